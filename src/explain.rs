@@ -14,7 +14,7 @@ use ontology::tomasys::{FunctionDesign, Individual};
 use ontology::vocab::local_name;
 
 use crate::mapek::{PlannedStep, ruled_out};
-use crate::message::Message;
+use crate::message::{Errors, Message};
 use crate::mission::{Mission, ground_with};
 use crate::number;
 
@@ -87,7 +87,7 @@ pub enum Target {
 ///
 /// # Errors
 /// The mission cannot be planned for.
-pub fn best(mission: &Mission, limits: &Limits) -> Result<BestPlan, Vec<Message>> {
+pub fn best(mission: &Mission, limits: &Limits) -> Result<BestPlan, Errors> {
     solve(mission, limits, &|_, available| available)
 }
 
@@ -96,11 +96,11 @@ fn solve(
     mission: &Mission,
     limits: &Limits,
     allowed: &dyn Fn(&str, bool) -> bool,
-) -> Result<BestPlan, Vec<Message>> {
+) -> Result<BestPlan, Errors> {
     let (mut problem, _) = mission.filled()?;
     let domain = mission.allow(&mut problem, allowed);
     let task = ground_with(mission, &domain, &problem, &[], limits)?;
-    let config = Config { limits: limits.clone(), ..Config::default() };
+    let config = Config::default().with_limits(limits.clone());
     let solution = optimize(&task, &config, &mut |_| {});
     let proved = matches!(solution.status, Status::Optimal | Status::Unsolvable);
     let steps = solution.plan.iter().flat_map(|plan| &plan.steps);
@@ -112,7 +112,7 @@ fn solve(
 ///
 /// # Errors
 /// There is no such design, or the mission cannot be planned for.
-pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignExplanation, Vec<Message>> {
+pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignExplanation, Errors> {
     let designs =
         mission.knowledge().map(|knowledge| knowledge.view().function_designs()).unwrap_or_default();
     let named = || designs.iter().find(|design| design.individual.name == name);
@@ -125,7 +125,7 @@ pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignEx
         let known: Vec<&str> = designs.iter().map(|design| design.individual.name.as_str()).collect();
         let meant = crate::message::did_you_mean(name, known.iter().map(|own| &**own));
         let text = format!("there is no design `{name}`; there are: {}{meant}", known.join(", "));
-        return Err(vec![Message::error("M112", text)]);
+        return Err(vec![Message::error("M112", text)].into());
     };
     let name = found.individual.name.as_str();
     let rivals: BTreeSet<&str> = designs
@@ -155,7 +155,7 @@ pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignEx
 ///
 /// # Errors
 /// The mission cannot be planned for.
-pub fn smallest_changes(mission: &Mission, limits: &Limits) -> Result<Vec<Change>, Vec<Message>> {
+pub fn smallest_changes(mission: &Mission, limits: &Limits) -> Result<Vec<Change>, Errors> {
     let base = best(mission, limits)?;
     let mut changes = Vec::new();
     for (attribute, from) in measured(mission) {
@@ -243,9 +243,9 @@ fn with_value(
     name: &str,
     value: &BigRational,
     limits: &Limits,
-) -> Result<BestPlan, Vec<Message>> {
+) -> Result<BestPlan, Errors> {
     let mut other = mission.clone();
-    other.set(name, &number::decimal(value)).map_err(|message| vec![message])?;
+    other.set(name, &number::decimal(value))?;
     best(&other, limits)
 }
 
@@ -257,7 +257,7 @@ fn bisect(
     upwards: bool,
     base: &BestPlan,
     limits: &Limits,
-) -> Result<Option<Change>, Vec<Message>> {
+) -> Result<Option<Change>, Errors> {
     let zero = BigRational::default();
     if *from <= zero {
         return Ok(None);
@@ -295,7 +295,7 @@ fn availability_changes(
     mission: &Mission,
     design: &FunctionDesign,
     limits: &Limits,
-) -> Result<Vec<Change>, Vec<Message>> {
+) -> Result<Vec<Change>, Errors> {
     let Some(knowledge) = mission.knowledge() else { return Ok(Vec::new()) };
     let mut changes = Vec::new();
     for component in knowledge.view().components() {
@@ -310,7 +310,7 @@ fn availability_changes(
         let status = if failed { Component::Recovered } else { Component::Failed };
         let Individual { iri, name } = component.individual;
         if let Some(knowledge) = other.knowledge_mut() {
-            knowledge.report(&iri, status).map_err(|message| vec![message])?;
+            knowledge.report(&iri, status)?;
         }
         let to = if failed { Target::Recovered } else { Target::Failed };
         changes.push(Change { name, from: None, to, then: best(&other, limits)? });

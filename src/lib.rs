@@ -5,7 +5,7 @@
 //! `metaplan-mission` joins OWL and PDDL, [`mission`] plans with both, and `metaplan-verify` checks what is claimed of plans. Order lives
 //! here, not logic.
 
-pub use ::mission::{file, knowledge, message, visible};
+pub use ::mission::{Errors, Message, file, knowledge, message, visible};
 pub use ::verify::measure;
 pub use {encodings, ontology, pddl, picture, rules};
 
@@ -22,6 +22,7 @@ pub mod manifest;
 pub mod mapek;
 pub mod mission;
 mod number;
+pub mod planner;
 pub mod recording;
 pub mod report;
 pub mod schemas;

@@ -10,7 +10,8 @@ pub fn lint(setup: &Setup) -> Vec<Message> {
     let mission = &setup.mission;
     let mut messages: Vec<Message> = mission.warnings().cloned().collect();
     match mission.filled() {
-        Ok((_, more)) | Err(more) => messages.extend(more),
+        Ok((_, more)) => messages.extend(more),
+        Err(errors) => messages.extend(errors),
     }
     messages.extend(setup.positions().err().into_iter().flatten());
     for (name, scenario) in &setup.scenarios {

@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 use toml::Spanned;
 
 use crate::file::{self, Kind, source};
-use crate::message::{Message, did_you_mean};
+use crate::message::{Errors, Message, did_you_mean};
 use crate::number;
 
 /// Where a manifest was read from.
@@ -24,10 +24,10 @@ pub struct ManifestPath {
 ///
 /// # Errors
 /// The file cannot be read, is no manifest, or has other sections or keys: all that is wrong with them.
-pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, ManifestPath), Vec<Message>> {
-    let source = source(file).map_err(|message| vec![message])?;
+pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, ManifestPath), Errors> {
+    let source = source(file)?;
     let (name, text) = (source.name().to_owned(), source.text());
-    file::expect(Kind::Manifest, &name, text).map_err(|message| vec![message])?;
+    file::expect(Kind::Manifest, &name, text)?;
     let sections = toml::from_str(text).map_err(|error| mistakes::<S>(text, error, &name))?;
     Ok((
         sections,
@@ -54,7 +54,7 @@ impl ManifestPath {
     }
 
     /// Messages about the manifest with the lines that they are about.
-    pub fn quote(&self, messages: Vec<Message>) -> Vec<Message> {
+    pub fn quote(&self, messages: impl IntoIterator<Item = Message>) -> Vec<Message> {
         let is_own = |message: &Message| message.file.as_ref() == Some(&self.file);
         let quoted =
             |message: Message| if is_own(&message) { message.with_source(&self.text) } else { message };

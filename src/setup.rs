@@ -13,7 +13,7 @@ use crate::file::source;
 use crate::knowledge::Knowledge;
 use crate::manifest::{self, ManifestPath};
 use crate::mapek::{AdaptationSection, Settings};
-use crate::message::Message;
+use crate::message::{Errors, Message};
 use crate::mission::{BindingsSection, KnowledgeSection, Mission, PlanningSection, Scenario};
 use crate::report::{Positions, ReportSection};
 use crate::simulate::Simulation;
@@ -61,7 +61,7 @@ impl Setup {
     ///
     /// # Errors
     /// All that is wrong with the manifest and with the files that it names.
-    pub fn read(manifest: &Path) -> Result<Self, Vec<Message>> {
+    pub fn read(manifest: &Path) -> Result<Self, Errors> {
         let (sections, origin): (Sections, ManifestPath) = manifest::read(manifest)?;
         let (settings, bindings) =
             (sections.adaptation.settings(&origin), sections.bindings.bindings(&origin));
@@ -95,7 +95,7 @@ impl Setup {
     ///
     /// # Errors
     /// The file of positions cannot be read, or what is wrong with it.
-    pub fn positions(&self) -> Result<Positions, Vec<Message>> {
+    pub fn positions(&self) -> Result<Positions, Errors> {
         self.report.positions(&self.origin)
     }
 

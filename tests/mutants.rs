@@ -17,12 +17,13 @@ use std::time::{Duration, Instant};
 use serde::Deserialize;
 
 /// What is copied of the workspace.
-const PARTS: [&str; 20] = [
+const PARTS: [&str; 21] = [
     "Cargo.toml",
     "Cargo.lock",
     "README.md",
     "docs",
     "src",
+    "errors",
     "ontology",
     "rules",
     "encodings",

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use encodings::{Config, Limits, Status, lexicographic};
 use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
-use metaplan::message::Message;
+use metaplan::message::Errors;
 use metaplan::mission::{Bindings, Mission, Planning as _};
 use metaplan::setup::Setup;
 use ontology::ReadOptions;
@@ -156,7 +156,7 @@ impl Generated {
             limits: StepLimits::default(),
         };
         let bindings = if domain == self.plain { self.bindings.clone() } else { BTreeMap::new() };
-        let mission: Result<Mission, Vec<Message>> = Mission::new(
+        let mission: Result<Mission, Errors> = Mission::new(
             "generated",
             Some(Knowledge::read(&sources)),
             Bindings::with(&bindings).expect("bindings"),

@@ -26,7 +26,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let task = ground(&domain, &problem, &GroundConfig::default()).map_err(|faults| format!("{faults:?}"))?;
     let backend: Backend = solver.parse()?;
     let limits = Limits::none().with_time(Duration::from_secs_f64(seconds.parse()?));
-    let config = Config { engine: Engine::Sat, strategy, backend, limits, ..Config::default() };
+    let config = Config::default()
+        .with_engine(Engine::Sat)
+        .with_strategy(strategy)
+        .with_backend(backend)
+        .with_limits(limits);
     let started = Instant::now();
     let solution = optimize(&task, &config, &mut |_| {});
     let text = |value: Option<_>| {

@@ -21,6 +21,9 @@ pub struct Place {
     pub span: Span,
 }
 
+/// Everything that is wrong with a task.
+pub type Errors = errors::Errors<Error>;
+
 /// Why a task cannot be grounded or encoded.
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
@@ -80,6 +83,12 @@ pub enum Error {
 impl From<Interrupted> for Error {
     fn from(Interrupted: Interrupted) -> Self {
         Self::Interrupted
+    }
+}
+
+impl From<Interrupted> for Errors {
+    fn from(interrupted: Interrupted) -> Self {
+        Error::from(interrupted).into()
     }
 }
 

@@ -18,7 +18,7 @@ fn solve(domain: &str, problem: &str, engine: Engine, head_start: usize) -> Solu
     let task = ground(&domain, &problem, &GroundConfig::default())
         .unwrap_or_else(|errors| panic!("{errors:?}\n{domain:?}"));
     let limits = Limits::none();
-    let config = Config { engine, head_start, limits, ..Config::default() };
+    let config = Config::default().with_engine(engine).with_head_start(head_start).with_limits(limits);
     optimize(&task, &config, &mut |_| {})
 }
 
@@ -203,15 +203,15 @@ fn agree(seeds: std::ops::Range<u64>) {
         let task = ground(&parsed, &goal, &GroundConfig::default())
             .unwrap_or_else(|errors| panic!("seed {seed}: {errors:?}\n{domain}\n{problem}"));
         let run = |engine| {
-            let config = Config { horizon: Some(HORIZON), engine, ..Config::default() };
+            let config = Config::default().with_horizon(HORIZON).with_engine(engine);
             optimize(&task, &config, &mut |_| {})
         };
         let (quick, sat) = (run(Engine::Auto), run(Engine::Sat));
         let cost = |solution: &Solution| solution.plan.as_ref().map(|plan| plan.cost.to_string());
         assert_eq!(cost(&quick), cost(&sat), "seed {seed}\n{domain}\n{problem}\n{quick:?}\n{sat:?}");
-        let known = optimize(&task, &Config { head_start: 1_000_000, ..Config::default() }, &mut |_| {});
+        let known = optimize(&task, &Config::default().with_head_start(1_000_000), &mut |_| {});
         for head_start in [1, 10, 100] {
-            let config = Config { engine: Engine::Search, head_start, ..Config::default() };
+            let config = Config::default().with_engine(Engine::Search).with_head_start(head_start);
             let found = optimize(&task, &config, &mut |_| {});
             let context = || format!("seed {seed}, {head_start}\n{domain}\n{problem}\n{known:?}\n{found:?}");
             assert_eq!((found.status, cost(&found)), (known.status, cost(&known)), "{}", context());

@@ -46,7 +46,7 @@ fn metric(domain: &Domain, problem: &Problem, plan: &Plan) -> Option<BigRational
 fn exact(domain: &Domain, problem: &Problem, horizon: Option<usize>) -> Solution {
     let task =
         ground_exact(domain, problem, &GroundConfig::default()).unwrap_or_else(|errors| panic!("{errors:?}"));
-    let solution = optimize_exact(&task, &Config { horizon, ..Config::default() });
+    let solution = optimize_exact(&task, &Config::default().with_horizon(horizon));
     if let Some(plan) = &solution.plan {
         assert_eq!(metric(domain, problem, plan), Some(plan.cost.to_rational()), "{solution:?}");
     }

@@ -30,7 +30,7 @@ fn task(domain: &str, problem: &str) -> Task {
 
 fn solve(task: &Task) -> Solution {
     let limits = Limits::none().with_time(Duration::from_secs(60));
-    optimize(task, &Config { limits, ..Config::default() }, &mut |_| {})
+    optimize(task, &Config::default().with_limits(limits), &mut |_| {})
 }
 
 /// A number as the files write it.
@@ -133,9 +133,9 @@ fn an_objective_whose_sum_does_not_fit_is_shown_and_not_proved() {
         read_objective(Direction::Minimize, &source, &domain, &problem).expect("an objective")
     };
     let objectives = vec![objective("(total-cost)"), objective("(total-time)")];
-    let task = ground(&domain, &problem, &GroundConfig { objectives, ..GroundConfig::default() });
+    let task = ground(&domain, &problem, &GroundConfig::default().with_objectives(objectives));
     let limits = Limits::none().with_time(Duration::from_secs(10));
-    let config = Config { limits, ..Config::default() };
+    let config = Config::default().with_limits(limits);
     let point = lexicographic(&task.expect("a task"), &config, &mut |_| {});
     assert_eq!(point.solution.status, Status::Feasible);
     let values: Vec<_> = point.values.iter().map(Exact::to_rational).collect();

@@ -60,7 +60,7 @@ fn depot(places: usize, parcels: usize, designs: usize) -> (Domain, Problem) {
 fn run(domain: &Domain, problem: &Problem, limit: Duration, engine: Engine) -> (Option<Status>, Duration) {
     let started = Instant::now();
     let limits = Limits::none().with_time(limit);
-    let config = GroundConfig { limits: limits.clone(), ..GroundConfig::default() };
+    let config = GroundConfig::default().with_limits(limits.clone());
     let task = match ground(domain, problem, &config) {
         Ok(task) => task,
         Err(errors) => {
@@ -68,7 +68,7 @@ fn run(domain: &Domain, problem: &Problem, limit: Duration, engine: Engine) -> (
             return (None, started.elapsed());
         }
     };
-    let config = Config { engine, limits, ..Config::default() };
+    let config = Config::default().with_engine(engine).with_limits(limits);
     let solution = optimize(&task, &config, &mut |_| {});
     if let Some(others) = alternatives(&task, &solution, 2, &config) {
         assert!(others.plans.len() <= 2);

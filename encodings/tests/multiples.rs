@@ -56,7 +56,7 @@ fn compare(seed: u64) -> (bool, bool) {
         ground(&read_domain, &read_problem, &config).unwrap_or_else(|errors| panic!("{errors:?}\n{domain}"));
     let mut found = Vec::new();
     for engine in [Engine::Auto, Engine::Search] {
-        let solution = optimize(&task, &Config { engine, ..Config::default() }, &mut |_| {});
+        let solution = optimize(&task, &Config::default().with_engine(engine), &mut |_| {});
         found.push((solution.status, solution.plan.map(|plan| plan.cost)));
     }
     let expected = (expected.status, expected.plan.map(|plan| plan.cost));

@@ -121,7 +121,7 @@ impl Mission {
             read_objective(Direction::Minimize, &source, &domain, &problem).expect("an objective")
         };
         let objectives = objectives.iter().map(objective).collect();
-        ground(&domain, &problem, &GroundConfig { objectives, ..GroundConfig::default() }).expect("a task")
+        ground(&domain, &problem, &GroundConfig::default().with_objectives(objectives)).expect("a task")
     }
 
     fn way(plan: &Plan, reversed: bool) -> (Vec<usize>, Vec<[usize; 2]>) {

@@ -16,15 +16,13 @@ fn check(seed: u64, (engine, head_start): (Engine, usize), backend: &Backend, st
     let costly = mission.weights.0 > 0 && mission.weights.1 > 0;
     let bounded = engine == Engine::Auto || costly && mission.oracle().is_some();
     let horizon = if bounded { None } else { Some(14) };
-    let config = Config {
-        engine,
-        head_start,
-        confirm: true,
-        horizon,
-        strategy,
-        backend: backend.clone(),
-        ..Config::default()
-    };
+    let config = Config::default()
+        .with_engine(engine)
+        .with_head_start(head_start)
+        .with_confirmation(true)
+        .with_horizon(horizon)
+        .with_strategy(strategy)
+        .with_backend(backend.clone());
     let solution = optimize(&task, &config, &mut |_| {});
     let context = || {
         format!("seed {seed}, {engine:?}, {head_start}, {backend:?}, {strategy:?}: {mission:?}: {solution:?}")

@@ -28,7 +28,11 @@ fn check(name: &str, init: &str, goal: &str, metric: &str, expected: (Status, Op
         let semantics = [Semantics::Sequential, Semantics::ForAllStep, Semantics::ExistsStep];
         for semantics in semantics.into_iter().map(Some).chain([None]) {
             let backend: Backend = backend.parse().expect("a solver");
-            let solution = optimize(&task, &Config { semantics, backend, ..Config::default() }, &mut |_| {});
+            let solution = optimize(
+                &task,
+                &Config::default().with_semantics(semantics).with_backend(backend),
+                &mut |_| {},
+            );
             let plan = solution.plan.as_ref();
             let found = (solution.status, plan.map(|p| p.cost.to_string()), plan.map(|p| p.steps.len()));
             let expected = (expected.0, expected.1.map(str::to_owned), expected.2);
@@ -102,7 +106,7 @@ fn proofs_name_what_they_rest_on() {
     let solution = optimize(&task, &Config::default(), &mut |_| {});
     // The projection to the place is exact here, so its cost to go is the cost.
     assert_eq!(solution.proof, Some(Proof::Bound));
-    let within = Config { horizon: Some(1), ..Config::default() };
+    let within = Config::default().with_horizon(1);
     assert_eq!(optimize(&task, &within, &mut |_| {}).status, Status::UnsolvableWithinHorizon);
 }
 

@@ -16,7 +16,7 @@ pub fn solve(domain: &Domain, problem: &Problem, reason: &str) -> Option<Solutio
         }
     };
     let limits = Limits::none().with_time(Duration::from_secs(2));
-    Some(optimize(&task, &Config { limits, ..Config::default() }, &mut |_| {}))
+    Some(optimize(&task, &Config::default().with_limits(limits), &mut |_| {}))
 }
 
 /// How many tasks came to a proof.

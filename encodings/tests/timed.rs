@@ -22,7 +22,11 @@ fn plan(domain: &Domain, problem: &Problem, engine: Engine) -> Option<Plan> {
         ground(domain, problem, &GroundConfig::default()).unwrap_or_else(|errors| panic!("{errors:?}"));
     let limits = Limits::none();
     let horizon = (engine == Engine::Sat).then_some(8);
-    let solution = optimize(&task, &Config { horizon, engine, limits, ..Config::default() }, &mut |_| {});
+    let solution = optimize(
+        &task,
+        &Config::default().with_horizon(horizon).with_engine(engine).with_limits(limits),
+        &mut |_| {},
+    );
     match solution.status {
         Status::Optimal | Status::Feasible => solution.plan,
         _ => None,

@@ -78,7 +78,7 @@ fn plan(domain: &Domain, problem: &Problem) -> Vec<Timed> {
         .ok()
         .and_then(|task| {
             let limits = Limits::none().with_time(Duration::from_secs(20));
-            optimize(&task, &Config { limits, ..Config::default() }, &mut |_| {}).plan
+            optimize(&task, &Config::default().with_limits(limits), &mut |_| {}).plan
         })
         .into_iter()
         .flat_map(|plan| plan.steps)

@@ -6,6 +6,7 @@ use std::io::{self, Read as _, Write as _};
 use std::path::Path;
 
 use pddl::Source;
+use tempfile::NamedTempFile;
 
 use crate::message::Message;
 
@@ -58,12 +59,7 @@ pub fn source(path: &Path) -> Result<Source, Message> {
 /// # Errors
 /// It cannot be written.
 pub fn write(path: &Path, text: &str) -> Result<(), Message> {
-    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut temporary = tempfile::Builder::new();
-    // Temporary files are for their owner alone; the process's mask applies to these, too.
-    #[cfg(unix)]
-    temporary.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let written = temporary.tempfile_in(directory).and_then(|mut file| {
+    let written = temporary(path).and_then(|mut file| {
         file.write_all(text.as_bytes())?;
         file.as_file().sync_all()?;
         file.persist(path).map_err(|error| error.error)
@@ -75,6 +71,19 @@ pub fn write(path: &Path, text: &str) -> Result<(), Message> {
             Err(Message::at("M109", &path.display().to_string(), None, text))
         }
     }
+}
+
+/// A file beside the one with this path, to be given its name once it is whole.
+///
+/// # Errors
+/// It cannot be made.
+pub fn temporary(path: &Path) -> io::Result<NamedTempFile> {
+    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut temporary = tempfile::Builder::new();
+    // Temporary files are for their owner alone; the process's mask applies to these, too.
+    #[cfg(unix)]
+    temporary.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    temporary.tempfile_in(directory)
 }
 
 /// What a text may be.

@@ -4,11 +4,12 @@ use std::collections::BTreeSet;
 
 use pddl::ast::{Condition, Direction, Domain, Metric, Name, Problem, Term};
 use pddl::{self, Severity, Source};
+use tracing::info_span;
 
 use crate::binding::Bindings;
 use crate::file::{self, Kind};
 use crate::knowledge::Knowledge;
-use crate::message::Message;
+use crate::message::{Errors, Message};
 use crate::names::{self, Meeting, NeverNamed};
 use crate::native::CoAdaptation;
 use crate::planta::Planta;
@@ -40,11 +41,11 @@ impl Mission {
     /// All that is wrong with any of them.
     pub fn new(
         name: &str,
-        knowledge: Option<Result<Knowledge, Vec<Message>>>,
+        knowledge: Option<Result<Knowledge, Errors>>,
         bindings: Bindings,
         domain: Result<Source, Message>,
         problem: Result<Source, Message>,
-    ) -> Result<Self, Vec<Message>> {
+    ) -> Result<Self, Errors> {
         let mut errors = Vec::new();
         let mut knowledge = match knowledge.transpose() {
             Ok(knowledge) => knowledge,
@@ -57,7 +58,7 @@ impl Mission {
             (Ok(domain), Ok(problem)) => (domain, problem),
             (domain, problem) => {
                 errors.extend([domain.err(), problem.err()].into_iter().flatten());
-                return Err(errors);
+                return Err(errors.into());
             }
         };
         for (kind, source) in [(Kind::Domain, &domain_source), (Kind::Problem, &problem_source)] {
@@ -65,15 +66,15 @@ impl Mission {
         }
         // Of what is no PDDL nothing is shown.
         if errors.iter().any(|error| error.code == file::CODE) {
-            return Err(errors);
+            return Err(errors.into());
         }
         let parsed = parse(&domain_source, &problem_source);
         let (domain, problem, warnings) = match parsed {
             Ok(parsed) if errors.is_empty() => parsed,
-            Ok(_) => return Err(errors),
+            Ok(_) => return Err(errors.into()),
             Err(more) => {
                 errors.extend(more);
-                return Err(errors);
+                return Err(errors.into());
             }
         };
         let (mut domain, mut problem, mut warnings) = (domain, problem, warnings);
@@ -171,11 +172,12 @@ impl Mission {
     ///
     /// # Errors
     /// What the knowledge base contributes does not fit the domain.
-    pub fn filled(&self) -> Result<(Problem, Vec<Message>), Vec<Message>> {
+    pub fn filled(&self) -> Result<(Problem, Vec<Message>), Errors> {
+        let _span = info_span!("fill").entered();
         let mut problem = self.problem.clone();
         let mut warnings = self.fill(&mut problem);
         if warnings.iter().any(Message::is_error) {
-            return Err(warnings);
+            return Err(warnings.into());
         }
         let found = pddl::check(&self.domain, &self.domain_source, &problem, &self.problem_source);
         let (errors, questionable): (Vec<_>, Vec<_>) =
@@ -197,7 +199,7 @@ impl Mission {
             let text = format!("{} (from a setting or from the knowledge base)", diagnostic.message);
             Message::error(diagnostic.code, text)
         }));
-        Err(messages)
+        Err(messages.into())
     }
 
     /// The domain and the problem as other planners get them: those of [`Mission::filled`], and for a domain in PLANTA's form all
@@ -205,7 +207,7 @@ impl Mission {
     ///
     /// # Errors
     /// As [`Mission::filled`].
-    pub fn merged(&self) -> Result<(Domain, Problem, Vec<Message>), Vec<Message>> {
+    pub fn merged(&self) -> Result<(Domain, Problem, Vec<Message>), Errors> {
         let (filled, warnings) = self.filled()?;
         let merged = self.planta.as_ref().zip(self.knowledge.as_ref()).and_then(|(planta, knowledge)| {
             planta.merged(&self.problem, (knowledge.engine(), knowledge.stated()))
@@ -255,13 +257,13 @@ impl Mission {
     ///
     /// # Errors
     /// All that is wrong with it.
-    pub fn objective(&self, problem: &Problem, text: &str) -> Result<Metric, Vec<Message>> {
+    pub fn objective(&self, problem: &Problem, text: &str) -> Result<Metric, Errors> {
         let text = text.trim();
         let is_word = !text.starts_with('(') && !text.eq_ignore_ascii_case("total-time");
         let text = if is_word && !text.is_empty() { format!("({text})") } else { text.to_owned() };
         let source = Source::new("objective", text);
         pddl::read_objective(Direction::Minimize, &source, &self.domain, problem)
-            .map_err(|diagnostics| Message::from_pddl(&diagnostics, &[&source]))
+            .map_err(|diagnostics| Message::from_pddl(&diagnostics, &[&source]).into())
     }
 }
 
@@ -275,7 +277,7 @@ fn joined_names(
     knowledge: &mut Knowledge,
     bindings: &Bindings,
     warnings: &mut Vec<Message>,
-) -> Result<(BTreeSet<Name>, NeverNamed), Vec<Message>> {
+) -> Result<(BTreeSet<Name>, NeverNamed), Errors> {
     let (called, more) = names::resolve(domain.0, problem.0, knowledge, bindings)?;
     warnings.extend(more);
     knowledge.call(called);
@@ -288,7 +290,7 @@ fn joined_names(
     Ok((own, never_named))
 }
 
-fn parse(domain: &Source, problem: &Source) -> Result<(Domain, Problem, Vec<Message>), Vec<Message>> {
+fn parse(domain: &Source, problem: &Source) -> Result<(Domain, Problem, Vec<Message>), Errors> {
     let (domain_tree, mut diagnostics) = pddl::parse_domain(domain);
     let (problem_tree, more) = match &domain_tree {
         Some(tree) => pddl::parse_problem_of(tree, problem),
@@ -298,6 +300,6 @@ fn parse(domain: &Source, problem: &Source) -> Result<(Domain, Problem, Vec<Mess
     let messages = Message::from_pddl(&diagnostics, &[domain, problem]);
     match (domain_tree, problem_tree) {
         (Some(domain), Some(problem)) if !pddl::has_errors(&diagnostics) => Ok((domain, problem, messages)),
-        _ => Err(messages),
+        _ => Err(messages.into()),
     }
 }

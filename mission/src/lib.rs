@@ -24,4 +24,5 @@ pub use binding::{Bindings, atom};
 pub use called::{Names, Place};
 pub use codes::CODES;
 pub use joined::Mission;
+pub use message::{Errors, Message};
 pub use native::CoAdaptation;

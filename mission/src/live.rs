@@ -10,7 +10,7 @@ use pddl::{self, Severity, Source};
 use crate::binding;
 use crate::joined::Mission;
 use crate::knowledge::Knowledge;
-use crate::message::Message;
+use crate::message::{Errors, Message};
 
 impl Mission {
     /// Adds to a problem of this mission what the knowledge base contributes now; returns warnings.
@@ -150,12 +150,12 @@ impl Mission {
     ///
     /// # Errors
     /// All that is wrong with it.
-    pub fn goal(&self, text: &str) -> Result<Condition, Vec<Message>> {
+    pub fn goal(&self, text: &str) -> Result<Condition, Errors> {
         let text = format!("(define (problem goal) (:domain {}) (:goal {text}))", self.domain.name.name);
         let source = Source::new("goal", text);
         let (tree, diagnostics) = pddl::parse_problem_of(&self.domain, &source);
         let errors = Message::from_pddl(&diagnostics, &[&source]);
-        let Some(tree) = tree.filter(|_| !pddl::has_errors(&diagnostics)) else { return Err(errors) };
+        let Some(tree) = tree.filter(|_| !pddl::has_errors(&diagnostics)) else { return Err(errors.into()) };
         let mut problem = self.problem.clone();
         problem.goal = tree.goal;
         self.fill(&mut problem);
@@ -163,7 +163,7 @@ impl Mission {
         let wrong = found.into_iter().filter(|diagnostic| diagnostic.severity == Severity::Error);
         // Only the goal has places in this text; all else was checked before.
         let wrong: Vec<_> = wrong.filter(|diagnostic| diagnostic.file == "goal").collect();
-        if wrong.is_empty() { Ok(problem.goal) } else { Err(Message::from_pddl(&wrong, &[&source])) }
+        if wrong.is_empty() { Ok(problem.goal) } else { Err(Message::from_pddl(&wrong, &[&source]).into()) }
     }
 
     /// The functions of the knowledge base that have designs, in alphabetical order.

@@ -1,9 +1,14 @@
 //! What went wrong or is questionable, from whatever room it came, in one form for people and programs.
 
+use std::fmt;
+
 use pddl::{self, Diagnostic, Excerpt, Severity, Shown, Source};
 use serde::Serialize;
 
 use crate::visible::visible;
+
+/// Everything that is wrong with an input.
+pub type Errors = errors::Errors<Message>;
 
 /// A message about an input.
 #[derive(Debug, Clone, Serialize)]
@@ -218,6 +223,15 @@ impl Message {
         self.shown(true, |part| visible(part).into_owned())
     }
 }
+
+impl fmt::Display for Message {
+    /// As [`Message::text`], without the line break at its end.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.text().trim_end())
+    }
+}
+
+impl std::error::Error for Message {}
 
 /// What every command answers that has failed.
 #[derive(Debug, Clone, Serialize)]

@@ -37,6 +37,9 @@ impl fmt::Display for Position {
     }
 }
 
+/// Everything that is wrong with a knowledge base.
+pub type Errors = errors::Errors<Error>;
+
 /// Why a knowledge base cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]

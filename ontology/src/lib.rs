@@ -30,7 +30,7 @@ pub mod runtime;
 pub mod tomasys;
 
 pub use codes::CODES;
-pub use error::{Error, Position, Warning};
+pub use error::{Error, Errors, Position, Warning};
 pub use lower::{AXIOM_SOURCE, Equality, INTERNAL, Lowered, lower, lower_together, lower_with};
 pub use ntriples::ntriples;
 pub use owl::*;

@@ -2,9 +2,15 @@
 //!
 //! Codes are stable. P100 to P119 are about the form of a file, P120 to P149 about names and types.
 
+use std::error::Error;
+use std::fmt;
+
 use super::ast::Span;
 use super::excerpt::{Excerpt, Shown};
 use super::source::Source;
+
+/// Everything that is wrong with PDDL files or a plan, warnings among it.
+pub type Errors = errors::Errors<Diagnostic>;
 
 /// How bad it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -13,6 +19,12 @@ pub enum Severity {
     Warning,
     /// The file cannot be used.
     Error,
+}
+
+impl fmt::Display for Severity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.as_str())
+    }
 }
 
 impl Severity {
@@ -47,6 +59,17 @@ pub struct Diagnostic {
     /// Another place that matters, for example an earlier declaration.
     pub related: Option<Related>,
 }
+
+impl fmt::Display for Diagnostic {
+    /// One line: place, severity, code, message, and what would be right.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { file, line, column, severity, code, message, .. } = self;
+        write!(f, "{file}:{line}:{column}: {severity}[{code}]: {message}")?;
+        self.help.iter().try_for_each(|help| write!(f, " ({help})"))
+    }
+}
+
+impl Error for Diagnostic {}
 
 /// A second place of a diagnostic.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -31,7 +31,7 @@ pub mod validate;
 
 pub use check::{check, check_domain};
 pub use codes::CODES;
-pub use diagnostic::{Diagnostic, Severity, has_errors, render};
+pub use diagnostic::{Diagnostic, Errors, Severity, has_errors, render};
 pub use excerpt::{Excerpt, Shown};
 pub use number::to_decimal;
 pub use parse::{parse_domain, parse_problem, parse_problem_of};
@@ -52,7 +52,7 @@ pub fn read_objective(
     expression: &Source,
     domain: &Domain,
     problem: &Problem,
-) -> Result<Metric, Vec<Diagnostic>> {
+) -> Result<Metric, Errors> {
     let mut parsed = parse::expression(expression);
     if let Some(tree) = parsed.tree {
         let end = source::place(expression.text().len());
@@ -62,7 +62,7 @@ pub fn read_objective(
             return Ok(metric);
         }
     }
-    Err(parsed.diagnostics)
+    Err(parsed.diagnostics.into())
 }
 
 /// A domain and a problem from their texts, with the warnings about both.
@@ -70,10 +70,7 @@ pub fn read_objective(
 /// # Errors
 ///
 /// All that is wrong, together with the warnings: the domain's messages first, each file's in its order.
-pub fn read(
-    domain: &Source,
-    problem: &Source,
-) -> Result<(Domain, Problem, Vec<Diagnostic>), Vec<Diagnostic>> {
+pub fn read(domain: &Source, problem: &Source) -> Result<(Domain, Problem, Vec<Diagnostic>), Errors> {
     let parsed_domain = parse::domain(domain);
     let parsed_problem = match &parsed_domain.tree {
         Some(tree) => parse::problem_of(tree, problem),
@@ -100,6 +97,6 @@ pub fn read(
     of_domain.append(&mut of_problem);
     match (parsed_domain.tree, parsed_problem.tree) {
         (Some(tree), Some(other)) if !has_errors(&of_domain) => Ok((tree, other, of_domain)),
-        _ => Err(of_domain),
+        _ => Err(of_domain.into()),
     }
 }

@@ -8,8 +8,8 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use metaplan_pddl::{
-    Diagnostic, Severity, Source, check_domain, has_errors, parse_domain, parse_problem, print_domain,
-    print_problem, read,
+    Diagnostic, Errors, Severity, Source, check_domain, has_errors, parse_domain, parse_problem,
+    print_domain, print_problem, read,
 };
 
 const REAL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/real/pddl");
@@ -175,7 +175,7 @@ fn problems_are_read_and_their_errors_reported() {
             continue;
         }
         let (domain, problem) = (source(&path_of(domain)), source(&path));
-        let (Ok((_, _, found)) | Err(found)) = read(&domain, &problem);
+        let found = read(&domain, &problem).map_or_else(Errors::into_vec, |(_, _, found)| found);
         let found = found.iter().filter(|diagnostic| diagnostic.file == path);
         assert_eq!(summary(found), expected, "{path}");
         let (Some(tree), found) = parse_problem(&problem) else { continue };

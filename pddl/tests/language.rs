@@ -1,7 +1,7 @@
 //! Every construct of the language, one by one: what is read, printed as written, and refused by name.
 
 use metaplan_pddl::{
-    Severity, Source, parse_domain, parse_problem, print_domain, print_problem, read, render,
+    Errors, Severity, Source, parse_domain, parse_problem, print_domain, print_problem, read, render,
 };
 
 const DOMAIN: &str = "(define (domain d) (:types place dock - place tool) (:constants home - dock)
@@ -44,7 +44,7 @@ fn texts(place: &str, what: &str) -> (Source, Source) {
 /// The codes of the errors.
 fn errors(place: &str, what: &str) -> Vec<&'static str> {
     let (domain, problem) = texts(place, what);
-    let (Ok((_, _, found)) | Err(found)) = read(&domain, &problem);
+    let found = read(&domain, &problem).map_or_else(Errors::into_vec, |(_, _, found)| found);
     found.iter().filter(|found| found.severity == Severity::Error).map(|found| found.code).collect()
 }
 
@@ -210,7 +210,7 @@ const REFUSED: [(&str, &str, &str); 11] = [
 fn what_is_not_supported_is_refused_by_name() {
     for (place, what, words) in REFUSED {
         let (domain, problem) = texts(place, what);
-        let (Ok((_, _, found)) | Err(found)) = read(&domain, &problem);
+        let found = read(&domain, &problem).map_or_else(Errors::into_vec, |(_, _, found)| found);
         let refusal = found.iter().find(|found| found.code == "P113" && found.severity == Severity::Error);
         let refusal = refusal.unwrap_or_else(|| panic!("{what}: {found:#?}"));
         assert!(refusal.message.contains(words), "{what}: {}", refusal.message);

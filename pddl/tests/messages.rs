@@ -1,6 +1,6 @@
 //! What people read when they make the usual mistakes.
 
-use metaplan_pddl::{Source, parse_domain, read, render};
+use metaplan_pddl::{Errors, Source, parse_domain, read, render};
 
 const DOMAIN: &str = "(define (domain robot)
   (:requirements :typing)
@@ -26,7 +26,7 @@ fn messages(right: &str, wrong: &str) -> String {
     let domain = Source::new("domain.pddl", DOMAIN.replacen(right, wrong, 1));
     let problem = if DOMAIN.contains(right) { PROBLEM.to_owned() } else { PROBLEM.replacen(right, wrong, 1) };
     let problem = Source::new("problem.pddl", problem);
-    let (Ok((_, _, found)) | Err(found)) = read(&domain, &problem);
+    let found = read(&domain, &problem).map_or_else(Errors::into_vec, |(_, _, found)| found);
     let text = render(&found, &[&domain, &problem], false);
     text.lines().map(str::trim_end).collect::<Vec<_>>().join("\n")
 }

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use metaplan_pddl::{
-    Source, has_errors, parse_domain, parse_problem, print_domain, print_problem, read, render,
+    Errors, Source, has_errors, parse_domain, parse_problem, print_domain, print_problem, read, render,
 };
 
 /// A name of any of the kinds that files have.
@@ -317,7 +317,7 @@ proptest! {
         let domain = of_domain.iter().fold(DOMAIN.to_owned(), |text, mutation| mutate(&text, mutation));
         let problem = of_problem.iter().fold(PROBLEM.to_owned(), |text, mutation| mutate(&text, mutation));
         let (domain, problem) = (Source::new("domain", domain), Source::new("problem", problem));
-        let (Ok((_, _, found)) | Err(found)) = read(&domain, &problem);
+        let found = read(&domain, &problem).map_or_else(Errors::into_vec, |(_, _, found)| found);
         render(&found, &[&domain, &problem], false);
         for source in [&domain, &problem] {
             let (tree, found) = parse_domain(source);
@@ -338,7 +338,7 @@ proptest! {
 #[test]
 fn what_the_mutations_start_from_is_valid() {
     let (domain, problem) = (Source::new("domain", DOMAIN), Source::new("problem", PROBLEM));
-    let (Ok((_, _, found)) | Err(found)) = read(&domain, &problem);
+    let found = read(&domain, &problem).map_or_else(Errors::into_vec, |(_, _, found)| found);
     // The object of the problem in the domain.
     assert_eq!(found.iter().map(|found| found.code).collect::<Vec<_>>(), ["P138"]);
 }
@@ -372,7 +372,8 @@ fn nesting_up_to_the_limit_works() {
         let printed = parse_and_print_domain(&text);
         assert_eq!(parse_and_print_domain(&printed), printed);
         let problem = Source::new("problem", "(define (problem p) (:domain d) (:init) (:goal (p)))");
-        let (Ok((_, _, found)) | Err(found)) = read(&Source::new("deep", text), &problem);
+        let found =
+            read(&Source::new("deep", text), &problem).map_or_else(Errors::into_vec, |(_, _, found)| found);
         assert!(!found.is_empty(), "`q` is not declared");
     }
     let sum = format!("{}1{}", "(+ 1 ".repeat(190), ")".repeat(190));

@@ -9,14 +9,13 @@
 //! ```
 //!
 //! What was done stays done: PlanSys2's problem expert knows it.
-
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use metaplan::message::Message;
+use metaplan::message::{Errors, Message};
 use metaplan::pddl::Source;
 use metaplan::setup::Setup;
 use smol::Timer;
@@ -58,7 +57,7 @@ pub struct Options {
 ///
 /// # Errors
 /// The mission or a parameter of the command line is wrong, or nothing that was tried has succeeded.
-pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Vec<Message>> {
+pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Errors> {
     let setup = Setup::read(&options.mission)?;
     for warning in setup.mission.warnings() {
         node.log(Severity::Warn, warning.text().trim_end());
@@ -70,7 +69,7 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
         executes: ExecutePlans::new(node, "execute_plan", options.version),
         told: Told::new(node)?,
     };
-    smol::block_on(controller.control(stop)).map_err(|message| vec![message])
+    smol::block_on(controller.control(stop)).map_err(Errors::from)
 }
 
 struct Controller {

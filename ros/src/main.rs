@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::{Parser, ValueEnum};
-use metaplan::message::Message;
+use metaplan::message::{Errors, Message};
 use metaplan_ros::node::{Network, Node, Opening, Rmw, RosArguments, Severity};
 use metaplan_ros::performer::PlanVersion;
 use metaplan_ros::{controller, manager, planner, reasoner};
@@ -76,14 +76,13 @@ fn main() -> ExitCode {
     }
 }
 
-fn start() -> Result<(), Vec<Message>> {
+fn start() -> Result<(), Errors> {
     let (words, ros) = RosArguments::split(std::env::args())?;
     let arguments = Arguments::parse_from(words);
-    let (network, warnings) =
-        Network::from_environment(|name| std::env::var(name).ok()).map_err(|message| vec![message])?;
+    let (network, warnings) = Network::from_environment(|name| std::env::var(name).ok())?;
     let opening =
         Opening { name: arguments.role.node().to_owned(), arguments: ros, network, rmw: arguments.rmw };
-    let node = Node::open(opening).map_err(|message| vec![message])?;
+    let node = Node::open(opening)?;
     for warning in warnings {
         node.log(Severity::Warn, warning.text().trim_end());
     }
@@ -100,7 +99,7 @@ fn start() -> Result<(), Vec<Message>> {
     let Arguments { role, mission, settings, journal, executor, .. } = arguments;
     if journal.is_some() && matches!(role, Role::Planner | Role::Controller) {
         let text = "`--journal` is for a manager and a reasoner: nothing of a planner has to be known after a restart";
-        return Err(vec![Message::error("N100", text)]);
+        return Err(vec![Message::error("N100", text)].into());
     }
     match (role, mission) {
         (Role::Planner, mission) => planner::run(&node, &planner::Options { mission, settings }, &stop),
@@ -113,6 +112,6 @@ fn start() -> Result<(), Vec<Message>> {
         (Role::Reasoner, Some(mission)) => {
             reasoner::run(&node, &reasoner::Options { mission, settings, journal }, &stop)
         }
-        (_, None) => Err(vec![Message::error("N100", "`--mission` is missing")]),
+        (_, None) => Err(vec![Message::error("N100", "`--mission` is missing")].into()),
     }
 }

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use metaplan::file;
-use metaplan::message::Message;
+use metaplan::message::{Errors, Message};
 use metaplan::mission::popf_text;
 use metaplan::pddl::Source;
 use metaplan::setup::Setup;
@@ -129,7 +129,7 @@ fn solve(asked: &Asked) -> Result<String, String> {
     let domain = read(&asked.domain, DOMAIN)?;
     let problem = read(&asked.problem, PROBLEM)?;
     if is_void(problem.text()) {
-        let wrong = |messages: Vec<Message>| NoPlan::Input(messages).text();
+        let wrong = |messages: Errors| NoPlan::Input(messages).text();
         return planner::check_domain(&domain).map(|()| popf_text(&[])).map_err(wrong);
     }
     let setup = asked.mission.as_deref().map(Setup::read).transpose().map_err(|messages| all(&messages))?;

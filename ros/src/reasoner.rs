@@ -16,7 +16,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use metaplan::configure::{Configurator, Keeper, Wishes};
-use metaplan::message::Message;
+use metaplan::message::{Errors, Message};
 use metaplan::setup::Setup;
 
 use crate::manager::Settings;
@@ -44,8 +44,8 @@ pub struct Options {
 ///
 /// # Errors
 /// The mission or its settings are wrong, or a topic or service cannot be made.
-pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Vec<Message>> {
-    let one = |message: Message| vec![message];
+pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Errors> {
+    let one = |message: Message| Errors::from(message);
     let Setup { mission, .. } = Setup::read(&options.mission)?;
     let settings = Settings::read(options.settings.as_deref(), &options.mission).map_err(one)?;
     let knowledge = mission.knowledge().cloned().ok_or_else(|| {

@@ -10,10 +10,12 @@
 use std::sync::Arc;
 
 use rustc_hash::FxHashSet;
+use tracing::field::Empty;
+use tracing::info_span;
 
 use crate::engine::{Delta, Engine};
 use crate::equality::Equality;
-use crate::error::Error;
+use crate::error::{Error, Errors};
 use crate::fact::Fact;
 use crate::limits::Limits;
 use crate::maintain::{Maintenance, state_change};
@@ -38,7 +40,7 @@ impl Engine {
         symbols: Symbols,
         program: Program,
         facts: impl IntoIterator<Item = Fact>,
-    ) -> Result<Self, Vec<Error>> {
+    ) -> Result<Self, Errors> {
         Self::with_limits(symbols, program, facts, Limits::default())
     }
 
@@ -51,10 +53,12 @@ impl Engine {
         program: Program,
         facts: impl IntoIterator<Item = Fact>,
         limits: Limits,
-    ) -> Result<Self, Vec<Error>> {
+    ) -> Result<Self, Errors> {
         let facts: Vec<Fact> = facts.into_iter().collect();
+        let span =
+            info_span!("derive", rules = program.rules.len(), stated = facts.len(), facts = Empty).entered();
         if let Some(error) = facts.iter().find_map(|fact| check_fact(fact, &symbols).err()) {
-            return Err(vec![error]);
+            return Err(vec![error].into());
         }
         let mut symbols = symbols;
         let same = program.equality.then(|| symbols.name(SAME_AS));
@@ -64,11 +68,12 @@ impl Engine {
         let mut engine =
             Self { symbols, program, network, store, records, limits, disabled: Vec::new(), equality };
         engine.build(facts)?;
+        span.record("facts", engine.store.len());
         Ok(engine)
     }
 
     /// Derives everything from stated facts, in an engine that holds nothing.
-    fn build(&mut self, facts: Vec<Fact>) -> Result<(), Vec<Error>> {
+    fn build(&mut self, facts: Vec<Fact>) -> Result<(), Errors> {
         let mut evaluated = Arc::clone(&self.program);
         if self.equality.is_some() {
             self.begin(facts);
@@ -82,8 +87,8 @@ impl Engine {
         let network = compile(&evaluated, Arc::make_mut(&mut self.symbols), &mut self.store)?;
         self.records = Records::new(&network);
         self.network = Arc::new(network);
-        Maintenance::new(self).derive_all().map_err(|error| vec![error])?;
-        self.settle().map_err(|error| vec![error])
+        Maintenance::new(self).derive_all()?;
+        self.settle().map_err(Errors::from)
     }
 
     /// Changes which facts are stated and returns the net change of all facts that hold, stated or derived, sorted.
@@ -94,6 +99,8 @@ impl Engine {
     /// R301 where the step budget is used up, R304 where the evaluation was interrupted, R302 and R303; the engine is then
     /// as it was before.
     pub fn apply(&mut self, delta: Delta) -> Result<Delta, Error> {
+        let span = info_span!("update", stated = delta.insert.len() + delta.delete.len(), changed = Empty);
+        let _entered = span.enter();
         for fact in delta.insert.iter().chain(&delta.delete) {
             check_fact(fact, &self.symbols)?;
         }
@@ -103,6 +110,9 @@ impl Engine {
             Some(equality) => self.apply_equally(equality, &delta),
             None => self.apply_plainly(delta),
         };
+        if let Ok(changed) = &result {
+            span.record("changed", changed.insert.len() + changed.delete.len());
+        }
         result.map_err(|(error, undo)| {
             match before {
                 Some(before) => *self = before,

@@ -3,6 +3,7 @@
 
 mod aggregate;
 mod apply;
+mod builder;
 mod builtin;
 mod codes;
 mod cost;
@@ -35,11 +36,12 @@ mod symbol;
 mod vocabulary;
 mod why_not;
 
+pub use builder::EngineBuilder;
 pub use builtin::{BuiltIn, CustomBuiltIn, Definition, SWRLB};
 pub use codes::CODES;
 pub use derivation::{Aggregated, Cause, Derivation, DerivationStep, Reason, Violation};
 pub use engine::{Delta, Engine};
-pub use error::Error;
+pub use error::{Error, Errors};
 pub use fact::{Arguments, Fact};
 pub use limits::{DEFAULT_STEP_BUDGET, Interrupt, Limits};
 pub use literal::{Decimal, Duration, Literal, Moment, MomentKind, is_subsumed};
@@ -47,6 +49,7 @@ pub use rule::{Aggregate, Atom, Program, Rule, RuleIdentity, Term, Variable};
 pub use swrl::{Prefixes, Syntax, parse_rules, parse_rules_as, parse_rules_together, print_rules};
 pub use symbol::{Symbol, Symbols, Value};
 pub use why_not::{NearMiss, Obstacle};
+pub use {num_rational::BigRational, smallvec::SmallVec};
 
 /// The status rules of the `TOMASys` metamodel as rule text, written for retraction; the names are those of
 /// `http://metacontrol.org/tomasys#`.

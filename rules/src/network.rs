@@ -4,7 +4,7 @@
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::cost::Costs;
-use crate::error::Error;
+use crate::error::{Error, Errors};
 use crate::fixpoint::PlanId;
 use crate::lower::Lowering;
 use crate::plan::{Condition, Lowered, Plan, Planner, Template};
@@ -54,11 +54,11 @@ pub(crate) fn compile(
     program: &Program,
     symbols: &mut Symbols,
     store: &mut Store,
-) -> Result<Network, Vec<Error>> {
+) -> Result<Network, Errors> {
     let mut errors: Vec<Error> = program.rules.iter().flat_map(check).collect();
     errors.extend(program.rules.iter().filter_map(|rule| unknown_symbols(rule, symbols)));
     if !errors.is_empty() {
-        return Err(errors);
+        return Err(errors.into());
     }
     let same = program.equality.then(|| store.relation(symbols.name(SAME_AS), 2));
     let mut network = Network { same, ..Network::default() };
@@ -95,11 +95,11 @@ pub(crate) fn revise(
     new: &Program,
     symbols: &mut Symbols,
     store: &mut Store,
-) -> Result<Option<Revision>, Vec<Error>> {
+) -> Result<Option<Revision>, Errors> {
     let mut errors: Vec<Error> = new.rules.iter().flat_map(check).collect();
     errors.extend(new.rules.iter().filter_map(|rule| unknown_symbols(rule, symbols)));
     if !errors.is_empty() {
-        return Err(errors);
+        return Err(errors.into());
     }
     let mut positions = FxHashMap::default();
     for (position, rule) in new.rules.iter().enumerate() {
@@ -178,7 +178,7 @@ fn stratify(
     store: &Store,
     rules: &[Lowered],
     same: Option<RelationId>,
-) -> Result<Vec<usize>, Vec<Error>> {
+) -> Result<Vec<usize>, Errors> {
     let mut successors = vec![Vec::new(); store.relations.len()];
     for rule in rules {
         let heads = || rule.heads.iter().map(|head| head.relation.0 as usize);
@@ -215,7 +215,7 @@ fn stratify(
             });
         }
     }
-    if errors.is_empty() { Ok(own) } else { Err(errors) }
+    if errors.is_empty() { Ok(own) } else { Err(errors.into()) }
 }
 
 /// A rule whose heads lie in several strata becomes one rule per stratum.

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use rustc_hash::FxHashSet;
 
 use crate::engine::{Delta, Engine};
-use crate::error::Error;
+use crate::error::{Error, Errors};
 use crate::fact::Fact;
 use crate::maintain::Maintenance;
 use crate::network::{Revision, compile, revise};
@@ -24,7 +24,7 @@ impl Engine {
     ///
     /// # Errors
     /// As [`Engine::new`]; the engine is then as it was before.
-    pub fn set_program(&mut self, program: Program) -> Result<Delta, Vec<Error>> {
+    pub fn set_program(&mut self, program: Program) -> Result<Delta, Errors> {
         if self.equality.is_some() || program.equality {
             return self.rebuild(program);
         }
@@ -36,7 +36,7 @@ impl Engine {
         self.revise(revision).map_err(|error| {
             (self.network, self.program) = old;
             self.restore(&Delta::default());
-            vec![error]
+            error.into()
         })
     }
 
@@ -44,7 +44,7 @@ impl Engine {
     ///
     /// # Errors
     /// As [`Engine::new`]; the engine is then as it was before.
-    pub fn add_rules(&mut self, rules: impl IntoIterator<Item = Rule>) -> Result<Delta, Vec<Error>> {
+    pub fn add_rules(&mut self, rules: impl IntoIterator<Item = Rule>) -> Result<Delta, Errors> {
         let mut program = Program::clone(&self.program);
         program.rules.extend(rules);
         self.set_program(program)
@@ -54,7 +54,7 @@ impl Engine {
     ///
     /// # Errors
     /// R301 where what remains does not follow within the step budget; the engine is then as it was before.
-    pub fn remove_rule(&mut self, identity: &RuleIdentity) -> Result<Delta, Vec<Error>> {
+    pub fn remove_rule(&mut self, identity: &RuleIdentity) -> Result<Delta, Errors> {
         let mut program = Program::clone(&self.program);
         program.rules.retain(|rule| rule.identity != *identity);
         let change = self.set_program(program)?;
@@ -67,7 +67,7 @@ impl Engine {
     ///
     /// # Errors
     /// As [`Engine::new`]; the engine is then as it was before.
-    pub fn set_enabled(&mut self, identity: &RuleIdentity, enabled: bool) -> Result<Delta, Vec<Error>> {
+    pub fn set_enabled(&mut self, identity: &RuleIdentity, enabled: bool) -> Result<Delta, Errors> {
         let mut program = Program::clone(&self.program);
         let is_meant = |rule: &mut Rule| rule.identity == *identity;
         let mut disabled = self.disabled.clone();
@@ -125,7 +125,7 @@ impl Engine {
         Ok(change)
     }
 
-    fn rebuild(&mut self, program: Program) -> Result<Delta, Vec<Error>> {
+    fn rebuild(&mut self, program: Program) -> Result<Delta, Errors> {
         let stated = self.stated();
         let mut engine = Self::with_limits(self.symbols().clone(), program, stated, self.limits.clone())?;
         engine.disabled.clone_from(&self.disabled);
@@ -137,6 +137,6 @@ impl Engine {
 }
 
 /// Rules that were compiled before give at most the error that they no longer fit together.
-fn first(errors: Vec<Error>) -> Error {
+fn first(errors: Errors) -> Error {
     errors.into_iter().next().unwrap_or(Error::UnknownSymbol { index: 0 })
 }

@@ -238,7 +238,7 @@ fn evaluation_can_be_interrupted() {
         };
         questions.store(2, Ordering::Relaxed);
         let stopped = Engine::with_limits(symbols.clone(), program.clone(), facts.clone(), limits.clone());
-        let error = stopped.expect_err("interrupted").remove(0).to_string();
+        let error = stopped.expect_err("interrupted")[0].to_string();
         assert_eq!(error, "R304 interrupted, last in rule test#1");
         questions.store(usize::MAX, Ordering::Relaxed);
         let mut engine = Engine::with_limits(symbols, program, [], limits).expect("nothing to do");

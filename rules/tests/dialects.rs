@@ -6,7 +6,7 @@ use metaplan_rules::{
 
 fn check(text: &str, syntax: &Syntax, expected: &[&str]) {
     let errors = parse_rules_as(text, "test", &mut Symbols::new(), &Prefixes::new(), syntax);
-    let errors: Vec<String> = errors.err().unwrap_or_default().iter().map(ToString::to_string).collect();
+    let errors: Vec<String> = errors.err().into_iter().flatten().map(|error| error.to_string()).collect();
     assert_eq!(errors, expected, "{text}");
 }
 

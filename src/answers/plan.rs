@@ -3,14 +3,13 @@
 use std::time::Duration;
 
 use encodings::{
-    Alternatives, Exact, Front, Moment, Part, Plan, Point, Proof, Solution, Statistics, Status, Step,
-    Unbounded,
+    Alternatives, Exact, Front, Moment, Part, Plan, Point, Proof, Solution, Statistics, Step, Unbounded,
 };
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use crate::mission::{Blocking, times};
+use crate::mission::Blocking;
 use crate::number::exact_to_json;
 
 /// A plan with its proof and its figures.
@@ -162,15 +161,12 @@ impl PlanAnswer {
         Self {
             format: "metaplan-plan/1",
             mission: mission.to_owned(),
-            status: word(solution.status),
+            status: solution.status.as_str(),
             cost: solution.plan.as_ref().map(|plan| exact_to_json(&plan.cost)),
             lower_bound: solution.lower_bound.as_ref().map(exact_to_json),
             horizon: solution.horizon,
             proof: solution.proof.as_ref().map(|proof| ProofPart::of(proof, statistics)),
-            unbounded: solution.unbounded.map(|unbounded| match unbounded {
-                Unbounded::Proved => "proved",
-                Unbounded::Suspected => "suspected",
-            }),
+            unbounded: solution.unbounded.map(Unbounded::as_str),
             steps: solution.plan.as_ref().map(steps).unwrap_or_default(),
             statistics: StatisticsPart::of(statistics, preparation),
             objectives: None,
@@ -218,12 +214,12 @@ impl ParetoAnswer {
         let solved = front.points.iter().filter(|point| point.solution.plan.is_some());
         let point = |point: &Point| {
             PlanAnswer::new(mission, &point.solution, preparation)
-                .with_objectives(Objective::all(objectives, point))
+                .with_objectives(Objective::all(objectives, &point.values))
         };
         Self {
             format: "metaplan-pareto/1",
             mission: mission.to_owned(),
-            status: word(front.status),
+            status: front.status.as_str(),
             objectives: objectives.to_vec(),
             points: solved.map(point).collect(),
         }
@@ -232,18 +228,9 @@ impl ParetoAnswer {
 
 impl Objective {
     /// The values of a plan by the objectives with these texts.
-    pub fn all(texts: &[String], point: &Point) -> Vec<Self> {
-        let pairs = texts.iter().zip(&point.values);
+    pub fn all(texts: &[String], values: &[Exact]) -> Vec<Self> {
+        let pairs = texts.iter().zip(values);
         pairs.map(|(text, value)| Self { minimize: text.clone(), value: exact_to_json(value) }).collect()
-    }
-}
-
-/// The part of the planner in a word.
-fn part(part: Part) -> &'static str {
-    match part {
-        Part::Search => "search",
-        Part::Satisficing => "satisficing",
-        Part::Sat => "sat",
     }
 }
 
@@ -256,17 +243,6 @@ impl MomentPart {
     }
 }
 
-/// The status in a word.
-fn word(status: Status) -> &'static str {
-    match status {
-        Status::Optimal => "optimal",
-        Status::Feasible => "feasible",
-        Status::Unsolvable => "unsolvable",
-        Status::UnsolvableWithinHorizon => "unsolvable_within_horizon",
-        Status::Unknown => "unknown",
-    }
-}
-
 fn steps(plan: &Plan) -> Vec<StepPart> {
     plan.steps.iter().map(StepPart::of).collect()
 }
@@ -274,7 +250,7 @@ fn steps(plan: &Plan) -> Vec<StepPart> {
 impl StepPart {
     fn of(step: &Step) -> Self {
         let configuration = step.configuration.iter();
-        let (start, duration) = times(step);
+        let (start, duration) = step.times();
         Self {
             action: step.action.clone(),
             arguments: step.arguments.clone(),
@@ -312,7 +288,7 @@ impl StatisticsPart {
             families: families.map(|(family, count)| ((*family).to_owned(), (*count).into())).collect(),
             conflicts: statistics.conflicts,
             solver_calls: statistics.calls,
-            found_by: statistics.found_by.map(part),
+            found_by: statistics.found_by.map(Part::as_str),
             expanded: statistics.expanded,
             generated: statistics.generated,
             evaluated: statistics.evaluated,

@@ -2,30 +2,9 @@
 
 use std::fmt::Write as _;
 
-use encodings::{Alternatives, Config, Solution, Task};
-use metaplan::mission::{Mission, Planning as _, Reading};
-use pddl::ast::Problem;
+use encodings::{Alternatives, Solution};
 
-use crate::cli::common::Failure;
-use crate::cli::confirm::confirm;
 use crate::cli::plan_text::steps_text;
-
-/// Looks for further plans; each is executed by the validator as the first one is.
-pub(super) fn find(
-    mission: &Mission,
-    problem: &Problem,
-    task: &Task,
-    solution: &Solution,
-    most: usize,
-    config: &Config,
-) -> Result<Option<Alternatives>, Failure> {
-    let Some(mut found) = encodings::alternatives(task, solution, most, config) else { return Ok(None) };
-    for plan in &found.plans {
-        confirm(mission, problem, plan, &Reading::sequential(task.is_timed()))?;
-    }
-    found.plans = found.plans.into_iter().map(|plan| mission.written(plan)).collect();
-    Ok(Some(found))
-}
 
 /// The further plans as tables, and for each step of the first one which of its choices are forced.
 pub(super) fn text(found: &Alternatives, first: &Solution) -> String {

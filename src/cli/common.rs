@@ -1,9 +1,11 @@
 //! What all commands share: the exit status, why there is no answer, and how one is written.
 
 use std::io::IsTerminal;
+use std::path::PathBuf;
 
 use clap::{Args, ColorChoice, ValueEnum};
-use metaplan::message::Message;
+use encodings::Limits;
+use metaplan::message::{Errors, Message};
 use probabilistic::{Diagnostic, Error};
 
 /// Exit statuses; `docs/reference/statuses.md` lists them.
@@ -24,24 +26,45 @@ pub(super) enum Exit {
 /// Why a command has no answer.
 pub(super) struct Failure {
     pub(super) exit: Exit,
-    pub(super) messages: Vec<Message>,
+    pub(super) messages: Errors,
 }
 
 impl Failure {
     pub(super) fn usage(message: Message) -> Self {
-        Self { exit: Exit::Usage, messages: vec![message] }
+        Self { exit: Exit::Usage, messages: message.into() }
+    }
+
+    /// Why there is no answer of the planner.
+    pub(super) fn planning(messages: Errors, limits: &Limits) -> Self {
+        let is = |code: &str| messages.iter().any(|message| message.code == code);
+        let exit = if is("M170") {
+            Exit::Fault
+        } else if is("M110") {
+            Exit::Inconsistent
+        } else if limits.reached() {
+            Exit::NothingFound
+        } else {
+            Exit::BadInput
+        };
+        Self { exit, messages }
+    }
+}
+
+impl From<Errors> for Failure {
+    fn from(messages: Errors) -> Self {
+        Self { exit: Exit::BadInput, messages }
     }
 }
 
 impl From<Vec<Message>> for Failure {
     fn from(messages: Vec<Message>) -> Self {
-        Self { exit: Exit::BadInput, messages }
+        Errors::from(messages).into()
     }
 }
 
 impl From<Message> for Failure {
     fn from(message: Message) -> Self {
-        vec![message].into()
+        Errors::from(message).into()
     }
 }
 
@@ -57,6 +80,9 @@ pub(super) struct Common {
     /// Statistics besides the answer.
     #[arg(long, short, global = true)]
     pub(super) verbose: bool,
+    /// Also write what the time is spent on, for `chrome://tracing` or Perfetto.
+    #[arg(long, global = true, value_name = "FILE")]
+    pub(super) trace: Option<PathBuf>,
     /// When messages have colours: on a terminal unless `NO_COLOR` is set, always, or never.
     #[arg(long, global = true, value_enum, default_value_t = ColorChoice::Auto, value_name = "WHEN")]
     pub(super) color: ColorChoice,
@@ -96,7 +122,7 @@ pub(super) fn process_failure(error: Error, model: (&str, &str), property: &str)
         Error::Constant(text) => Failure::usage(Message::error("Q504", text)),
         Error::StateLimit { .. } | Error::Interrupted { .. } => Failure {
             exit: Exit::NothingFound,
-            messages: vec![Message::at("Q505", model.0, None, error.to_string())],
+            messages: vec![Message::at("Q505", model.0, None, error.to_string())].into(),
         },
         other => Message::at("Q506", model.0, None, other.to_string()).into(),
     }

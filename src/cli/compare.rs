@@ -10,7 +10,7 @@ use metaplan::comparison::{
     Action, Candidate, Coadaptation, Comparison, Config, Costs, Listener, NoResult, Planned, Risk, Roles,
     Stages, Tasked, Valuation, compare,
 };
-use metaplan::message::Message;
+use metaplan::message::{Errors, Message};
 use metaplan::mission::{Mission, Planning as _};
 use metaplan::setup::Setup;
 use pddl::ast::Problem;
@@ -209,7 +209,7 @@ fn plan(
     roles: &Roles,
     risk: Risk,
     situation: Valuation,
-) -> Result<Planned, Vec<Message>> {
+) -> Result<Planned, Errors> {
     let one = |message| vec![message];
     let mut mission = mission.clone();
     mission.set(&roles.location, &coadaptation.places[situation.place]).map_err(one)?;
@@ -231,9 +231,9 @@ fn plan(
 /// The plan of a problem, and what it took.
 fn solve(
     mission: &Mission,
-    problem: impl FnOnce(&Mission) -> Result<Problem, Vec<Message>>,
+    problem: impl FnOnce(&Mission) -> Result<Problem, Errors>,
     actions: impl FnOnce(&[encodings::Step]) -> Option<Vec<Action>>,
-) -> Result<Planned, Vec<Message>> {
+) -> Result<Planned, Errors> {
     let started = Instant::now();
     let problem = problem(mission)?;
     let task = mission.ground(&problem, &[], &Limits::none())?;

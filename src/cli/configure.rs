@@ -97,7 +97,7 @@ impl Wanted {
         let (mut configurator, mut wrong) = match Configurator::new(knowledge.clone(), wishes) {
             Ok(configurator) => (configurator, Vec::new()),
             // What else is wrong is told, too.
-            Err(wrong) => (Configurator::new(knowledge, Wishes::default())?, wrong),
+            Err(wrong) => (Configurator::new(knowledge, Wishes::default())?, wrong.into_vec()),
         };
         let functions = if self.objectives.is_empty() && configurator.objectives().is_empty() {
             configurator.functions()
@@ -118,7 +118,11 @@ impl Wanted {
             let requirements = own.map(|(_, attribute, bound)| (attribute.clone(), bound.clone())).collect();
             wrong.extend(configurator.pursue(&Goal { requirements, ..Goal::of(function) }).err());
         }
-        if wrong.is_empty() { Ok(configurator) } else { Err(Failure { exit: Exit::Usage, messages: wrong }) }
+        if wrong.is_empty() {
+            Ok(configurator)
+        } else {
+            Err(Failure { exit: Exit::Usage, messages: wrong.into() })
+        }
     }
 }
 

@@ -25,7 +25,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let messages = match arguments.situation.setup(&arguments.inputs) {
         Ok(setup) => lint(&setup),
         Err(failure) if failure.exit == Exit::Usage => return Err(failure),
-        Err(failure) => in_order(failure.messages),
+        Err(failure) => in_order(failure.messages.into_vec()),
     };
     let answer = LintAnswer::new(&messages);
     let (errors, warnings) = answer.counts();

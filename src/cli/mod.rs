@@ -9,7 +9,6 @@ mod compare_table;
 mod completions;
 mod concurrent;
 mod configure;
-mod confirm;
 mod convert;
 mod drawn;
 mod examples;
@@ -24,7 +23,6 @@ mod objectives;
 mod output;
 mod plan;
 mod plan_answer;
-mod plan_exact;
 mod plan_text;
 mod progress;
 mod reason;
@@ -36,6 +34,7 @@ mod run_outlet;
 mod schema;
 mod simulate;
 mod situation;
+mod trace;
 mod validate;
 mod values;
 mod verify;
@@ -46,6 +45,7 @@ use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _, Parser, Subcom
 use metaplan::message::Message;
 
 use common::{Common, Exit, Failure, Format};
+use trace::Trace;
 
 /// Adapts a robot's task plan and its software architecture together, and proves that the result is optimal.
 #[derive(Debug, Parser)]
@@ -121,7 +121,7 @@ pub fn main() -> ExitCode {
     let cli = parse();
     // The default hook would print a stack trace at users; what matters is printed below.
     std::panic::set_hook(Box::new(|_| {}));
-    let outcome = std::panic::catch_unwind(|| run(&cli));
+    let outcome = std::panic::catch_unwind(|| traced(&cli));
     let exit = match outcome {
         Ok(Ok(_)) if output::answer_lost() => Exit::BadInput,
         Ok(Ok(exit)) => exit,
@@ -135,6 +135,16 @@ pub fn main() -> ExitCode {
         }
     };
     ExitCode::from(exit as u8)
+}
+
+/// Runs the command, with a trace if one is wanted. A trace that cannot be written is an error once the answer is there.
+fn traced(cli: &Cli) -> Result<Exit, Failure> {
+    let trace = cli.common.trace.as_deref().map(Trace::begin).transpose()?;
+    let outcome = run(cli);
+    match (trace.map_or(Ok(()), Trace::end), outcome) {
+        (Err(message), Ok(_)) => Err(message.into()),
+        (_, outcome) => outcome,
+    }
 }
 
 /// The command line. What is wrong with it is said in colours where `--color` asks for that, wherever it stands.

@@ -1,33 +1,26 @@
 //! `metaplan plan`.
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
-use encodings::{
-    Alternatives, Backend, Config, Front, Improvement, Limits, Plan, Point, Semantics, Solution, Status, Task,
-};
-use metaplan::answers::{PlanAnswer, Preparation};
-use metaplan::certificate::{self, Ground};
+use encodings::{Backend, Config, Limits, Plan, Semantics, Status};
 use metaplan::message::Message;
-use metaplan::mission::{
-    Blocking, Mission, Planning as _, Reading, blocking, blocking_text, btcpp_text, spaced, verdict,
-};
-use metaplan::report::{Positions, Seen, front_sheet};
+use metaplan::mission::{Mission, btcpp_text, plan_lines, popf_text};
+use metaplan::planner::{Planned, PlannedFront, Planner};
+use metaplan::report::Positions;
 use metaplan::visible::visible;
-use pddl::ast::Problem;
 
 use crate::cli::alternatives;
 use crate::cli::common::{Common, Exit, Failure, Format};
-use crate::cli::concurrent::{self, Overlap};
-use crate::cli::confirm::fault;
+use crate::cli::concurrent::Overlap;
 use crate::cli::drawn::Drawing;
 use crate::cli::limits::Guard;
-use crate::cli::objectives::Objectives;
+use crate::cli::objectives;
 use crate::cli::output;
 use crate::cli::plan_answer::answer_text;
-use crate::cli::plan_exact;
-use crate::cli::plan_text::{PlanFormat, plan_text};
+use crate::cli::plan_text::PlanFormat;
 use crate::cli::progress::Progress;
 use crate::cli::situation::Situation;
 use crate::cli::values::seconds;
@@ -159,19 +152,17 @@ impl From<Encoding> for Semantics {
 
 /// What the user asks of the optimizer.
 fn configuration(arguments: &Arguments, limits: Limits) -> Config {
-    let backend = arguments.solver.clone();
-    let (horizon, semantics) = (arguments.horizon, arguments.encoding.map(Semantics::from));
-    let strategy = arguments.strategy.into();
-    let (engine, confirm) = (arguments.engine.into(), arguments.confirm);
-    Config { horizon, engine, confirm, semantics, strategy, backend, limits, ..Config::default() }
+    Config::default()
+        .with_horizon(arguments.horizon)
+        .with_engine(arguments.engine.into())
+        .with_confirmation(arguments.confirm)
+        .with_semantics(arguments.encoding.map(Semantics::from))
+        .with_strategy(arguments.strategy.into())
+        .with_backend(arguments.solver.clone())
+        .with_limits(limits)
 }
 
 impl Arguments {
-    /// Whether one plan is not all that the user wants.
-    fn asks_for_more(&self) -> bool {
-        self.pareto.is_some() || self.alternatives.is_some()
-    }
-
     /// Refuses what no parser of options sees.
     fn check(&self) -> Result<(), Failure> {
         let usage = |code: &str, text: String| Failure::usage(Message::error(code, text));
@@ -179,6 +170,10 @@ impl Arguments {
         if self.plan_format == Some(PlanFormat::Btcpp) && self.overlap.separation().is_some() {
             let text =
                 "`--plan-format btcpp` writes a sequence of actions, and with `--concurrent` they overlap";
+            return Err(usage("M107", text.to_owned()));
+        }
+        if self.minimize.len() > 1 && self.overlap.separation().is_some() {
+            let text = "`--concurrent` takes one objective; add several with weights";
             return Err(usage("M107", text.to_owned()));
         }
         Ok(())
@@ -200,224 +195,138 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let is_drawn = arguments.report.is_some() || arguments.drawing.is_file_wanted();
     let positions = if is_drawn { setup.positions()? } else { Positions::Unknown };
     let mission = setup.mission;
-    let (problem, warnings) = mission.filled()?;
-    output::warnings(common, mission.warnings().chain(&warnings));
+    let planner = Planner::new(&mission)?;
+    output::warnings(common, mission.warnings().chain(planner.warnings()));
     let limits = guard.plan();
     let read = started.elapsed();
-    let objectives = Objectives::read(&mission, &problem, &arguments.minimize, arguments.pareto.as_deref())?;
     let progress = Progress::new("planning", common);
-    let mut report = |improvement: Improvement| {
-        progress.set_message(format!(
-            "cost {}, lower bound {}, gap {:.1} %, up to {} steps",
-            improvement.cost,
-            improvement.lower_bound,
-            100.0 * improvement.gap(),
-            improvement.horizon
-        ));
-    };
-    if let Some(separation) = arguments.overlap.separation() {
-        if objectives.metrics.len() > 1 {
-            let text = "`--concurrent` takes one objective; add several with weights";
-            return Err(Failure::usage(Message::error("M107", text)));
-        }
-        let point = concurrent::solve(&mission, &problem, &objectives, separation, &limits, &mut report)?;
+    let planner = planner
+        .config(configuration(arguments, limits.clone()))
+        .minimize(&arguments.minimize)
+        .concurrent(arguments.overlap.separation().cloned())
+        .alternatives(arguments.alternatives)
+        .on_improvement(|improvement| {
+            progress.set_message(format!(
+                "cost {}, lower bound {}, gap {:.1} %, up to {} steps",
+                improvement.cost,
+                improvement.lower_bound,
+                100.0 * improvement.gap(),
+                improvement.horizon
+            ));
+            ControlFlow::Continue(())
+        });
+    if let Some(pair) = &arguments.pareto {
+        let found = planner.pareto(two(pair)?);
         progress.finish();
-        let ground = started.elapsed().saturating_sub(read + point.solution.statistics.search);
-        let preparation = Preparation { read, ground };
-        let reading = Reading::concurrent(separation);
-        objectives.confirm(&mission, &problem, &point, &reading)?;
-        let subject = (&mission, &problem, &reading);
-        return finish(point, &Beside::default(), subject, &objectives, &preparation, (arguments, common));
+        let mut front = found.map_err(|messages| Failure::planning(messages, &limits))?;
+        front.preparation.read = read;
+        return show_front(&front, &mission.name, &positions, (arguments, common));
     }
-    let config = configuration(arguments, limits);
-    let failed = |messages| {
-        let exit = if config.limits.reached() { Exit::NothingFound } else { Exit::BadInput };
-        Failure { exit, messages }
-    };
-    let ground = mission.ground(&problem, &objectives.metrics, &config.limits);
-    let preparation = Preparation { read, ground: started.elapsed().saturating_sub(read) };
-    let task = match ground {
-        Ok(task) => task,
-        Err(refused) if plan_exact::is_too_large(&refused) && !arguments.asks_for_more() => {
-            let found = plan_exact::solve(&mission, &problem, &objectives, &config, refused.clone());
-            progress.finish();
-            let (task, point, reading) = found.map_err(failed)?;
-            objectives.confirm(&mission, &problem, &point, &reading)?;
-            if common.verbose {
-                plan_exact::explain(&refused);
-            }
-            let subject = (&mission, &problem, Ground::Exact(&task));
-            let certified = certify(arguments, subject, &objectives, &point.solution, &config.limits);
-            let beside = Beside::default();
-            let subject = (&mission, &problem, &reading);
-            let exit = finish(point, &beside, subject, &objectives, &preparation, (arguments, common))?;
-            return Ok(certified_or(certified, exit, common));
-        }
-        Err(messages) => return Err(failed(messages)),
-    };
-    if arguments.pareto.is_some() {
-        let front = encodings::pareto(&task, &config, &mut report);
-        progress.finish();
-        let seen = Seen { mission: &mission, problem: &problem, positions: &positions };
-        return show_front(front, (seen, &task), &objectives, &preparation, (arguments, common));
-    }
-    let point = encodings::lexicographic(&task, &config, &mut report);
+    let found = planner.plan();
     progress.finish();
-    if let Some(reason) = &point.solution.statistics.contradiction {
-        return Err(fault(reason));
+    let mut planned = found.map_err(|messages| Failure::planning(messages, &limits))?;
+    planned.preparation.read = read;
+    if common.verbose {
+        for message in &planned.too_large {
+            output::note(&format!("planned by search alone, in exact numbers: {}\n", message.message));
+        }
     }
-    let reading = Reading::sequential(task.is_timed());
-    objectives.confirm(&mission, &problem, &point, &reading)?;
-    let subject = (&mission, &problem, Ground::Integers(&task));
-    let certified = certify(arguments, subject, &objectives, &point.solution, &config.limits);
-    if let Some(reason) = &point.solution.statistics.failure {
+    if let Some(reason) = &planned.solution.statistics.failure {
         let text = format!("the SAT solver gave up: {reason}");
         output::warnings(common, &[Message::warning("M114", text)]);
     }
-    let others = match arguments.alternatives {
-        Some(most) => alternatives::find(&mission, &problem, &task, &point.solution, most, &config)?,
-        None => None,
-    };
-    let blocking = match point.solution.status {
-        Status::Unsolvable => blocking(&mission, &problem, &config),
-        _ => None,
-    };
-    let beside = Beside { others, blocking };
-    let subject = (&mission, &problem, &reading);
-    let exit = finish(point, &beside, subject, &objectives, &preparation, (arguments, common))?;
-    Ok(certified_or(certified, exit, common))
-}
-
-/// How the program ends: the plan is there, but what was asked for besides may not be.
-fn certified_or(certified: Result<(), Message>, exit: Exit, common: &Common) -> Exit {
-    match certified {
-        Ok(()) => exit,
+    let certified = arguments.certificate.as_deref().map_or(Ok(()), |directory| planned.certify(directory));
+    finish(&planned, &mission, (arguments, common))?;
+    Ok(match certified {
+        Ok(()) => exit(planned.solution.status),
+        // The plan is there, but what was asked for besides is not.
         Err(message) => {
             output::warnings(common, [&message]);
             Exit::BadInput
         }
-    }
+    })
+}
+
+/// The two objectives of a front.
+fn two(pair: &str) -> Result<[&str; 2], Failure> {
+    let parts: Vec<_> = pair.split(',').map(str::trim).collect();
+    <[&str; 2]>::try_from(parts).map_err(|parts| {
+        let text =
+            format!("`--pareto {pair}` names {} objectives; it takes two, with a comma between", parts.len());
+        Failure::usage(Message::error("M107", text))
+    })
 }
 
 /// Shows the answer, or writes it to a file.
 fn finish(
-    mut point: Point,
-    beside: &Beside,
-    (mission, problem, reading): (&Mission, &Problem, &Reading),
-    objectives: &Objectives,
-    preparation: &Preparation,
+    planned: &Planned<'_>,
+    mission: &Mission,
     (arguments, common): (&Arguments, &Common),
-) -> Result<Exit, Failure> {
-    if arguments.plan_format == Some(PlanFormat::Plansys2) {
-        point.solution.plan = point.solution.plan.take().map(|plan| spaced(mission, problem, plan, reading));
-    }
-    let drawn = arguments.drawing.draw(mission, &point.solution, arguments.is_text(common))?;
-    // What `validate` executes has the designs, what the user's own domain has no place for them has not.
-    if arguments.plan_format != Some(PlanFormat::Ipc) {
-        point.solution.plan = point.solution.plan.take().map(|plan| mission.written(plan));
-    }
-    let status = point.solution.status;
-    match (show(&point, beside, mission, objectives, preparation, (arguments, common)), &arguments.output) {
+) -> Result<(), Failure> {
+    let is_text = arguments.is_text(common);
+    let drawn = arguments.drawing.draw(mission, &planned.solution, is_text)?;
+    match (show(planned, mission, (arguments, common)), &arguments.output) {
         (Some(text), Some(file)) => {
             output::write_file(file, &text)?;
-            output::note(&verdict(&point.solution));
+            output::note(&format!("{}\n", planned.solution.verdict()));
         }
         (Some(text), None) => output::answer(&(drawn + &text)),
         // There is nothing to write, and readers of plans would stumble over anything else.
-        (None, _) => output::note(&verdict(&point.solution)),
+        (None, _) => output::note(&format!("{}\n", planned.solution.verdict())),
     }
-    Ok(exit(status))
-}
-
-/// What is known besides the plan.
-#[derive(Default)]
-struct Beside {
-    others: Option<Alternatives>,
-    blocking: Option<Blocking>,
+    Ok(())
 }
 
 /// The answer in the form that the user asks for; none if that is a plan, and there is none.
 fn show(
-    point: &Point,
-    beside: &Beside,
+    planned: &Planned<'_>,
     mission: &Mission,
-    objectives: &Objectives,
-    preparation: &Preparation,
     (arguments, common): (&Arguments, &Common),
 ) -> Option<String> {
-    let (solution, name) = (&point.solution, mission.name.as_str());
     match (arguments.plan_format, common.format) {
-        (Some(PlanFormat::Json), _) | (None, Format::Json) => {
-            let overlaps = arguments.overlap.separation().and(solution.plan.as_ref());
-            let answer = PlanAnswer::new(name, solution, preparation)
-                .with_objectives(objectives.values(point))
-                .with_alternatives(beside.others.as_ref())
-                .with_makespan(overlaps.map(Plan::makespan).as_ref())
-                .with_blocking(beside.blocking.as_ref());
-            Some(output::pretty(&answer))
-        }
+        (Some(PlanFormat::Json), _) | (None, Format::Json) => Some(output::pretty(&planned.answer())),
         (None, _) => {
-            let plan = answer_text(name, solution, common.verbose, preparation);
-            let others = beside.others.as_ref().map(|others| alternatives::text(others, solution));
-            let blocking = beside.blocking.as_ref().map(blocking_text);
-            let overlaps = arguments.overlap.separation().and(solution.plan.as_ref());
-            let makespan = concurrent::makespan_text(overlaps);
-            Some(plan + &objectives.values_text(point) + &makespan + &others.or(blocking).unwrap_or_default())
+            let mut solution = planned.solution.clone();
+            solution.plan = planned.written();
+            let plan = answer_text(&mission.name, &solution, common.verbose, &planned.preparation);
+            let others = planned.alternatives.as_ref().map(|others| alternatives::text(others, &solution));
+            let blocking = planned.blocking.as_ref().map(|blocking| format!("{blocking}\n"));
+            let overlaps = solution.plan.as_ref().filter(|_| planned.overlaps());
+            let makespan =
+                overlaps.map_or_else(String::new, |plan| format!("makespan {}\n", plan.makespan()));
+            let values = objectives::values_text(planned.objectives(), &planned.values);
+            Some(plan + &values + &makespan + &others.or(blocking).unwrap_or_default())
         }
-        (Some(PlanFormat::Btcpp), _) => solution.plan.as_ref().map(|plan| btcpp_text(mission, plan)),
-        (Some(format), _) => solution.plan.as_ref().map(|plan| plan_text(plan, format)),
+        (Some(PlanFormat::Btcpp), _) => planned.written().map(|plan| btcpp_text(mission, &plan)),
+        (Some(PlanFormat::Plansys2), _) => planned.spaced().map(|plan| popf_text(&plan_lines(&plan))),
+        // What `validate` executes has the designs, what the user's own domain has no place for them has not.
+        (Some(PlanFormat::Ipc), _) => planned.solution.plan.as_ref().map(Plan::to_string),
     }
 }
 
-/// Writes why nothing is better than the solution, if that is asked for.
-fn certify(
-    arguments: &Arguments,
-    (mission, problem, task): (&Mission, &Problem, Ground<'_>),
-    objectives: &Objectives,
-    solution: &Solution,
-    limits: &Limits,
-) -> Result<(), Message> {
-    let Some(directory) = &arguments.certificate else { return Ok(()) };
-    let plan = solution.plan.as_ref().map_or_else(String::new, |plan| plan_text(plan, PlanFormat::Ipc));
-    let mut problem = problem.clone();
-    if let [metric] = &objectives.metrics[..] {
-        problem.metric = Some(metric.clone());
-    }
-    let certificate = certificate::Contents { mission, problem: &problem, task, solution, plan: &plan };
-    certificate::write(directory, &certificate, limits)
-}
-
-/// Shows a Pareto front whose every plan the validator has executed.
+/// Shows a Pareto front.
 fn show_front(
-    mut front: Front,
-    (seen, task): (Seen<'_>, &Task),
-    objectives: &Objectives,
-    preparation: &Preparation,
+    front: &PlannedFront<'_>,
+    name: &str,
+    positions: &Positions,
     (arguments, common): (&Arguments, &Common),
 ) -> Result<Exit, Failure> {
-    let Seen { mission, problem, .. } = seen;
-    for point in &front.points {
-        objectives.confirm(mission, problem, point, &Reading::sequential(task.is_timed()))?;
-    }
     if arguments.report.is_some() || arguments.drawing.is_file_wanted() {
-        let sheet = front_sheet(seen, objectives.texts(), &front);
+        let sheet = front.sheet(positions);
         arguments.drawing.draw_front(&sheet)?;
         if let Some(file) = &arguments.report {
             output::write_file(file, &visible(&sheet.html()))?;
         }
     }
-    for point in &mut front.points {
-        point.solution.plan = point.solution.plan.take().map(|plan| mission.written(plan));
-    }
     let text = match common.format {
-        Format::Json => output::pretty(&objectives.front_answer(&mission.name, &front, preparation)),
-        _ => objectives.front_text(&mission.name, &front),
+        Format::Json => output::pretty(&front.answer()),
+        _ => objectives::front_text(name, front.objectives(), &front.written()),
     };
     match &arguments.output {
         Some(file) => output::write_file(file, &text)?,
         None => output::answer(&text),
     }
-    Ok(exit(front.status))
+    Ok(exit(front.front.status))
 }
 
 /// How the program ends with a solution of this status.

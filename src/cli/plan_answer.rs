@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 
 use encodings::{Part, Solution, Status};
 use metaplan::answers::{Preparation, milliseconds};
-use metaplan::mission::verdict;
 
 use crate::cli::plan_text::steps_text;
 
@@ -31,7 +30,8 @@ pub(super) fn answer_text(
         }
         text += ": ";
     }
-    text += &verdict(solution);
+    text += &solution.verdict();
+    text.push('\n');
     if verbose {
         text += &statistics_text(solution, preparation);
     }

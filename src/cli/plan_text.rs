@@ -1,10 +1,8 @@
 //! A plan in the formats of other programs.
 
 use clap::ValueEnum;
-use std::fmt::Write as _;
 
 use encodings::{Plan, Step};
-use metaplan::mission::{decimal, plan_lines, popf_text, times};
 
 use crate::cli::output;
 
@@ -18,28 +16,6 @@ pub(super) enum PlanFormat {
     Btcpp,
     /// As `--format json`.
     Json,
-}
-
-/// The plan in the formats of the planning competitions and of `PlanSys2`.
-pub(super) fn plan_text(plan: &Plan, format: PlanFormat) -> String {
-    if format == PlanFormat::Plansys2 {
-        return popf_text(&plan_lines(plan));
-    }
-    let timed = |step: &Step| !step.duration.is_zero() || !step.start.is_zero();
-    let temporal = plan.steps.iter().any(timed);
-    let mut text = String::new();
-    for step in &plan.steps {
-        let call: Vec<&str> =
-            std::iter::once(&step.action).chain(&step.arguments).map(String::as_str).collect();
-        if temporal {
-            let (start, duration) = times(step);
-            let (start, duration) = (decimal(&start), decimal(&duration));
-            let _ = writeln!(text, "{start}: ({})  [{duration}]", call.join(" "));
-        } else {
-            let _ = writeln!(text, "({})", call.join(" "));
-        }
-    }
-    text
 }
 
 /// The steps as a table.

@@ -4,26 +4,24 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
-use encodings::{Config, Limits, Point, Solution};
+use encodings::{Limits, Solution};
 use metaplan::certificate::{Verification, verify};
 use metaplan::journal::JournalReport;
 use metaplan::message::Message;
-use metaplan::mission::{Mission, Planning as _, Reading, verdict};
+use metaplan::mission::Mission;
 use metaplan::picture::{Checked, Plan, Report};
-use metaplan::report::{Positions, Seen, changes, log_picture, plan_picture};
+use metaplan::planner::Planner;
+use metaplan::report::{Positions, changes, log_picture};
 use metaplan::setup::Setup;
 use metaplan::visible::visible;
 use num_rational::BigRational;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
-use crate::cli::concurrent::{self, Overlap};
-use crate::cli::confirm::fault;
+use crate::cli::concurrent::Overlap;
 use crate::cli::drawn::write_pictures;
 use crate::cli::limits::Guard;
-use crate::cli::objectives::Objectives;
 use crate::cli::output;
 use crate::cli::plan::exit;
-use crate::cli::plan_exact;
 use crate::cli::situation::Situation;
 use crate::cli::values::seconds;
 
@@ -83,12 +81,12 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         .certificate
         .as_deref()
         .map(|directory| checked(&verify(directory, Some(&setup.mission), &|| limits.reached())));
-    let (status, said) = (answer.solution.status, verdict(&answer.solution));
+    let (status, said) = (answer.solution.status, answer.solution.verdict());
     let report = page(arguments, &setup, before, answer, checked);
     if let Some(directory) = &arguments.svg {
         write_pictures(directory, &report.pictures())?;
     }
-    write(arguments, &report.html(), &said)?;
+    write(arguments, &report.html(), &format!("{said}\n"))?;
     Ok(exit(status))
 }
 
@@ -130,38 +128,10 @@ impl Answer {
         separation: Option<&BigRational>,
         limits: &Limits,
     ) -> Result<Self, Failure> {
-        let (problem, _) = mission.filled()?;
-        let config = Config { limits: limits.clone(), ..Config::default() };
-        let objectives = Objectives::read(mission, &problem, &[], None)?;
-        let failed = |messages| {
-            let exit = if limits.reached() { Exit::NothingFound } else { Exit::BadInput };
-            Failure { exit, messages }
-        };
-        let (point, reading): (Point, Reading) = match separation {
-            Some(separation) => {
-                let found =
-                    concurrent::solve(mission, &problem, &objectives, separation, limits, &mut |_| {});
-                (found?, Reading::concurrent(separation))
-            }
-            None => match mission.ground(&problem, &[], limits) {
-                Ok(task) => {
-                    let point = encodings::lexicographic(&task, &config, &mut |_| {});
-                    (point, Reading::sequential(task.is_timed()))
-                }
-                Err(refused) if plan_exact::is_too_large(&refused) => {
-                    let found = plan_exact::solve(mission, &problem, &objectives, &config, refused);
-                    let (_, point, reading) = found.map_err(failed)?;
-                    (point, reading)
-                }
-                Err(messages) => return Err(failed(messages)),
-            },
-        };
-        if let Some(reason) = &point.solution.statistics.contradiction {
-            return Err(fault(reason));
-        }
-        objectives.confirm(mission, &problem, &point, &reading)?;
-        let plan = plan_picture(Seen { mission, problem: &problem, positions }, &point.solution);
-        Ok(Self { solution: point.solution, plan })
+        let planner = Planner::new(mission)?.limits(limits.clone()).concurrent(separation.cloned());
+        let planned = planner.plan().map_err(|messages| Failure::planning(messages, limits))?;
+        let plan = planned.picture(positions);
+        Ok(Self { solution: planned.solution, plan })
     }
 
     fn cost(&self) -> String {

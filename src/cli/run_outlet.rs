@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 use metaplan::answers::{HandledLine, NumberedAnswer};
 use metaplan::live::{Address, Live, Token};
 use metaplan::mapek::{Answer, Beliefs, Loop};
-use metaplan::message::Message;
+use metaplan::message::{Errors, Message};
 use metaplan::recording::{Form, Recorder};
 use metaplan::report::Painter;
 use metaplan::setup::Setup;
@@ -46,7 +46,7 @@ enum Recorded {
 
 impl Outlets {
     /// Who draws the plans of a mission, if anybody can look at them.
-    pub(super) fn painter(&self, setup: &Setup) -> Result<Option<Painter>, Vec<Message>> {
+    pub(super) fn painter(&self, setup: &Setup) -> Result<Option<Painter>, Errors> {
         let positions = self.serve.as_ref().map(|_| setup.positions()).transpose()?;
         Ok(positions.map(|positions| Painter::new(&setup.mission, positions)))
     }

@@ -7,6 +7,7 @@ use metaplan::file::source;
 use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
 use metaplan::message::{Message, did_you_mean};
 use metaplan::mission::{Bindings, Mission, Names};
+use metaplan::planner;
 use metaplan::setup::Setup;
 use ontology::ReadOptions;
 
@@ -195,20 +196,10 @@ pub(super) fn knowledge(
     let mut wrong: Vec<Message> =
         fail.iter().filter_map(|component| knowledge.fail(component).err()).collect();
     wrong.extend(set.iter().filter_map(|(attribute, value)| knowledge.measure(attribute, value).err()));
-    if wrong.is_empty() { Ok(knowledge) } else { Err(Failure { exit: Exit::Usage, messages: wrong }) }
+    if wrong.is_empty() { Ok(knowledge) } else { Err(Failure { exit: Exit::Usage, messages: wrong.into() }) }
 }
 
 /// Nothing is planned on knowledge that contradicts itself.
 pub(super) fn consistent(knowledge: Option<&Knowledge>) -> Result<(), Failure> {
-    let contradictions = knowledge.map(Knowledge::contradictions).unwrap_or_default();
-    if contradictions.is_empty() {
-        return Ok(());
-    }
-    let messages = contradictions.iter().map(|c| {
-        Message::error(
-            "M110",
-            format!("the knowledge is inconsistent: {}: {}", c.violated, c.facts.join(", ")),
-        )
-    });
-    Err(Failure { exit: Exit::Inconsistent, messages: messages.collect() })
+    planner::consistent(knowledge).map_err(|messages| Failure { exit: Exit::Inconsistent, messages })
 }

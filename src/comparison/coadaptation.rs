@@ -1,7 +1,6 @@
 //! A filled problem to places, arcs, configurations and what they cost: the data of the co-adaptation process.
 //!
 //! The PDDL symbols have default names; a manifest's section `[probabilistic]` gives others.
-
 use std::collections::BTreeMap;
 
 use num_bigint::BigInt;
@@ -12,7 +11,7 @@ use pddl::ast::{Atom, Condition, InitialElement, Problem, Term};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use crate::message::Message;
+use crate::message::{Errors, Message};
 use crate::mission::Mission;
 
 /// Which PDDL symbols stand for what; the section `[probabilistic]` of a manifest.
@@ -167,7 +166,7 @@ impl Coadaptation {
     ///
     /// # Errors
     /// Everything that is missing.
-    pub fn new(mission: &Mission, problem: &Problem, roles: &Roles) -> Result<Self, Vec<Message>> {
+    pub fn new(mission: &Mission, problem: &Problem, roles: &Roles) -> Result<Self, Errors> {
         let facts = Facts::new(problem);
         let mut problems = Vec::new();
         let mut need = |what: &str, found: Option<String>| {
@@ -185,7 +184,7 @@ impl Coadaptation {
             need(&roles.suits, None);
         }
         if !problems.is_empty() {
-            return Err(problems);
+            return Err(problems.into());
         }
         let mut places: Vec<String> = vec![start.clone(), goal.clone()];
         let mut designs: Vec<String> = vec![configured.clone()];
@@ -274,7 +273,7 @@ impl Coadaptation {
     ///
     /// # Errors
     /// Everything that is not so.
-    pub(super) fn checked(self) -> Result<Self, Vec<Message>> {
+    pub(super) fn checked(self) -> Result<Self, Errors> {
         let (zero, one) = (BigRational::zero(), BigRational::one());
         let mut problems = Vec::new();
         let mut check = |what: &str, spent: [&BigRational; 2], probabilities: [&BigRational; 2]| {
@@ -310,7 +309,7 @@ impl Coadaptation {
         if let Some(loss) = &self.loss {
             check("the loss of the component", [&zero, &zero], [&loss.rate, &one]);
         }
-        if problems.is_empty() { Ok(self) } else { Err(problems) }
+        if problems.is_empty() { Ok(self) } else { Err(problems.into()) }
     }
 
     /// The same without one component, and what needs it.
@@ -325,14 +324,14 @@ impl Coadaptation {
 }
 
 /// Whether the number of a state has room for so many places and configurations.
-pub(super) fn fits(places: usize, configurations: usize) -> Result<(), Vec<Message>> {
+pub(super) fn fits(places: usize, configurations: usize) -> Result<(), Errors> {
     if places <= PLACES && configurations <= CONFIGURATIONS {
         return Ok(());
     }
     let text = format!(
         "a process has at most {PLACES} places and {CONFIGURATIONS} configurations, not {places} and {configurations}"
     );
-    Err(vec![Message::error("M127", text)])
+    Err(vec![Message::error("M127", text)].into())
 }
 
 /// Numbers in names count as numbers: `l2` before `l10`.
@@ -379,7 +378,7 @@ impl Facts {
     }
 
     /// The arcs with their traversals.
-    fn arcs(&self, roles: &Roles, places: &[String], designs: &[String]) -> Result<Vec<Arc>, Vec<Message>> {
+    fn arcs(&self, roles: &Roles, places: &[String], designs: &[String]) -> Result<Vec<Arc>, Errors> {
         let index =
             |names: &[String], name: &str| names.iter().position(|known| known == name).unwrap_or_default();
         let (place, design) = (|name: &str| index(places, name), |name: &str| index(designs, name));
@@ -407,7 +406,7 @@ impl Facts {
             });
             arc.by[design(name)] = Some(traversal);
         }
-        if problems.is_empty() { Ok(arcs.into_values().collect()) } else { Err(problems) }
+        if problems.is_empty() { Ok(arcs.into_values().collect()) } else { Err(problems.into()) }
     }
 
     fn of(&self, name: &str) -> &[Vec<String>] {

@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use super::map::{Coordinates, Map, Measured, object};
-use crate::message::{Message, did_you_mean};
+use crate::message::{Errors, Message, did_you_mean};
 
 /// Where the mission starts and ends, and what the file does not say.
 #[derive(Debug, Clone)]
@@ -198,7 +198,7 @@ fn rounded(value: f64, digits: usize) -> f64 {
 ///
 /// # Errors
 /// The file is no such map, or has no such places.
-pub fn import_map(file: &str, text: &str, options: &MapOptions) -> Result<Files, Vec<Message>> {
+pub fn import_map(file: &str, text: &str, options: &MapOptions) -> Result<Files, Errors> {
     let map = Map::read(file, text)?;
     let known = map.places();
     let asked =
@@ -220,7 +220,7 @@ pub fn import_map(file: &str, text: &str, options: &MapOptions) -> Result<Files,
         problems.push(Message::error("M124", text));
     }
     if !problems.is_empty() {
-        return Err(problems);
+        return Err(problems.into());
     }
     Ok(Files {
         manifest: manifest(&options.name),

@@ -2,14 +2,13 @@
 //!
 //! A place has `node-id`, `connected-to` and `coords`; in maps of 2017, for Rainbow's first robots, `coord`. Those have no
 //! measurements, and rectangles that the robot should not enter (`unsafe-rects`), which no corridor needs.
-
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Deserializer, de};
 use serde_json::Value;
 use serde_json::value::RawValue;
 
-use crate::message::{Message, did_you_mean};
+use crate::message::{Errors, Message, did_you_mean};
 
 /// A map.
 #[derive(Deserialize)]
@@ -86,7 +85,7 @@ impl<'t> Map<'t> {
     ///
     /// # Errors
     /// It is no JSON of that form, or places are there twice, or lead where there is no place.
-    pub(super) fn read(file: &str, text: &'t str) -> Result<Self, Vec<Message>> {
+    pub(super) fn read(file: &str, text: &'t str) -> Result<Self, Errors> {
         let map: Self = serde_json::from_str(text).map_err(|error| {
             let older = if error.to_string().contains("missing field `coords`") {
                 " (or `coord`, in maps of 2017)"
@@ -102,7 +101,7 @@ impl<'t> Map<'t> {
             ]
         })?;
         let problems = map.problems(file, text);
-        if problems.is_empty() { Ok(map) } else { Err(problems) }
+        if problems.is_empty() { Ok(map) } else { Err(problems.into()) }
     }
 
     /// The names of all places.

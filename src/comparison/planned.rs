@@ -11,7 +11,7 @@ use crate::comparison::nominal::after;
 use crate::comparison::play::{Measures, play};
 use crate::comparison::process::{Action, Risk, State, Valuation};
 use crate::comparison::referee::Referee;
-use crate::message::Message;
+use crate::message::Errors;
 
 /// A plan from a situation, and what it cost to find it.
 #[derive(Debug, Clone, Default)]
@@ -45,7 +45,7 @@ impl Stages {
 }
 
 /// Finds plans; asked once for each situation.
-pub type PlanFinder<'a> = dyn FnMut(&Valuation) -> Result<Planned, Vec<Message>> + 'a;
+pub type PlanFinder<'a> = dyn FnMut(&Valuation) -> Result<Planned, Errors> + 'a;
 
 /// What both sides take.
 #[derive(Debug, Clone, Default)]
@@ -80,7 +80,7 @@ pub enum NoResult {
     /// Of the process.
     Process(Error),
     /// Of the planner.
-    Planner(Vec<Message>),
+    Planner(Errors),
 }
 
 impl From<Error> for NoResult {
@@ -89,8 +89,8 @@ impl From<Error> for NoResult {
     }
 }
 
-impl From<Vec<Message>> for NoResult {
-    fn from(messages: Vec<Message>) -> Self {
+impl From<Errors> for NoResult {
+    fn from(messages: Errors) -> Self {
         Self::Planner(messages)
     }
 }
@@ -104,7 +104,7 @@ pub(super) struct PlanTable<'a, 'b> {
 
 impl PlanTable<'_, '_> {
     /// The plan from a situation.
-    pub(super) fn plan(&mut self, situation: &Valuation) -> Result<Option<Vec<Action>>, Vec<Message>> {
+    pub(super) fn plan(&mut self, situation: &Valuation) -> Result<Option<Vec<Action>>, Errors> {
         let key = Valuation { hit: false, ..*situation };
         if let Some(known) = self.plans.get(&key) {
             return Ok(known.clone());

@@ -17,7 +17,7 @@ use crate::comparison::coadaptation::{
     Arc, Coadaptation, Configuration, Facts, Loss, Roles, Switch, Traversal, components, fits,
 };
 use crate::comparison::process::{Action, Valuation};
-use crate::message::Message;
+use crate::message::{Errors, Message};
 use crate::mission::{Mission, Planning as _};
 
 /// States of the task beyond which it does not become a process.
@@ -42,11 +42,11 @@ impl Tasked {
     ///
     /// # Errors
     /// What the planner does not handle, or too many states.
-    pub fn new(mission: &Mission, problem: &Problem, roles: &Roles) -> Result<Self, Vec<Message>> {
+    pub fn new(mission: &Mission, problem: &Problem, roles: &Roles) -> Result<Self, Errors> {
         let timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
         if timed {
             let text = "timed initial literals have no place in a decision process";
-            return Err(vec![Message::error("M127", text)]);
+            return Err(vec![Message::error("M127", text)].into());
         }
         let task = mission.ground(problem, &[], &Limits::none())?;
         let view = mission.knowledge().map(crate::knowledge::Knowledge::view);
@@ -78,7 +78,7 @@ impl Tasked {
     ///
     /// # Errors
     /// The mission with the component lost does not fit its domain.
-    pub fn problem(&self, mission: &Mission, situation: &Valuation) -> Result<Problem, Vec<Message>> {
+    pub fn problem(&self, mission: &Mission, situation: &Valuation) -> Result<Problem, Errors> {
         let mut way = Vec::new();
         let mut place = situation.place;
         while let Some((before, act)) = &self.origins[place] {
@@ -88,7 +88,7 @@ impl Tasked {
         let (mut current, _) = mission.filled()?;
         let mut changed = mission.clone();
         if let Some(loss) = self.coadaptation.loss.as_ref().filter(|_| situation.lost) {
-            changed.fail(&loss.component).map_err(|message| vec![message])?;
+            changed.fail(&loss.component)?;
         }
         let (mut left, _) = changed.filled()?;
         for (action, arguments) in way.into_iter().rev() {
@@ -148,7 +148,7 @@ struct Explorer<'a> {
 }
 
 impl Explorer<'_> {
-    fn explore(&mut self) -> Result<(), Vec<Message>> {
+    fn explore(&mut self) -> Result<(), Errors> {
         let start = self.places[0].clone();
         self.numbers.insert(start, 0);
         let mut at = 0;
@@ -156,7 +156,7 @@ impl Explorer<'_> {
             if self.places.len() > STATES {
                 let text =
                     format!("the task has more than {STATES} states, too many for a process of its states");
-                return Err(vec![Message::error("M127", text)]);
+                return Err(vec![Message::error("M127", text)].into());
             }
             let state = self.places[at].clone();
             self.moves.push(HashMap::new());
@@ -228,7 +228,7 @@ impl Explorer<'_> {
             .unwrap_or_else(|| (0..self.places.len()).map(|number| format!("s{number}")).collect())
     }
 
-    fn finish(mut self, components: impl Fn(&String) -> Vec<String>) -> Result<Tasked, Vec<Message>> {
+    fn finish(mut self, components: impl Fn(&String) -> Vec<String>) -> Result<Tasked, Errors> {
         let goals: Vec<bool> = self.places.iter().map(|place| self.task.reaches_goal(place)).collect();
         // All states of the goal become one place, the last one.
         let goal = self.places.len();

@@ -9,7 +9,7 @@ use rules::Literal;
 
 use crate::configure::choice::{Choice, Configuration, Wishes, Worth, choose};
 use crate::knowledge::Knowledge;
-use crate::message::{Message, did_you_mean};
+use crate::message::{Errors, Message, did_you_mean};
 
 /// What follows from what was heard is to be found in so many steps; see [`rules::Limits`].
 const STEPS: u64 = 100_000_000;
@@ -49,7 +49,7 @@ impl Configurator {
     ///
     /// # Errors
     /// All attribute types and components of the wishes that are not in the knowledge base.
-    pub fn new(mut knowledge: Knowledge, wishes: Wishes) -> Result<Self, Vec<Message>> {
+    pub fn new(mut knowledge: Knowledge, wishes: Wishes) -> Result<Self, Errors> {
         knowledge.limit(STEPS);
         let view = knowledge.view();
         let attributes: Vec<String> = view.attribute_types().into_iter().map(|kind| kind.name).collect();
@@ -68,7 +68,11 @@ impl Configurator {
         }
         wishes.budgets.iter().for_each(|(name, _)| check("quality attribute type", name, &attributes));
         wishes.exclusive.iter().for_each(|name| check("component", name, &components));
-        if wrong.is_empty() { Ok(Self { knowledge, wishes, pending: BTreeSet::new() }) } else { Err(wrong) }
+        if wrong.is_empty() {
+            Ok(Self { knowledge, wishes, pending: BTreeSet::new() })
+        } else {
+            Err(wrong.into())
+        }
     }
 
     /// What is known.

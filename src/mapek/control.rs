@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use serde_json::Value;
+use tracing::info_span;
 
 use crate::knowledge::Knowledge;
 use crate::mapek::adapt::Adapting;
@@ -21,7 +22,7 @@ use crate::mapek::record::{self, Decision, Snapshot};
 use crate::mapek::settings::Settings;
 use crate::mapek::step::PlannedStep;
 use crate::mapek::watch::Watch;
-use crate::message::Message;
+use crate::message::{Errors, Message};
 use crate::mission::Mission;
 
 /// What follows from an observation is to be found in so many steps; see [`rules::Limits`]. A robot waits meanwhile.
@@ -46,13 +47,13 @@ impl Loop {
     /// # Errors
     /// The mission cannot be planned for: what the knowledge base contributes does not fit the domain, or the knowledge
     /// contradicts itself.
-    pub fn new(mission: Mission, settings: Settings) -> Result<Self, Vec<Message>> {
+    pub fn new(mission: Mission, settings: Settings) -> Result<Self, Errors> {
         mission.filled()?;
         let contradictions = mission.knowledge().map(Knowledge::contradictions).unwrap_or_default();
         if let Some(first) = contradictions.first() {
             let text =
                 format!("the knowledge is inconsistent: {}: {}", first.violated, first.facts.join(", "));
-            return Err(vec![Message::error("M110", text)]);
+            return Err(vec![Message::error("M110", text)].into());
         }
         let monitor = Monitor::new(&mission);
         let digest = digest(&mission, &settings);
@@ -94,6 +95,7 @@ impl Loop {
 
     /// Takes an observation over, at a time since the start of the mission that never goes back, and says what follows.
     pub fn handle(&mut self, observation: &Observation, now: Duration) -> Vec<Answer> {
+        let _span = info_span!("handle", line = self.beliefs.lines + 1).entered();
         let mut answers = Vec::new();
         // Plans that nobody has asked for are of no use to anybody.
         self.planner.made.clear();

@@ -80,7 +80,7 @@ pub(super) fn from_scratch(ask: &Ask<'_>, limits: Limits, watch: &Watch) -> Outc
             return none(false, texts.join("; "));
         }
     };
-    let config = Config { limits, ..Config::default() };
+    let config = Config::default().with_limits(limits);
     let mut report = |better: encodings::Improvement| {
         watch.improve(Some(number::of_plan(&better.cost)), number::of_plan(&better.lower_bound));
     };

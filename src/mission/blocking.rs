@@ -7,6 +7,8 @@
 //!
 //! [1] J. Marques-Silva, I. Lynce: On improving MUS extraction algorithms, SAT 2011.
 
+use std::fmt;
+
 use encodings::{Config, Status, optimize};
 use pddl::ast::Problem;
 
@@ -24,10 +26,29 @@ pub enum Blocking {
     Other,
 }
 
+/// In a sentence.
+impl fmt::Display for Blocking {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Designs(designs) => write!(
+                f,
+                "it is for designs that are not available: there is no plan without {}; with any one of them, and all \
+                 others, there would be",
+                designs.join(", ")
+            ),
+            Self::Other => {
+                f.write_str("it is not for designs: with all of them available there would be none either")
+            }
+        }
+    }
+}
+
 /// Why there is no plan for a problem that [`Mission::filled`] has made and that is proved to have none. None if the mission has
 /// no knowledge base, or if a limit was reached before the reason was known.
 pub fn blocking(mission: &Mission, problem: &Problem, config: &Config) -> Option<Blocking> {
-    let config = &Config { horizon: None, ..config.clone() };
+    let mut config = config.clone();
+    config.horizon = None;
+    let config = &config;
     let designs = mission.knowledge()?.view().function_designs();
     let missing: Vec<String> =
         designs.into_iter().filter(|design| !design.available).map(|design| design.individual.name).collect();

@@ -38,7 +38,7 @@ mod tests {
     use pddl::Source;
 
     use super::lean;
-    use crate::message::Message;
+
     use crate::mission::{Bindings, Mission, Reading};
 
     const DOMAIN: &str = "(define (domain d) (:requirements :durative-actions) (:predicates (done ?x))
@@ -47,8 +47,7 @@ mod tests {
     /// What is left of work on these objects, side by side, where a and b have to be done.
     fn check(problem: &str, cost: i64, work: &[&str], expected: &[&str]) {
         let (domain, problem) = (Ok(Source::new("d", DOMAIN)), Ok(Source::new("p", problem)));
-        let mission: Result<Mission, Vec<Message>> =
-            Mission::new("", None, Bindings::default(), domain, problem);
+        let mission = Mission::new("", None, Bindings::default(), domain, problem);
         let mission = mission.expect("a mission");
         let number = |value: i64| Exact::from(BigRational::from_integer(value.into()));
         let step = |object: &&str| Step {

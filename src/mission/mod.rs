@@ -9,8 +9,6 @@ mod lean;
 mod planning;
 mod plansys2;
 mod sections;
-mod times;
-mod verdict;
 
 pub use ::mission::{Bindings, CoAdaptation, Mission, Names};
 pub use blocking::{Blocking, blocking};
@@ -19,7 +17,5 @@ pub use confirm::{Reading, confirm};
 pub use lean::lean;
 pub use planning::Planning;
 pub(crate) use planning::{ground_with, replanner};
-pub use plansys2::{PlanLine, decimal, instant, plan_lines, popf_text, spaced};
+pub use plansys2::{PlanLine, instant, plan_lines, popf_text, spaced};
 pub use sections::{BindingsSection, KnowledgeSection, PlanningSection, Scenario};
-pub use times::times;
-pub use verdict::{blocking_text, verdict};

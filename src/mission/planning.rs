@@ -1,5 +1,4 @@
 //! A mission to a ground task, and its plans as the domain's file writes them.
-
 use encodings::{Concurrent, ExactTask, GroundConfig, Limits, Plan, Replanner, Task};
 use num_rational::BigRational;
 use pddl::ast::{Domain, Metric, Name, Problem};
@@ -7,7 +6,7 @@ use pddl::{Diagnostic, Severity};
 
 use ::mission::Mission;
 
-use crate::message::Message;
+use crate::message::{Errors, Message};
 
 /// Planning for a mission.
 pub trait Planning {
@@ -16,8 +15,7 @@ pub trait Planning {
     ///
     /// # Errors
     /// Everything that the planner does not handle, or that a limit was reached.
-    fn ground(&self, problem: &Problem, objectives: &[Metric], limits: &Limits)
-    -> Result<Task, Vec<Message>>;
+    fn ground(&self, problem: &Problem, objectives: &[Metric], limits: &Limits) -> Result<Task, Errors>;
 
     /// As [`Planning::ground`], whatever the size of the numbers: for plans that are searched for in exact rationals.
     ///
@@ -28,7 +26,7 @@ pub trait Planning {
         problem: &Problem,
         objectives: &[Metric],
         limits: &Limits,
-    ) -> Result<ExactTask, Vec<Message>>;
+    ) -> Result<ExactTask, Errors>;
 
     /// Grounds a filled problem for plans whose actions overlap; those that interfere are to lie `separation` apart, in the
     /// domain's time unit.
@@ -41,7 +39,7 @@ pub trait Planning {
         objectives: &[Metric],
         separation: &BigRational,
         limits: &Limits,
-    ) -> Result<Concurrent, Vec<Message>>;
+    ) -> Result<Concurrent, Errors>;
 
     /// The plan with the arguments that the domain's file gives its actions: without the designs that the knowledge base has
     /// added to a plain domain. The configuration of each step has them.
@@ -50,12 +48,7 @@ pub trait Planning {
 }
 
 impl Planning for Mission {
-    fn ground(
-        &self,
-        problem: &Problem,
-        objectives: &[Metric],
-        limits: &Limits,
-    ) -> Result<Task, Vec<Message>> {
+    fn ground(&self, problem: &Problem, objectives: &[Metric], limits: &Limits) -> Result<Task, Errors> {
         ground_with(self, self.domain(), problem, objectives, limits)
     }
 
@@ -64,7 +57,7 @@ impl Planning for Mission {
         problem: &Problem,
         objectives: &[Metric],
         limits: &Limits,
-    ) -> Result<ExactTask, Vec<Message>> {
+    ) -> Result<ExactTask, Errors> {
         encodings::ground_exact(self.domain(), problem, &config(self, objectives, limits))
             .map_err(|errors| messages(self, &errors))
     }
@@ -75,7 +68,7 @@ impl Planning for Mission {
         objectives: &[Metric],
         separation: &BigRational,
         limits: &Limits,
-    ) -> Result<Concurrent, Vec<Message>> {
+    ) -> Result<Concurrent, Errors> {
         encodings::ground_concurrent(self.domain(), problem, &config(self, objectives, limits), separation)
             .map_err(|errors| messages(self, &errors))
     }
@@ -100,7 +93,7 @@ pub(crate) fn ground_with(
     problem: &Problem,
     objectives: &[Metric],
     limits: &Limits,
-) -> Result<Task, Vec<Message>> {
+) -> Result<Task, Errors> {
     encodings::ground(domain, problem, &config(mission, objectives, limits))
         .map_err(|errors| messages(mission, &errors))
 }
@@ -117,11 +110,14 @@ pub(crate) fn replanner(mission: &Mission, problem: &Problem, limits: &Limits) -
 }
 
 fn config(mission: &Mission, objectives: &[Metric], limits: &Limits) -> GroundConfig {
-    GroundConfig { solves: mission.solves(), objectives: objectives.to_vec(), limits: limits.clone() }
+    GroundConfig::default()
+        .with_solves(mission.solves())
+        .with_objectives(objectives.to_vec())
+        .with_limits(limits.clone())
 }
 
 /// Errors of grounding and encoding, with the source lines that they are about.
-fn messages(mission: &Mission, errors: &[encodings::Error]) -> Vec<Message> {
+fn messages(mission: &Mission, errors: &[encodings::Error]) -> Errors {
     let (domain, problem) = (mission.domain_source(), mission.problem_source());
     let message = |error: &encodings::Error| match error.place() {
         Some(place) => {

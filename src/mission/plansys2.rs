@@ -11,7 +11,6 @@ use num_rational::BigRational;
 use pddl::ast::Problem;
 
 use crate::mission::confirm::{Reading, verdict_of};
-use crate::mission::times::times;
 
 /// An action of a plan for PlanSys2.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -47,9 +46,9 @@ pub fn spaced(mission: &Mission, problem: &Problem, plan: Plan, reading: &Readin
 /// The lines of a plan, whose arguments are as the domain's file writes them.
 pub fn plan_lines(plan: &Plan) -> Vec<PlanLine> {
     let line = |step: &Step| {
-        let (start, duration) = times(step);
+        let (start, duration) = step.times();
         let duration = if duration.is_zero() { instant().into() } else { duration };
-        PlanLine { start, action: call(step), duration }
+        PlanLine { start, action: step.call(), duration }
     };
     plan.steps.iter().map(line).collect()
 }
@@ -64,29 +63,14 @@ pub fn instant() -> BigRational {
     BigRational::new(1.into(), 1000.into())
 }
 
-fn call(step: &Step) -> String {
-    let words: Vec<&str> = std::iter::once(&step.action).chain(&step.arguments).map(String::as_str).collect();
-    format!("({})", words.join(" "))
-}
-
 /// The lines as POPF writes them, and as PlanSys2's plugin for POPF reads them.
 pub fn popf_text(lines: &[PlanLine]) -> String {
     let mut text = "Solution Found\n".to_owned();
     for line in lines {
-        let (start, duration) = (decimal(&line.start), decimal(&line.duration));
+        let (start, duration) = (line.start.as_time(), line.duration.as_time());
         let _ = writeln!(text, "{start}: {}  [{duration}]", line.action);
     }
     text
-}
-
-/// A time with three decimals, or as many more as it has: an action must not start before what it waits for.
-pub fn decimal(time: &Exact) -> String {
-    let text = time.to_string();
-    match text.split_once('.') {
-        _ if text.contains('/') => format!("{:.9}", time.to_f64()),
-        Some((_, decimals)) => text.clone() + &"0".repeat(3_usize.saturating_sub(decimals.len())),
-        None => text + ".000",
-    }
 }
 
 #[cfg(test)]
@@ -97,19 +81,6 @@ mod tests {
 
     fn exact(numerator: i64, denominator: i64) -> Exact {
         BigRational::new(BigInt::from(numerator), BigInt::from(denominator)).into()
-    }
-
-    #[test]
-    fn times_are_not_rounded() {
-        for (numerator, denominator, expected) in [
-            (5, 1, "5.000"),
-            (5, 2, "2.500"),
-            (1, 8, "0.125"),
-            (100_001, 10_000, "10.0001"),
-            (1, 3, "0.333333333"),
-        ] {
-            assert_eq!(decimal(&exact(numerator, denominator)), expected);
-        }
     }
 
     /// Lines of steps `(name, start, duration)`, in thousandths, for a problem with this in `:init`.

@@ -14,7 +14,7 @@ use toml::Spanned;
 
 use crate::knowledge::{COADAPTATION, Sources, TOMASYS};
 use crate::manifest::ManifestPath;
-use crate::message::Message;
+use crate::message::{Errors, Message};
 
 /// The section `knowledge` of a manifest; paths are relative to the manifest.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -78,7 +78,7 @@ impl BindingsSection {
     ///
     /// # Errors
     /// All queries that are malformed.
-    pub fn bindings(&self, origin: &ManifestPath) -> Result<Bindings, Vec<Message>> {
+    pub fn bindings(&self, origin: &ManifestPath) -> Result<Bindings, Errors> {
         let mut names = Names::default();
         for (individual, object) in &self.names {
             let place = (origin.file().to_owned(), Some(origin.place(individual.span().start)));
@@ -92,7 +92,7 @@ impl BindingsSection {
         let symbols = self.symbols.iter().map(|(symbol, query)| (symbol.clone(), query.get_ref().clone()));
         match Bindings::with(&symbols.collect()) {
             Ok(bindings) if wrong.is_empty() => Ok(bindings.naming(names)),
-            _ => Err(wrong),
+            _ => Err(wrong.into()),
         }
     }
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use encodings::{Exact, Plan, Solution, Status, Step};
 use picture::Axis;
 
-use crate::mission::{Mission, times, verdict};
+use crate::mission::Mission;
 use crate::report::designs::designs;
 use crate::report::map::map;
 use crate::report::numbers::curves;
@@ -43,8 +43,7 @@ fn sentence(solution: &Solution) -> String {
     let cost = solution.plan.as_ref().map(|plan| format!("Cost {}", plan.cost));
     let bound = solution.lower_bound.as_ref().filter(|_| solution.status != Status::Optimal);
     let bound = bound.filter(|_| cost.is_some()).map(|bound| format!(", lower bound {bound}"));
-    let said = verdict(solution);
-    let said = said.trim_end();
+    let said = solution.verdict();
     match cost {
         Some(cost) => format!("{cost}{}: {said}.", bound.unwrap_or_default()),
         None => format!("No plan is shown: {said}."),
@@ -70,7 +69,7 @@ fn steps(known: &Designs, plan: &Plan, axis: Axis) -> Vec<picture::Step> {
         });
         let reconfigured = changed.collect();
         before.extend(configuration.iter().cloned());
-        let (start, duration) = times(step);
+        let (start, duration) = step.times();
         let (from, to) = match axis {
             Axis::Steps => (index as f64, index as f64 + 1.0),
             Axis::Time => (step.start.to_f64(), step.start.to_f64() + step.duration.to_f64()),

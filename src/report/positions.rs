@@ -10,7 +10,7 @@ use serde::Deserialize;
 
 use crate::file::source;
 use crate::manifest::ManifestPath;
-use crate::message::Message;
+use crate::message::{Errors, Message};
 
 /// The section `report`.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
@@ -47,7 +47,7 @@ impl ReportSection {
     ///
     /// # Errors
     /// The file cannot be read, or has lines that are no positions: all of them.
-    pub fn positions(&self, origin: &ManifestPath) -> Result<Positions, Vec<Message>> {
+    pub fn positions(&self, origin: &ManifestPath) -> Result<Positions, Errors> {
         match &self.positions {
             None => Ok(Positions::Unknown),
             Some(Written::Functions(functions)) => Ok(Positions::Functions(functions.clone())),
@@ -86,8 +86,8 @@ fn values(problem: &Problem, function: &str) -> BTreeMap<Name, f64> {
 }
 
 /// Reads lines `place,x,y`; a first line without numbers is a heading.
-fn read(file: &Path) -> Result<BTreeMap<Name, (f64, f64)>, Vec<Message>> {
-    let source = source(file).map_err(|message| vec![message])?;
+fn read(file: &Path) -> Result<BTreeMap<Name, (f64, f64)>, Errors> {
+    let source = source(file)?;
     let mut reader = csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
@@ -120,5 +120,5 @@ fn read(file: &Path) -> Result<BTreeMap<Name, (f64, f64)>, Vec<Message>> {
             }
         }
     }
-    if wrong.is_empty() { Ok(positions) } else { Err(wrong) }
+    if wrong.is_empty() { Ok(positions) } else { Err(wrong.into()) }
 }

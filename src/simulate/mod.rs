@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
 use crate::mapek::{Answer, Command, Event, Loop, Observation, Settings};
-use crate::message::Message;
+use crate::message::{Errors, Message};
 use crate::mission::Mission;
 
 pub use baseline::Strategy;
@@ -41,9 +41,9 @@ pub fn simulate(
     strategy: Strategy,
     seed: u64,
     log: &mut dyn FnMut(&Observation, &[Answer]),
-) -> Result<Run, Vec<Message>> {
+) -> Result<Run, Errors> {
     if let Some(mistake) = settings.mistake() {
-        return Err(vec![Message::error("M135", format!("the simulation cannot be run: {mistake}"))]);
+        return Err(vec![Message::error("M135", format!("the simulation cannot be run: {mistake}"))].into());
     }
     let control = Loop::new(mission.clone(), control.clone())?;
     let mut stage = Stage {
@@ -54,7 +54,7 @@ pub fn simulate(
         upset: None,
         run: Run { strategy, seed, ..Run::default() },
     };
-    stage.play(settings, log).map_err(|message| vec![message])?;
+    stage.play(settings, log)?;
     Ok(stage.finish())
 }
 

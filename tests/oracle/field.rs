@@ -416,7 +416,7 @@ fn n3_doublings() {
     let (mission, problem) = read(&domain, problem).expect("it is read");
     let limits = Limits::none().with_time(Duration::from_secs(20));
     if let Ok(task) = mission.ground(&problem, &[], &limits) {
-        let config = Config { horizon: Some(75), limits, ..Config::default() };
+        let config = Config::default().with_horizon(75).with_limits(limits);
         let solution = encodings::optimize(&task, &config, &mut |_| {});
         assert!(!matches!(solution.status, Status::UnsolvableWithinHorizon | Status::Unsolvable));
     }

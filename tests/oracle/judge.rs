@@ -9,8 +9,8 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use encodings::{Config, Exact, Limits, Plan, Solution, Status, Unbounded};
+use metaplan::Errors;
 use metaplan::measure::measure;
-use metaplan::message::Message;
 use metaplan::mission::{Bindings, Mission, Planning as _};
 use num_rational::BigRational;
 use num_traits::Zero as _;
@@ -176,7 +176,7 @@ pub fn project_verdict(mission: &Mission, problem: &Problem, steps: &[Step], mod
 }
 
 /// Domain and problem as the program reads them.
-pub fn read(domain: &str, problem: &str) -> Result<(Mission, Problem), Vec<Message>> {
+pub fn read(domain: &str, problem: &str) -> Result<(Mission, Problem), Errors> {
     let source = |name: &str, text: &str| Ok(Source::new(name, text.to_owned()));
     let (domain, problem) = (source("domain.pddl", domain), source("problem.pddl", problem));
     let mission = Mission::new("", None, Bindings::default(), domain, problem)?;
@@ -191,7 +191,7 @@ fn head_start(name: &str) -> usize {
 }
 
 fn plan(mission: &Mission, problem: &Problem, Case { mode, name, .. }: &Case, limits: &Limits) -> Answer {
-    let refused = |messages: Vec<Message>| {
+    let refused = |messages: Errors| {
         let mut codes: Vec<_> = messages.iter().map(|message| message.code.clone()).collect();
         codes.dedup();
         Answer::Refused(codes.join("+"))
@@ -203,7 +203,7 @@ fn plan(mission: &Mission, problem: &Problem, Case { mode, name, .. }: &Case, li
                 match mission.ground_exact(problem, &[], limits) {
                     Err(messages) => refused(messages),
                     Ok(task) => {
-                        let config = Config { limits: limits.clone(), ..Config::default() };
+                        let config = Config::default().with_limits(limits.clone());
                         let solution = encodings::optimize_exact(&task, &config);
                         let (timed, task) = (task.is_timed(), Some(Planned::Exact(Box::new(task))));
                         Answer::Solved(Box::new(Solved { solution, timed, task }))
@@ -213,7 +213,7 @@ fn plan(mission: &Mission, problem: &Problem, Case { mode, name, .. }: &Case, li
             Err(messages) => refused(messages),
             Ok(task) => {
                 let (head_start, limits) = (head_start(name), limits.clone());
-                let config = Config { limits, head_start, ..Config::default() };
+                let config = Config::default().with_limits(limits).with_head_start(head_start);
                 let point = encodings::lexicographic(&task, &config, &mut |_| {});
                 let timed = task.is_timed();
                 let task = Some(Planned::Integers(Box::new(task)));

@@ -36,6 +36,7 @@ mod run;
 mod schemas;
 mod shell;
 mod simulate;
+mod trace;
 mod ugv;
 mod uuv;
 mod validate;

@@ -12,9 +12,8 @@ use crate::manifest::{DOMAIN, PROBLEM};
 /// The first thing that is wrong with them.
 pub fn read_pddl(domain: &str, problem: &str) -> Result<(Domain, Problem), String> {
     let read = pddl::read(&Source::new(DOMAIN, domain), &Source::new(PROBLEM, problem));
-    let first = |found: Vec<pddl::Diagnostic>| {
-        found.first().map_or_else(String::new, |diagnostic| diagnostic.message.clone())
-    };
+    let first =
+        |found: pddl::Errors| found.first().map_or_else(String::new, |diagnostic| diagnostic.message.clone());
     read.map(|(domain, problem, _)| (domain, problem)).map_err(first)
 }
 

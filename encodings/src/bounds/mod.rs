@@ -20,6 +20,7 @@ use partition::Partition;
 use resources::Resource;
 
 use smallvec::SmallVec;
+use tracing::info_span;
 
 use crate::context::Context;
 use crate::limits::Interrupted;
@@ -55,6 +56,7 @@ pub(crate) struct Window {
 
 impl Bounds {
     pub(crate) fn new(context: Context<'_>) -> Result<Self, Interrupted> {
+        let _span = info_span!("bounds").entered();
         let mut bounds = Self::of_projections(context)?;
         bounds.projections.append(&mut bounds.further);
         bounds.partitions = partition::partitions(context, &bounds.projections)?;

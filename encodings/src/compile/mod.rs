@@ -17,10 +17,9 @@ mod judge;
 mod monitor;
 mod regress;
 mod terms;
-
 use std::borrow::Cow;
 
-use crate::error::{Error, File};
+use crate::error::{Errors, File};
 use pddl::ast::{Constraint, Domain, Expression, InitialElement, Metric, Name, Problem, Term};
 
 use additions::unsupported;
@@ -53,7 +52,7 @@ pub(crate) fn compile<'t>(
     domain: &'t Domain,
     problem: &'t Problem,
     objectives: &'t [Metric],
-) -> Result<Compiled<'t>, Vec<Error>> {
+) -> Result<Compiled<'t>, Errors> {
     if !is_needed(domain, problem) {
         let (domain, problem) = (Cow::Borrowed(domain), Cow::Borrowed(problem));
         return Ok(Compiled { domain, problem, objectives: Cow::Borrowed(objectives) });
@@ -82,7 +81,7 @@ pub(crate) fn compile<'t>(
         ));
     }
     if !errors.is_empty() {
-        return Err(errors);
+        return Err(errors.into());
     }
     let mut task = (domain.clone(), problem.clone());
     (task.0.constraints, task.1.constraints) = (Vec::new(), Vec::new());

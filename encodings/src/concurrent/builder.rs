@@ -9,7 +9,7 @@ use crate::concurrent::split::{Half, Split};
 use crate::concurrent::timer::TIMER;
 use crate::concurrent::unit::{Divisors, Unit};
 use crate::context::Context;
-use crate::error::Error;
+use crate::error::{Error, Errors};
 use crate::ground::evaluate::reads::Reads;
 use crate::ground::vocabulary::atom::{AtomId, Binding};
 use crate::ground::vocabulary::reached::Reached;
@@ -81,12 +81,12 @@ impl<'a> Builder<'a> {
     }
 
     /// Pairs the halves of instances, and collects what operators write.
-    pub(super) fn collect(&mut self, context: Context<'_>) -> Result<(), Vec<Error>> {
+    pub(super) fn collect(&mut self, context: Context<'_>) -> Result<(), Errors> {
         let Context { task, limits } = context;
         let mut errors = Vec::new();
         let mut refused = FxHashSet::default();
         for item in limits.watch(task.operators.iter().zip((0..).map(OperatorId))) {
-            let (operator, id) = item.map_err(|interrupted| vec![interrupted.into()])?;
+            let (operator, id) = item?;
             let origin = self.split.origins[operator.schema as usize];
             let schema = &self.split.lifted.schemas[operator.schema as usize];
             let arguments: Vec<ObjectId> = operator.arguments.iter().copied().filter_map(object).collect();
@@ -135,7 +135,7 @@ impl<'a> Builder<'a> {
                 _ => halves.over_all = Some(id),
             }
         }
-        if errors.is_empty() { Ok(()) } else { Err(errors) }
+        if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
     }
 
     /// The instances that can be executed, and which operators are their starts and ends.

@@ -1,5 +1,6 @@
 //! The split ground task to happenings: what pairs a start with its end, what each waits for, and integers for all times.
 
+use crate::error::Errors;
 use rustc_hash::FxHashSet;
 
 use crate::concurrent::builder::Builder;
@@ -10,7 +11,6 @@ use crate::concurrent::measure::Measure;
 use crate::concurrent::split::{Half, Split};
 use crate::concurrent::unit::{LIMIT as TIME_LIMIT, Unit};
 use crate::context::Context;
-use crate::error::Error;
 use crate::ground::vocabulary::reached::Reached;
 use crate::lifted::Rational;
 use crate::limits::{Interrupted, Limits};
@@ -43,7 +43,7 @@ pub(super) fn compile(
     separation: &Rational,
     time_weight: Rational,
     limits: &Limits,
-) -> Result<Concurrent, Vec<Error>> {
+) -> Result<Concurrent, Errors> {
     let one = |error| vec![error];
     // Operators are watched as they are collected, each as a whole.
     let unlimited = Limits::none();
@@ -75,15 +75,13 @@ pub(super) fn compile(
     task.time_scale = unit.0;
     drop_links(&mut task, &instances);
     let compressible = compressible(&task, &happenings, &instances, limits);
-    for (own, compressible) in
-        instances.iter_mut().zip(compressible.map_err(|interrupted| vec![interrupted.into()])?)
-    {
+    for (own, compressible) in instances.iter_mut().zip(compressible?) {
         own.compressible = compressible;
     }
     let guards = vec![None; keys];
     let mut concurrent =
         Concurrent { task, happenings, instances, events, guards, measure, is_exact, separation };
-    concurrent.guard(limits).map_err(|interrupted| vec![interrupted.into()])?;
+    concurrent.guard(limits)?;
     Ok(concurrent)
 }
 

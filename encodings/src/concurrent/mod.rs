@@ -33,10 +33,11 @@ use std::time::Instant;
 
 use num_rational::BigRational;
 use num_traits::Signed;
+use tracing::info_span;
 
 use crate::bounds::Bounds;
 use crate::context::Context;
-use crate::error::{Error, File, Place};
+use crate::error::{Error, Errors, File, Place};
 use crate::ground::{Config as GroundConfig, Generality, ground_lifted};
 use crate::lifted::{Expression, Lifted, Metric, Rational};
 use crate::limits::Limits;
@@ -63,10 +64,10 @@ pub fn ground_concurrent(
     problem: &Problem,
     config: &GroundConfig,
     separation: &BigRational,
-) -> Result<Concurrent, Vec<Error>> {
+) -> Result<Concurrent, Errors> {
     let overflow = || vec![Error::overflow("the separation")];
     if !separation.is_positive() {
-        return Err(overflow());
+        return Err(overflow().into());
     }
     let separation = Rational::from_big(separation.clone());
     if let Some(place) = first_constraint(domain, problem) {
@@ -74,7 +75,8 @@ pub fn ground_concurrent(
             construct: "a preference, or a constraint on trajectories, where actions overlap".into(),
             instead: "plan without `--concurrent`: states are in one order only where actions are".into(),
             place,
-        }]);
+        }]
+        .into());
     }
     let lifted = || normalize(domain, problem, &config.objectives);
     match ground_normal(domain, lifted()?, config, &separation) {
@@ -93,7 +95,7 @@ fn ground_normal(
     mut lifted: Lifted,
     config: &GroundConfig,
     separation: &Rational,
-) -> Result<Concurrent, Vec<Error>> {
+) -> Result<Concurrent, Errors> {
     let place = Place { file: File::Problem, span: Span::default() };
     let number = |number| Expression::Number(Rational::from_integer(number));
     let (weight, metric) = match lifted.metrics.first() {
@@ -116,6 +118,7 @@ fn ground_normal(
     let (lifted, designs) = (&split.lifted, &split.designs);
     let generality = Generality { measures_ends: true, measures_rewards: true, ..Generality::default() };
     let (task, reached) = ground_lifted(lifted, designs, &none, &generality, &config.limits)?;
+    let _span = info_span!("happenings", operators = task.operators.len()).entered();
     compile::compile(task, &split, &reached, separation, weight, &config.limits)
 }
 
@@ -210,7 +213,8 @@ pub fn optimize_concurrent(
             horizon: sequence.happenings.len(),
         });
     };
-    let (ended, incumbent) = take_turns(concurrent, bounds.as_ref(), limits, &mut hear);
+    let span = info_span!("optimize", operators = task.operators.len());
+    let (ended, incumbent) = span.in_scope(|| take_turns(concurrent, bounds.as_ref(), limits, &mut hear));
     let plan = incumbent.as_ref().map(|sequence| in_names(concurrent, sequence));
     let (status, lower) = match (&ended, &incumbent) {
         (Ended::Exhausted, Some(incumbent)) => (Status::Optimal, Some(incumbent.value.0)),

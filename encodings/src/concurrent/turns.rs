@@ -2,6 +2,8 @@
 //!
 //! Small tasks are proved before the greedy search begins. Where it does begin, its plans are the incumbents of both.
 
+use tracing::info_span;
+
 use crate::bounds::Bounds;
 use crate::concurrent::compile::Concurrent;
 use crate::concurrent::estimate::Estimate;
@@ -30,7 +32,7 @@ pub(super) fn take_turns(
     let expansion = Expansion::new(concurrent);
     let mut exact = Search::new(concurrent, &expansion, &estimate, bounds);
     let root = exact.lower();
-    let mut ended = exact.run(limits, SOON, report);
+    let mut ended = info_span!("search").in_scope(|| exact.run(limits, SOON, report));
     if exact.is_over() || limits.reached() {
         return (claimed(ended, concurrent, root), exact.incumbent);
     }
@@ -43,6 +45,7 @@ pub(super) fn take_turns(
     let mut share = 1_usize;
     while !(exact.is_over() || limits.reached() || (greedy.is_none() && exact.is_full(limits))) {
         while let Some(own) = &mut greedy {
+            let _span = info_span!("greedy").entered();
             match own.run(&mut exact.incumbent, limits, GREEDY.saturating_mul(share)) {
                 Outcome::Found => {
                     let lower = exact.lower();
@@ -53,6 +56,7 @@ pub(super) fn take_turns(
                 Outcome::Stopped => break,
             }
         }
+        let _span = info_span!("search").entered();
         ended = exact.run(limits, EXACT.saturating_mul(share), report);
         share = share.saturating_mul(2);
     }

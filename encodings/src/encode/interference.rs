@@ -16,6 +16,7 @@
 //! \[2\] J. Rintanen, K. Heljanko, I. Niemelä: Planning as satisfiability: parallel plans and algorithms for plan search,
 //! Artificial Intelligence 170(12-13), 2006.
 
+use crate::words::words;
 use std::collections::BTreeMap;
 
 use crate::bounds::Projection;
@@ -28,6 +29,7 @@ use crate::task::{Condition, OperatorId, Task, VariableId};
 
 /// How many operators can stand at one step of a formula.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Semantics {
     /// One.
     Sequential,
@@ -35,6 +37,10 @@ pub enum Semantics {
     ForAllStep,
     /// Several that can be executed in the order of the ground task.
     ExistsStep,
+}
+
+words! {
+    Semantics, "semantics": Sequential = "sequential", ForAllStep = "for-all-step", ExistsStep = "exists-step"
 }
 
 /// What must not happen at the same step, for all steps alike.

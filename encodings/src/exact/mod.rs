@@ -15,7 +15,7 @@ use num_traits::{One, ToPrimitive, Zero};
 
 use crate::bounds::Bounds;
 use crate::context::Context;
-use crate::error::Error;
+use crate::error::Errors;
 use crate::exact::integral::Integral;
 use crate::ground::{Config as GroundConfig, Generality, ground_for};
 use crate::limits::Interrupted;
@@ -44,11 +44,7 @@ pub struct ExactTask(pub(crate) Task<Rational>);
 ///
 /// # Errors
 /// Every construct that the planner does not handle, with its place.
-pub fn ground_exact(
-    domain: &Domain,
-    problem: &Problem,
-    config: &GroundConfig,
-) -> Result<ExactTask, Vec<Error>> {
+pub fn ground_exact(domain: &Domain, problem: &Problem, config: &GroundConfig) -> Result<ExactTask, Errors> {
     ground_for(domain, problem, config, &Generality::default()).map(ExactTask)
 }
 

@@ -4,8 +4,9 @@ use crate::limits::Limits;
 use crate::number::Int;
 use pddl::ast::{Metric, Name};
 
-/// How the domain's symbols are to be read.
+/// How the domain's symbols are to be read. Each `with_` changes one thing.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Config {
     /// Predicates `(p DESIGN FUNCTION)` that say which design solves which function.
     pub solves: Vec<Name>,
@@ -23,6 +24,26 @@ impl Default for Config {
             objectives: Vec::new(),
             limits: Limits::none(),
         }
+    }
+}
+
+impl Config {
+    /// Predicates `(p DESIGN FUNCTION)` that say which design solves which function.
+    #[must_use]
+    pub fn with_solves(self, solves: Vec<Name>) -> Self {
+        Self { solves, ..self }
+    }
+
+    /// What plans are measured by in place of the metric of the problem, the most important first.
+    #[must_use]
+    pub fn with_objectives(self, objectives: Vec<Metric>) -> Self {
+        Self { objectives, ..self }
+    }
+
+    /// When to give up.
+    #[must_use]
+    pub fn with_limits(self, limits: Limits) -> Self {
+        Self { limits, ..self }
     }
 }
 

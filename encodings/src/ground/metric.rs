@@ -4,13 +4,12 @@
 //! an offset plus the sum of its operators' costs. Others are only measured: their values in the end are added, and of such a
 //! metric no plan is called the best. A metric to maximize is
 //! negated. Without a metric, plans of durative actions are measured by total time, others by their length.
-
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 
 use num_traits::{One, Zero};
 
-use crate::error::{Error, Place};
+use crate::error::{Error, Errors, Place};
 use crate::ground::config::Generality;
 use crate::ground::evaluate::expression::ground;
 use crate::ground::vocabulary::failure::Failure;
@@ -26,7 +25,7 @@ use pddl::ast::Direction;
 ///
 /// # Errors
 /// A metric that is not linear, or over a fluent whose change depends on the state.
-pub(crate) fn attach_costs(task: &mut GroundTask<'_>, generality: &Generality) -> Result<(), Vec<Error>> {
+pub(crate) fn attach_costs(task: &mut GroundTask<'_>, generality: &Generality) -> Result<(), Errors> {
     let lifted = task.world.lifted;
     if lifted.metrics.is_empty() {
         let temporal = task.operators.iter().any(|operator| !operator.duration.is_zero());
@@ -42,7 +41,7 @@ pub(crate) fn attach_costs(task: &mut GroundTask<'_>, generality: &Generality) -
     for metric in &lifted.metrics {
         attach(task, metric, generality).unwrap_or_else(|error| errors.push(error));
     }
-    if errors.is_empty() { Ok(()) } else { Err(errors) }
+    if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
 }
 
 /// Gives every operator its cost by one metric.

@@ -30,7 +30,7 @@ mod tests;
 pub(crate) mod vocabulary;
 
 use crate::compile::compile;
-use crate::error::Error;
+use crate::error::{Error, Errors};
 use crate::lifted::Lifted;
 use crate::lifted::configuration::{SlotParameter, design_parameters, slot_parameters};
 use crate::limits::Limits;
@@ -38,6 +38,8 @@ use crate::normalize::{events, normalize, partial, zero};
 use crate::task::Task;
 use crate::task::number::TaskNumber;
 use pddl::ast::{Domain, Problem};
+use tracing::field::Empty;
+use tracing::info_span;
 
 pub use config::Config;
 pub(crate) use config::Generality;
@@ -48,7 +50,7 @@ use vocabulary::world::World;
 ///
 /// # Errors
 /// Every construct that the planner does not handle, with its place.
-pub fn ground(domain: &Domain, problem: &Problem, config: &Config) -> Result<Task, Vec<Error>> {
+pub fn ground(domain: &Domain, problem: &Problem, config: &Config) -> Result<Task, Errors> {
     let measures_ends = config.objectives.len() <= 1;
     ground_for(domain, problem, config, &Generality { measures_ends, ..Generality::default() })
 }
@@ -59,9 +61,10 @@ pub(crate) fn ground_for<N: TaskNumber>(
     problem: &Problem,
     config: &Config,
     generality: &Generality,
-) -> Result<Task<N>, Vec<Error>> {
-    let plain = compile(domain, problem, &config.objectives)?;
-    let lifted = || normalize(&plain.domain, &plain.problem, &plain.objectives);
+) -> Result<Task<N>, Errors> {
+    let plain = info_span!("compile").in_scope(|| compile(domain, problem, &config.objectives))?;
+    let lifted =
+        || info_span!("normalize").in_scope(|| normalize(&plain.domain, &plain.problem, &plain.objectives));
     let found = ground_normal(lifted()?, config, generality);
     match found {
         Err(errors) if generality.numbers.is_none() && errors.iter().any(Error::is_value_missing) => {
@@ -78,7 +81,7 @@ fn ground_normal<N: TaskNumber>(
     mut lifted: Lifted,
     config: &Config,
     generality: &Generality,
-) -> Result<Task<N>, Vec<Error>> {
+) -> Result<Task<N>, Errors> {
     zero::split(&mut lifted)?;
     events::begin(&mut lifted);
     let designs: Vec<_> =
@@ -102,17 +105,21 @@ pub(crate) fn ground_lifted<N: TaskNumber>(
     slots: &[Vec<SlotParameter>],
     generality: &Generality,
     limits: &Limits,
-) -> Result<(Task<N>, Reached), Vec<Error>> {
-    let reached = reach::reach(lifted, slots, limits).map_err(|error| vec![error])?;
+) -> Result<(Task<N>, Reached), Errors> {
+    let span = info_span!("ground", operators = Empty, variables = Empty).entered();
+    let reached = info_span!("reach").in_scope(|| reach::reach(lifted, slots, limits))?;
     let world = World::new(lifted, &reached, limits);
+    let instantiate = info_span!("instantiate", operators = Empty).entered();
     let mut ground = instantiate::instantiate(world, designs, slots)?;
-    derived::simplify(&mut ground).map_err(|interrupted| vec![interrupted.into()])?;
-    metric::attach_costs(&mut ground, generality)?;
+    instantiate.record("operators", ground.operators.len());
+    drop(instantiate);
+    info_span!("derived").in_scope(|| derived::simplify(&mut ground))?;
+    info_span!("metric").in_scope(|| metric::attach_costs(&mut ground, generality))?;
     if limits.reached() {
-        return Err(vec![Error::Interrupted]);
+        return Err(vec![Error::Interrupted].into());
     }
-    let unreachable =
-        prune::prune(&mut ground, generality).map_err(|interrupted| vec![interrupted.into()])?;
-    let task = finish::finish(ground, unreachable, generality).map_err(|error| vec![error])?;
+    let unreachable = info_span!("prune").in_scope(|| prune::prune(&mut ground, generality))?;
+    let task = info_span!("finish").in_scope(|| finish::finish(ground, unreachable, generality))?;
+    span.record("operators", task.operators.len()).record("variables", task.variables.len());
     Ok((task, reached))
 }

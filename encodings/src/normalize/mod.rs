@@ -13,7 +13,7 @@ mod names;
 pub(crate) mod partial;
 pub(crate) mod zero;
 
-use crate::error::{Error, File, Place};
+use crate::error::{Errors, File, Place};
 use crate::lifted::{Axiom, Formula, Lifted, Metric, Schema};
 use names::{Duration, Names, Scope};
 use pddl::ast::{self, ConditionTime, EffectTime};
@@ -27,7 +27,7 @@ pub(crate) fn normalize(
     domain: &ast::Domain,
     problem: &ast::Problem,
     objectives: &[ast::Metric],
-) -> Result<Lifted, Vec<Error>> {
+) -> Result<Lifted, Errors> {
     let mut names = Names::new(domain, problem);
     let written = if objectives.is_empty() { problem.metric.as_slice() } else { objectives };
     let metrics: Vec<_> = written
@@ -49,7 +49,7 @@ pub(crate) fn normalize(
     let mut scope = Scope::new(File::Problem);
     let goal = condition::condition(&mut names, &problem.goal, true, &mut scope);
     if !names.errors.is_empty() {
-        return Err(names.errors);
+        return Err(names.errors.into());
     }
     let time = initial::time(&mut names, &events);
     if !events.is_empty() {

@@ -3,11 +3,10 @@
 //! Its conditions, of start and end, hold in the one state before it, its effects take place together, and nothing holds over all of
 //! an interval without a point in it (`validate`, clauses 1 and 4 of the definition). So such a schema becomes a second one for
 //! duration 0; the first keeps the durations above 0.
-
 use num_traits::Zero;
 use rustc_hash::FxHashMap;
 
-use crate::error::Error;
+use crate::error::{Error, Errors};
 use crate::lifted::{Expression, Formula, FunctionId, Joint, Lifted, Rational, Schema};
 use pddl::ast::Comparison;
 
@@ -18,7 +17,7 @@ type Range = Option<(Rational, Rational)>;
 ///
 /// # Errors
 /// A duration that is chosen as short as it may be, and may be 0 or less: what holds with 0 does not tell what holds with a little more.
-pub(crate) fn split(lifted: &mut Lifted) -> Result<(), Vec<Error>> {
+pub(crate) fn split(lifted: &mut Lifted) -> Result<(), Errors> {
     let mut ranges: FxHashMap<FunctionId, (Rational, Rational)> = FxHashMap::default();
     for (function, _, value) in &lifted.values {
         let range = ranges.entry(*function).or_insert_with(|| (value.clone(), value.clone()));
@@ -60,7 +59,7 @@ pub(crate) fn split(lifted: &mut Lifted) -> Result<(), Vec<Error>> {
         }
     }
     lifted.schemas.extend(instants);
-    if errors.is_empty() { Ok(()) } else { Err(errors) }
+    if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
 }
 
 /// The schema with duration 0.

@@ -1,5 +1,7 @@
 //! The way to a cheapest plan that a task asks for.
 
+use tracing::info_span;
+
 use crate::optimize::bounded::bounded_reading;
 use crate::optimize::config::Config;
 use crate::optimize::run::Run;
@@ -25,6 +27,7 @@ pub fn optimize(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement
 }
 
 fn cheapest(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement)) -> Solution {
+    let _span = info_span!("optimize", operators = task.operators.len()).entered();
     let run = Run::new(task, config, report);
     if let Some(reason) = &task.unreachable {
         return run.finish(Status::Unsolvable, None, None, 0, Some(Proof::Relaxation(reason.clone())));

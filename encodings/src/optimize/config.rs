@@ -3,9 +3,11 @@
 use crate::encode::Semantics;
 use crate::limits::Limits;
 use crate::sat::Backend;
+use crate::words::words;
 
 /// How the SAT solver is made to find a cheapest plan.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Strategy {
     /// The one that is faster in general.
     #[default]
@@ -17,8 +19,11 @@ pub enum Strategy {
     Cores,
 }
 
+words! { Strategy, "strategy": Auto = "auto", Tighten = "tighten", Cores = "cores" }
+
 /// What finds plans, and proves that there is none better.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Engine {
     /// Search in the space of states first, then the SAT solver.
     #[default]
@@ -29,8 +34,11 @@ pub enum Engine {
     Search,
 }
 
-/// What the user asks of the optimizer.
+words! { Engine, "engine": Auto = "auto", Sat = "sat", Search = "search" }
+
+/// What the user asks of the optimizer. It begins with what is so unless said otherwise, and each `with_` changes one thing.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Config {
     /// Only plans with at most this many steps count.
     pub horizon: Option<usize>,
@@ -65,5 +73,55 @@ impl Default for Config {
             backend: Backend::default(),
             limits: Limits::none(),
         }
+    }
+}
+
+impl Config {
+    /// Only plans with at most this many steps count; `None` for all.
+    #[must_use]
+    pub fn with_horizon(self, steps: impl Into<Option<usize>>) -> Self {
+        Self { horizon: steps.into(), ..self }
+    }
+
+    /// What finds plans, and proves that there is none better.
+    #[must_use]
+    pub fn with_engine(self, engine: Engine) -> Self {
+        Self { engine, ..self }
+    }
+
+    /// How many states A\* stores before the other parts have their turn.
+    #[must_use]
+    pub fn with_head_start(self, head_start: usize) -> Self {
+        Self { head_start, ..self }
+    }
+
+    /// Whether the SAT solver has to confirm what is proved without it, however long it takes.
+    #[must_use]
+    pub fn with_confirmation(self, confirm: bool) -> Self {
+        Self { confirm, ..self }
+    }
+
+    /// How many operators stand at a step of the formulas; `None` for what suits.
+    #[must_use]
+    pub fn with_semantics(self, semantics: impl Into<Option<Semantics>>) -> Self {
+        Self { semantics: semantics.into(), ..self }
+    }
+
+    /// How the SAT solver is made to find a cheapest plan.
+    #[must_use]
+    pub fn with_strategy(self, strategy: Strategy) -> Self {
+        Self { strategy, ..self }
+    }
+
+    /// The SAT solver.
+    #[must_use]
+    pub fn with_backend(self, backend: Backend) -> Self {
+        Self { backend, ..self }
+    }
+
+    /// When to stop.
+    #[must_use]
+    pub fn with_limits(self, limits: Limits) -> Self {
+        Self { limits, ..self }
     }
 }

@@ -28,6 +28,7 @@ pub struct Point {
 
 /// The Pareto front of two objectives.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Front {
     /// Best by the first objective to best by the second.
     pub points: Vec<Point>,

@@ -6,6 +6,9 @@
 
 use std::time::Instant;
 
+use tracing::field::Empty;
+use tracing::{Span, info_span};
+
 use crate::bounds::Bounds;
 use crate::number::Int;
 use crate::optimize::allowance::Allowance;
@@ -15,7 +18,7 @@ use crate::optimize::first::{First, FirstPlan};
 use crate::optimize::prover::{Prover, Proving};
 use crate::optimize::run::{Best, Run};
 use crate::plan::ground::GroundPlan;
-use crate::plan::solution::{Part, Proof, Solution, Status};
+use crate::plan::solution::{Part, Proof, Solution, Statistics, Status};
 use crate::satisfice::{Advance, Satisficer};
 use crate::search::{Duo, Found, Prepared, Space, ties};
 
@@ -120,6 +123,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
     fn search_exactly(&mut self, stored: usize) -> Turn {
         let Self { exact, run, lower, reason, best, .. } = self;
         let exact = exact.as_mut()?;
+        let span = info_span!("search", expanded = Empty, generated = Empty).entered();
         let cost = best.as_ref().map(|plan| plan.cost);
         if let Some(cost) = cost {
             exact.know(&cost);
@@ -132,6 +136,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
             }
         });
         exact.figures().add_to(before, &mut run.statistics);
+        record(&span, &run.statistics);
         match found {
             Some(Found::Optimal(plan)) => Some(Ending::Exact(plan)),
             Some(Found::None) if self.best.is_none() => Some(Ending::Unsolvable),
@@ -151,12 +156,14 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         // A plan is worth more than a better one.
         let share = if self.best.is_none() { 2 } else { 1 };
         let satisficer = self.satisficer.as_mut()?;
+        let span = info_span!("satisfice", expanded = Empty, generated = Empty).entered();
         let nodes = work.saturating_mul(NODES).saturating_mul(share) as u64;
         let most = nodes.checked_div(satisficer.size()).unwrap_or(nodes).max(1);
         let limit = self.best.as_ref().map(|plan| plan.cost);
         let before = satisficer.figures;
         let advance = satisficer.run(limit.as_ref(), most);
         satisficer.figures.add_to(before, &mut self.run.statistics);
+        record(&span, &self.run.statistics);
         match advance {
             Ok(Advance::Plan(plan)) => self.improve(plan, Part::Satisficing),
             Ok(Advance::Unsolvable) => Some(Ending::Unsolvable),
@@ -272,4 +279,9 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
             }
         }
     }
+}
+
+/// So many states have been looked at until now, by all searches.
+fn record(span: &Span, statistics: &Statistics) {
+    span.record("expanded", statistics.expanded).record("generated", statistics.generated);
 }

@@ -3,6 +3,9 @@
 use std::cell::OnceCell;
 use std::time::Instant;
 
+use tracing::field::{Empty, debug};
+use tracing::info_span;
+
 use crate::bounds::Bounds;
 use crate::context::Context;
 use crate::encode::{CostLimit, Encoding, Plans, Semantics, Symmetry};
@@ -138,8 +141,12 @@ impl<'a> Run<'a> {
         semantics: Semantics,
         most: usize,
     ) -> Option<Encoding<'a>> {
+        let span = info_span!("encode", steps = allowed.len(), variables = Empty, clauses = Empty).entered();
         let plans = Plans { allowed, cost, semantics, most };
-        Encoding::new(self.context(), plans, &self.symmetry)
+        let encoding = Encoding::new(self.context(), plans, &self.symmetry)?;
+        let formula = &encoding.formula;
+        span.record("variables", formula.variables()).record("clauses", formula.len());
+        Some(encoding)
     }
 
     /// What plans that cost at most so much can look like.
@@ -175,6 +182,7 @@ impl<'a> Run<'a> {
     ) -> (Answer, Option<GroundPlan>) {
         let started = Instant::now();
         let formula = &encoding.formula;
+        let span = info_span!("solve", clauses = formula.len(), conflicts = Empty, answer = Empty).entered();
         for item in self.config.limits.watch(formula.clauses_from(live.known)) {
             let Ok((_, clause)) = item else { return (Answer::Interrupted, None) };
             live.solver.add_clause(clause);
@@ -191,6 +199,7 @@ impl<'a> Run<'a> {
         self.statistics.calls = self.statistics.calls.saturating_add(1);
         self.statistics.conflicts = self.statistics.conflicts.saturating_add(more);
         live.conflicts = conflicts;
+        span.record("conflicts", more).record("answer", debug(answer));
         if let Some(reason) = live.solver.failure() {
             self.statistics.failure = Some(reason.to_owned());
         }

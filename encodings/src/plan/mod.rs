@@ -4,7 +4,9 @@ pub(crate) mod earliest;
 pub(crate) mod ground;
 mod names;
 pub(crate) mod solution;
+mod text;
 pub(crate) mod transitions;
+mod verdict;
 
-pub use names::{Exact, Plan, Step};
+pub use names::{Exact, NotANumber, Plan, Step};
 pub(crate) use names::{decode, measured, metric, resolve};

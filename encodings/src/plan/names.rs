@@ -1,8 +1,12 @@
 //! Plans: sequences of operators with the designs they run with, and how they read to people and programs.
 
+use std::borrow::Cow;
+use std::str::FromStr;
+
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{ToPrimitive, Zero};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::compile::is_hidden;
 use crate::context::Context;
@@ -60,6 +64,54 @@ impl From<BigRational> for Exact {
     }
 }
 
+/// Reads a decimal or a fraction: `2.5`, `-7/3`.
+impl FromStr for Exact {
+    type Err = NotANumber;
+
+    fn from_str(text: &str) -> Result<Self, NotANumber> {
+        let wrong = || NotANumber(text.to_owned());
+        let digits = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
+        let unsigned = text.strip_prefix('-').unwrap_or(text);
+        let number = match (unsigned.split_once('/'), unsigned.split_once('.')) {
+            (Some((numerator, denominator)), _) if digits(numerator) && digits(denominator) => {
+                let denominator: BigInt = denominator.parse().map_err(|_| wrong())?;
+                if denominator.is_zero() {
+                    return Err(wrong());
+                }
+                BigRational::new(numerator.parse().map_err(|_| wrong())?, denominator)
+            }
+            (None, Some((whole, decimals))) if digits(whole) && digits(decimals) => {
+                let scale = num_traits::pow(BigInt::from(10), decimals.len());
+                BigRational::new(format!("{whole}{decimals}").parse().map_err(|_| wrong())?, scale)
+            }
+            (None, None) if digits(unsigned) => {
+                BigRational::from_integer(unsigned.parse().map_err(|_| wrong())?)
+            }
+            _ => return Err(wrong()),
+        };
+        Ok(Self::from(if text.starts_with('-') { -number } else { number }))
+    }
+}
+
+/// A text that is neither a decimal nor a fraction.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is not a number: a decimal such as `2.5` or a fraction such as `7/3` would be one")]
+pub struct NotANumber(String);
+
+/// As text, because the numbers of most formats are binary: `"2.5"`, `"7/3"`.
+impl Serialize for Exact {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for Exact {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = <Cow<'_, str>>::deserialize(deserializer)?;
+        text.parse().map_err(serde::de::Error::custom)
+    }
+}
+
 /// Writes an exact decimal where there is one, else a fraction.
 impl std::fmt::Display for Exact {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -69,7 +121,7 @@ impl std::fmt::Display for Exact {
 }
 
 /// One action of a plan as users see it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Step {
     /// The name of the action schema.
     pub action: String,
@@ -89,7 +141,7 @@ pub struct Step {
 }
 
 /// A plan as users see it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Plan {
     /// The actions, in order of execution.
     pub steps: Vec<Step>,

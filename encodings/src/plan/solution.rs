@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use crate::plan::ground::GroundPlan;
 use crate::plan::names::{Exact, Plan};
+use crate::words::words;
 
 /// How good the answer is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,6 +19,15 @@ pub enum Status {
     UnsolvableWithinHorizon,
     /// A limit was reached before anything was known.
     Unknown,
+}
+
+words! {
+    Status, "status":
+    Optimal = "optimal",
+    Feasible = "feasible",
+    Unsolvable = "unsolvable",
+    UnsolvableWithinHorizon = "unsolvable_within_horizon",
+    Unknown = "unknown",
 }
 
 /// Why the status is what it is.
@@ -38,6 +48,7 @@ pub enum Proof {
 
 /// A better plan was found, or a better lower bound.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Improvement {
     /// The metric of the best plan so far.
     pub cost: Exact,
@@ -65,6 +76,8 @@ pub enum Unbounded {
     Suspected,
 }
 
+words! { Unbounded, "reason": Proved = "proved", Suspected = "suspected" }
+
 /// A part of the planner.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
@@ -76,8 +89,11 @@ pub enum Part {
     Sat,
 }
 
+words! { Part, "part of the planner": Search = "search", Satisficing = "satisficing", Sat = "sat" }
+
 /// What was known at some time of a run.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Moment {
     /// Since the optimizer has begun.
     pub time: Duration,
@@ -89,6 +105,7 @@ pub struct Moment {
 
 /// Figures of a run.
 #[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct Statistics {
     /// Operators of the ground task.
     pub operators: usize,
@@ -128,8 +145,9 @@ pub struct Statistics {
     pub solve: Duration,
 }
 
-/// The answer.
+/// The answer. Shown by `Display` it is its verdict, and the plan if there is one.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Solution {
     /// How good the plan is.
     pub status: Status,

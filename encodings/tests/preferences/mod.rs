@@ -25,7 +25,7 @@ fn solve(domain: &str, problem: &str, engine: Engine) -> Option<Solution> {
         }
     };
     let limits = Limits::none().with_time(Duration::from_secs(2));
-    Some(optimize(&task, &Config { engine, limits, ..Config::default() }, &mut |_| {}))
+    Some(optimize(&task, &Config::default().with_engine(engine).with_limits(limits), &mut |_| {}))
 }
 
 fn compare(seed: u64) -> bool {

@@ -11,12 +11,13 @@ use ontology::tomasys::{CalledNames, View};
 use ontology::vocab::local_name;
 use ontology::{Annotation, EntityKind, Equality, Iri, ReadOptions};
 use rules::{Delta, Engine, Fact, Literal, Program, Symbols};
+use tracing::info_span;
 
 use crate::knowledge::catalogue::Catalogue;
 use crate::knowledge::sources::{Sources, Stated};
 use crate::knowledge::statement::{Statement, Statements};
 use crate::knowledge::waiting::Waiting;
-use crate::message::Message;
+use crate::message::{Errors, Message};
 use crate::planta::Terms;
 
 /// From so many names of one individual on, not all of their pairs are listed.
@@ -62,7 +63,7 @@ impl Knowledge {
     ///
     /// # Errors
     /// All that is wrong with them.
-    pub fn read(sources: &Sources) -> Result<Self, Vec<Message>> {
+    pub fn read(sources: &Sources) -> Result<Self, Errors> {
         Self::read_as(sources, Equality::Owl)
     }
 
@@ -70,7 +71,7 @@ impl Knowledge {
     ///
     /// # Errors
     /// All that is wrong with the sources.
-    pub fn read_as(sources: &Sources, equality: Equality) -> Result<Self, Vec<Message>> {
+    pub fn read_as(sources: &Sources, equality: Equality) -> Result<Self, Errors> {
         Self::of_stated(sources, Stated::read(sources, equality)?)
     }
 
@@ -79,12 +80,13 @@ impl Knowledge {
     ///
     /// # Errors
     /// All that is wrong with the sources.
-    pub fn read_for(sources: &Sources, domain: &str) -> Result<Self, Vec<Message>> {
+    pub fn read_for(sources: &Sources, domain: &str) -> Result<Self, Errors> {
         Self::of_stated(sources, Stated::read_for(sources, domain)?)
     }
 
-    fn of_stated(sources: &Sources, stated: Stated) -> Result<Self, Vec<Message>> {
+    fn of_stated(sources: &Sources, stated: Stated) -> Result<Self, Errors> {
         let Stated { symbols, program, facts, ontology, rule_count, mut warnings, terms } = stated;
+        let _span = info_span!("knowledge").entered();
         let engine = Engine::with_limits(symbols, program, facts, sources.limits.clone())
             .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
         let mistakes = ontology::tomasys::check(&ontology, &engine);
@@ -107,7 +109,7 @@ impl Knowledge {
     ///
     /// # Errors
     /// The facts refer to other symbols.
-    pub fn closed(symbols: Symbols, facts: Vec<Fact>, equality: bool) -> Result<Self, Vec<Message>> {
+    pub fn closed(symbols: Symbols, facts: Vec<Fact>, equality: bool) -> Result<Self, Errors> {
         let program = Program { rules: Vec::new(), equality };
         let engine = Engine::new(symbols, program, facts)
             .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
@@ -408,7 +410,7 @@ impl Knowledge {
     ///
     /// # Errors
     /// All that is wrong with the document.
-    pub fn assertions(&mut self, file: &Path) -> Result<Vec<Fact>, Vec<Message>> {
+    pub fn assertions(&mut self, file: &Path) -> Result<Vec<Fact>, Errors> {
         let options = ReadOptions { allow_missing_imports: true, ..ReadOptions::default() };
         let ontology = ontology::read_files(&[file], &options)
             .map_err(|errors| errors.iter().map(Message::from_ontology).collect::<Vec<_>>())?;

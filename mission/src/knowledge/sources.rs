@@ -9,7 +9,7 @@ use rules::{Fact, Limits, Prefixes, Program, Rule, Symbols, Syntax};
 
 use crate::file::{self, discreet, quoted};
 use crate::knowledge::statement::Statements;
-use crate::message::Message;
+use crate::message::{Errors, Message};
 use crate::planta::{self, Terms};
 
 /// The name under which the shipped co-adaptation rules are asked for.
@@ -52,7 +52,7 @@ impl Stated {
     ///
     /// # Errors
     /// All that is wrong with them.
-    pub fn read(sources: &Sources, equality: Equality) -> Result<Self, Vec<Message>> {
+    pub fn read(sources: &Sources, equality: Equality) -> Result<Self, Errors> {
         Self::read_with(sources, |_| (equality, None))
     }
 
@@ -60,7 +60,7 @@ impl Stated {
     ///
     /// # Errors
     /// As [`Stated::read`].
-    pub fn read_for(sources: &Sources, domain: &str) -> Result<Self, Vec<Message>> {
+    pub fn read_for(sources: &Sources, domain: &str) -> Result<Self, Errors> {
         Self::read_with(sources, |ontology| match planta::wanted(ontology, domain) {
             Some(terms) => (Equality::UniqueNames, Some(Arc::new(terms))),
             None => (Equality::Owl, None),
@@ -70,7 +70,7 @@ impl Stated {
     fn read_with(
         sources: &Sources,
         meaning: impl FnOnce(&Ontology) -> (Equality, Option<Arc<Terms>>),
-    ) -> Result<Self, Vec<Message>> {
+    ) -> Result<Self, Errors> {
         let read = ontology::read_files(&sources.documents, &sources.options);
         let mut errors = Vec::new();
         let mut symbols = Symbols::new();
@@ -81,11 +81,11 @@ impl Stated {
         }
         let ontology = match read {
             Ok(ontology) if errors.is_empty() => ontology,
-            Ok(_) => return Err(errors),
+            Ok(_) => return Err(errors.into()),
             Err(more) => {
                 let more = more.iter().map(Message::from_ontology).collect();
                 errors.extend(quoted(discreet(more)));
-                return Err(errors);
+                return Err(errors.into());
             }
         };
         let rule_count = ontology.rules.len() + own.len();
@@ -123,7 +123,7 @@ pub fn rule_text(file: &str) -> Result<String, Message> {
 }
 
 /// The rules of all files. What one file asks for, another may conclude.
-fn parse_rule_files(files: &[String], symbols: &mut Symbols) -> Result<Vec<Rule>, Vec<Message>> {
+fn parse_rule_files(files: &[String], symbols: &mut Symbols) -> Result<Vec<Rule>, Errors> {
     let (mut texts, mut errors) = (Vec::new(), Vec::new());
     for file in files {
         match rule_text(file) {
@@ -134,7 +134,7 @@ fn parse_rule_files(files: &[String], symbols: &mut Symbols) -> Result<Vec<Rule>
     let texts: Vec<(&str, &str)> = texts.iter().map(|(file, text)| (file.as_str(), text.as_str())).collect();
     match rules::parse_rules_together(&texts, symbols, &Prefixes::default(), &Syntax::default()) {
         Ok(program) if errors.is_empty() => Ok(program.rules),
-        Ok(_) => Err(errors),
+        Ok(_) => Err(errors.into()),
         Err(more) => {
             let quoted = |error: &rules::Error| {
                 let message = Message::from_rules(error);

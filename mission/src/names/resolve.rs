@@ -11,7 +11,7 @@ use super::roles::Roles;
 use crate::binding::Bindings;
 use crate::called::Naming;
 use crate::knowledge::Knowledge;
-use crate::message::{Message, did_you_mean};
+use crate::message::{Errors, Message, did_you_mean};
 
 /// What individuals are called, by IRI, and warnings.
 pub(crate) type Resolved = (CalledNames, Vec<Message>);
@@ -26,7 +26,7 @@ pub(crate) fn resolve(
     problem: &Problem,
     knowledge: &Knowledge,
     bindings: &Bindings,
-) -> Result<Resolved, Vec<Message>> {
+) -> Result<Resolved, Errors> {
     let entries = bindings.names().entries();
     if entries.is_empty() {
         return Ok(Resolved::default());
@@ -59,7 +59,7 @@ pub(crate) fn resolve(
     if errors.is_empty() {
         Ok((called.into_iter().map(|(iri, (name, _))| (iri.to_owned(), name)).collect(), warnings))
     } else {
-        Err(errors)
+        Err(errors.into())
     }
 }
 

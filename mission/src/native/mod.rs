@@ -23,7 +23,7 @@ use pddl::ast::{
 };
 
 use crate::binding::{Bindings, atom, identifier, is_pddl_name};
-use crate::message::Message;
+use crate::message::{Errors, Message};
 use walk::{mentions, walk_condition, walk_effect, walk_expression, walk_uncounted};
 
 const FUNCTION: &str = "function";
@@ -71,7 +71,7 @@ impl CoAdaptation {
         problem: &Problem,
         view: &View<'_>,
         bindings: &Bindings,
-    ) -> Result<Option<Self>, Vec<Message>> {
+    ) -> Result<Option<Self>, Errors> {
         if domain.types.iter().any(|declared| bindings.is_design(&declared.identifier.name)) {
             return Ok(None);
         }
@@ -99,7 +99,7 @@ impl CoAdaptation {
         let (chosen, changed) = attributes(domain, problem, view, &designs, bindings);
         let adaptation = Self { actions, chosen, changed };
         let errors = adaptation.errors(domain);
-        if errors.is_empty() { Ok(Some(adaptation)) } else { Err(errors) }
+        if errors.is_empty() { Ok(Some(adaptation)) } else { Err(errors.into()) }
     }
 
     fn errors(&self, domain: &Domain) -> Vec<Message> {

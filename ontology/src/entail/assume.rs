@@ -231,7 +231,7 @@ fn by_rules(mut engine: Engine, class: &ClassExpression, individual: &Iri) -> Re
         rule.identity.source = "urn:metaplan:assumed".into();
     }
     if !new.is_empty() {
-        engine.add_rules(new).map_err(|mut errors| errors.remove(0))?;
+        engine.add_rules(new).map_err(|errors| errors.into_vec().remove(0))?;
     }
     engine.apply(Delta { insert: lowered.facts, delete: Vec::new() })?;
     Ok(engine)

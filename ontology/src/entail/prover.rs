@@ -43,7 +43,7 @@ impl Prover {
         let mut base = engine.clone();
         if !engine.program().equality {
             let program = Program { equality: true, ..engine.program().clone() };
-            base.set_program(program).map_err(|mut errors| errors.remove(0))?;
+            base.set_program(program).map_err(|errors| errors.into_vec().remove(0))?;
         }
         Ok(Self { base })
     }

@@ -22,6 +22,8 @@ mod swrl;
 mod vocabulary;
 
 use rules::{Atom, Error, Fact, Program, Rule, RuleIdentity, Symbols};
+use tracing::field::Empty;
+use tracing::info_span;
 
 use crate::error::Warning;
 use crate::owl::Ontology;
@@ -60,6 +62,7 @@ pub fn lower_together(
     equality: Equality,
     symbols: &mut Symbols,
 ) -> Lowered {
+    let span = info_span!("lower", rules = Empty, facts = Empty).entered();
     let mut context = Context::new(symbols, equality, ontology);
     let duplicates = swrl::lower(&ontology.rules, &mut context);
     axiom::lower_rules(&ontology.axioms, &mut context);
@@ -73,6 +76,7 @@ pub fn lower_together(
     // Rules of others stay last.
     context.rules[stated..].rotate_left(taken - stated);
     let Context { rules, facts, mut warnings, .. } = context;
+    span.record("rules", rules.len()).record("facts", facts.len());
     warnings.sort();
     warnings.dedup();
     Lowered { program: Program { rules, equality }, facts, duplicates, warnings }

@@ -12,7 +12,7 @@ use super::message::shortened;
 use super::structural::Structural;
 use super::syntax::{self, Syntax};
 use super::{encoding, entities, foreign};
-use crate::error::{Error, Position};
+use crate::error::{Error, Errors, Position};
 use crate::graph::iri_of;
 use crate::names::{Compact, Names, Object};
 use crate::triples::Document;
@@ -22,10 +22,10 @@ use crate::vocab::{owl, rdf};
 const MOST_ERRORS: usize = 10;
 
 /// The text of a document in UTF-8, without a byte order mark.
-pub(crate) fn decoded<'a>(bytes: &'a [u8], name: &str) -> Result<Cow<'a, [u8]>, Vec<Error>> {
+pub(crate) fn decoded<'a>(bytes: &'a [u8], name: &str) -> Result<Cow<'a, [u8]>, Errors> {
     encoding::decoded(bytes).map_err(|message| {
         let position = Position::of_offset(name, bytes, 0);
-        vec![Error::Malformed { position, syntax: Syntax::RdfXml, message }]
+        Error::Malformed { position, syntax: Syntax::RdfXml, message }.into()
     })
 }
 
@@ -37,9 +37,9 @@ pub(crate) fn parse(
     base: &str,
     prefix: &str,
     names: &mut Names,
-) -> Result<Document, Vec<Error>> {
+) -> Result<Document, Errors> {
     if let Some(what) = foreign::recognized(text) {
-        return Err(vec![Error::OtherSyntax { position: Position::of_offset(name, text, 0), what }]);
+        return Err(vec![Error::OtherSyntax { position: Position::of_offset(name, text, 0), what }].into());
     }
     let syntax = Syntax::detect(text);
     let mut sink = Sink { names, prefix, blanks: HashMap::default(), triples: Vec::new() };
@@ -185,7 +185,7 @@ fn is_strict(triple: &Triple) -> bool {
     }
 }
 
-fn parse_turtle(text: &[u8], name: &str, base: &str, sink: &mut Sink) -> Result<(), Vec<Error>> {
+fn parse_turtle(text: &[u8], name: &str, base: &str, sink: &mut Sink) -> Result<(), Errors> {
     let mut parser = oxttl::TurtleParser::new();
     if let Ok(with_base) = parser.clone().with_base_iri(base) {
         parser = with_base;
@@ -202,13 +202,13 @@ fn parse_turtle(text: &[u8], name: &str, base: &str, sink: &mut Sink) -> Result<
             }
         }
     }
-    if errors.is_empty() { Ok(()) } else { Err(errors) }
+    if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
 }
 
 /// Refuses what is not N-Triples: entities and prefixes can make much of a short text.
-pub(crate) fn require_ntriples(text: &[u8], name: &str) -> Result<(), Vec<Error>> {
+pub(crate) fn require_ntriples(text: &[u8], name: &str) -> Result<(), Errors> {
     match oxttl::NTriplesParser::new().for_slice(text).find_map(Result::err) {
-        Some(error) => Err(vec![malformed_turtle(&error, name)]),
+        Some(error) => Err(vec![malformed_turtle(&error, name)].into()),
         None => Ok(()),
     }
 }
@@ -219,7 +219,7 @@ fn malformed_turtle(error: &oxttl::TurtleSyntaxError, name: &str) -> Error {
     Error::Malformed { position, syntax: Syntax::Turtle, message: shortened(error.message()) }
 }
 
-fn parse_rdf_xml(text: &[u8], name: &str, base: &str, sink: &mut Sink) -> Result<(), Vec<Error>> {
+fn parse_rdf_xml(text: &[u8], name: &str, base: &str, sink: &mut Sink) -> Result<(), Errors> {
     let mut parser = oxrdfxml::RdfXmlParser::new();
     if let Ok(with_base) = parser.clone().with_base_iri(base) {
         parser = with_base;
@@ -235,13 +235,13 @@ fn parse_rdf_xml(text: &[u8], name: &str, base: &str, sink: &mut Sink) -> Result
             Ok(triple) => sink.add(triple),
             Err(error) => {
                 let offset = usize::try_from(parser.buffer_position()).unwrap_or(usize::MAX);
-                return Err(malformed(flat.origin(offset), &error.to_string()));
+                return Err(malformed(flat.origin(offset), &error.to_string()).into());
             }
         }
     }
     // The parser takes the end of the text for the end of the document, wherever it is.
     if let Some(root) = syntax::unclosed_root(&flat.text) {
-        return Err(malformed(text.len(), &format!("the document ends before </{root}>")));
+        return Err(malformed(text.len(), &format!("the document ends before </{root}>")).into());
     }
     Ok(())
 }

@@ -1,9 +1,8 @@
 //! The bytes of files and of standard input.
-
 use std::io::Read;
 use std::path::Path;
 
-use crate::error::Error;
+use crate::error::{Error, Errors};
 
 /// Documents with more bytes are not read.
 const LARGEST: u64 = 1 << 30;
@@ -23,10 +22,10 @@ pub(super) fn regular_file(path: &Path) -> std::io::Result<Vec<u8>> {
 }
 
 /// The bytes of standard input.
-pub(super) fn standard_input() -> Result<Vec<u8>, Vec<Error>> {
+pub(super) fn standard_input() -> Result<Vec<u8>, Errors> {
     let mut text = Vec::new();
     match std::io::stdin().read_to_end(&mut text) {
         Ok(_) => Ok(text),
-        Err(error) => Err(vec![Error::Unreadable { file: "-".into(), reason: error.to_string() }]),
+        Err(error) => Err(vec![Error::Unreadable { file: "-".into(), reason: error.to_string() }].into()),
     }
 }

@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 use super::document;
 use super::options::ReadOptions;
-use crate::error::Error;
+use crate::error::{Error, Errors};
 use crate::kb;
 use crate::triples::Document;
 
@@ -60,7 +60,7 @@ struct Candidate {
 
 impl Resolver {
     /// Reads the catalogs named in `options`.
-    pub(crate) fn new(options: &ReadOptions) -> Result<Self, Vec<Error>> {
+    pub(crate) fn new(options: &ReadOptions) -> Result<Self, Errors> {
         let (mut catalogs, mut errors) = (Vec::new(), Vec::new());
         for file in &options.catalogs {
             match horned_catalog::Catalog::from_path(file) {
@@ -69,7 +69,7 @@ impl Resolver {
             }
         }
         if !errors.is_empty() {
-            return Err(errors);
+            return Err(errors.into());
         }
         Ok(Self { catalogs, below: OnceCell::new(), directories: options.directories.clone() })
     }

@@ -18,7 +18,6 @@ mod spelling;
 mod structural;
 pub(crate) mod syntax;
 mod text;
-
 pub use options::ReadOptions;
 pub use syntax::Syntax;
 
@@ -27,8 +26,10 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
 use oxrdf::Triple;
+use tracing::field::Empty;
+use tracing::info_span;
 
-use crate::error::{Error, Warning};
+use crate::error::{Error, Errors, Warning};
 use crate::horned;
 use crate::names::{Compact, Names};
 use crate::normalize::{self, Normal};
@@ -45,7 +46,7 @@ use text::{Seen, Text};
 /// # Errors
 /// All problems found, and not only the first: files that cannot be read, syntax errors with their positions, imports
 /// found nowhere.
-pub fn read_files<P: AsRef<Path>>(files: &[P], options: &ReadOptions) -> Result<Ontology, Vec<Error>> {
+pub fn read_files<P: AsRef<Path>>(files: &[P], options: &ReadOptions) -> Result<Ontology, Errors> {
     let roots = files.iter().map(|file| Pending::File(file.as_ref().to_owned()));
     read(roots.collect(), options)
 }
@@ -54,7 +55,7 @@ pub fn read_files<P: AsRef<Path>>(files: &[P], options: &ReadOptions) -> Result<
 ///
 /// # Errors
 /// As [`read_files`].
-pub fn read_text(text: &str, name: &str, options: &ReadOptions) -> Result<Ontology, Vec<Error>> {
+pub fn read_text(text: &str, name: &str, options: &ReadOptions) -> Result<Ontology, Errors> {
     let root = Pending::Text(name.to_owned(), text.as_bytes().to_vec());
     read(VecDeque::from([root]), options)
 }
@@ -63,7 +64,7 @@ pub fn read_text(text: &str, name: &str, options: &ReadOptions) -> Result<Ontolo
 pub(crate) fn merged<P: AsRef<Path>>(
     files: &[P],
     options: &ReadOptions,
-) -> Result<(Vec<Triple>, Vec<Warning>), Vec<Error>> {
+) -> Result<(Vec<Triple>, Vec<Warning>), Errors> {
     let roots = files.iter().map(|file| Pending::File(file.as_ref().to_owned()));
     let mut names = Names::default();
     let (documents, warnings) = closure(roots.collect(), options, &mut Vec::new(), &mut names)?;
@@ -77,16 +78,19 @@ enum Pending {
     Text(String, Vec<u8>),
 }
 
-fn read(roots: VecDeque<Pending>, options: &ReadOptions) -> Result<Ontology, Vec<Error>> {
+fn read(roots: VecDeque<Pending>, options: &ReadOptions) -> Result<Ontology, Errors> {
     let (mut texts, mut names) = (Vec::new(), Names::default());
-    let (documents, mut warnings) = closure(roots, options, &mut texts, &mut names)?;
+    let span = info_span!("parse", documents = Empty);
+    let (documents, mut warnings) = span.in_scope(|| closure(roots, options, &mut texts, &mut names))?;
+    span.record("documents", documents.len());
     let sources: Vec<Source> = documents.iter().map(source).collect();
     let about = sources.first().and_then(|source| source.iri.clone()).unwrap_or_default();
-    let Normal { ntriples, plain, names, rules, warnings: more } =
-        normalize::normalize(documents, names, &options.known)
-            .map_err(|error| vec![spelling::placed(error, &texts)])?;
+    let Normal { ntriples, plain, names, rules, warnings: more } = info_span!("normalize")
+        .in_scope(|| normalize::normalize(documents, names, &options.known))
+        .map_err(|error| vec![spelling::placed(error, &texts)])?;
     warnings.extend(more);
-    let parts = horned::build(&ntriples, &about, &rules, plain, names).map_err(|reason| {
+    let parts = info_span!("axioms").in_scope(|| horned::build(&ntriples, &about, &rules, plain, names));
+    let parts = parts.map_err(|reason| {
         let place = spelling::place(&reason, &texts);
         let file = sources.first().map(|source| source.name.clone()).unwrap_or_default();
         vec![Error::NotAnOntology { file, position: place, reason }]
@@ -120,7 +124,7 @@ fn closure(
     options: &ReadOptions,
     texts: &mut Vec<(String, Text)>,
     names: &mut Names,
-) -> Result<(Vec<Document>, Vec<Warning>), Vec<Error>> {
+) -> Result<(Vec<Document>, Vec<Warning>), Errors> {
     let resolver = Resolver::new(options)?;
     let (mut documents, mut paths) = (Vec::<Document>::new(), Vec::<Option<PathBuf>>::new());
     let (mut seen, mut errors, mut warnings) = (Seen::default(), Vec::new(), Vec::new());
@@ -164,7 +168,7 @@ fn closure(
         }
         next += 1;
     }
-    if errors.is_empty() { Ok((documents, warnings)) } else { Err(errors) }
+    if errors.is_empty() { Ok((documents, warnings)) } else { Err(errors.into()) }
 }
 
 type Loaded = Option<(Document, Option<PathBuf>, Text)>;
@@ -176,7 +180,7 @@ fn load(
     seen: &mut Seen,
     options: &ReadOptions,
     names: &mut Names,
-) -> Result<Loaded, Vec<Error>> {
+) -> Result<Loaded, Errors> {
     let (name, text, path) = match item {
         Pending::Text(name, text) => (name, text, None),
         Pending::File(file) if file.as_os_str() == "-" => ("-".to_owned(), standard_input()?, None),

@@ -3,7 +3,7 @@
 use super::entities;
 use super::message::shortened;
 use super::syntax::{self, Syntax};
-use crate::error::{Error, Position};
+use crate::error::{Error, Errors, Position};
 use crate::horned;
 use crate::normalize::depth::DEEPEST;
 
@@ -15,22 +15,22 @@ pub(super) struct Structural<'a> {
 }
 
 impl Structural<'_> {
-    fn malformed(&self, offset: usize, message: &str) -> Vec<Error> {
+    fn malformed(&self, offset: usize, message: &str) -> Errors {
         let (position, message) = (self.place(offset), shortened(message));
-        vec![Error::Malformed { position, syntax: self.syntax, message }]
+        Error::Malformed { position, syntax: self.syntax, message }.into()
     }
 
     fn place(&self, offset: usize) -> Position {
         Position::of_offset(self.name, self.text, offset)
     }
 
-    fn too_deep(&self, offset: usize) -> Vec<Error> {
+    fn too_deep(&self, offset: usize) -> Errors {
         let (file, position) = (self.name.to_owned(), Some(self.place(offset)));
-        vec![Error::TooDeep { file, about: None, position, deepest: DEEPEST }]
+        Error::TooDeep { file, about: None, position, deepest: DEEPEST }.into()
     }
 
     /// OWL/XML as N-Triples.
-    pub(super) fn owl_xml(&self) -> Result<Vec<u8>, Vec<Error>> {
+    pub(super) fn owl_xml(&self) -> Result<Vec<u8>, Errors> {
         let whole =
             entities::expanded(self.text).map_err(|fault| self.malformed(fault.offset, &fault.message))?;
         // The reader takes memory without end where an element is not closed, and recurses into elements.
@@ -49,7 +49,7 @@ impl Structural<'_> {
     }
 
     /// Functional-style syntax as N-Triples.
-    pub(super) fn functional(&self) -> Result<Vec<u8>, Vec<Error>> {
+    pub(super) fn functional(&self) -> Result<Vec<u8>, Errors> {
         let words = Words { text: self.text, at: 0 };
         let mut depth = 0_usize;
         for (offset, word) in words.clone() {

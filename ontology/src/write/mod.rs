@@ -5,13 +5,12 @@
 //! hold what was understood: entities, axioms, annotations and rules, and a warning for everything else.
 
 mod functional;
-
 use std::path::Path;
 
 use oxrdf::{NamedNode, Triple};
 use oxrdfio::{RdfFormat, RdfSerializer};
 
-use crate::error::{Error, Warning};
+use crate::error::{Error, Errors, Warning};
 use crate::horned;
 use crate::read::{self, ReadOptions};
 use crate::vocab::{owl, rdf, rdfs, swrl, tomasys, xsd};
@@ -39,7 +38,7 @@ pub fn convert_files<P: AsRef<Path>>(
     files: &[P],
     options: &ReadOptions,
     syntax: OutputSyntax,
-) -> Result<(String, Vec<Warning>), Vec<Error>> {
+) -> Result<(String, Vec<Warning>), Errors> {
     let format = match syntax {
         OutputSyntax::RdfXml => RdfFormat::RdfXml,
         OutputSyntax::Turtle => RdfFormat::Turtle,
@@ -62,7 +61,7 @@ pub fn convert_files<P: AsRef<Path>>(
     }
     serialize(format, &triples)
         .map(|text| (text, warnings))
-        .map_err(|reason| vec![Error::Unwritable { syntax: format.name(), reason }])
+        .map_err(|reason| Error::Unwritable { syntax: format.name(), reason }.into())
 }
 
 /// Writes an N-Triples document (of this crate's making) as Turtle with the prefixes of the vocabularies in it.

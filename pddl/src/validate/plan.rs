@@ -2,11 +2,11 @@
 
 use num_rational::BigRational;
 
+use crate::Source;
 use crate::ast::{Name, Span};
-use crate::diagnostic::Sink;
+use crate::diagnostic::{Errors, Sink};
 use crate::number::{Literal, literal};
 use crate::source::place;
-use crate::{Diagnostic, Source};
 
 /// A plan as somebody wrote it: the steps in the order of the text.
 #[derive(Debug, Clone, Default)]
@@ -42,14 +42,14 @@ impl PlanText {
         clippy::arithmetic_side_effects,
         reason = "positions in a text in memory, which are at most its length"
     )]
-    pub fn parse(source: &Source) -> Result<Self, Vec<Diagnostic>> {
+    pub fn parse(source: &Source) -> Result<Self, Errors> {
         let text = source.text();
         let announced = text.rfind("Solution Found");
         let begin = announced.map_or(0, |at| text[at..].find('\n').map_or(text.len(), |end| at + end + 1));
         let mut sink = Sink::new(source);
         if u32::try_from(text.len()).is_err() {
             sink.error("P100", Span::default(), "the file is larger than 4 GB");
-            return Err(sink.finish());
+            return Err(sink.finish().into());
         }
         let mut steps = Vec::new();
         let mut at = begin;
@@ -70,7 +70,7 @@ impl PlanText {
                 }
             }
         }
-        if sink.has_errors() { Err(sink.finish()) } else { Ok(Self { steps }) }
+        if sink.has_errors() { Err(sink.finish().into()) } else { Ok(Self { steps }) }
     }
 }
 

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use metaplan::journal::{Journal, Policy};
 use metaplan::mapek::Loop;
-use metaplan::message::{Message, did_you_mean};
+use metaplan::message::{Errors, Message, did_you_mean};
 use metaplan::setup::Setup;
 use serde_json::json;
 
@@ -51,10 +51,9 @@ pub struct Options {
 ///
 /// # Errors
 /// The mission, its settings or the journal are wrong, or the journal cannot be written any more.
-pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Vec<Message>> {
+pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Errors> {
     let Setup { mission, settings: adaptation, .. } = Setup::read(&options.mission)?;
-    let settings =
-        Settings::read(options.settings.as_deref(), &options.mission).map_err(|message| vec![message])?;
+    let settings = Settings::read(options.settings.as_deref(), &options.mission)?;
     for warning in mission.warnings() {
         node.log(Severity::Warn, warning.text().trim_end());
     }
@@ -65,15 +64,14 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
     )?;
     let ticks = !adaptation.settle.is_zero();
     let mut control = Loop::new(mission, adaptation)?;
-    let journal = journal(node, options, &mut control).map_err(|message| vec![message])?;
+    let journal = journal(node, options, &mut control)?;
     let begun = control.beliefs().now();
     let performers: BTreeMap<String, Box<dyn Perform>> =
         performers(node, &settings.actions, &settings.poses)?;
     let machine = Machine::new(control, journal, settings.clone(), ticks);
     let (sender, inputs) = mpsc::channel();
-    let robot = Robot::connect(node, &settings, machine.functions(), performers, sender.clone())
-        .map_err(|message| vec![message])?;
-    let active = Lifecycle::activated(node).map_err(|message| vec![message])?;
+    let robot = Robot::connect(node, &settings, machine.functions(), performers, sender.clone())?;
+    let active = Lifecycle::activated(node)?;
     let mut driver = Driver {
         node: Arc::clone(node),
         machine,
@@ -84,8 +82,8 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
         clock: Instant::now(),
         begun,
     };
-    driver.meet(&sender, &inputs, stop).map_err(|message| vec![message])?;
-    driver.drive(&inputs, stop).map_err(|message| vec![message])
+    driver.meet(&sender, &inputs, stop)?;
+    driver.drive(&inputs, stop).map_err(Errors::from)
 }
 
 fn journal(node: &Node, options: &Options, control: &mut Loop) -> Result<Option<Journal>, Message> {

@@ -3,10 +3,9 @@
 //! The syntax is that of `rcl` (ROS 2 design, articles "ROS 2 command line arguments" and "Remapping names"): `-r from:=to`,
 //! `-r node:from:=to`, `-r __node:=name`, `-r __ns:=/namespace`, `-p name:=value` (the value is YAML), `--params-file FILE`,
 //! `--log-level LEVEL`, each as often as wanted; `--` ends the group.
-
 use std::path::{Path, PathBuf};
 
-use metaplan::message::Message;
+use metaplan::message::{Errors, Message};
 use ros2_client::ParameterValue;
 use serde_yaml_ng::Value;
 
@@ -42,7 +41,7 @@ impl RosArguments {
     ///
     /// # Errors
     /// All that is wrong with the latter, and with the files that it names.
-    pub fn split(words: impl IntoIterator<Item = String>) -> Result<(Vec<String>, Self), Vec<Message>> {
+    pub fn split(words: impl IntoIterator<Item = String>) -> Result<(Vec<String>, Self), Errors> {
         let (mut own, mut ros) = (Vec::new(), Vec::new());
         let mut is_ros = false;
         for word in words {
@@ -61,14 +60,14 @@ impl RosArguments {
                 messages.extend(more);
             }
         }
-        if messages.is_empty() { Ok((own, arguments)) } else { Err(messages) }
+        if messages.is_empty() { Ok((own, arguments)) } else { Err(messages.into()) }
     }
 
-    fn take(&mut self, word: &str, words: &mut impl Iterator<Item = String>) -> Result<(), Vec<Message>> {
+    fn take(&mut self, word: &str, words: &mut impl Iterator<Item = String>) -> Result<(), Errors> {
         let mut next = || words.next().ok_or_else(|| vec![wrong(format!("`{word}` wants a value"))]);
         match word {
-            "-r" | "--remap" => self.rules.push(rule(&next()?).map_err(|message| vec![message])?),
-            "-p" | "--param" => self.parameters.push(parameter(&next()?).map_err(|message| vec![message])?),
+            "-r" | "--remap" => self.rules.push(rule(&next()?)?),
+            "-p" | "--param" => self.parameters.push(parameter(&next()?)?),
             "--params-file" => self.parameters.extend(parameters_file(&PathBuf::from(next()?))?),
             "--log-level" => self.log_level = Some(next()?.to_lowercase()),
             // What these set has no counterpart here: the enclave of security, files of log4 libraries, where logs go.
@@ -78,7 +77,7 @@ impl RosArguments {
                 let text = format!(
                     "`{word}` is not known behind `--ros-args`; -r, -p, --params-file and --log-level are"
                 );
-                return Err(vec![wrong(text)]);
+                return Err(wrong(text).into());
             }
         }
         Ok(())
@@ -148,7 +147,7 @@ fn parameter(text: &str) -> Result<Assigned, Message> {
 }
 
 /// A file of parameters: names or patterns of nodes, and below `ros__parameters` their parameters.
-fn parameters_file(path: &Path) -> Result<Vec<Assigned>, Vec<Message>> {
+fn parameters_file(path: &Path) -> Result<Vec<Assigned>, Errors> {
     let file = path.display().to_string();
     let fault = |text: String| vec![Message::at("N102", &file, None, text)];
     let text =
@@ -159,7 +158,7 @@ fn parameters_file(path: &Path) -> Result<Vec<Assigned>, Vec<Message>> {
     nodes("", &root, &mut found, &mut messages);
     let messages: Vec<Message> =
         messages.into_iter().map(|text| Message::at("N102", &file, None, text)).collect();
-    if messages.is_empty() { Ok(found) } else { Err(messages) }
+    if messages.is_empty() { Ok(found) } else { Err(messages.into()) }
 }
 
 /// Goes down to each `ros__parameters`; the keys on the way are parts of the nodes' names.

@@ -1,11 +1,10 @@
 //! Parameters: declared, overridden from the command line, and served to `ros2 param`.
-
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use metaplan::message::{Message, did_you_mean};
+use metaplan::message::{Errors, Message, did_you_mean};
 use ros2_client::ParameterValue;
 
 use crate::interfaces::rcl_interfaces::msg;
@@ -44,7 +43,7 @@ impl Node {
         self: &Arc<Self>,
         declared: Vec<Declared>,
         changed: impl Fn(&str, &ParameterValue) + Send + Sync + 'static,
-    ) -> Result<Vec<Message>, Vec<Message>> {
+    ) -> Result<Vec<Message>, Errors> {
         let mut table: Table = declared.into_iter().map(|own| (own.name.to_owned(), own)).collect();
         table.insert(
             "use_sim_time".to_owned(),
@@ -71,14 +70,13 @@ impl Node {
             }
         }
         if !errors.is_empty() {
-            return Err(errors);
+            return Err(errors.into());
         }
         for own in table.values() {
             // Undeclared ones are allowed underneath; what is allowed is decided here.
             let _ = self.inner().set_parameter(own.name, own.value.clone());
         }
-        self.serve_parameters(Arc::new(Mutex::new(table)), Arc::new(changed))
-            .map_err(|message| vec![message])?;
+        self.serve_parameters(Arc::new(Mutex::new(table)), Arc::new(changed))?;
         Ok(warnings)
     }
 
@@ -92,7 +90,7 @@ impl Node {
         name: &'static str,
         description: &'static str,
         seconds: f64,
-    ) -> Result<Arc<AtomicU64>, Vec<Message>> {
+    ) -> Result<Arc<AtomicU64>, Errors> {
         let time = Arc::new(AtomicU64::new(0));
         let own = Arc::clone(&time);
         let set = move |value: &ParameterValue| {

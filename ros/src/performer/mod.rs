@@ -8,11 +8,10 @@ mod navigation;
 mod offer;
 mod settings;
 mod topic;
-
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
-use metaplan::message::Message;
+use metaplan::message::{Errors, Message};
 
 use crate::interfaces::suave_msgs::action::{
     FollowPipeline, RechargeBattery, RecoverThrusters, SpiralSearch,
@@ -37,7 +36,7 @@ pub fn performers(
     node: &Arc<Node>,
     actions: &BTreeMap<String, By>,
     poses: &Poses,
-) -> Result<BTreeMap<String, Box<dyn Perform>>, Vec<Message>> {
+) -> Result<BTreeMap<String, Box<dyn Perform>>, Errors> {
     let (mut performers, mut errors) = (BTreeMap::new(), Vec::new());
     let hub = OnceLock::new();
     for (action, by) in actions {
@@ -46,7 +45,7 @@ pub fn performers(
             Err(error) => errors.push(error),
         }
     }
-    if errors.is_empty() { Ok(performers) } else { Err(errors) }
+    if errors.is_empty() { Ok(performers) } else { Err(errors.into()) }
 }
 
 fn performer(

@@ -1,10 +1,9 @@
 //! A performer for PlanSys2: what its executor asks for on `actions_hub` is done by whoever is configured for it here.
-
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use metaplan::message::Message;
+use metaplan::message::{Errors, Message};
 use smol::Timer;
 
 use crate::interfaces::builtin_interfaces::msg::Time;
@@ -79,15 +78,11 @@ pub fn offer(
 ///
 /// # Errors
 /// What is wrong with the names of topics, all of it.
-pub fn offers(
-    node: &Arc<Node>,
-    offered: &BTreeMap<String, Offered>,
-    poses: &Poses,
-) -> Result<(), Vec<Message>> {
+pub fn offers(node: &Arc<Node>, offered: &BTreeMap<String, Offered>, poses: &Poses) -> Result<(), Errors> {
     let by = offered.iter().map(|(action, offered)| (action.clone(), offered.by.clone())).collect();
     for (action, performer) in performers(node, &by, poses)? {
         let specialized = offered[&action].specialized_arguments.clone();
-        offer(node, &action, specialized, Arc::from(performer)).map_err(|message| vec![message])?;
+        offer(node, &action, specialized, Arc::from(performer))?;
     }
     Ok(())
 }

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use metaplan::encodings::Exact;
 use metaplan::mapek::{Event, Observation};
-use metaplan::message::Message;
+use metaplan::message::Errors;
 use metaplan::mission::Mission;
 
 use crate::diagnosed::Diagnosed;
@@ -23,8 +23,8 @@ impl Joint {
     ///
     /// # Errors
     /// The topic cannot be made.
-    pub(crate) fn listen(node: &Arc<Node>, mission: Mission) -> Result<Arc<Self>, Vec<Message>> {
-        let diagnosed = Diagnosed::hear(node, || {}).map_err(|message| vec![message])?;
+    pub(crate) fn listen(node: &Arc<Node>, mission: Mission) -> Result<Arc<Self>, Errors> {
+        let diagnosed = Diagnosed::hear(node, || {})?;
         Ok(Arc::new(Self { mission: Mutex::new(mission), diagnosed }))
     }
 

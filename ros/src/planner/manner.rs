@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use metaplan::message::Message;
+use metaplan::message::Errors;
 use ros2_client::ParameterValue;
 
 use crate::node::{Declared, Node, Severity};
@@ -60,7 +60,7 @@ impl Chosen {
     ///
     /// # Errors
     /// The command line gives a value of another type.
-    pub(crate) fn declare(node: &Arc<Node>) -> Result<Arc<Self>, Vec<Message>> {
+    pub(crate) fn declare(node: &Arc<Node>) -> Result<Arc<Self>, Errors> {
         let manner =
             Manner { metric: None, time_limit: Duration::ZERO, overlap: None, alternatives: ALTERNATIVES };
         let chosen = Arc::new(Self { manner: Mutex::new(manner) });

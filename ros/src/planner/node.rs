@@ -3,13 +3,12 @@
 //!
 //! Each request is planned on a thread of its own, so that the node answers all others meanwhile. With a mission, its knowledge base joins
 //! in, and hears `/diagnostics`.
-
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
-use metaplan::message::Message;
+use metaplan::message::{Errors, Message};
 use metaplan::mission::PlanLine;
 use metaplan::pddl::Source;
 use metaplan::setup::Setup;
@@ -47,7 +46,7 @@ struct Planner {
 ///
 /// # Errors
 /// A parameter of the command line is wrong, or a topic cannot be made.
-pub fn serve(node: &Arc<Node>, setup: Option<Setup>) -> Result<Arc<Lifecycle>, Vec<Message>> {
+pub fn serve(node: &Arc<Node>, setup: Option<Setup>) -> Result<Arc<Lifecycle>, Errors> {
     let manner = Chosen::declare(node)?;
     let joint = setup.map(|setup| Joint::listen(node, setup.mission)).transpose()?;
     let planner = Arc::new(Planner {
@@ -79,7 +78,7 @@ const LOOK: Duration = Duration::from_millis(50);
 ///
 /// # Errors
 /// The mission, the settings or a parameter of the command line is wrong.
-pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Vec<Message>> {
+pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Errors> {
     let setup = options.mission.as_deref().map(Setup::read).transpose()?;
     for warning in setup.iter().flat_map(|setup| setup.mission.warnings()) {
         node.log(Severity::Warn, warning.text().trim_end());
@@ -88,7 +87,7 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
         (None, None) => Settings::default(),
         (file, mission) => {
             let beside = mission.clone().unwrap_or_default();
-            Settings::read(file.as_deref(), &beside).map_err(|message| vec![message])?
+            Settings::read(file.as_deref(), &beside)?
         }
     };
     serve(node, setup)?;

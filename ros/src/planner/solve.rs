@@ -12,10 +12,9 @@ use metaplan::encodings::{
     Config, Exact, Limits, Plan, Solution, Status, Step, alternatives, optimize, optimize_concurrent,
     optimize_exact,
 };
-use metaplan::message::Message;
+use metaplan::message::{Errors, Message};
 use metaplan::mission::{
-    Bindings, Mission, PlanLine, Planning as _, Reading, blocking, blocking_text, confirm, instant,
-    plan_lines, spaced, verdict,
+    Bindings, Mission, PlanLine, Planning as _, Reading, blocking, confirm, instant, plan_lines, spaced,
 };
 use metaplan::pddl::ast::{ActionBody, Problem};
 use metaplan::pddl::{self, Source};
@@ -93,9 +92,9 @@ impl Found {
 #[derive(Debug, Clone)]
 pub enum NoPlan {
     /// The domain, the problem or what the knowledge base contributes is wrong.
-    Input(Vec<Message>),
+    Input(Errors),
     /// They have something that cannot be planned with.
-    Unsupported(Vec<Message>),
+    Unsupported(Errors),
     /// There is none, or none was found: why, in a sentence.
     None(String),
     /// A fault of this program.
@@ -188,7 +187,7 @@ fn solve_or_panic(Request { domain, problem, joint }: Request<'_>, manner: &Mann
         configuration: plan.steps.iter().map(|step: &Step| step.configuration.clone()).collect(),
         cost: plan.cost.clone(),
         proved: solution.status == Status::Optimal,
-        verdict: verdict(&solution).trim_end().to_owned(),
+        verdict: solution.verdict(),
         warnings,
     })
 }
@@ -215,7 +214,7 @@ impl Asked<'_> {
 
     /// A plan whose actions follow one another, and others that are as good.
     fn sequence(&self, limits: Limits) -> Result<(Solution, Vec<Plan>), NoPlan> {
-        let config = Config { limits, ..Config::default() };
+        let config = Config::default().with_limits(limits);
         let task = match self.mission.ground(self.problem, &[], &config.limits) {
             Ok(task) => task,
             Err(refused) if refused.iter().all(|message| message.code == "E304") => {
@@ -257,12 +256,12 @@ impl Asked<'_> {
     }
 
     fn reason(&self, solution: &Solution) -> NoPlan {
-        let mut text = verdict(solution).trim_end().to_owned();
+        let mut text = solution.verdict();
         if solution.status == Status::Unsolvable && self.mission.knowledge().is_some() {
             let limits = Limits::none().with_time(self.manner.time_limit);
-            let config = Config { limits, ..Config::default() };
+            let config = Config::default().with_limits(limits);
             let blocking = blocking(self.mission, self.problem, &config);
-            let more = blocking.as_ref().map(|blocking| blocking_text(blocking).trim_end().to_owned());
+            let more = blocking.as_ref().map(ToString::to_string);
             text.extend(more.map(|more| format!("; {more}")));
         }
         NoPlan::None(text)
@@ -273,7 +272,7 @@ impl Asked<'_> {
 ///
 /// # Errors
 /// All that is wrong with it.
-pub(crate) fn check_domain(domain: &Source) -> Result<(), Vec<Message>> {
+pub(crate) fn check_domain(domain: &Source) -> Result<(), Errors> {
     let (tree, mut found) = pddl::parse_domain(domain);
     if let Some(tree) = &tree {
         found.extend(pddl::check_domain(tree, domain));
@@ -281,6 +280,6 @@ pub(crate) fn check_domain(domain: &Source) -> Result<(), Vec<Message>> {
     found.retain(|diagnostic| diagnostic.severity == pddl::Severity::Error);
     match tree {
         Some(_) if found.is_empty() => Ok(()),
-        _ => Err(Message::from_pddl(&found, &[domain])),
+        _ => Err(Message::from_pddl(&found, &[domain]).into()),
     }
 }

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use metaplan::message::Message;
+use metaplan::message::Errors;
 
 use crate::interfaces::std_msgs::msg::String as Text;
 use crate::node::{Node, Publisher, Severity, latched};
@@ -21,8 +21,8 @@ impl Told {
     ///
     /// # Errors
     /// It cannot be made.
-    pub(crate) fn new(node: &Arc<Node>) -> Result<Self, Vec<Message>> {
-        let plans = node.publisher("~/plan", latched(1)).map_err(|message| vec![message])?;
+    pub(crate) fn new(node: &Arc<Node>) -> Result<Self, Errors> {
+        let plans = node.publisher("~/plan", latched(1))?;
         Ok(Self { node: Arc::clone(node), plans })
     }
 

@@ -1,12 +1,11 @@
 //! The reasoner on the network: the action that it serves, the diagnostics that it hears, and the services that it calls.
-
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::time::{Duration, Instant};
 
-use metaplan::message::Message;
+use metaplan::message::{Errors, Message};
 use ros2_client::action::GoalId;
 use smol::Task;
 
@@ -63,7 +62,7 @@ impl Network {
         node: &Arc<Node>,
         keeping: Keeping,
         memory: Option<MemoryFile>,
-    ) -> Result<Self, Vec<Message>> {
+    ) -> Result<Self, Errors> {
         let one = |message: Message| vec![message];
         let period = node.declare_seconds(
             "reasoning_period",

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use metaplan::message::Message;
+use metaplan::message::Errors;
 use metaplan_ros::interfaces::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use metaplan_ros::interfaces::mros2_msgs::action::{ControlQos, ControlQosGoal};
 use metaplan_ros::interfaces::std_msgs::msg::{Bool, String as Text};
@@ -95,17 +95,17 @@ impl Robot {
 /// A role that runs in a thread of its own.
 struct Running {
     stop: Arc<AtomicBool>,
-    thread: JoinHandle<Result<(), Vec<Message>>>,
+    thread: JoinHandle<Result<(), Errors>>,
 }
 
 impl Running {
-    fn new(role: impl FnOnce(&AtomicBool) -> Result<(), Vec<Message>> + Send + 'static) -> Self {
+    fn new(role: impl FnOnce(&AtomicBool) -> Result<(), Errors> + Send + 'static) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
         let asked = Arc::clone(&stop);
         Self { stop, thread: std::thread::spawn(move || role(&asked)) }
     }
 
-    fn end(self) -> Result<(), Vec<Message>> {
+    fn end(self) -> Result<(), Errors> {
         self.stop.store(true, Ordering::Relaxed);
         self.thread.join().expect("no panic")
     }

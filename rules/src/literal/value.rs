@@ -58,6 +58,24 @@ pub enum Literal {
     },
 }
 
+impl From<bool> for Literal {
+    fn from(value: bool) -> Self {
+        Self::Boolean(value)
+    }
+}
+
+impl From<i64> for Literal {
+    fn from(value: i64) -> Self {
+        Self::integer(value)
+    }
+}
+
+impl From<&str> for Literal {
+    fn from(text: &str) -> Self {
+        Self::string(text)
+    }
+}
+
 impl Literal {
     /// An `xsd:string`.
     pub fn string(text: &str) -> Self {

@@ -6,7 +6,7 @@ use super::foreign::{ForeignAtom, unknown};
 use super::lexer::{Fault, Spanned, Token, tokens};
 use super::prefixes::Prefixes;
 use crate::builtin::{BuiltIn, SWRLB, is_refused};
-use crate::error::Error;
+use crate::error::{Error, Errors};
 use crate::literal::{Literal, XSD, is_datatype};
 use crate::rule::{Aggregate, Atom, Program, Rule, RuleIdentity, Term, Variable};
 use crate::symbol::{Symbol, Symbols};
@@ -34,7 +34,7 @@ pub fn parse_rules(
     source: &str,
     symbols: &mut Symbols,
     prefixes: &Prefixes,
-) -> Result<Program, Vec<Error>> {
+) -> Result<Program, Errors> {
     parse_rules_as(text, source, symbols, prefixes, &Syntax::default())
 }
 
@@ -48,7 +48,7 @@ pub fn parse_rules_as(
     symbols: &mut Symbols,
     prefixes: &Prefixes,
     syntax: &Syntax,
-) -> Result<Program, Vec<Error>> {
+) -> Result<Program, Errors> {
     parse(text, source, symbols, prefixes, syntax).map(|(program, _)| program)
 }
 
@@ -63,7 +63,7 @@ pub fn parse_rules_together(
     symbols: &mut Symbols,
     prefixes: &Prefixes,
     syntax: &Syntax,
-) -> Result<Program, Vec<Error>> {
+) -> Result<Program, Errors> {
     let (mut program, mut foreign, mut errors) = (Program::default(), Vec::new(), Vec::new());
     for (source, text) in texts {
         match parse(text, source, symbols, prefixes, syntax) {
@@ -77,7 +77,7 @@ pub fn parse_rules_together(
     if errors.is_empty() {
         errors = unknown(foreign, &program, symbols);
     }
-    if errors.is_empty() { Ok(program) } else { Err(errors) }
+    if errors.is_empty() { Ok(program) } else { Err(errors.into()) }
 }
 
 fn parse(
@@ -86,14 +86,14 @@ fn parse(
     symbols: &mut Symbols,
     prefixes: &Prefixes,
     syntax: &Syntax,
-) -> Result<(Program, Vec<ForeignAtom>), Vec<Error>> {
+) -> Result<(Program, Vec<ForeignAtom>), Errors> {
     let (tokens, faults) = tokens(text);
     let errors = faults.into_iter().map(|fault| fault_at(source, fault)).collect();
     let source: Arc<str> = source.into();
     let (variables, foreign, prefixes) = (Vec::new(), Vec::new(), prefixes.clone());
     let mut parser = Parser { tokens, at: 0, source, symbols, prefixes, syntax, variables, foreign, errors };
     let program = parser.program();
-    if parser.errors.is_empty() { Ok((program, parser.foreign)) } else { Err(parser.errors) }
+    if parser.errors.is_empty() { Ok((program, parser.foreign)) } else { Err(parser.errors.into()) }
 }
 
 fn fault_at(source: &str, fault: Fault) -> Error {

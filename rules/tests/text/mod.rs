@@ -1,7 +1,7 @@
 //! Facts and engines from text, read by the rule parser.
 #![allow(dead_code, reason = "each suite uses a part")]
 
-use metaplan_rules::{Atom, Engine, Error, Fact, Literal, Prefixes, Symbols, Term, Violation, parse_rules};
+use metaplan_rules::{Atom, Engine, Errors, Fact, Literal, Prefixes, Symbols, Term, Violation, parse_rules};
 
 pub fn prefixes() -> Prefixes {
     Prefixes::new().with("t", "http://metacontrol.org/tomasys#").with("mros", "http://ros/mros#")
@@ -29,7 +29,7 @@ pub fn fact(engine: &mut Engine, text: &str) -> Fact {
     facts(engine.symbols_mut(), text).remove(0)
 }
 
-pub fn engine(rules: &str, stated: &str) -> Result<Engine, Vec<Error>> {
+pub fn engine(rules: &str, stated: &str) -> Result<Engine, Errors> {
     let mut symbols = Symbols::new();
     let program = parse_rules(rules, "test", &mut symbols, &prefixes())?;
     let facts = if stated.is_empty() { Vec::new() } else { facts(&mut symbols, stated) };

@@ -20,16 +20,14 @@ const LIMIT: Duration = Duration::from_millis(500);
 
 fn config(rng: &mut Rng) -> Config {
     let semantics = [Semantics::Sequential, Semantics::ForAllStep, Semantics::ExistsStep];
-    Config {
-        engine: one(rng, &[Engine::Auto, Engine::Sat, Engine::Search]),
-        confirm: rng.bool(),
-        head_start: one(rng, &[1, 10, 100, 20_000]),
-        semantics: (!super::draw::once_in(rng, 4)).then(|| one(rng, &semantics)),
-        strategy: one(rng, &[Strategy::Auto, Strategy::Tighten, Strategy::Cores]),
-        backend: if rng.bool() { Backend::Batsat } else { Backend::Varisat },
-        limits: Limits::none().with_time(LIMIT),
-        ..Config::default()
-    }
+    Config::default()
+        .with_engine(one(rng, &[Engine::Auto, Engine::Sat, Engine::Search]))
+        .with_confirmation(rng.bool())
+        .with_head_start(one(rng, &[1, 10, 100, 20_000]))
+        .with_semantics((!super::draw::once_in(rng, 4)).then(|| one(rng, &semantics)))
+        .with_strategy(one(rng, &[Strategy::Auto, Strategy::Tighten, Strategy::Cores]))
+        .with_backend(if rng.bool() { Backend::Batsat } else { Backend::Varisat })
+        .with_limits(Limits::none().with_time(LIMIT))
 }
 
 /// Asks with two random settings, and with a horizon.
@@ -53,7 +51,7 @@ pub fn check_variants(puzzle: &Puzzle, case: &Case, rng: &mut Rng, tally: &mut T
         check(puzzle, case, &solution, &said, tally);
     }
     let horizon = rng.usize(0..5);
-    let config = Config { horizon: Some(horizon), semantics: None, ..config(rng) };
+    let config = config(rng).with_horizon(horizon).with_semantics(None);
     let solution = encodings::optimize(&task, &config, &mut |_| {});
     tally.count(format!("horizon: {:?}", solution.status));
     check_horizon(puzzle, case, &solution, (horizon, &config), tally);
@@ -165,7 +163,7 @@ pub fn check_objectives(puzzle: &Puzzle, expressions: &[Expr], case: &Case, tall
             return tally.fail(case, "an objective is not read", &messages[0].message);
         }
     };
-    let config = || Config { limits: Limits::none().with_time(LIMIT), ..Config::default() };
+    let config = || Config::default().with_limits(Limits::none().with_time(LIMIT));
     let said = || expressions.iter().map(|e| objective(&puzzle.task, e)).collect::<Vec<_>>().join(", ");
     let started = Instant::now();
     if let Ok(task) = mission.ground(&problem, &metrics, &Limits::none()) {

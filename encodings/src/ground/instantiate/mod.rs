@@ -21,13 +21,12 @@ mod moment;
 mod outline;
 mod passage;
 mod timeline;
-
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
 
 use rustc_hash::FxHashMap;
 
-use crate::error::Error;
+use crate::error::{Error, Errors};
 use crate::ground::evaluate::condition::residual;
 use crate::ground::instantiate::axioms::instantiate_axioms;
 use crate::ground::instantiate::frame::Frame;
@@ -54,7 +53,7 @@ pub(crate) fn instantiate<'a>(
     world: World<'a>,
     designs: &[Vec<SlotParameter>],
     slots: &[Vec<SlotParameter>],
-) -> Result<GroundTask<'a>, Vec<Error>> {
+) -> Result<GroundTask<'a>, Errors> {
     let mut errors = Vec::new();
     let mut instantiation = Instantiation::new(world);
     let mut operators = operators(&mut instantiation, designs, slots, &mut errors)?;
@@ -67,7 +66,7 @@ pub(crate) fn instantiate<'a>(
         }
     };
     if !errors.is_empty() {
-        return Err(errors);
+        return Err(errors.into());
     }
     let Instantiation { world, definitions, timeline } = instantiation;
     if let Some(timeline) = &timeline {
@@ -86,7 +85,7 @@ fn operators(
     designs: &[Vec<SlotParameter>],
     slots: &[Vec<SlotParameter>],
     errors: &mut Vec<Error>,
-) -> Result<Vec<GroundOperator>, Vec<Error>> {
+) -> Result<Vec<GroundOperator>, Errors> {
     let (lifted, reached) = (instantiation.world.lifted, instantiation.world.reached);
     // Growing would move operators that are large and many; most instances become one.
     let mut operators = Vec::with_capacity(reached.instances.iter().map(Vec::len).sum());
@@ -101,7 +100,7 @@ fn operators(
         let outline = Outline::new(lifted, schema, designs, slots);
         let mut frames: FxHashMap<Row, Option<Arc<Frame>>> = FxHashMap::default();
         for binding in instantiation.world.limits.watch(instances) {
-            let binding = binding.map_err(|interrupted| vec![interrupted.into()])?;
+            let binding = binding?;
             let frame = match frames.entry(outline.key(binding)) {
                 Entry::Occupied(known) => Ok(known.get().clone()),
                 Entry::Vacant(new) => match Frame::new(&mut instantiation.world, &outline, binding) {

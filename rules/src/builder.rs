@@ -1,0 +1,127 @@
+//! The front door: rule texts and facts to an engine.
+
+use crate::builtin::BuiltIn;
+use crate::engine::Engine;
+use crate::error::{Error, Errors};
+use crate::fact::Fact;
+use crate::limits::Limits;
+use crate::literal::Literal;
+use crate::rule::Program;
+use crate::swrl::{Prefixes, Syntax, parse_rules_as};
+use crate::symbol::{Symbol, Symbols};
+
+/// Puts rules and facts together; [`Engine::builder`] makes it.
+///
+/// ```
+/// use metaplan_rules::{Delta, Engine, Fact};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let mut engine = Engine::builder()
+///     .prefix("", "http://example.org/#")
+///     .rules("lamps.swrl", "[dark] Lamp(?l) ^ not on(?l, true) -> Dark(?l) .  [one] -> Lamp(lamp) .")
+///     .build()?;
+///
+/// let [dark, on, lamp] = ["Dark", "on", "lamp"].map(|local| engine.name(&format!("http://example.org/#{local}")));
+/// let is_dark = Fact::new(dark, [lamp]);
+/// assert!(engine.holds(&is_dark));
+///
+/// let yes = engine.literal(true.into());
+/// let change = engine.apply(Delta { insert: vec![Fact::new(on, [lamp, yes])], delete: vec![] })?;
+/// assert_eq!(change.delete, [is_dark]);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug, Default)]
+pub struct EngineBuilder {
+    symbols: Symbols,
+    prefixes: Prefixes,
+    syntax: Syntax,
+    texts: Vec<(String, String)>,
+    program: Program,
+    facts: Vec<Fact>,
+    limits: Limits,
+}
+
+impl EngineBuilder {
+    /// The symbols of [`EngineBuilder::program`] and [`EngineBuilder::facts`]; those of rule texts are added to them.
+    #[must_use]
+    pub fn symbols(self, symbols: Symbols) -> Self {
+        Self { symbols, ..self }
+    }
+
+    /// What a prefix stands for in the rule texts that do not declare it themselves.
+    #[must_use]
+    pub fn prefix(mut self, prefix: &str, iri: &str) -> Self {
+        self.prefixes.insert(prefix, iri);
+        self
+    }
+
+    /// Rules in SWRL's human-readable syntax; `source` names the text in errors and in the identities of the rules. A rule without a
+    /// body states facts.
+    #[must_use]
+    pub fn rules(mut self, source: &str, text: &str) -> Self {
+        self.texts.push((source.to_owned(), text.to_owned()));
+        self
+    }
+
+    /// Built-ins that the rule texts may use besides SWRL's.
+    #[must_use]
+    pub fn built_in(mut self, built_in: BuiltIn) -> Self {
+        self.syntax.built_ins.push(built_in);
+        self
+    }
+
+    /// Rules as data, before those of the texts.
+    #[must_use]
+    pub fn program(mut self, program: Program) -> Self {
+        self.program.rules.extend(program.rules);
+        self.program.equality |= program.equality;
+        self
+    }
+
+    /// What is stated at first.
+    #[must_use]
+    pub fn facts(mut self, facts: impl IntoIterator<Item = Fact>) -> Self {
+        self.facts.extend(facts);
+        self
+    }
+
+    /// The limits of this derivation and of each later update.
+    #[must_use]
+    pub fn limits(self, limits: Limits) -> Self {
+        Self { limits, ..self }
+    }
+
+    /// Derives everything that follows.
+    ///
+    /// # Errors
+    /// All errors of all texts: R101 to R105; or, where the texts are right, those of [`Engine::new`].
+    pub fn build(mut self) -> Result<Engine, Errors> {
+        let mut wrong: Vec<Error> = Vec::new();
+        for (source, text) in &self.texts {
+            match parse_rules_as(text, source, &mut self.symbols, &self.prefixes, &self.syntax) {
+                Ok(program) => self.program.rules.extend(program.rules),
+                Err(more) => wrong.extend(more),
+            }
+        }
+        Errors::unless_empty(wrong)?;
+        Engine::with_limits(self.symbols, self.program, self.facts, self.limits)
+    }
+}
+
+impl Engine {
+    /// Begins with neither rules nor facts.
+    pub fn builder() -> EngineBuilder {
+        EngineBuilder::default()
+    }
+
+    /// The symbol of a name, such as an IRI, for facts.
+    pub fn name(&mut self, name: &str) -> Symbol {
+        self.symbols_mut().name(name)
+    }
+
+    /// The symbol of a value, for facts.
+    pub fn literal(&mut self, literal: Literal) -> Symbol {
+        self.symbols_mut().literal(literal)
+    }
+}

@@ -1,0 +1,62 @@
+//! What plans are measured by, and that they are.
+
+use encodings::Point;
+use pddl::ast::{Metric, Problem};
+
+use crate::message::{Errors, Message};
+use crate::mission::{Mission, Reading, confirm};
+
+/// Objectives in order; none for the problem's metric.
+#[derive(Debug, Clone)]
+pub(super) struct Objectives {
+    /// As the user has written them.
+    pub(super) texts: Vec<String>,
+    pub(super) metrics: Vec<Metric>,
+}
+
+impl Objectives {
+    /// # Errors
+    /// All that is wrong with each of them.
+    pub(super) fn read(mission: &Mission, problem: &Problem, texts: &[String]) -> Result<Self, Errors> {
+        let mut metrics = Vec::new();
+        let mut messages = Vec::new();
+        for text in texts {
+            match mission.objective(problem, text) {
+                Ok(metric) => metrics.push(metric),
+                Err(more) => messages.extend(more),
+            }
+        }
+        Errors::unless_empty(messages)?;
+        Ok(Self { texts: texts.to_vec(), metrics })
+    }
+
+    /// Has the validator execute the plan, and check its value by every objective.
+    ///
+    /// # Errors
+    /// M170, what the validator refuses or measures otherwise.
+    pub(super) fn confirm(
+        &self,
+        mission: &Mission,
+        problem: &Problem,
+        point: &Point,
+        reading: &Reading,
+    ) -> Result<(), Errors> {
+        let Some(plan) = &point.solution.plan else { return Ok(()) };
+        if self.metrics.is_empty() {
+            confirm(mission, problem, plan, reading).map_err(|reason| fault(&reason))?;
+        }
+        for (metric, value) in self.metrics.iter().zip(&point.values) {
+            let problem = Problem { metric: Some(metric.clone()), ..problem.clone() };
+            let mut plan = plan.clone();
+            plan.cost = value.clone();
+            confirm(mission, &problem, &plan, reading).map_err(|reason| fault(&reason))?;
+        }
+        Ok(())
+    }
+}
+
+/// A fault of ours.
+pub(super) fn fault(reason: &str) -> Message {
+    let text = format!("this is a fault of metaplan, not of your input; please report it: {reason}");
+    Message::error("M170", text)
+}
