@@ -17,7 +17,7 @@ use crate::number::Number;
 use crate::prism::ast::Model;
 use crate::prism::{Packed, Program};
 use crate::property::Property;
-use crate::solve::NONE;
+use crate::solve::{NONE, Work};
 
 pub use answer::{Answer, Outcome, Quantity};
 pub use options::{Exactness, Options};
@@ -25,6 +25,12 @@ pub use table::{PolicyTable, Row};
 
 /// Transitions up to which a model is solved in rationals unless asked otherwise.
 const SMALL: usize = 150_000;
+
+/// What exact arithmetic may cost a model with so many transitions unless it was asked for, in units of about a nanosecond.
+fn budget(transitions: usize) -> u64 {
+    let transitions = u64::try_from(transitions).unwrap_or(u64::MAX);
+    transitions.saturating_mul(500).saturating_add(10_000_000)
+}
 
 /// What came out.
 #[derive(Debug, Clone)]
@@ -73,6 +79,7 @@ pub fn check(model: &Model, property: &Property, options: &Options<'_>) -> Resul
     };
     let start = Instant::now();
     let mut spent = Duration::ZERO;
+    let most = if small { budget(explored.mdp.transition_count()) } else { u64::MAX };
     if small || options.exactness == Exactness::Always {
         let again = Instant::now();
         let exact = Program::<BigRational>::new(model, &options.settings)?.with_rewards(&wanted);
@@ -83,8 +90,14 @@ pub fn check(model: &Model, property: &Property, options: &Options<'_>) -> Resul
         let same = states.mdp.choice_count() == explored.mdp.choice_count()
             && states.mdp.transition_count() == explored.mdp.transition_count();
         let doubles = same.then(|| states.mdp.to_f64());
-        let found = query::Query { program: &exact, explored: &states, wanted: &wanted, doubles }
-            .answer(property, options)?;
+        let found = query::Query {
+            program: &exact,
+            explored: &states,
+            wanted: &wanted,
+            doubles,
+            work: Work::new(most).into(),
+        }
+        .answer(property, options)?;
         if let Some((outcome, policy)) = found {
             report.outcome = outcome;
             report.policy = policy.filter(|_| options.policy).map(|p| policy_table(&exact, &states, &p));
@@ -93,8 +106,14 @@ pub fn check(model: &Model, property: &Property, options: &Options<'_>) -> Resul
             return Ok(report);
         }
     }
-    let found = query::Query { program: &program, explored: &explored, wanted: &wanted, doubles: None }
-        .answer(property, options)?;
+    let found = query::Query {
+        program: &program,
+        explored: &explored,
+        wanted: &wanted,
+        doubles: None,
+        work: Work::new(0).into(),
+    }
+    .answer(property, options)?;
     if let Some((outcome, policy)) = found {
         report.outcome = outcome;
         report.policy = policy.filter(|_| options.policy).map(|p| policy_table(&program, &explored, &p));

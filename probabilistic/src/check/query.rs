@@ -1,5 +1,7 @@
 //! A property and an explored model to an outcome, in one kind of number.
 
+use std::cell::RefCell;
+
 use fixedbitset::FixedBitSet;
 use num_rational::BigRational;
 use num_traits::ToPrimitive;
@@ -16,7 +18,7 @@ use crate::policy::{choices_of, evaluate, with_secondary};
 use crate::prism::ast::{BinaryOp, Expr, ExprKind, ModelKind, Type};
 use crate::prism::{Code, Names, Packed, Program};
 use crate::property::{Path, Property, Question, RewardPath, Steps};
-use crate::solve::{Direction, Problem, Solution, solve};
+use crate::solve::{Direction, Problem, Solution, Work, draft, solve_within};
 
 /// Fewer steps than this are counted one by one.
 const STEPS: u32 = 1_000_000_000;
@@ -29,6 +31,8 @@ pub struct Query<'a, N> {
     pub wanted: &'a [usize],
     /// The process in doubles, to find a policy to start from.
     pub doubles: Option<Mdp<f64>>,
+    /// What exact arithmetic may still cost.
+    pub work: RefCell<Work>,
 }
 
 /// An answer, and the policy that has it. None where exact arithmetic takes too long.
@@ -226,9 +230,9 @@ impl<N: Number> Query<'_, N> {
         let given = options.evaluate.as_ref().map(|table| table.choices(self.program, self.explored));
         let allowed = given.transpose()?.map(|policy| choices_of(self.mdp(), &policy));
         let problem = Problem { allowed: allowed.as_ref(), ..problem };
-        let found = steps::apply(problem, values, self.limit(limit)?);
-        Ok(found.map(|(values, error)| {
-            let answer = Answer::from_number(&values[0], error);
+        let found = steps::apply(problem, values, self.limit(limit)?, &mut self.work.borrow_mut());
+        Ok(found.map(|found| {
+            let answer = Answer::from_number(&found.values[0], found.error(0));
             (if problem.rewards.is_none() { answer.probability() } else { answer }, None)
         }))
     }
@@ -280,16 +284,15 @@ impl<N: Number> Query<'_, N> {
         Ok(Some((clip(Answer::of(&solution, 0)), Some(policy))))
     }
 
-    /// Solves a problem, from the policy that is best in doubles where arithmetic is exact.
+    /// Solves a problem, from a policy that is good in doubles where arithmetic is exact.
     fn solve_hinted(&self, problem: Problem<'_, N>) -> Option<Solution<N>> {
         let hint = self.doubles.as_ref().and_then(|mdp| {
             let rewards: Option<Vec<f64>> =
                 problem.rewards.map(|rewards| rewards.iter().map(Number::to_f64).collect());
             let Problem { direction, terminal, blocked, .. } = problem;
-            let doubles = Problem { blocked, ..Problem::new(mdp, direction, rewards.as_deref(), terminal) };
-            solve(doubles, None)
+            draft(Problem { blocked, ..Problem::new(mdp, direction, rewards.as_deref(), terminal) })
         });
-        solve(problem, hint.as_ref().map(|hint| &hint.policy[..]))
+        solve_within(problem, hint.as_deref(), &mut self.work.borrow_mut())
     }
 
     fn rewards(&self, name: Option<&str>) -> Result<&[N], Error> {

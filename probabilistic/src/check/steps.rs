@@ -1,13 +1,42 @@
 //! Values after a bounded number of steps: repeated application of the equations.
 
 use crate::number::{Number, count};
-use crate::solve::{Direction, EXACT_WORK, Problem};
+use crate::solve::{Direction, Problem, Work};
+
+/// Products of positive doubles below lose digits; values that are made of them are off by no more than this.
+const TINY: f64 = 1e-280;
+
+/// Values after some steps.
+pub struct Stepped<N> {
+    /// For each state its value.
+    pub values: Vec<N>,
+    /// How far they can be from the truth, relative to each.
+    pub relative: f64,
+    /// Whether products became too small for doubles.
+    pub lost: bool,
+}
+
+impl<N: Number> Stepped<N> {
+    /// How far the value of a state can be from the truth.
+    pub fn error(&self, state: usize) -> f64 {
+        let value = self.values[state].to_f64();
+        value * self.relative + if self.lost { TINY } else { 0.0 }
+    }
+}
 
 /// Applies the equations of all states so many times, starting with `values`. Those of the states at which the problem ends
-/// do not change. The second result bounds the rounding error. None where exact arithmetic takes too long.
-pub fn apply<N: Number>(problem: Problem<'_, N>, mut values: Vec<N>, steps: u32) -> Option<(Vec<N>, f64)> {
+/// do not change. None where exact arithmetic takes too long.
+///
+/// All that is added and multiplied is positive, so that each step makes the error of a value a little greater, relative to
+/// that value.
+pub fn apply<N: Number>(
+    problem: Problem<'_, N>,
+    mut values: Vec<N>,
+    steps: u32,
+    work: &mut Work,
+) -> Option<Stepped<N>> {
     let mdp = problem.mdp;
-    let (mut widest, mut work) = (1, 0_u64);
+    let (mut widest, mut lost) = (1, false);
     for _ in 0..steps {
         let mut next = values.clone();
         for state in (0..mdp.states()).filter(|state| !problem.is_sink(*state)) {
@@ -18,11 +47,10 @@ pub fn apply<N: Number>(problem: Problem<'_, N>, mut values: Vec<N>, steps: u32)
                 let value = mdp
                     .transitions(choice)
                     .fold(start, |sum, (target, p)| sum.plus(&p.times(&values[target])));
-                // Fractions are reduced, which takes the square of their length.
-                if N::EXACT {
-                    let square = value.size().saturating_mul((value.size() / 64).saturating_add(1));
-                    work = u64::saturating_add(work, square);
-                }
+                lost |= !N::EXACT
+                    && value.to_f64() < TINY
+                    && mdp.targets(choice).iter().any(|target| !values[*target as usize].is_zero());
+                work.spend(&value, mdp.targets(choice).len())?;
                 let better = best.as_ref().is_none_or(|best| match problem.direction {
                     Direction::Min => value < *best,
                     Direction::Max => value > *best,
@@ -34,9 +62,6 @@ pub fn apply<N: Number>(problem: Problem<'_, N>, mut values: Vec<N>, steps: u32)
             if let Some(best) = best {
                 next[state] = best;
             }
-            if work > EXACT_WORK {
-                return None;
-            }
         }
         let settled = next == values;
         values = next;
@@ -44,9 +69,7 @@ pub fn apply<N: Number>(problem: Problem<'_, N>, mut values: Vec<N>, steps: u32)
             break;
         }
     }
-    let greatest = values.iter().map(Number::to_f64).fold(0.0, f64::max);
     // Values that settle may do so because of rounding, so that all steps count.
-    let error =
-        if N::EXACT { 0.0 } else { f64::from(steps) * (count(widest) + 2.0) * f64::EPSILON * greatest };
-    Some((values, error))
+    let relative = if N::EXACT { 0.0 } else { f64::from(steps) * (count(widest) + 4.0) * f64::EPSILON };
+    Some(Stepped { values, relative, lost })
 }

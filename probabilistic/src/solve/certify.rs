@@ -12,6 +12,7 @@ use crate::solve::chain::solve_chain;
 use crate::solve::local::NONE;
 use crate::solve::problem::Direction;
 use crate::solve::quotient::Quotient;
+use crate::solve::work::Work;
 
 /// Rounds of policy iteration for the longest way.
 const ROUNDS: usize = 200;
@@ -99,7 +100,7 @@ fn longest<N: Number>(
     rows.end(1.0, 1.0);
     let mut policy: Vec<u32> = policy.iter().map(|row| if *row == NONE { idle } else { *row }).collect();
     for _ in 0..ROUNDS {
-        let steps = solve_chain(&rows, &policy, |_| 1.0)?;
+        let steps = solve_chain(&rows, &policy, |_| 1.0, &mut Work::new(0))?.values;
         if steps.iter().any(|steps| !steps.is_finite()) {
             return None;
         }

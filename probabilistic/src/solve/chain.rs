@@ -4,10 +4,17 @@
 //! The pivot 1 − p(i,i) is the sum of what leaves the state (Grassmann, Taksar and Heyman, Operations Research
 //! 33(5), 1985), so nothing is ever subtracted: with doubles each result has a small *relative* error, however rarely
 //! the chain is left.
+//!
+//! How small follows from two facts. A step of elimination computes each entry of what remains by a few sums, products and
+//! quotients of positive numbers, so that it is the exact step from entries that are off by a factor near 1. And a value
+//! is a quotient of two polynomials with positive coefficients whose degree is the number of states that remain (the
+//! matrix-tree theorem; O'Cinneide, Numerische Mathematik 73, 1996), so that such factors come out once for each state, above and
+//! below.
 
 use crate::graph::components;
 use crate::mdp::dense;
-use crate::number::Number;
+use crate::number::{Number, count};
+use crate::solve::work::Work;
 
 /// Rows of a chain: where a state leads inside, what it costs, and with which probability it leaves for good.
 #[derive(Debug, Clone, Default)]
@@ -80,6 +87,18 @@ impl<N: Number> Rows<N> {
 /// up, and are better iterated.
 const ELIMINATION: u64 = 300_000_000;
 
+/// Values of a chain.
+pub struct Solved<N> {
+    /// For each state its value.
+    pub values: Vec<N>,
+    /// How far each can be from the truth, relative to the value, given rows whose entries are rounded once or twice; infinite
+    /// where products became too small for doubles, zero where arithmetic is exact.
+    pub relative: Vec<f64>,
+}
+
+/// Doubles below are so small that products of them lose digits.
+const LOST: f64 = 1e-290;
+
 /// Solves the chain in which state `i` has the row `policy[i]`, with the constants of the rows.
 ///
 /// None if some state never leaves, or if elimination takes too long.
@@ -87,7 +106,8 @@ pub fn solve_chain<N: Number>(
     rows: &Rows<N>,
     policy: &[u32],
     constants: impl Fn(usize) -> N,
-) -> Option<Vec<N>> {
+    work: &mut Work,
+) -> Option<Solved<N>> {
     let mut chain = Rows::new();
     chain.clear();
     for row in policy {
@@ -100,18 +120,42 @@ pub fn solve_chain<N: Number>(
     }
     let order = components(policy.len(), |state| &chain.columns[chain.range(state as usize)]);
     let mut values = vec![N::zero(); policy.len()];
+    let mut relative = vec![0.0_f64; policy.len()];
     for component in order.iter() {
+        let before = if N::EXACT { 0.0 } else { worst_outside(&chain, component, &relative) };
         if let [state] = component {
             let state = *state as usize;
             let looping = chain.range(state).any(|at| chain.columns[at] as usize == state);
             if !looping {
                 values[state] = chain.apply(state, &values);
+                work.spend(&values[state], chain.range(state).len())?;
+                relative[state] = before + rounding::<N>(1, chain.range(state).len());
                 continue;
             }
         }
-        eliminate(&chain, component, &mut values)?;
+        let Precision { widest, lost } = eliminate(&chain, component, &mut values, work)?;
+        let own = if lost { f64::INFINITY } else { rounding::<N>(component.len(), widest) };
+        for state in component {
+            relative[*state as usize] = before + own;
+        }
     }
-    Some(values)
+    Some(Solved { values, relative })
+}
+
+/// The greatest relative error of what a component leads to.
+fn worst_outside<N: Number>(chain: &Rows<N>, component: &[u32], relative: &[f64]) -> f64 {
+    let entries = component.iter().flat_map(|state| chain.range(*state as usize));
+    entries.fold(0.0, |worst, at| worst.max(relative[chain.columns[at] as usize]))
+}
+
+/// The relative error of eliminating so many states, in rows of so many entries.
+///
+/// The step with m states left is off by a factor of 1 ± (w + 4)u in each entry, which a value has 2m times; all of them
+/// together are below n(n + 1)(w + 4)u, the rounding of the first entries and the way back below another 4n(w + 4)u. The unit
+/// u is half of the epsilon, so that this is twice as much.
+fn rounding<N: Number>(states: usize, widest: usize) -> f64 {
+    let n = count(states) + 4.0;
+    if N::EXACT { 0.0 } else { n * n * (count(widest) + 8.0) * f64::EPSILON }
 }
 
 /// A state of the component under elimination.
@@ -122,7 +166,21 @@ struct Row<N> {
     leaving: N,
 }
 
-fn eliminate<N: Number>(chain: &Rows<N>, component: &[u32], values: &mut [N]) -> Option<()> {
+/// What an elimination's error depends on.
+struct Precision {
+    /// The greatest number of entries that a row had.
+    widest: usize,
+    /// Whether products became too small for doubles.
+    lost: bool,
+}
+
+/// The values of a component.
+fn eliminate<N: Number>(
+    chain: &Rows<N>,
+    component: &[u32],
+    values: &mut [N],
+    budget: &mut Work,
+) -> Option<Precision> {
     let mut members: Vec<u32> = component.to_vec();
     members.sort_unstable();
     let local = |state: u32| members.binary_search(&state).ok();
@@ -151,11 +209,12 @@ fn eliminate<N: Number>(chain: &Rows<N>, component: &[u32], values: &mut [N]) ->
     }
     let order = elimination_order(&rows, &users);
     let mut done = vec![false; members.len()];
-    let mut work = 0_u64;
+    let (mut work, mut lost) = (0_u64, false);
+    let mut widest = rows.iter().map(|row| row.entries.len()).max().unwrap_or(0);
     for pivot in &order {
         let p = *pivot as usize;
         done[p] = true;
-        normalise(&mut rows[p], *pivot)?;
+        normalise(&mut rows[p], *pivot, budget)?;
         let row = std::mem::replace(
             &mut rows[p],
             Row { entries: Vec::new(), constant: N::zero(), leaving: N::zero() },
@@ -164,7 +223,8 @@ fn eliminate<N: Number>(chain: &Rows<N>, component: &[u32], values: &mut [N]) ->
             if !done[user as usize] {
                 let touched = row.entries.len().saturating_add(rows[user as usize].entries.len());
                 work = work.saturating_add(u64::try_from(touched).unwrap_or(u64::MAX));
-                substitute(&mut rows[user as usize], *pivot, &row, user, &mut users);
+                lost |= substitute(&mut rows[user as usize], *pivot, &row, user, &mut users, budget)?;
+                widest = widest.max(rows[user as usize].entries.len());
             }
         }
         rows[p] = row;
@@ -179,9 +239,10 @@ fn eliminate<N: Number>(chain: &Rows<N>, component: &[u32], values: &mut [N]) ->
         let value = row.entries.iter().fold(row.constant.clone(), |sum, (column, probability)| {
             sum.plus(&probability.times(&values[members[*column as usize] as usize]))
         });
+        budget.spend(&value, row.entries.len().saturating_add(1))?;
         values[members[p] as usize] = value;
     }
-    Some(())
+    Some(Precision { widest, lost })
 }
 
 /// Few entries first: rows that fill the others least. Greedy on the initial pattern.
@@ -192,7 +253,7 @@ fn elimination_order<N>(rows: &[Row<N>], users: &[Vec<u32>]) -> Vec<u32> {
 }
 
 /// Removes the loop of a row, and divides by what leaves it.
-fn normalise<N: Number>(row: &mut Row<N>, own: u32) -> Option<()> {
+fn normalise<N: Number>(row: &mut Row<N>, own: u32, budget: &mut Work) -> Option<()> {
     let Ok(at) = row.entries.binary_search_by_key(&own, |(column, _)| *column) else { return Some(()) };
     row.entries.remove(at);
     let leaves = row.entries.iter().fold(row.leaving.clone(), |sum, (_, p)| sum.plus(p));
@@ -201,20 +262,36 @@ fn normalise<N: Number>(row: &mut Row<N>, own: u32) -> Option<()> {
     }
     for (_, probability) in &mut row.entries {
         *probability = probability.over(&leaves);
+        budget.spend(probability, 1)?;
     }
+    budget.spend(&leaves, row.entries.len().saturating_add(2))?;
     row.constant = row.constant.over(&leaves);
     row.leaving = row.leaving.over(&leaves);
     Some(())
 }
 
-/// Puts a row in the place of its state in the row of `user`.
-fn substitute<N: Number>(target: &mut Row<N>, pivot: u32, row: &Row<N>, user: u32, users: &mut [Vec<u32>]) {
-    let Ok(at) = target.entries.binary_search_by_key(&pivot, |(column, _)| *column) else { return };
+/// Puts a row in the place of its state in the row of `user`; whether a product became too small for doubles.
+fn substitute<N: Number>(
+    target: &mut Row<N>,
+    pivot: u32,
+    row: &Row<N>,
+    user: u32,
+    users: &mut [Vec<u32>],
+    budget: &mut Work,
+) -> Option<bool> {
+    let Ok(at) = target.entries.binary_search_by_key(&pivot, |(column, _)| *column) else {
+        return Some(false);
+    };
     let (_, factor) = target.entries.remove(at);
+    let mut lost = false;
     target.constant = target.constant.plus(&factor.times(&row.constant));
-    target.leaving = target.leaving.plus(&factor.times(&row.leaving));
+    let leaving = factor.times(&row.leaving);
+    lost |= !N::EXACT && !row.leaving.is_zero() && leaving.to_f64() < LOST;
+    target.leaving = target.leaving.plus(&leaving);
     for (column, probability) in &row.entries {
         let more = factor.times(probability);
+        lost |= !N::EXACT && more.to_f64() < LOST;
+        budget.spend(&more, 2)?;
         match target.entries.binary_search_by_key(column, |(known, _)| *known) {
             Ok(at) => target.entries[at].1 = target.entries[at].1.plus(&more),
             Err(at) => {
@@ -223,4 +300,7 @@ fn substitute<N: Number>(target: &mut Row<N>, pivot: u32, row: &Row<N>, user: u3
             }
         }
     }
+    budget.spend(&target.constant, 2)?;
+    budget.spend(&target.leaving, 2)?;
+    Some(lost)
 }

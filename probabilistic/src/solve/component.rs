@@ -4,19 +4,13 @@ use std::collections::VecDeque;
 
 use crate::mdp::dense;
 use crate::number::Number;
-use crate::solve::certify::certify;
-use crate::solve::chain::{Rows, solve_chain};
-use crate::solve::interval::{self, Enclosed};
+use crate::solve::chain::Rows;
+use crate::solve::doubles;
+use crate::solve::interval::Enclosed;
+use crate::solve::iterate::{Iterated, iterate, leave};
 use crate::solve::local::{EndComponents, Local, NONE, attractor, end_components};
-use crate::solve::problem::{Direction, EXACT_WORK, Run, TINY};
+use crate::solve::problem::{Direction, Run, TINY};
 use crate::solve::quotient::Quotient;
-
-/// Rounds of policy iteration after which the best policy so far is taken; the certificate tells what it is worth.
-const ROUNDS: usize = 1000;
-/// Sweeps between two solutions of the chain, where components are large.
-const SWEEPS: usize = 40;
-/// Blocks from which on sweeps pay off.
-const LARGE: usize = 200;
 
 impl<N: Number> Run<'_, N> {
     /// Solves a component of more than one state; none where exact arithmetic takes too long.
@@ -170,17 +164,15 @@ impl<N: Number> Run<'_, N> {
             ends = end_components(local, |_| false);
         }
         let quotient = quotient(local, &ends);
-        let found = self.iterate(local, &quotient).map(|(policy, values)| {
-            let direction = self.problem.direction;
-            let errors = if N::EXACT { Vec::new() } else { certify(&quotient, &policy, &values, direction) };
-            Enclosed { policy, values, errors }
-        });
-        let certified = |found: &Enclosed<N>| found.errors.iter().all(|error| error.is_finite());
-        let found = match found {
-            Some(found) if certified(&found) => Some(found),
+        let start = self.start(local, &quotient);
+        let direction = self.problem.direction;
+        let found = match iterate(&quotient, start, direction, &mut self.work) {
             None if N::EXACT => return None,
-            // Elimination cannot solve it, or its solution has no certificate.
-            other => interval::enclose(&quotient, self.problem.direction).or(other),
+            Some(Iterated { policy, values, .. }) if N::EXACT || self.draft => {
+                Some(Enclosed { policy, values, errors: Vec::new() })
+            }
+            None if self.draft => None,
+            found => doubles::enclosed(&quotient, found, direction),
         };
         let Some(Enclosed { policy, values, errors }) = found else {
             self.unknown(local);
@@ -193,7 +185,11 @@ impl<N: Number> Run<'_, N> {
             let (block, state) = (ends.block[number] as usize, *state as usize);
             self.solution.values[state] = values[block].clone();
             if !N::EXACT {
-                let own = if values[block].is_zero() { 0.0 } else { errors[block] };
+                let own = if values[block].is_zero() {
+                    0.0
+                } else {
+                    errors.get(block).copied().unwrap_or(f64::INFINITY)
+                };
                 self.solution.errors[state] = own + outside;
             }
         }
@@ -217,36 +213,6 @@ impl<N: Number> Run<'_, N> {
         for state in &local.states {
             self.solution.errors[*state as usize] = f64::INFINITY;
         }
-    }
-
-    /// Policy iteration from a proper policy.
-    fn iterate(&mut self, local: &Local<N>, quotient: &Quotient<N>) -> Option<(Vec<u32>, Vec<N>)> {
-        let direction = self.problem.direction;
-        let mut policy = self.start(local, quotient);
-        let mut values = chain(quotient, &policy)?;
-        for _ in 0..ROUNDS {
-            let mut improved = false;
-            let large = !N::EXACT && quotient.blocks() >= LARGE;
-            for _ in 0..if large { SWEEPS } else { 1 } {
-                let changed = improve(quotient, &mut policy, &mut values, direction, large);
-                improved |= changed;
-                if !changed {
-                    break;
-                }
-            }
-            if N::EXACT {
-                let sizes = values.iter().map(Number::size).fold(0, u64::saturating_add);
-                self.work = self.work.saturating_add(sizes.saturating_mul(8));
-            }
-            if N::EXACT && self.work > EXACT_WORK {
-                return None;
-            }
-            if !improved {
-                return Some((policy, values));
-            }
-            values = chain(quotient, &policy)?;
-        }
-        Some((policy, values))
     }
 
     /// The policy of the hint where there is one, else one that leaves the component for sure.
@@ -332,86 +298,6 @@ fn component_part(states: &[u32], members: &[bool], sure_too: bool, only_sure: b
 fn stay<N: Number>(local: &Local<N>, ends: &EndComponents, state: usize) -> u32 {
     let mut choices = local.range(state);
     choices.find(|choice| ends.alive[*choice]).map_or(NONE, |choice| local.choices[choice])
-}
-
-fn chain<N: Number>(quotient: &Quotient<N>, policy: &[u32]) -> Option<Vec<N>> {
-    // Blocks that nothing leaves are worth nothing; they get an empty row.
-    if policy.contains(&NONE) {
-        let mut padded = Rows::new();
-        let mut chosen = Vec::with_capacity(policy.len());
-        for row in policy {
-            if *row != NONE {
-                for at in quotient.rows.range(*row as usize) {
-                    padded.columns.push(quotient.rows.columns[at]);
-                    padded.probabilities.push(quotient.rows.probabilities[at].clone());
-                }
-            }
-            let constant =
-                if *row == NONE { N::zero() } else { quotient.rows.constants[*row as usize].clone() };
-            let leaving = if *row == NONE { N::one() } else { quotient.rows.leaving[*row as usize].clone() };
-            chosen.push(dense(padded.len()));
-            padded.end(constant, leaving);
-        }
-        return solve_chain(&padded, &chosen, |row| padded.constants[row].clone());
-    }
-    solve_chain(&quotient.rows, policy, |row| quotient.rows.constants[row].clone())
-}
-
-/// Takes the best row of each block; `sweep` writes its value, too. Whether any changed.
-fn improve<N: Number>(
-    quotient: &Quotient<N>,
-    policy: &mut [u32],
-    values: &mut [N],
-    direction: Direction,
-    sweep: bool,
-) -> bool {
-    let mut changed = false;
-    let old: Option<Vec<N>> = (!sweep).then(|| values.to_vec());
-    for block in 0..quotient.blocks() {
-        for row in quotient.range(block) {
-            if policy[block] as usize == row {
-                continue;
-            }
-            let value = quotient.rows.apply(row, old.as_deref().unwrap_or(values));
-            let better = match direction {
-                Direction::Min => value.clearly_less(&values[block]),
-                Direction::Max => values[block].clearly_less(&value),
-            };
-            if better {
-                policy[block] = dense(row);
-                values[block] = value;
-                changed = true;
-            }
-        }
-    }
-    changed
-}
-
-/// A policy under which every block is left, by rows that get closer to the outside.
-fn leave<N: Number>(quotient: &Quotient<N>) -> Vec<u32> {
-    let mut policy = vec![NONE; quotient.blocks()];
-    let mut users: Vec<Vec<(u32, u32)>> = vec![Vec::new(); quotient.blocks()];
-    let mut queue = VecDeque::new();
-    for (block, chosen) in policy.iter_mut().enumerate() {
-        for row in quotient.range(block) {
-            if *chosen == NONE && !quotient.rows.leaving[row].is_zero() {
-                *chosen = dense(row);
-                queue.push_back(block);
-            }
-            for at in quotient.rows.range(row) {
-                users[quotient.rows.columns[at] as usize].push((dense(block), dense(row)));
-            }
-        }
-    }
-    while let Some(at) = queue.pop_front() {
-        for (block, row) in &users[at] {
-            if policy[*block as usize] == NONE {
-                policy[*block as usize] = *row;
-                queue.push_back(*block as usize);
-            }
-        }
-    }
-    policy
 }
 
 fn quotient<N: Number>(local: &Local<N>, ends: &EndComponents) -> Quotient<N> {

@@ -24,7 +24,7 @@ pub struct Enclosed<N> {
 /// The width of the bounds that is aimed at, relative to the value.
 const WIDTH: f64 = 1e-7;
 /// Rows that are evaluated at most.
-const WORK: u64 = 20_000_000_000;
+const WORK: u64 = 2_000_000_000;
 /// Sweeps from above before the values from below are made better.
 const UPPER_SWEEPS: usize = 40;
 
@@ -137,6 +137,7 @@ mod tests {
     use super::*;
     use crate::solve::certify::certify;
     use crate::solve::chain;
+    use crate::solve::work::Work;
 
     /// A walk over a square with two choices in each place, which is left with probability 1/50 at each step.
     fn square(side: u32) -> Quotient<f64> {
@@ -166,9 +167,14 @@ mod tests {
         for direction in [Direction::Min, Direction::Max] {
             let quotient = square(12);
             let found = enclose(&quotient, direction).expect("it converges");
-            let values =
-                chain::solve_chain(&quotient.rows, &found.policy, |row| quotient.rows.constants[row])
-                    .expect("each place is left");
+            let values = chain::solve_chain(
+                &quotient.rows,
+                &found.policy,
+                |row| quotient.rows.constants[row],
+                &mut Work::new(0),
+            )
+            .expect("each place is left")
+            .values;
             let exact = certify(&quotient, &found.policy, &values, direction);
             for ((value, error), (known, rounding)) in
                 found.values.iter().zip(&found.errors).zip(values.iter().zip(exact))

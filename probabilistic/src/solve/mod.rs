@@ -10,11 +10,14 @@
 pub(crate) mod certify;
 pub(crate) mod chain;
 mod component;
+mod doubles;
 mod interval;
+mod iterate;
 pub(crate) mod local;
 mod problem;
 mod quotient;
 mod ways;
+pub(crate) mod work;
 
 use fixedbitset::FixedBitSet;
 
@@ -25,8 +28,8 @@ use crate::number::{Number, is_whole};
 use problem::{Run, TINY};
 
 pub use local::NONE;
-pub(crate) use problem::EXACT_WORK;
 pub use problem::{Direction, Problem, Solution};
+pub(crate) use work::Work;
 
 /// Exact arithmetic takes too long.
 struct TooMuchWork;
@@ -35,6 +38,29 @@ struct TooMuchWork;
 ///
 /// `hint` is a policy to start from, as a solution in doubles has it.
 pub fn solve<N: Number>(problem: Problem<'_, N>, hint: Option<&[u32]>) -> Option<Solution<N>> {
+    solve_within(problem, hint, &mut Work::new(work::MOST))
+}
+
+/// Solves a problem within a budget of exact arithmetic; none where that does not suffice.
+pub(crate) fn solve_within<N: Number>(
+    problem: Problem<'_, N>,
+    hint: Option<&[u32]>,
+    work: &mut Work,
+) -> Option<Solution<N>> {
+    let mut run = Run { work: *work, ..begin(problem, hint) };
+    let done = run.all();
+    *work = run.work;
+    done.map(|()| run.solution)
+}
+
+/// A good policy, which need not be the best one.
+pub(crate) fn draft<N: Number>(problem: Problem<'_, N>) -> Option<Vec<u32>> {
+    let mut run = Run { draft: true, ..begin(problem, None) };
+    run.all()?;
+    Some(run.solution.policy)
+}
+
+fn begin<'a, N: Number>(problem: Problem<'a, N>, hint: Option<&'a [u32]>) -> Run<'a, N> {
     let n = problem.mdp.states();
     let values = (0..n).map(|state| problem.worth(state)).collect();
     let solution = Solution {
@@ -44,26 +70,32 @@ pub fn solve<N: Number>(problem: Problem<'_, N>, hint: Option<&[u32]>) -> Option
         sure: problem.terminal.clone(),
         policy: vec![NONE; n],
     };
-    let mut run = Run { problem, solution, hint, position: vec![NONE; n], work: 0 };
+    let mut run =
+        Run { problem, solution, hint, position: vec![NONE; n], work: Work::new(work::MOST), draft: false };
     run.solution.sure.grow(n);
-    let (mut local, mut ways) = (local::Local::new(), ways::Ways::default());
-    let successors = |state: u32| {
-        if problem.is_sink(state as usize) { &[] } else { problem.mdp.successors(state as usize) }
-    };
-    visit_components(n, successors, |component| {
-        match component {
-            [state] if problem.is_sink(*state as usize) => run.sink(*state as usize),
-            [state] => run.single(*state as usize),
-            _ if run.ways(component, &mut ways) => {}
-            _ => run.component(component, &mut local).ok_or(TooMuchWork)?,
-        }
-        if N::EXACT && run.work > EXACT_WORK { Err(TooMuchWork) } else { Ok(()) }
-    })
-    .ok()?;
-    Some(run.solution)
+    run
 }
 
 impl<N: Number> Run<'_, N> {
+    /// Solves all components, each after those that it leads to.
+    fn all(&mut self) -> Option<()> {
+        let (mut local, mut ways) = (local::Local::new(), ways::Ways::default());
+        let problem = self.problem;
+        let successors = |state: u32| {
+            if problem.is_sink(state as usize) { &[] } else { problem.mdp.successors(state as usize) }
+        };
+        let visited = visit_components(problem.mdp.states(), successors, |component| {
+            match component {
+                [state] if problem.is_sink(*state as usize) => self.sink(*state as usize),
+                [state] => self.single(*state as usize),
+                _ if self.ways(component, &mut ways) => {}
+                _ => self.component(component, &mut local).ok_or(TooMuchWork)?,
+            }
+            if N::EXACT && self.work.is_spent() { Err(TooMuchWork) } else { Ok(()) }
+        });
+        visited.ok()
+    }
+
     /// A state at which it ends, well or badly.
     fn sink(&mut self, state: usize) {
         if self.problem.rewards.is_some() && !self.problem.terminal.contains(state) {
@@ -116,7 +148,6 @@ impl<N: Number> Run<'_, N> {
             }
         }
         if let Some((value, choice, own)) = best {
-            self.work = self.work.saturating_add(value.size());
             if !N::EXACT {
                 // Nothing is less than zero, so that only the error of what is zero counts there.
                 self.solution.errors[state] = if value.is_zero() { own } else { error };
@@ -131,7 +162,7 @@ impl<N: Number> Run<'_, N> {
         let mdp = self.problem.mdp;
         let (mut sum, mut leaving, mut looping) = (self.problem.reward(choice), N::zero(), false);
         let mut whole = !N::EXACT && is_whole(sum.to_f64());
-        let (mut error, mut terms, mut tiny) = (0.0_f64, 4.0, false);
+        let (mut error, mut terms, mut tiny, mut unsure) = (0.0_f64, 4.0, false, false);
         for (target, probability) in mdp.transitions(choice) {
             if target == state {
                 looping = true;
@@ -145,13 +176,13 @@ impl<N: Number> Run<'_, N> {
             leaving = leaving.plus(probability);
             terms += 2.0;
             if !N::EXACT {
-                error = error.max(self.solution.errors[target]);
+                unsure |= self.solution.errors[target] > 0.0;
+                error += probability.to_f64() * self.solution.errors[target];
                 tiny |= !value.is_zero();
                 whole &= is_whole(value.to_f64());
             }
-            if N::EXACT {
-                self.work = self.work.saturating_add(sum.size().saturating_mul(4));
-            }
+            // What the budget does not pay for is noticed when the state is done.
+            let _ = self.work.spend(&sum, 2);
         }
         if leaving.is_zero() {
             // It stays for ever: worth nothing where that is allowed.
@@ -159,7 +190,11 @@ impl<N: Number> Run<'_, N> {
         }
         if looping {
             sum = sum.over(&leaving);
+            error /= leaving.to_f64();
         }
+        // Probabilities that are rounded may sum to a little more than one.
+        error *= 1.0 + terms * f64::EPSILON;
+        error += if error > 0.0 || unsure { f64::MIN_POSITIVE } else { 0.0 };
         let size = sum.to_f64();
         // Deterministic choices with whole rewards carry no error of their own.
         if whole && error == 0.0 && terms < 7.0 && !looping && is_whole(size) {

@@ -4,6 +4,7 @@ use fixedbitset::FixedBitSet;
 
 use crate::mdp::Mdp;
 use crate::number::{Number, enclosing};
+use crate::solve::work::Work;
 
 /// Which policy is looked for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -110,9 +111,6 @@ impl<N: Number> Solution<N> {
     }
 }
 
-/// How much exact arithmetic may cost, in bits touched, before it is given up.
-pub(crate) const EXACT_WORK: u64 = 3_000_000_000;
-
 /// Products of positive doubles below lose digits; values that are made of them get this error on top.
 pub(super) const TINY: f64 = 1e-280;
 
@@ -124,7 +122,10 @@ pub(crate) struct Run<'a, N> {
     pub hint: Option<&'a [u32]>,
     /// For each state its number in the component at work.
     pub position: Vec<u32>,
-    pub work: u64,
+    /// What exact arithmetic may still cost.
+    pub work: Work,
+    /// Whether a policy is all that is wanted, which need not be the best one: nothing is certified.
+    pub draft: bool,
 }
 
 impl<N: Number> Run<'_, N> {

@@ -183,7 +183,6 @@ impl<N: Number> Run<'_, N> {
             let Some((value, error)) = self.single_choice(state, *choice as usize, must_be_sure) else {
                 continue;
             };
-            self.work = self.work.saturating_add(value.size());
             ways.error = ways.error.max(error);
             if value.is_zero() {
                 ways.zero_error = ways.zero_error.max(error);

@@ -1,0 +1,83 @@
+//! What policy iteration found in doubles to values with bounds: by the first method that makes them tight.
+
+use num_rational::BigRational;
+
+use crate::number::{Number, count};
+use crate::solve::certify::certify;
+use crate::solve::chain::Rows;
+use crate::solve::interval::{self, Enclosed};
+use crate::solve::iterate::{Iterated, iterate};
+use crate::solve::problem::Direction;
+use crate::solve::quotient::Quotient;
+use crate::solve::work::Work;
+
+/// Bounds that are wider, relative to the value, are not tight.
+const TIGHT: f64 = 1e-7;
+/// What a component may cost in rationals, where doubles cannot tell enough of it; and the blocks that it may have.
+const RATIONAL: (u64, usize) = (1_000_000_000, 3000);
+
+/// Bounds on the values of all blocks; none where no method finds any.
+///
+/// A chain's elimination has a small relative error by itself. Where there are choices, a certificate tells the error; a
+/// process that is left very rarely has none in doubles, and is solved in rationals. What elimination cannot solve at all is
+/// iterated from both sides.
+pub fn enclosed<N: Number>(
+    quotient: &Quotient<N>,
+    found: Option<Iterated<N>>,
+    direction: Direction,
+) -> Option<Enclosed<N>> {
+    let Some(found) = found else { return interval::enclose(quotient, direction) };
+    let is_chain = (0..quotient.blocks()).all(|block| quotient.range(block).len() <= 1);
+    let mut errors: Vec<f64> = if is_chain {
+        found.values.iter().zip(&found.relative).map(|(value, relative)| value.to_f64() * relative).collect()
+    } else {
+        certify(quotient, &found.policy, &found.values, direction)
+    };
+    if is_chain && !is_tight(&found.values, &errors) {
+        let certified = certify(quotient, &found.policy, &found.values, direction);
+        for (error, certified) in errors.iter_mut().zip(certified) {
+            *error = error.min(certified);
+        }
+    }
+    let is_good = is_tight(&found.values, &errors);
+    let rounded = Enclosed { policy: found.policy, values: found.values, errors };
+    if is_good {
+        return Some(rounded);
+    }
+    let exact = (quotient.blocks() <= RATIONAL.1).then(|| in_rationals(quotient, &rounded.policy, direction));
+    exact.flatten().or_else(|| interval::enclose(quotient, direction)).or(Some(rounded))
+}
+
+fn is_tight<N: Number>(values: &[N], errors: &[f64]) -> bool {
+    values.iter().zip(errors).all(|(value, error)| value.is_zero() || *error <= TIGHT * value.to_f64())
+}
+
+/// The best values of the rounded rows, exactly. Each entry of a row is off by a few roundings, and so a value by as many for
+/// each block, above and below (see `chain`), for whichever policy, and so for the best one.
+fn in_rationals<N: Number>(
+    quotient: &Quotient<N>,
+    policy: &[u32],
+    direction: Direction,
+) -> Option<Enclosed<N>> {
+    let exact = |numbers: &[N]| {
+        numbers.iter().map(|number| BigRational::from_float(number.to_f64())).collect::<Option<Vec<_>>>()
+    };
+    let rows = &quotient.rows;
+    let rational = Quotient {
+        first: quotient.first.clone(),
+        rows: Rows {
+            first: rows.first.clone(),
+            columns: rows.columns.clone(),
+            probabilities: exact(&rows.probabilities)?,
+            constants: exact(&rows.constants)?,
+            leaving: exact(&rows.leaving)?,
+        },
+        choices: quotient.choices.clone(),
+        widest: quotient.widest,
+    };
+    let found = iterate(&rational, policy.to_vec(), direction, &mut Work::new(RATIONAL.0))?;
+    let relative = (count(quotient.blocks()) + 4.0) * 2.0 * (count(quotient.widest) + 8.0) * f64::EPSILON;
+    let values: Vec<N> = found.values.iter().map(N::from_rational).collect();
+    let errors = values.iter().map(|value| value.to_f64() * relative).collect();
+    Some(Enclosed { policy: found.policy, values, errors })
+}

@@ -1,0 +1,38 @@
+//! What exact arithmetic may cost.
+
+use crate::number::Number;
+
+/// How much exact arithmetic may cost, in units of about a nanosecond, before it is given up.
+pub const MOST: u64 = 3_000_000_000;
+
+/// What is left of a budget of exact arithmetic. Doubles cost nothing.
+#[derive(Debug, Clone, Copy)]
+pub struct Work {
+    left: u64,
+}
+
+impl Work {
+    /// A budget of so many units.
+    pub const fn new(left: u64) -> Self {
+        Self { left }
+    }
+
+    /// Pays for so many operations whose results are about as long as this one; none where the budget is spent.
+    ///
+    /// Fractions are reduced, which takes the square of their length; the first part is for the memory that they take.
+    pub fn spend<N: Number>(&mut self, result: &N, operations: usize) -> Option<()> {
+        if !N::EXACT {
+            return Some(());
+        }
+        let bits = result.size();
+        let one = bits.saturating_mul((bits / 64).saturating_add(1)).saturating_add(200);
+        let cost = one.saturating_mul(u64::try_from(operations).unwrap_or(u64::MAX));
+        self.left = self.left.saturating_sub(cost);
+        if self.is_spent() { None } else { Some(()) }
+    }
+
+    /// Whether nothing is left.
+    pub const fn is_spent(self) -> bool {
+        self.left == 0
+    }
+}
