@@ -4,10 +4,10 @@ use schemars::{Schema, schema_for};
 use serde_json::{Map, Value, json};
 
 use crate::answers::{
-    ChangesAnswer, CheckAnswer, CodeAnswer, CompareAnswer, ConfigureAnswer, DesignAnswer, EntailmentAnswer,
-    ErrorAnswer, ImportAnswer, InitAnswer, JournalAnswer, LintAnswer, MissionExport, ModelExport,
-    ParetoAnswer, PlanAnswer, ReasonAnswer, ReasonsAnswer, SchemaAnswer, SimulateAnswer, VerdictAnswer,
-    VerificationAnswer,
+    ChangesAnswer, CheckAnswer, ChecksAnswer, CodeAnswer, CompareAnswer, ConfigureAnswer, DesignAnswer,
+    EntailmentAnswer, ErrorAnswer, ImportAnswer, InitAnswer, JournalAnswer, LintAnswer, MissionExport,
+    ModelExport, ParetoAnswer, PlanAnswer, ReasonAnswer, ReasonsAnswer, SchemaAnswer, SimulateAnswer,
+    VerdictAnswer, VerificationAnswer,
 };
 use crate::mapek::event_schema;
 use crate::recording::answer_schema;
@@ -21,7 +21,7 @@ pub const FORMATS: [Entry; 23] = [
     ("manifest", "a mission's manifest", || vec![setup::schema()]),
     ("event", "a line of events", || vec![event_schema()]),
     ("answer", "an answer of the loop", || vec![answer_schema()]),
-    ("check", "metaplan check", || vec![schema_for!(CheckAnswer)]),
+    ("check", "metaplan check", || vec![schema_for!(CheckAnswer), schema_for!(ChecksAnswer)]),
     ("code", "metaplan explain CODE", || vec![schema_for!(CodeAnswer)]),
     ("compare", "metaplan compare", || vec![schema_for!(CompareAnswer)]),
     ("configure", "metaplan configure", || vec![schema_for!(ConfigureAnswer)]),

@@ -5,9 +5,11 @@
 
 use std::hash::Hash;
 
+use num_rational::BigRational;
+
 use crate::error::Error;
 use crate::mdp::{MOST, Mdp, dense};
-use crate::number::Number;
+use crate::number::{Number, rounded};
 use crate::states::States;
 
 /// The action of the loop that a state without choices gets.
@@ -20,6 +22,11 @@ pub trait Generator<N: Number> {
 
     /// Where it starts.
     fn initial(&self) -> Self::State;
+
+    /// All states in which it can start, if there are several.
+    fn starts(&self) -> Vec<Self::State> {
+        vec![self.initial()]
+    }
 
     /// How many rewards each choice has.
     fn rewards(&self) -> usize;
@@ -108,8 +115,10 @@ impl Default for Bounds<'_> {
 /// A process with what its states and choices mean.
 #[derive(Debug)]
 pub struct Explored<S, N> {
-    /// The process; state 0 is where it starts.
+    /// The process; it starts in state 0, or in one of the first ones.
     pub mdp: Mdp<N>,
+    /// How many states it can start in.
+    pub starts: usize,
     /// The states by number.
     pub states: States<S>,
     /// For each reward its value for each choice.
@@ -122,62 +131,116 @@ pub struct Explored<S, N> {
 ///
 /// # Errors
 /// What the model must not do, a limit, or that the caller wants to stop.
-#[expect(
-    clippy::arithmetic_side_effects,
-    reason = "no more deadlocks than states, which are counted by 32 bits"
-)]
 pub fn explore<N: Number, G: Generator<N>>(
     generator: &G,
     bounds: &Bounds<'_>,
 ) -> Result<Explored<G::State, N>, Error> {
-    let mut states = States::new(generator.codes());
-    let most = bounds.states.min(MOST);
-    let too_many = |states: usize| Error::StateLimit { states, limit: most };
-    let initial = generator.initial();
-    states.insert(generator.code(&initial), initial).ok_or_else(|| too_many(0))?;
-    let mut mdp = Mdp::default();
-    let kinds = generator.rewards();
-    let mut rewards: Vec<Vec<N>> = vec![Vec::new(); kinds];
-    let mut choices = Choices::default();
-    let mut deadlocks = 0;
-    for at in 0..MOST {
-        if at == states.len() {
-            break;
+    let mut exploration = Exploration::new(generator, bounds)?;
+    exploration.go_on(generator, bounds, usize::MAX)?;
+    Ok(exploration.found)
+}
+
+/// An exploration that can be interrupted.
+pub(crate) struct Exploration<S, N> {
+    /// What was found so far.
+    pub found: Explored<S, N>,
+    /// The state that is next.
+    next: usize,
+}
+
+impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
+    /// Knows the states in which a model starts.
+    pub fn new<G: Generator<N, State = S>>(generator: &G, bounds: &Bounds<'_>) -> Result<Self, Error> {
+        let mut states = States::new(generator.codes());
+        for start in generator.starts() {
+            let known = states.insert(generator.code(&start), start);
+            known
+                .ok_or_else(|| Error::StateLimit { states: states.len(), limit: bounds.states.min(MOST) })?;
         }
-        if at % 65_536 == 0 && !(bounds.progress)(states.len()) {
-            return Err(Error::Interrupted { states: states.len() });
-        }
-        choices.clear();
-        let state = states[at].clone();
-        generator.successors(&state, &mut choices)?;
-        let mut transitions = choices.transitions.drain(..);
-        let mut begin = 0;
-        let mut reward = choices.rewards.drain(..);
-        for (action, end) in choices.ends.drain(..) {
-            for _ in begin..end {
-                if let Some((target, probability)) = transitions.next() {
-                    let target = states.insert(generator.code(&target), target);
-                    mdp.push_transition(target.ok_or_else(|| too_many(states.len()))?, probability);
+        let rewards = vec![Vec::new(); generator.rewards()];
+        let found = Explored { mdp: Mdp::default(), starts: states.len(), states, rewards, deadlocks: 0 };
+        Ok(Self { found, next: 0 })
+    }
+
+    /// Explores until all is known or there are so many transitions; whether all is known.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "no more deadlocks than states, which are counted by 32 bits"
+    )]
+    pub fn go_on<G: Generator<N, State = S>>(
+        &mut self,
+        generator: &G,
+        bounds: &Bounds<'_>,
+        transitions: usize,
+    ) -> Result<bool, Error> {
+        let Explored { mdp, states, rewards, deadlocks, .. } = &mut self.found;
+        let most = bounds.states.min(MOST);
+        let too_many = |states: usize| Error::StateLimit { states, limit: most };
+        let mut choices = Choices::default();
+        for at in self.next..MOST {
+            self.next = at;
+            if at == states.len() {
+                return Ok(true);
+            }
+            if mdp.transition_count() >= transitions {
+                return Ok(false);
+            }
+            if at % 65_536 == 0 && !(bounds.progress)(states.len()) {
+                return Err(Error::Interrupted { states: states.len() });
+            }
+            choices.clear();
+            let state = states[at].clone();
+            generator.successors(&state, &mut choices)?;
+            let mut transitions = choices.transitions.drain(..);
+            let mut begin = 0;
+            let mut reward = choices.rewards.drain(..);
+            for (action, end) in choices.ends.drain(..) {
+                for _ in begin..end {
+                    if let Some((target, probability)) = transitions.next() {
+                        let target = states.insert(generator.code(&target), target);
+                        mdp.push_transition(target.ok_or_else(|| too_many(states.len()))?, probability);
+                    }
+                }
+                begin = end;
+                mdp.end_choice(action)?;
+                for values in &mut *rewards {
+                    values.push(reward.next().unwrap_or_else(N::zero));
                 }
             }
-            begin = end;
-            mdp.end_choice(action)?;
-            for values in &mut rewards {
-                values.push(reward.next().unwrap_or_else(N::zero));
+            if states.len() > most {
+                return Err(too_many(states.len()));
             }
-        }
-        if states.len() > most {
-            return Err(too_many(states.len()));
-        }
-        if mdp.open_choices() == 0 {
-            deadlocks += 1;
-            mdp.push_transition(dense(at), N::one());
-            mdp.end_choice(DEADLOCK)?;
-            for values in &mut rewards {
-                values.push(N::zero());
+            if mdp.open_choices() == 0 {
+                *deadlocks += 1;
+                mdp.push_transition(dense(at), N::one());
+                mdp.end_choice(DEADLOCK)?;
+                for values in &mut *rewards {
+                    values.push(N::zero());
+                }
             }
+            mdp.end_state();
         }
-        mdp.end_state();
+        Ok(true)
     }
-    Ok(Explored { mdp, states, rewards, deadlocks })
+}
+
+impl<S: Clone> Exploration<S, BigRational> {
+    /// The same in doubles; none where a number is too large or too small for them.
+    pub fn rounded(&self) -> Option<Exploration<S, f64>> {
+        Some(Exploration { found: self.found.rounded()?, next: self.next })
+    }
+}
+
+impl<S: Clone> Explored<S, BigRational> {
+    /// The same in doubles; none where a number is too large or too small for them.
+    pub(crate) fn rounded(&self) -> Option<Explored<S, f64>> {
+        let rewards = self.rewards.iter().map(|values| values.iter().map(rounded).collect());
+        Some(Explored {
+            mdp: self.mdp.rounded(rounded)?,
+            starts: self.starts,
+            states: self.states.clone(),
+            rewards: rewards.collect::<Option<_>>()?,
+            deadlocks: self.deadlocks,
+        })
+    }
 }

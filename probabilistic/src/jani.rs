@@ -272,6 +272,8 @@ impl Writer<'_> {
                 "else": self.expression(otherwise),
             }),
             ExprKind::Call(function, arguments) => self.call(*function, arguments),
+            // They stand in no model.
+            ExprKind::Property(_) | ExprKind::Temporal(_) => json!(true),
         }
     }
 

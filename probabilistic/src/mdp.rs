@@ -172,6 +172,19 @@ impl<N: Number> Mdp<N> {
     }
 }
 
+impl Mdp<BigRational> {
+    /// The same process with its probabilities rounded by a function, which may refuse to.
+    pub(crate) fn rounded(&self, by: fn(&BigRational) -> Option<f64>) -> Option<Mdp<f64>> {
+        Some(Mdp {
+            first_choice: self.first_choice.clone(),
+            first_transition: self.first_transition.clone(),
+            targets: self.targets.clone(),
+            probabilities: self.probabilities.iter().map(by).collect::<Option<_>>()?,
+            actions: self.actions.clone(),
+        })
+    }
+}
+
 /// What a decimal of the model stands for in the kind of number that is solved in.
 pub fn number<N: Number>(value: &BigRational) -> N {
     N::from_rational(value)

@@ -150,6 +150,14 @@ impl Number for BigRational {
     }
 }
 
+/// A probability or a reward in the kind of number that is solved in; none where doubles would lose digits that the bounds on
+/// results count on.
+pub(crate) fn rounded<N: Number>(value: &BigRational) -> Option<N> {
+    let number = N::from_rational(value);
+    let magnitude = number.to_f64().abs();
+    (N::EXACT || Zero::is_zero(value) || (1e-250..=1e250).contains(&magnitude)).then_some(number)
+}
+
 /// A decimal as it is written, `1.25e-3`, exactly; none where the text is no number.
 pub fn parse_decimal(text: &str) -> Option<BigRational> {
     let (mantissa, exponent) = match text.split_once(['e', 'E']) {

@@ -1,62 +1,71 @@
 //! Properties in PRISM's syntax to what is asked.
 //!
 //! `Pmax=? [ F "goal" ]`, `P>=0.9 [ !hit U "goal" ]`, `R{"time"}min=? [ F "goal" ]`, `R{"time"}min=? [ C<=10 ]`,
-//! `multi(R{"time"}min=? [ F "goal" ], Pmax=? [ F "safe" ])`.
+//! `multi(R{"time"}min=? [ F "goal" ], Pmax=? [ F "safe" ])`, `filter(max, P=? [ F "goal" ], "start")`, and numbers and
+//! truth values made of such: `1 - Pmax=? [ F "goal" ]`.
 
-use crate::error::{Diagnostic, Error};
-use crate::prism::ast::{BinaryOp, Expr, ExprKind};
-use crate::prism::expression::{Cursor, Read};
+use crate::error::{Diagnostic, Error, Place};
+use crate::prism::ast::{BinaryOp, Constant, Expr, ExprKind, Named};
+pub use crate::prism::ast::{Filter, Path, Property, Question, RewardPath, StepBound, Steps, Temporal};
+use crate::prism::expression::{Besides, Cursor, Read};
 use crate::prism::lexer::{Kind, tokens};
+use crate::prism::{constant_declaration, named_expression};
 use crate::solve::Direction;
 
-/// What is asked of a model.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Property {
-    /// A probability.
-    Probability(Question, Path),
-    /// An expected reward, with the name of its structure where there is one.
-    Reward(Question, Option<String>, RewardPath),
-    /// Several objectives at once.
-    Multi(Vec<Self>),
+/// What is expected where a property begins.
+const PROPERTY: &str = "a property (`Pmax=? [ F … ]`, `R{\"name\"}min=? [ F … ]`)";
+
+/// What properties have besides the expressions of models.
+const BESIDES: Besides = Besides { start, go_on };
+
+/// The filters by their names.
+const FILTERS: [(&str, Filter); 15] = [
+    ("min", Filter::Min),
+    ("max", Filter::Max),
+    ("sum", Filter::Sum),
+    ("avg", Filter::Average),
+    ("count", Filter::Count),
+    ("forall", Filter::ForAll),
+    ("exists", Filter::Exists),
+    ("first", Filter::First),
+    ("state", Filter::State),
+    ("range", Filter::Range),
+    ("print", Filter::Print),
+    ("printall", Filter::PrintAll),
+    ("argmin", Filter::ArgMin),
+    ("argmax", Filter::ArgMax),
+    ("average", Filter::Average),
+];
+
+/// A file of properties: what it declares besides, and the properties in their order.
+#[derive(Debug, Clone, Default)]
+pub struct File {
+    /// Constants and labels.
+    pub declarations: Declarations,
+    /// The properties.
+    pub properties: Vec<Listed>,
 }
 
-/// For the value, or whether it keeps a bound.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Question {
-    /// Least or greatest; none where the model has one policy only, or the bound says it.
-    pub direction: Option<Direction>,
-    /// The bound; none for the value.
-    pub bound: Option<(BinaryOp, Expr)>,
+/// Constants and labels of a file of properties, which its properties know besides those of the model.
+#[derive(Debug, Clone, Default)]
+pub struct Declarations {
+    /// Constants, which may be left open.
+    pub constants: Vec<Constant>,
+    /// Labels.
+    pub labels: Vec<Named>,
 }
 
-/// Paths.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Path {
-    /// `X`: in the next state.
-    Next(Expr),
-    /// `U`, and `F` with `true` on the left: the right one holds some day (in at most so many steps), the left one
-    /// until then.
-    Until(Expr, Expr, Option<Steps>),
-    /// `G`: always (for so many steps).
-    Globally(Expr, Option<Steps>),
-}
-
-/// A bound on the number of steps: at most so many.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Steps {
-    /// The number.
-    pub limit: Expr,
-    /// Whether the number itself is excluded.
-    pub strict: bool,
-}
-
-/// Over what a reward is summed.
-#[derive(Debug, Clone, PartialEq)]
-pub enum RewardPath {
-    /// `F`: until a state is reached.
-    Reach(Expr),
-    /// `C<=k`: over so many steps.
-    Steps(Steps),
+/// A property of a file.
+#[derive(Debug, Clone)]
+pub struct Listed {
+    /// Its name, if it has one.
+    pub name: Option<String>,
+    /// The property.
+    pub property: Property,
+    /// How it is written, without its name.
+    pub text: String,
+    /// Where it starts.
+    pub place: Place,
 }
 
 /// Reads a property.
@@ -65,7 +74,7 @@ pub enum RewardPath {
 /// What is wrong with it.
 pub fn parse(text: &str) -> Result<Property, Error> {
     let tokens = tokens(text).map_err(Error::Property)?;
-    let mut cursor = Cursor::new(&tokens);
+    let mut cursor = Cursor::of_properties(&tokens, BESIDES);
     let read = property(&mut cursor).and_then(|property| {
         cursor.take(";");
         if *cursor.peek() == Kind::End {
@@ -77,55 +86,218 @@ pub fn parse(text: &str) -> Result<Property, Error> {
     read.map_err(|problem| Error::Property(vec![problem]))
 }
 
-fn property(cursor: &mut Cursor<'_>) -> Read<Property> {
-    let Kind::Name(word) = cursor.peek() else {
-        return Err(cursor.expected("a property (`Pmax=? [ F … ]`, `R{\"name\"}min=? [ F … ]`)"));
-    };
-    let place = cursor.place();
-    match word.as_str() {
-        "multi" => {
-            cursor.advance();
-            cursor.need("(")?;
-            let mut parts = vec![property(cursor)?];
-            while cursor.take(",") {
-                parts.push(property(cursor)?);
-            }
-            cursor.need(")")?;
-            if parts.iter().any(|part| matches!(part, Property::Multi(_))) {
-                return Err(Diagnostic::new("Q501", place, "`multi` does not nest"));
-            }
-            Ok(Property::Multi(parts))
+/// Reads a file of properties, with its constants and labels.
+///
+/// # Errors
+/// All that is wrong with it; after a wrong property, reading goes on behind the next `;`.
+pub fn parse_file(text: &str) -> Result<File, Error> {
+    let tokens = tokens(text).map_err(Error::Property)?;
+    let mut cursor = Cursor::of_properties(&tokens, BESIDES);
+    let (mut file, mut problems) = (File::default(), Vec::new());
+    while *cursor.peek() != Kind::End {
+        if cursor.take(";") {
+            continue;
         }
-        "P" | "Pmin" | "Pmax" => {
-            cursor.advance();
-            let question = question(cursor, &word[1..])?;
-            cursor.need("[")?;
-            let path = path(cursor)?;
-            cursor.need("]")?;
-            Ok(Property::Probability(question, path))
-        }
-        "R" | "Rmin" | "Rmax" => {
-            cursor.advance();
-            let mut name = None;
-            if cursor.take("{") {
-                let Kind::Quoted(text) = cursor.peek() else {
-                    return Err(cursor.expected("the name of a reward structure in quotation marks"));
-                };
-                name = Some(text.clone());
+        if let Err(problem) = entry(&mut cursor, text, &mut file) {
+            problems.push(problem);
+            cursor.reset();
+            while !cursor.is(";") && *cursor.peek() != Kind::End {
                 cursor.advance();
-                cursor.need("}")?;
             }
+        }
+    }
+    if problems.is_empty() { Ok(file) } else { Err(Error::Property(problems)) }
+}
+
+fn entry(cursor: &mut Cursor<'_>, text: &str, file: &mut File) -> Read<()> {
+    if cursor.is_word("const") {
+        file.declarations.constants.push(constant_declaration(cursor)?);
+        return Ok(());
+    }
+    if cursor.is_word("label") {
+        file.declarations.labels.push(named_expression(cursor)?);
+        return Ok(());
+    }
+    let mut name = None;
+    if let (Kind::Quoted(found), Kind::Sign(":")) = (cursor.peek(), cursor.peek_at(1)) {
+        name = Some(found.clone());
+        cursor.advance();
+        cursor.advance();
+    }
+    let place = cursor.place();
+    let begin = position(text, place);
+    let property = property(cursor)?;
+    let end = if *cursor.peek() == Kind::End { text.len() } else { position(text, cursor.place()) };
+    // A remark that stands between this property and the next is none of it.
+    let written = text[begin..end].split("//").next().unwrap_or("").trim().to_owned();
+    file.properties.push(Listed { name, property, text: written, place });
+    Ok(())
+}
+
+/// The position of a place in a text, in bytes.
+fn position(text: &str, place: Place) -> usize {
+    let lines = text.split_inclusive('\n').take(place.line.saturating_sub(1));
+    let before = lines.map(str::len).fold(0, usize::saturating_add);
+    let line = &text[before..];
+    let within = line.char_indices().nth(place.column.saturating_sub(1)).map_or(line.len(), |(at, _)| at);
+    before.saturating_add(within)
+}
+
+fn property(cursor: &mut Cursor<'_>) -> Read<Property> {
+    if !matches!(
+        cursor.peek(),
+        Kind::Name(_) | Kind::Number(_) | Kind::Quoted(_) | Kind::Sign("(" | "!" | "-")
+    ) {
+        return Err(cursor.expected(PROPERTY));
+    }
+    let expression = cursor.expression()?;
+    let expression = go_on(cursor, expression)?;
+    Ok(match expression.kind {
+        ExprKind::Property(property) => *property,
+        ExprKind::Temporal(_) => {
+            let text =
+                "a path has a probability and no truth value: write `P=? [ … ]` or `P>=1 [ … ]` around it";
+            return Err(Diagnostic::new("Q403", expression.place, text));
+        }
+        _ => Property::Expression(expression),
+    })
+}
+
+/// A property, or a temporal operator with one side.
+fn start(cursor: &mut Cursor<'_>) -> Read<Option<ExprKind>> {
+    let Kind::Name(word) = cursor.peek() else { return Ok(None) };
+    let place = cursor.place();
+    let property = match word.as_str() {
+        "multi" if matches!(cursor.peek_at(1), Kind::Sign("(")) => multi(cursor)?,
+        "P" | "Pmin" | "Pmax" => probability(cursor, &word[1..])?,
+        "R" | "Rmin" | "Rmax" => reward(cursor, &word[1..])?,
+        "S" | "Smin" | "Smax" if !matches!(cursor.peek_at(1), Kind::Sign(")" | "]")) => {
+            cursor.advance();
             let question = question(cursor, &word[1..])?;
             cursor.need("[")?;
-            let path = reward_path(cursor)?;
-            cursor.need("]")?;
-            Ok(Property::Reward(question, name, path))
+            let states = cursor.expression()?;
+            filtered(cursor, Property::SteadyState(question, states), place)?
         }
-        "S" | "E" | "A" | "filter" => {
-            Err(Diagnostic::new("Q403", place, format!("properties with `{word}` are not handled")))
+        "filter" => filter(cursor)?,
+        "X" | "F" | "G" => {
+            let letter = word.chars().next().unwrap_or('F');
+            cursor.advance();
+            let steps = if letter == 'X' { None } else { steps(cursor)? };
+            let right = cursor.expression()?;
+            let temporal = Temporal { letter, steps, left: Expr::bool(true), right };
+            return Ok(Some(ExprKind::Temporal(Box::new(temporal))));
         }
-        _ => Err(cursor.expected("a property (`Pmax=? [ F … ]`, `R{\"name\"}min=? [ F … ]`)")),
+        "A" | "E" => {
+            let text = format!("`{word}` of CTL is not handled; `P>=1 [ … ]` and `P>0 [ … ]` are");
+            return Err(Diagnostic::new("Q403", place, text));
+        }
+        _ => return Ok(None),
+    };
+    Ok(Some(ExprKind::Property(Box::new(property))))
+}
+
+/// An operator with two sides, of which the left one was read.
+fn go_on(cursor: &mut Cursor<'_>, left: Expr) -> Read<Expr> {
+    let letter = match cursor.peek() {
+        Kind::Name(word) if word == "U" => 'U',
+        Kind::Name(word) if word == "W" => 'W',
+        Kind::Name(word) if word == "R" => 'R',
+        _ => return Ok(left),
+    };
+    let place = left.place;
+    cursor.advance();
+    let steps = steps(cursor)?;
+    let right = cursor.expression()?;
+    Ok(Expr { kind: ExprKind::Temporal(Box::new(Temporal { letter, steps, left, right })), place })
+}
+
+fn multi(cursor: &mut Cursor<'_>) -> Read<Property> {
+    let place = cursor.place();
+    cursor.advance();
+    cursor.need("(")?;
+    let mut parts = vec![property(cursor)?];
+    while cursor.take(",") {
+        parts.push(property(cursor)?);
     }
+    cursor.need(")")?;
+    if parts.iter().any(|part| matches!(part, Property::Multi(_))) {
+        return Err(Diagnostic::new("Q501", place, "`multi` does not nest"));
+    }
+    Ok(Property::Multi(parts))
+}
+
+fn probability(cursor: &mut Cursor<'_>, suffix: &str) -> Read<Property> {
+    let place = cursor.place();
+    cursor.advance();
+    let question = question(cursor, suffix)?;
+    cursor.need("[")?;
+    let written = cursor.expression()?;
+    let written = go_on(cursor, written)?;
+    let path = path(written)?;
+    filtered(cursor, Property::Probability(question, path), place)
+}
+
+fn reward(cursor: &mut Cursor<'_>, suffix: &str) -> Read<Property> {
+    let place = cursor.place();
+    cursor.advance();
+    let mut name = None;
+    if cursor.take("{") {
+        let Kind::Quoted(text) = cursor.peek() else {
+            return Err(cursor.expected("the name of a reward structure in quotation marks"));
+        };
+        name = Some(text.clone());
+        cursor.advance();
+        cursor.need("}")?;
+    }
+    let question = question(cursor, suffix)?;
+    cursor.need("[")?;
+    let path = reward_path(cursor)?;
+    filtered(cursor, Property::Reward(question, name, path), place)
+}
+
+/// The end of an operator: `]`, and in the old form the states that are asked for, `{states}{min}]`.
+fn filtered(cursor: &mut Cursor<'_>, property: Property, place: Place) -> Read<Property> {
+    if !cursor.take("{") {
+        cursor.need("]")?;
+        return Ok(property);
+    }
+    let states = cursor.expression()?;
+    cursor.need("}")?;
+    let mut filter = Filter::State;
+    while cursor.take("{") {
+        filter = if cursor.take_word("min") {
+            Filter::Min
+        } else if cursor.take_word("max") {
+            Filter::Max
+        } else {
+            return Err(cursor.expected("`min` or `max`"));
+        };
+        cursor.need("}")?;
+    }
+    cursor.need("]")?;
+    let inner = Expr { kind: ExprKind::Property(Box::new(property)), place };
+    Ok(Property::Filter(filter, inner, Some(states)))
+}
+
+fn filter(cursor: &mut Cursor<'_>) -> Read<Property> {
+    cursor.advance();
+    cursor.need("(")?;
+    let signs = [("+", Filter::Sum), ("&", Filter::ForAll), ("|", Filter::Exists)];
+    let known = match cursor.peek() {
+        Kind::Name(word) => FILTERS.iter().find(|(name, _)| name == word),
+        Kind::Sign(sign) => signs.iter().find(|(name, _)| name == sign),
+        _ => None,
+    };
+    let Some((_, filter)) = known else {
+        let names: Vec<_> = FILTERS.iter().take(14).map(|(name, _)| *name).collect();
+        return Err(cursor.expected(&format!("a filter ({})", names.join(", "))));
+    };
+    cursor.advance();
+    cursor.need(",")?;
+    let inner = cursor.expression()?;
+    let states = if cursor.take(",") { Some(cursor.expression()?) } else { None };
+    cursor.need(")")?;
+    Ok(Property::Filter(*filter, inner, states))
 }
 
 fn question(cursor: &mut Cursor<'_>, suffix: &str) -> Read<Question> {
@@ -158,65 +330,165 @@ fn question(cursor: &mut Cursor<'_>, suffix: &str) -> Read<Question> {
     Ok(Question { direction, bound: None })
 }
 
+/// The bounds of a temporal operator, if it has any.
 fn steps(cursor: &mut Cursor<'_>) -> Read<Option<Steps>> {
-    let strict = cursor.is("<");
-    if cursor.take("<=") || cursor.take("<") {
-        // `F<=10 "goal"`: the number ends before the state formula; in parentheses it can be any expression.
-        let place = cursor.place();
-        let limit = match cursor.peek() {
-            Kind::Number(text) if text.bytes().all(|byte| byte.is_ascii_digit()) => {
-                let value = text.parse().map_err(|_| cursor.expected("a number of steps"))?;
-                cursor.advance();
-                Expr { kind: ExprKind::Int(value), place }
-            }
-            Kind::Name(_) => Expr { kind: ExprKind::Name(cursor.name("a number of steps")?.0), place },
-            Kind::Sign("(") => {
-                cursor.advance();
-                let inner = cursor.expression()?;
-                cursor.need(")")?;
-                inner
-            }
-            _ => return Err(cursor.expected("a number of steps")),
-        };
-        return Ok(Some(Steps { limit, strict }));
+    if cursor.take("^") {
+        cursor.need("{")?;
+        let is_reward = matches!(cursor.peek(), Kind::Name(word) if word == "rew");
+        if !is_reward {
+            return Err(cursor.expected("`rew{\"name\"}`"));
+        }
+        cursor.advance();
+        let mut name = None;
+        if cursor.take("{") {
+            let Kind::Quoted(text) = cursor.peek() else {
+                return Err(cursor.expected("the name of a reward structure in quotation marks"));
+            };
+            name = Some(text.clone());
+            cursor.advance();
+            cursor.need("}")?;
+        }
+        let found = one_sided(cursor, |cursor| cursor.expression())?;
+        cursor.need("}")?;
+        let found = found.ok_or_else(|| cursor.expected("a bound (`<=10`)"))?;
+        return Ok(Some(Steps { reward: Some(name), ..found }));
     }
-    if cursor.is(">") || cursor.is(">=") || cursor.is("[") {
-        return Err(Diagnostic::new("Q403", cursor.place(), "only upper bounds on steps are handled"));
+    if cursor.take("[") {
+        let least = cursor.expression()?;
+        cursor.need(",")?;
+        let most = cursor.expression()?;
+        cursor.need("]")?;
+        let bound = |limit| Some(StepBound { limit, strict: false });
+        return Ok(Some(Steps { least: bound(least), most: bound(most), reward: None }));
+    }
+    one_sided(cursor, number_of_steps)
+}
+
+fn one_sided(cursor: &mut Cursor<'_>, limit: impl Fn(&mut Cursor<'_>) -> Read<Expr>) -> Read<Option<Steps>> {
+    for sign in ["<=", "<", ">=", ">", "="] {
+        if !cursor.take(sign) {
+            continue;
+        }
+        let bound = Some(StepBound { limit: limit(cursor)?, strict: sign.len() == 1 && sign != "=" });
+        let (least, most) = match sign {
+            "=" => (bound.clone(), bound),
+            "<=" | "<" => (None, bound),
+            _ => (bound, None),
+        };
+        return Ok(Some(Steps { least, most, reward: None }));
     }
     Ok(None)
 }
 
-fn path(cursor: &mut Cursor<'_>) -> Read<Path> {
-    if cursor.take_word("X") {
-        return Ok(Path::Next(cursor.expression()?));
+/// `F<=10 "goal"`: the number ends before the state formula; in parentheses it can be any expression.
+fn number_of_steps(cursor: &mut Cursor<'_>) -> Read<Expr> {
+    let place = cursor.place();
+    match cursor.peek() {
+        Kind::Number(text) if text.bytes().all(|byte| byte.is_ascii_digit()) => {
+            let value = text.parse().map_err(|_| cursor.expected("a number of steps"))?;
+            cursor.advance();
+            Ok(Expr { kind: ExprKind::Int(value), place })
+        }
+        Kind::Name(_) => Ok(Expr { kind: ExprKind::Name(cursor.name("a number of steps")?.0), place }),
+        Kind::Sign("(") => {
+            cursor.advance();
+            let inner = cursor.expression()?;
+            cursor.need(")")?;
+            Ok(inner)
+        }
+        _ => Err(cursor.expected("a number of steps")),
     }
-    if cursor.take_word("F") {
-        let steps = steps(cursor)?;
-        return Ok(Path::Until(Expr::bool(true), cursor.expression()?, steps));
+}
+
+/// A path, of those that need no automaton.
+fn path(written: Expr) -> Read<Path> {
+    let place = written.place;
+    if !has_temporal(&written) {
+        return Ok(Path::State(written));
     }
-    if cursor.take_word("G") {
-        let steps = steps(cursor)?;
-        return Ok(Path::Globally(cursor.expression()?, steps));
+    match written.kind {
+        ExprKind::Not(inner) => Ok(Path::Not(Box::new(path(*inner)?))),
+        ExprKind::Temporal(temporal) => {
+            let Temporal { letter, steps, left, right } = *temporal;
+            if has_temporal(&left) || has_temporal(&right) {
+                return nested(letter, steps.as_ref(), right, place);
+            }
+            Ok(match letter {
+                'X' => Path::Next(right),
+                'G' => Path::Globally(right, steps),
+                'W' => Path::WeakUntil(left, right, steps),
+                'R' => Path::Release(left, right, steps),
+                _ => Path::Until(left, right, steps),
+            })
+        }
+        _ => Err(ltl(place)),
     }
-    let left = cursor.expression()?;
-    if cursor.is_word("W") || cursor.is_word("R") {
-        return Err(Diagnostic::new("Q403", cursor.place(), "`W` and `R` are not handled"));
+}
+
+/// `G F`, `F G`, and the same operator twice.
+fn nested(letter: char, steps: Option<&Steps>, right: Expr, place: Place) -> Read<Path> {
+    let ExprKind::Temporal(inner) = right.kind else { return Err(ltl(place)) };
+    if steps.is_some() || inner.steps.is_some() || has_temporal(&inner.right) {
+        return Err(ltl(place));
     }
-    cursor.need_word("U")?;
-    let steps = steps(cursor)?;
-    Ok(Path::Until(left, cursor.expression()?, steps))
+    match (letter, inner.letter) {
+        ('G', 'F') => Ok(Path::Repeatedly(inner.right)),
+        ('F', 'G') => Ok(Path::Persistently(inner.right)),
+        ('F', 'F') => Ok(Path::Until(Expr::bool(true), inner.right, None)),
+        ('G', 'G') => Ok(Path::Globally(inner.right, None)),
+        _ => Err(ltl(place)),
+    }
+}
+
+fn ltl(place: Place) -> Diagnostic {
+    let text = "LTL (temporal operators in one another, or joined) is not handled, apart from `G F` and `F G`; ask for one \
+                operator at a time";
+    Diagnostic::new("Q403", place, text)
+}
+
+/// Whether there is a temporal operator in an expression, apart from those in the brackets of a property in it.
+fn has_temporal(expression: &Expr) -> bool {
+    match &expression.kind {
+        ExprKind::Temporal(_) => true,
+        ExprKind::Not(inner) | ExprKind::Negative(inner) => has_temporal(inner),
+        ExprKind::Binary(_, left, right) => has_temporal(left) || has_temporal(right),
+        ExprKind::If(condition, then, otherwise) => {
+            [condition, then, otherwise].into_iter().any(|part| has_temporal(part))
+        }
+        ExprKind::Call(_, arguments) => arguments.iter().any(has_temporal),
+        ExprKind::Bool(_)
+        | ExprKind::Int(_)
+        | ExprKind::Number(_)
+        | ExprKind::Name(_)
+        | ExprKind::Label(_)
+        | ExprKind::Property(_) => false,
+    }
 }
 
 fn reward_path(cursor: &mut Cursor<'_>) -> Read<RewardPath> {
-    if cursor.take_word("F") {
-        return Ok(RewardPath::Reach(cursor.expression()?));
-    }
     let place = cursor.place();
-    if cursor.take_word("C")
-        && let Some(steps) = steps(cursor)?
-    {
-        return Ok(RewardPath::Steps(steps));
+    if cursor.take_word("C") {
+        let strict = cursor.is("<");
+        if cursor.take("<=") || cursor.take("<") {
+            return Ok(RewardPath::Steps(StepBound { limit: cursor.expression()?, strict }));
+        }
+        return Ok(RewardPath::Total);
     }
-    let text = "only `F` and `C<=k` are handled in properties of rewards";
-    Err(Diagnostic::new("Q403", place, text))
+    if cursor.take_word("I") {
+        cursor.need("=")?;
+        return Ok(RewardPath::Instant(cursor.expression()?));
+    }
+    if cursor.take_word("S") {
+        return Ok(RewardPath::LongRun);
+    }
+    let written = cursor.expression()?;
+    let written = go_on(cursor, written)?;
+    match path(written) {
+        Ok(Path::Until(left, goal, None)) if left.kind == ExprKind::Bool(true) => Ok(RewardPath::Reach(goal)),
+        _ => {
+            let text =
+                "of rewards, `F`, `C`, `C<=k`, `I=k` and `S` are handled, and not what LTL says besides";
+            Err(Diagnostic::new("Q403", place, text))
+        }
+    }
 }

@@ -1,6 +1,8 @@
 //! What `metaplan check` answers.
 
-use probabilistic::check::{Answer, Outcome, Report};
+use std::collections::BTreeMap;
+
+use probabilistic::check::{Answer, Listed, Outcome, Report};
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -9,9 +11,32 @@ use serde::Serialize;
 pub struct CheckAnswer<'a> {
     format: &'static str,
     property: &'a str,
+    /// Its name in a file of properties.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    name: Option<&'a str>,
+    /// The values of the constants that have several.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    constants: BTreeMap<&'a str, &'a str>,
     #[serde(flatten)]
     found: Found,
     statistics: SizePart,
+}
+
+/// What several properties, or several values of constants, are answered with.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct ChecksAnswer<'a> {
+    format: &'static str,
+    answers: Vec<CheckAnswer<'a>>,
+    /// Properties without an answer.
+    refused: Vec<RefusedPart<'a>>,
+}
+
+/// A property that has no answer.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+struct RefusedPart<'a> {
+    property: &'a str,
+    name: Option<&'a str>,
+    messages: Vec<String>,
 }
 
 /// What stands in the middle, by the kind of property.
@@ -24,6 +49,13 @@ enum Found {
         value: Option<ValuePart>,
         /// Null where it is not decided.
         holds: Option<bool>,
+    },
+    Range {
+        least: ValuePart,
+        greatest: ValuePart,
+    },
+    States {
+        states: Vec<StatePart>,
     },
     Front {
         vertices: Vec<[ValuePart; 2]>,
@@ -45,6 +77,16 @@ struct ValuePart {
     lower: Option<f64>,
     upper: Option<f64>,
     exact: Option<String>,
+}
+
+/// A state, by the values of its variables, with its value or whether the property holds in it.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+struct StatePart {
+    state: BTreeMap<String, i64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    holds: Option<bool>,
+    #[serde(flatten)]
+    value: Option<ValuePart>,
 }
 
 /// A value, and whether it is proved to be the best.
@@ -103,6 +145,12 @@ impl<'a> CheckAnswer<'a> {
                 Found::Truth { value: answer.as_ref().map(ValuePart::of), holds: Some(*holds) }
             }
             Outcome::Undecided(answer) => Found::Truth { value: Some(ValuePart::of(answer)), holds: None },
+            Outcome::Range(least, greatest) => {
+                Found::Range { least: ValuePart::of(least), greatest: ValuePart::of(greatest) }
+            }
+            Outcome::States(states) => Found::States {
+                states: states.iter().map(|listed| StatePart::new(&report.variables, listed)).collect(),
+            },
             Outcome::Front(vertices) => Found::Front {
                 vertices: vertices.iter().map(|pair| pair.each_ref().map(ValuePart::of)).collect(),
             },
@@ -122,6 +170,42 @@ impl<'a> CheckAnswer<'a> {
             deadlocks: *deadlocks,
             milliseconds,
         };
-        Self { format: "metaplan-check/1", property, found, statistics }
+        let (name, constants) = (None, BTreeMap::new());
+        Self { format: "metaplan-check/1", property, name, constants, found, statistics }
+    }
+
+    /// The same with the name of the property, and with the values of constants that have several.
+    #[must_use]
+    pub fn told(
+        mut self,
+        name: Option<&'a str>,
+        constants: impl IntoIterator<Item = (&'a str, &'a str)>,
+    ) -> Self {
+        self.name = name;
+        self.constants = constants.into_iter().collect();
+        self
+    }
+}
+
+impl<'a> ChecksAnswer<'a> {
+    /// The answers that there are, in their order.
+    pub fn new(answers: Vec<CheckAnswer<'a>>) -> Self {
+        Self { format: "metaplan-checks/1", answers, refused: Vec::new() }
+    }
+
+    /// Adds a property without an answer.
+    pub fn refuse(&mut self, property: &'a str, name: Option<&'a str>, messages: Vec<String>) {
+        self.refused.push(RefusedPart { property, name, messages });
+    }
+}
+
+impl StatePart {
+    fn new(variables: &[(String, bool)], listed: &Listed) -> Self {
+        let names = variables.iter().map(|(name, _)| name.clone());
+        Self {
+            state: names.zip(listed.values.iter().copied()).collect(),
+            holds: listed.truth,
+            value: listed.answer.as_ref().map(ValuePart::of),
+        }
     }
 }

@@ -20,7 +20,7 @@ mod validate;
 
 pub use ::mission::message::ErrorAnswer;
 pub use ::verify::VerificationAnswer;
-pub use check::CheckAnswer;
+pub use check::{CheckAnswer, ChecksAnswer};
 pub use code::CodeAnswer;
 pub use compare::{CompareAnswer, ComparisonAnswer, MEASURES, Pair, Row, begun_rows, rows};
 pub use configure::{ConfigureAnswer, KeeperReadyLine};

@@ -4,14 +4,17 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use metaplan::answers::CheckAnswer;
+use metaplan::answers::{CheckAnswer, ChecksAnswer};
 use metaplan::file::source;
 use metaplan::message::Message;
-use probabilistic::check::{Answer, Exactness, Options, Outcome, PolicyTable, Report, check};
+use probabilistic::check::{Exactness, Options, Outcome, PolicyTable, Precision, Report, check_all};
 use probabilistic::explore::Bounds;
-use probabilistic::prism::Settings;
-use probabilistic::{prism, property};
+use probabilistic::prism::ast::Model;
+use probabilistic::property::{Declarations, Listed};
+use probabilistic::{Error, prism, property};
 
+use crate::cli::check_series::{Combination, combinations, csv, table};
+use crate::cli::check_text::as_text;
 use crate::cli::common::{Common, Exit, Failure, Format, in_file, process_failure};
 use crate::cli::output;
 use crate::cli::progress::Progress;
@@ -24,13 +27,23 @@ pub struct Arguments {
     #[arg(value_name = "MODEL")]
     model: PathBuf,
     /// What is asked: `Pmax=? [ F "goal" ]`, `R{"time"}min=? [ F "goal" ]`, `multi(…, …)`.
-    #[arg(value_name = "PROPERTY")]
-    property: String,
-    /// The value of a constant (repeatable, or separated by commas).
+    #[arg(value_name = "PROPERTY", required_unless_present = "props", conflicts_with = "props")]
+    property: Option<String>,
+    /// A file of properties, with its constants and labels; each property gets an answer.
+    #[arg(long, value_name = "FILE")]
+    props: Option<PathBuf>,
+    /// Only the property of this name, or with this number, from 1 (repeatable).
+    #[arg(long, value_name = "NAME", requires = "props")]
+    prop: Vec<String>,
+    /// The value of a constant (repeatable, or separated by commas); `first:last` and `first:step:last` are series, which make a
+    /// table.
     #[arg(long = "const", value_name = "NAME=VALUE", value_delimiter = ',', value_parser = setting)]
     constants: Vec<(String, String)>,
-    /// Write the best policy to a file.
+    /// Write the table of a series to a file, too.
     #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Write the best policy to a file.
+    #[arg(long, value_name = "FILE", conflicts_with = "props")]
     policy: Option<PathBuf>,
     /// Evaluate the policy of a file in place of the best one.
     #[arg(long, value_name = "FILE", conflicts_with = "policy")]
@@ -41,12 +54,40 @@ pub struct Arguments {
     /// Stop beyond so many states.
     #[arg(long, value_name = "N", default_value_t = 20_000_000)]
     state_limit: usize,
-    /// Solve in rational numbers, however large the model is.
+    /// Solve in rational numbers, however long that takes.
     #[arg(long, conflicts_with = "inexact")]
     exact: bool,
     /// Solve in doubles with certified bounds, however small the model is.
     #[arg(long)]
     inexact: bool,
+    /// How far apart the bounds on a value may be, as a part of the value unless `--absolute` is given.
+    #[arg(long, value_name = "WIDTH", value_parser = width)]
+    precision: Option<f64>,
+    /// The precision is a part of the value; this is the default.
+    #[arg(long, requires = "precision", conflicts_with = "absolute")]
+    relative: bool,
+    /// The precision is a difference.
+    #[arg(long, requires = "precision")]
+    absolute: bool,
+}
+
+fn width(text: &str) -> Result<f64, String> {
+    let wrong = || format!("`{text}` is not a positive number such as 1e-6");
+    text.parse::<f64>().ok().filter(|width| *width > 0.0 && width.is_finite()).ok_or_else(wrong)
+}
+
+/// What is asked, and the file that it comes from.
+struct Asked {
+    listed: Vec<Listed>,
+    declarations: Declarations,
+    file: String,
+    text: String,
+}
+
+/// What came out for one combination of values.
+struct Answered<'a> {
+    combination: &'a Combination,
+    reports: Vec<Result<Report, Error>>,
 }
 
 /// Runs the command.
@@ -54,28 +95,144 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let file = source(&arguments.model)?;
     let model_text = (file.name(), file.text());
     let model = prism::parse(file.text()).map_err(|problems| in_file(&problems, model_text))?;
-    let failed = |error| process_failure(error, model_text, &arguments.property);
-    let property = property::parse(&arguments.property).map_err(failed)?;
+    let mut asked = asked(arguments)?;
+    let declarations = std::mem::take(&mut asked.declarations);
+    let (file, text) = (asked.file.clone(), asked.text.clone());
+    let failed = |error| process_failure(error, model_text, (&file, &text));
+    let all = combinations(&arguments.constants)?;
+    let is_series = all.len() > 1;
+    if is_series && arguments.policy.is_some() {
+        return Err(Failure::usage(Message::error(
+            "M107",
+            "a policy is written for one value of each constant",
+        )));
+    }
     let progress = Progress::new("checking", common);
-    let told = |states: usize| {
-        progress.set_message(format!("{states} states"));
-        true
-    };
-    let options = Options {
-        settings: arguments.constants.iter().cloned().collect::<Settings>(),
-        bounds: Bounds { states: arguments.state_limit, progress: &told },
-        exactness: match (arguments.exact, arguments.inexact) {
-            (true, _) => Exactness::Always,
-            (_, true) => Exactness::Never,
-            _ => Exactness::Auto,
-        },
-        secondary: arguments.secondary.clone(),
-        policy: arguments.policy.is_some(),
-        evaluate: arguments.evaluate.as_deref().map(read_policy).transpose()?,
-    };
-    let report = check(&model, &property, &options);
+    let evaluate = arguments.evaluate.as_deref().map(read_policy).transpose()?;
+    let (model, listed, declarations) = (&model, &asked.listed[..], &declarations);
+    let one = Checked { arguments, model, listed, declarations, evaluate, progress: &progress };
+    let mut answered = Vec::new();
+    for combination in &all {
+        let reports = one.check(combination).map_err(failed)?;
+        answered.push(Answered { combination, reports });
+    }
     progress.finish();
-    let report = report.map_err(failed)?;
+    if asked.listed.len() == 1 && !is_series && arguments.props.is_none() {
+        let report = answered.swap_remove(0).reports.swap_remove(0).map_err(failed)?;
+        return single(arguments, common, &asked.listed[0].text, &report);
+    }
+    write_all(arguments, common, &asked.listed, &answered)?;
+    let mut messages = Vec::new();
+    let mut exit = Exit::Done;
+    for report in answered.into_iter().flat_map(|answered| answered.reports) {
+        match report {
+            Ok(report) if !is_proved(arguments, &report) => exit = Exit::NotProved,
+            Ok(_) => {}
+            Err(error) => messages.extend(failed(error).messages),
+        }
+    }
+    messages.dedup_by(|a, b| a.text() == b.text());
+    if messages.is_empty() {
+        return Ok(exit);
+    }
+    // Among the answers for programs they have their place.
+    if common.format != Format::Json {
+        output::warnings(common, &messages);
+    }
+    Ok(Exit::BadInput)
+}
+
+/// The property of the command line, or those of a file that are asked for.
+fn asked(arguments: &Arguments) -> Result<Asked, Failure> {
+    let Some(path) = &arguments.props else {
+        let text = arguments.property.clone().unwrap_or_default();
+        let property =
+            property::parse(&text).map_err(|error| process_failure(error, ("", ""), ("property", &text)))?;
+        let listed =
+            vec![Listed { name: None, property, text: text.clone(), place: probabilistic::Place::default() }];
+        return Ok(Asked {
+            listed,
+            declarations: Declarations::default(),
+            file: "property".to_owned(),
+            text,
+        });
+    };
+    let file = source(path)?;
+    let found = property::parse_file(file.text())
+        .map_err(|error| process_failure(error, ("", ""), (file.name(), file.text())))?;
+    let (name, text) = (file.name().to_owned(), file.text().to_owned());
+    let property::File { declarations, properties } = found;
+    if arguments.prop.is_empty() {
+        return Ok(Asked { listed: properties, declarations, file: name, text });
+    }
+    let mut listed = Vec::new();
+    for wanted in &arguments.prop {
+        let number = wanted.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
+        let named = properties.iter().find(|property| property.name.as_ref() == Some(wanted));
+        let Some(property) = named.or_else(|| properties.get(number?)) else {
+            let known: Vec<_> = properties.iter().filter_map(|property| property.name.as_deref()).collect();
+            let text = format!(
+                "there is no property `{wanted}` in {name}, which has {}; their names: {}",
+                properties.len(),
+                known.join(", ")
+            );
+            return Err(Failure::usage(Message::error("M107", text)));
+        };
+        listed.push(property.clone());
+    }
+    Ok(Asked { listed, declarations, file: name, text })
+}
+
+/// What is the same for all values of constants.
+struct Checked<'a> {
+    arguments: &'a Arguments,
+    model: &'a Model,
+    listed: &'a [Listed],
+    declarations: &'a Declarations,
+    evaluate: Option<PolicyTable>,
+    progress: &'a Progress,
+}
+
+impl Checked<'_> {
+    fn check(&self, combination: &Combination) -> Result<Vec<Result<Report, Error>>, Error> {
+        let Checked { arguments, model, listed, declarations, evaluate, progress } = self;
+        let told = |states: usize| {
+            progress.set_message(format!("{states} states"));
+            true
+        };
+        let options = Options {
+            settings: combination.settings.clone(),
+            bounds: Bounds { states: arguments.state_limit, progress: &told },
+            exactness: match (arguments.exact, arguments.inexact) {
+                (true, _) => Exactness::Always,
+                (_, true) => Exactness::Never,
+                _ => Exactness::Auto,
+            },
+            secondary: arguments.secondary.clone(),
+            policy: arguments.policy.is_some(),
+            evaluate: evaluate.clone(),
+            precision: precision(arguments),
+            declarations: (*declarations).clone(),
+        };
+        let properties: Vec<_> = listed.iter().map(|listed| &listed.property).collect();
+        check_all(model, &properties, &options)
+    }
+}
+
+fn precision(arguments: &Arguments) -> Option<Precision> {
+    arguments.precision.map(|width| match arguments.absolute {
+        true => Precision::Absolute(width),
+        false => Precision::Relative(width),
+    })
+}
+
+/// Whether the answer is as sure and as tight as was asked for.
+fn is_proved(arguments: &Arguments, report: &Report) -> bool {
+    let fits = precision(arguments).is_none_or(|precision| report.outcome.is_within(precision));
+    fits && !matches!(report.outcome, Outcome::Undecided(_))
+}
+
+fn single(arguments: &Arguments, common: &Common, property: &str, report: &Report) -> Result<Exit, Failure> {
     if let Some(path) = &arguments.policy {
         let Some(policy) = &report.policy else {
             let text = "this property has no policy to write; ask for one value with `F`, `G` or `U`";
@@ -84,64 +241,71 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         output::write_file(path, &output::pretty(&policy.to_json()))?;
     }
     match common.format {
-        Format::Json => output::json_answer(&CheckAnswer::new(&arguments.property, &report)),
-        _ => output::answer(&as_text(&report, common.verbose)),
+        Format::Json => output::json_answer(&CheckAnswer::new(property, report)),
+        _ => output::answer(&as_text(report, common.verbose)),
     }
-    Ok(match &report.outcome {
-        Outcome::Undecided(_) => Exit::NotProved,
-        _ => Exit::Done,
-    })
+    Ok(if is_proved(arguments, report) { Exit::Done } else { Exit::NotProved })
+}
+
+/// Several answers: a line for each property, or a table with a line for each combination of values.
+fn write_all(
+    arguments: &Arguments,
+    common: &Common,
+    listed: &[Listed],
+    answered: &[Answered<'_>],
+) -> Result<(), Failure> {
+    let heads: Vec<&str> =
+        listed.iter().map(|listed| listed.name.as_deref().unwrap_or(&listed.text)).collect();
+    let rows: Vec<_> =
+        answered.iter().map(|answered| (answered.combination, &answered.reports[..])).collect();
+    if let Some(path) = &arguments.csv {
+        output::write_file(path, &csv(&heads, &rows))?;
+    }
+    if common.format == Format::Json {
+        let mut answers = Vec::new();
+        for Answered { combination, reports } in answered {
+            for (listed, report) in listed.iter().zip(reports) {
+                let Ok(report) = report else { continue };
+                let constants = combination.varied.iter().map(|(name, value)| (&name[..], &value[..]));
+                answers.push(CheckAnswer::new(&listed.text, report).told(listed.name.as_deref(), constants));
+            }
+        }
+        let mut answer = ChecksAnswer::new(answers);
+        for Answered { reports, .. } in answered {
+            for (listed, report) in listed.iter().zip(reports) {
+                if let Err(error) = report {
+                    answer.refuse(&listed.text, listed.name.as_deref(), said(error));
+                }
+            }
+        }
+        output::json_answer(&answer);
+    } else if answered.len() > 1 {
+        output::answer(&table(&heads, &rows));
+    } else {
+        let mut text = String::new();
+        for (head, report) in heads.iter().zip(&answered[0].reports) {
+            let shown =
+                report.as_ref().map_or("no answer\n".to_owned(), |report| as_text(report, common.verbose));
+            let between = if shown.trim_end().contains('\n') { "\n" } else { " " };
+            let _ = write!(text, "{head}:{between}{shown}");
+        }
+        output::answer(&text);
+    }
+    Ok(())
+}
+
+/// What is wrong, in words.
+fn said(error: &Error) -> Vec<String> {
+    match error {
+        Error::Model(problems) | Error::Property(problems) => {
+            problems.iter().map(|problem| problem.message.clone()).collect()
+        }
+        other => vec![other.to_string()],
+    }
 }
 
 fn read_policy(path: &Path) -> Result<PolicyTable, Failure> {
     let file = source(path)?;
-    PolicyTable::from_json(file.text())
-        .map_err(|error| process_failure(error, (file.name(), file.text()), ""))
-}
-
-fn as_text(report: &Report, verbose: bool) -> String {
-    let mut text = match &report.outcome {
-        Outcome::Value(answer) => format!("{}\n", shown(answer)),
-        Outcome::Truth(holds, answer) => {
-            let value = answer.as_ref().map(|answer| format!(" ({})", shown(answer))).unwrap_or_default();
-            format!("{holds}{value}\n")
-        }
-        Outcome::Undecided(answer) => format!("not decided: {}\n", shown(answer)),
-        Outcome::Front(vertices) => {
-            let rows = vertices.iter().map(|pair| pair.iter().map(shown).collect());
-            output::table(&["first", "second"], rows)
-        }
-        Outcome::Constrained { randomised, deterministic, proved } => {
-            let note = if *proved { "" } else { " (perhaps not the least)" };
-            format!("randomised: {}\ndeterministic: {}{note}\n", shown(randomised), shown(deterministic))
-        }
-    };
-    if verbose {
-        let Report { states, choices, transitions, deadlocks, build, solve, .. } = report;
-        let _ = writeln!(
-            text,
-            "{states} states, {choices} choices, {transitions} transitions, {deadlocks} deadlocks; \
-             built in {:.3} s, solved in {:.3} s",
-            build.as_secs_f64(),
-            solve.as_secs_f64()
-        );
-    }
-    text
-}
-
-/// A value for people: exactly, or with its bounds.
-pub fn shown(answer: &Answer) -> String {
-    match answer {
-        Answer::Infinite => "infinite".to_owned(),
-        Answer::Undefined => "undefined: no policy does this".to_owned(),
-        Answer::Finite(quantity) => match &quantity.exact {
-            Some(exact) if exact.is_integer() => exact.to_string(),
-            Some(exact) if exact.denom().bits() + exact.numer().bits() <= 128 => {
-                format!("{} ({exact})", quantity.value)
-            }
-            Some(_) => format!("{} (exact, rounded)", quantity.value),
-            None if quantity.lower >= quantity.upper => quantity.value.to_string(),
-            None => format!("{} (between {} and {})", quantity.value, quantity.lower, quantity.upper),
-        },
-    }
+    let named = (file.name(), file.text());
+    PolicyTable::from_json(file.text()).map_err(|error| process_failure(error, named, ("property", "")))
 }

@@ -115,10 +115,10 @@ pub(super) enum Format {
 }
 
 /// What the library reports of a model and a property, each with its name and its text.
-pub(super) fn process_failure(error: Error, model: (&str, &str), property: &str) -> Failure {
+pub(super) fn process_failure(error: Error, model: (&str, &str), property: (&str, &str)) -> Failure {
     match error {
         Error::Model(problems) => in_file(&problems, model),
-        Error::Property(problems) => in_file(&problems, ("property", property)),
+        Error::Property(problems) => in_file(&problems, property),
         Error::Constant(text) => Failure::usage(Message::error("Q504", text)),
         Error::StateLimit { .. } | Error::Interrupted { .. } => Failure {
             exit: Exit::NothingFound,

@@ -197,7 +197,7 @@ fn one(
         None => plan(mission, coadaptation, roles, risk, *situation),
     };
     compare(coadaptation, &config, &mut planner, report).map_err(|error| match error {
-        NoResult::Process(error) => process_failure(error, (&mission.name, ""), ""),
+        NoResult::Process(error) => process_failure(error, (&mission.name, ""), ("property", "")),
         NoResult::Planner(messages) => messages.into(),
     })
 }

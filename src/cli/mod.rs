@@ -2,6 +2,8 @@
 
 mod alternatives;
 mod check;
+mod check_series;
+mod check_text;
 mod common;
 mod compare;
 mod compare_so_far;

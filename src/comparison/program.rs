@@ -44,6 +44,7 @@ pub(super) fn model(
         modules: vec![robot],
         rewards,
         labels,
+        initial: None,
     }
 }
 

@@ -3,7 +3,6 @@
 use num_rational::BigRational;
 
 use crate::number::{Number, enclosing};
-use crate::solve::Solution;
 
 /// A number that was asked for, with bounds on it.
 #[derive(Debug, Clone, PartialEq)]
@@ -16,6 +15,28 @@ pub struct Quantity {
     pub upper: f64,
     /// The true value, where it was computed exactly.
     pub exact: Option<BigRational>,
+}
+
+/// How wide the bounds on a value may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Precision {
+    /// So much, as a part of the value.
+    Relative(f64),
+    /// So much.
+    Absolute(f64),
+}
+
+impl Precision {
+    /// Whether the bounds on a value are within it.
+    pub fn holds(self, quantity: &Quantity) -> bool {
+        let width = quantity.upper - quantity.lower;
+        match self {
+            _ if quantity.exact.is_some() => true,
+            // The ends are rounded to doubles.
+            Self::Relative(most) => width <= (most.max(4.0 * f64::EPSILON)) * quantity.value.abs(),
+            Self::Absolute(most) => width <= most.max(4.0 * f64::EPSILON * quantity.value.abs()),
+        }
+    }
 }
 
 /// A value that was asked for.
@@ -38,6 +59,10 @@ pub enum Outcome {
     Truth(bool, Option<Answer>),
     /// The bounds on the value do not decide whether the bound is kept.
     Undecided(Answer),
+    /// The least and the greatest value, where there are several states to start in or it was asked for.
+    Range(Answer, Answer),
+    /// Some states, with their values.
+    States(Vec<Listed>),
     /// The vertices of a Pareto front.
     Front(Vec<[Answer; 2]>),
     /// The best value under a bound on a second objective.
@@ -49,6 +74,33 @@ pub enum Outcome {
         /// Whether the latter is proved to be the best.
         proved: bool,
     },
+}
+
+impl Outcome {
+    /// Whether the bounds on all of its values are within a width.
+    pub fn is_within(&self, precision: Precision) -> bool {
+        let fits = |answer: &Answer| answer.quantity().is_none_or(|quantity| precision.holds(quantity));
+        match self {
+            Self::Value(answer) | Self::Undecided(answer) => fits(answer),
+            Self::Range(least, greatest) => fits(least) && fits(greatest),
+            Self::States(states) => states.iter().filter_map(|state| state.answer.as_ref()).all(fits),
+            Self::Front(vertices) => vertices.iter().flatten().all(fits),
+            Self::Constrained { randomised, deterministic, .. } => fits(randomised) && fits(deterministic),
+            // What is decided is decided.
+            Self::Truth(..) => true,
+        }
+    }
+}
+
+/// A state with its value.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Listed {
+    /// The values of the variables, in their order.
+    pub values: Vec<i64>,
+    /// Whether the property holds, for one that does or does not.
+    pub truth: Option<bool>,
+    /// The value, for a property that has one.
+    pub answer: Option<Answer>,
 }
 
 impl Answer {
@@ -74,19 +126,6 @@ impl Answer {
     pub fn from_exact(exact: BigRational) -> Self {
         let (lower, upper) = enclosing(&exact);
         Self::Finite(Quantity { value: Number::to_f64(&exact), lower, upper, exact: Some(exact) })
-    }
-
-    /// The value of a state.
-    pub fn of<N: Number>(solution: &Solution<N>, state: usize) -> Self {
-        match solution.bounds(state) {
-            None => Self::Infinite,
-            Some((lower, upper)) => Self::Finite(Quantity {
-                value: solution.values[state].to_f64(),
-                lower,
-                upper,
-                exact: solution.values[state].to_rational(),
-            }),
-        }
     }
 
     /// A probability from that of its complement.

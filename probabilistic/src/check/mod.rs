@@ -1,10 +1,19 @@
 //! A model and a property to an answer: explored in doubles, and once more in rationals where the model is small.
 
 mod answer;
+mod ask;
+mod bounded;
+mod filters;
+mod longrun;
+mod multi;
 mod options;
+mod paths;
 mod query;
+mod state;
 mod steps;
 mod table;
+mod validate;
+mod vector;
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -12,19 +21,22 @@ use std::time::{Duration, Instant};
 use num_rational::BigRational;
 
 use crate::error::Error;
-use crate::explore::{Explored, explore};
+use crate::explore::{Exploration, Explored, explore};
 use crate::number::Number;
 use crate::prism::ast::Model;
-use crate::prism::{Packed, Program};
-use crate::property::Property;
-use crate::solve::{NONE, Work};
+use crate::prism::{Packed, Program, Settings};
+use crate::property::{Declarations, Property};
+use crate::solve::NONE;
+use crate::solve::work::MOST;
+use query::Query;
+use validate::{expressions_of, properties_in, steps_of, validate};
 
-pub use answer::{Answer, Outcome, Quantity};
+pub use answer::{Answer, Listed, Outcome, Precision, Quantity};
 pub use options::{Exactness, Options};
 pub use table::{PolicyTable, Row};
 
-/// Transitions up to which a model is solved in rationals unless asked otherwise.
-const SMALL: usize = 150_000;
+/// Transitions up to which a model is explored in rationals unless asked otherwise.
+const SMALL: usize = 20_000;
 
 /// What exact arithmetic may cost a model with so many transitions unless it was asked for, in units of about a nanosecond.
 fn budget(transitions: usize) -> u64 {
@@ -37,6 +49,8 @@ fn budget(transitions: usize) -> u64 {
 pub struct Report {
     /// The answer.
     pub outcome: Outcome,
+    /// The variables: name, and whether it is a truth value.
+    pub variables: Vec<(String, bool)>,
     /// States.
     pub states: usize,
     /// Choices in all states.
@@ -58,69 +72,177 @@ pub struct Report {
 /// # Errors
 /// Everything that is wrong with model, property, constants or policy, or that a limit was reached.
 pub fn check(model: &Model, property: &Property, options: &Options<'_>) -> Result<Report, Error> {
+    let mut reports = check_all(model, &[property], options)?;
+    reports.pop().expect("invariant: one report for each property")
+}
+
+/// Checks several properties of a model, which is explored once.
+///
+/// # Errors
+/// Everything that is wrong with model, constants or policy, or that a limit was reached. What is wrong with a single property stands
+/// in its place.
+pub fn check_all(
+    model: &Model,
+    properties: &[&Property],
+    options: &Options<'_>,
+) -> Result<Vec<Result<Report, Error>>, Error> {
     let start = Instant::now();
-    // Probabilities must sum to one as they are written: the first pass decides that in doubles.
-    let program = Program::<f64>::new(model, &options.settings)?;
-    let wanted = wanted_rewards(&program.reward_names, property, options)?;
+    let joined = join(model, &options.declarations);
+    let program = Program::<f64>::new(&joined, &options.settings)
+        .map_err(|error| blame(error, model, &joined, &options.settings))?;
+    let (mut wanted, mut refused) = (Vec::new(), Vec::new());
+    for property in properties {
+        let needed = wanted_rewards(&program.reward_names, property, options)
+            .and_then(|needed| validate(&program, property).map(|()| needed));
+        refused.push(needed.map(|needed| wanted.extend(needed)).err());
+    }
+    if !refused.iter().any(Option::is_none) {
+        return Ok(refused.into_iter().flatten().map(Err).collect());
+    }
+    wanted.sort_unstable();
+    wanted.dedup();
     let program = program.with_rewards(&wanted);
-    query::validate(&program, property)?;
-    let explored = explore(&program, &options.bounds)?;
-    let small = options.exactness == Exactness::Auto && explored.mdp.transition_count() <= SMALL;
-    let mut build = start.elapsed();
-    let mut report = Report {
-        outcome: Outcome::Truth(false, None),
-        states: explored.mdp.states(),
-        choices: explored.mdp.choice_count(),
-        transitions: explored.mdp.transition_count(),
-        deadlocks: explored.deadlocks,
-        policy: None,
-        build,
-        solve: Duration::ZERO,
+    let exact = match options.exactness {
+        Exactness::Never => None,
+        _ => Some(Program::<BigRational>::new(&joined, &options.settings)?.with_rewards(&wanted)),
     };
-    let start = Instant::now();
-    let mut spent = Duration::ZERO;
-    let most = if small { budget(explored.mdp.transition_count()) } else { u64::MAX };
-    if small || options.exactness == Exactness::Always {
-        let again = Instant::now();
-        let exact = Program::<BigRational>::new(model, &options.settings)?.with_rewards(&wanted);
-        let states = explore(&exact, &options.bounds)?;
-        spent = again.elapsed();
-        build = build.saturating_add(spent);
-        // A policy of the doubles is a good start where both have the same choices.
-        let same = states.mdp.choice_count() == explored.mdp.choice_count()
-            && states.mdp.transition_count() == explored.mdp.transition_count();
-        let doubles = same.then(|| states.mdp.to_f64());
-        let found = query::Query {
-            program: &exact,
-            explored: &states,
-            wanted: &wanted,
-            doubles,
-            work: Work::new(most).into(),
+    let mut found = Processes::explore(&program, exact.as_ref(), options)?;
+    let build = start.elapsed();
+    let mut reports = Vec::new();
+    for (property, refused) in properties.iter().zip(refused) {
+        if let Some(error) = refused {
+            reports.push(Err(error));
+            continue;
         }
-        .answer(property, options)?;
-        if let Some((outcome, policy)) = found {
-            report.outcome = outcome;
-            report.policy = policy.filter(|_| options.policy).map(|p| policy_table(&exact, &states, &p));
-            report.build = build;
-            report.solve = start.elapsed().saturating_sub(spent);
-            return Ok(report);
+        let start = Instant::now();
+        let report = found.report(&program, exact.as_ref(), property, options, &wanted);
+        reports.push(report.map(|report| Report { build, solve: start.elapsed(), ..report }));
+    }
+    Ok(reports)
+}
+
+/// A model with the constants and labels of a file of properties.
+fn join(model: &Model, declarations: &Declarations) -> Model {
+    let mut joined = model.clone();
+    joined.constants.extend(declarations.constants.iter().cloned());
+    joined.labels.extend(declarations.labels.iter().cloned());
+    joined
+}
+
+/// What is wrong with a model and with declarations besides: the declarations, if the model is fine without them.
+fn blame(error: Error, model: &Model, joined: &Model, settings: &Settings) -> Error {
+    let Error::Model(problems) = error else { return error };
+    let declared = joined.constants.len() > model.constants.len() || joined.labels.len() > model.labels.len();
+    if !declared {
+        return Error::Model(problems);
+    }
+    let known = |name: &String| model.constants.iter().any(|constant| constant.name == *name);
+    let own: Settings =
+        settings.iter().filter(|(name, _)| known(name)).map(|(k, v)| (k.clone(), v.clone())).collect();
+    match Program::<f64>::new(model, &own) {
+        Err(Error::Model(problems)) => Error::Model(problems),
+        _ => Error::Property(problems),
+    }
+}
+
+/// A model that was explored: exactly, in doubles, or both.
+struct Processes {
+    exact: Option<Explored<Packed, BigRational>>,
+    doubles: Option<Explored<Packed, f64>>,
+    /// What exact arithmetic may cost each property.
+    budget: u64,
+}
+
+impl Processes {
+    /// Explores exactly as long as the model is small, and goes on in doubles unless exact values were asked for.
+    fn explore(
+        program: &Program<f64>,
+        exact: Option<&Program<BigRational>>,
+        options: &Options<'_>,
+    ) -> Result<Self, Error> {
+        let bounds = &options.bounds;
+        let Some(exact) = exact else {
+            return Ok(Self { exact: None, doubles: Some(explore(program, bounds)?), budget: 0 });
+        };
+        if options.exactness == Exactness::Always {
+            return Ok(Self { exact: Some(explore(exact, bounds)?), doubles: None, budget: u64::MAX });
         }
+        let mut exploration = Exploration::new(exact, bounds)?;
+        if exploration.go_on(exact, bounds, SMALL)? {
+            let budget = budget(exploration.found.mdp.transition_count());
+            return Ok(Self { exact: Some(exploration.found), doubles: None, budget });
+        }
+        let found = match exploration.rounded() {
+            Some(mut rounded) => {
+                drop(exploration);
+                rounded.go_on(program, bounds, usize::MAX)?;
+                rounded.found
+            }
+            // Says where the number stands.
+            None => explore(program, bounds)?,
+        };
+        Ok(Self { exact: None, doubles: Some(found), budget: 0 })
     }
-    let found = query::Query {
-        program: &program,
-        explored: &explored,
-        wanted: &wanted,
-        doubles: None,
-        work: Work::new(0).into(),
+
+    fn report(
+        &mut self,
+        program: &Program<f64>,
+        exact: Option<&Program<BigRational>>,
+        property: &Property,
+        options: &Options<'_>,
+        wanted: &[usize],
+    ) -> Result<Report, Error> {
+        if let (Some(program), Some(explored)) = (exact, &self.exact) {
+            let mut query = Query::new(program, explored, options, wanted, self.budget)?;
+            query.doubles = Some(explored.mdp.to_f64());
+            if let Some(found) = query.answer(property)? {
+                return Ok(report(program, explored, found, options));
+            }
+        }
+        if self.doubles.is_none() {
+            let rounded = self.exact.as_ref().and_then(Explored::rounded);
+            self.doubles = Some(rounded.map_or_else(|| explore(program, &options.bounds), Ok)?);
+        }
+        let explored = self.doubles.as_ref().expect("invariant: explored just now");
+        let found = Query::new(program, explored, options, wanted, 0)?.answer(property)?;
+        let found = found.expect("invariant: doubles cost nothing");
+        let wide = options.precision.is_some_and(|precision| !found.0.is_within(precision));
+        if let Some(exact) = exact.filter(|_| wide) {
+            let budget = MOST.saturating_mul(10);
+            if self.exact.is_none() {
+                self.exact = Some(explore(exact, &options.bounds)?);
+            }
+            if self.budget < budget {
+                self.budget = budget;
+                return self.report(program, Some(exact), property, options, wanted);
+            }
+        }
+        Ok(report(program, explored, found, options))
     }
-    .answer(property, options)?;
-    if let Some((outcome, policy)) = found {
-        report.outcome = outcome;
-        report.policy = policy.filter(|_| options.policy).map(|p| policy_table(&program, &explored, &p));
+}
+
+fn report<N: Number>(
+    program: &Program<N>,
+    explored: &Explored<Packed, N>,
+    (outcome, policy): query::Found,
+    options: &Options<'_>,
+) -> Report {
+    let mdp = &explored.mdp;
+    Report {
+        outcome,
+        variables: program
+            .variables
+            .iter()
+            .map(|variable| (variable.name.clone(), variable.is_bool))
+            .collect(),
+        states: mdp.states(),
+        choices: mdp.choice_count(),
+        transitions: mdp.transition_count(),
+        deadlocks: explored.deadlocks,
+        policy: policy.filter(|_| options.policy).map(|policy| policy_table(program, explored, &policy)),
+        build: Duration::ZERO,
+        solve: Duration::ZERO,
     }
-    report.build = build;
-    report.solve = start.elapsed().saturating_sub(spent);
-    Ok(report)
 }
 
 /// The reward structures that a property and the ties of its policy need, by number.
@@ -128,17 +250,24 @@ fn wanted_rewards(names: &[String], property: &Property, options: &Options<'_>) 
     let mut wanted = Vec::new();
     let mut parts = vec![property];
     while let Some(part) = parts.pop() {
-        match part {
-            Property::Reward(_, name, _) => wanted.push(query::structure(names, name.as_deref())?),
-            Property::Multi(more) => parts.extend(more),
-            Property::Probability(..) => {}
+        if let Property::Multi(more) = part {
+            parts.extend(more);
+        }
+        let name = match part {
+            Property::Reward(_, name, _) => Some(name),
+            Property::Probability(_, path) => steps_of(path).and_then(|steps| steps.reward.as_ref()),
+            _ => None,
+        };
+        if let Some(name) = name {
+            wanted.push(query::structure(names, name.as_deref())?);
+        }
+        for expression in expressions_of(part) {
+            properties_in(expression, &mut parts);
         }
     }
     if let Some(name) = &options.secondary {
         wanted.push(query::structure(names, Some(name))?);
     }
-    wanted.sort_unstable();
-    wanted.dedup();
     Ok(wanted)
 }
 

@@ -1,13 +1,15 @@
 //! How a property is checked.
 
+use crate::check::answer::Precision;
 use crate::check::table::PolicyTable;
 use crate::explore::Bounds;
 use crate::prism::Settings;
+use crate::property::Declarations;
 
 /// Whether to solve in rationals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Exactness {
-    /// Where the model is small.
+    /// While that is cheap; the result is bounds otherwise.
     #[default]
     Auto,
     /// Always.
@@ -31,4 +33,8 @@ pub struct Options<'a> {
     pub policy: bool,
     /// A policy to evaluate, in place of the best one.
     pub evaluate: Option<PolicyTable>,
+    /// How wide bounds may be: where they are wider in doubles, the model is solved in rationals unless that was excluded.
+    pub precision: Option<Precision>,
+    /// Constants and labels besides those of the model.
+    pub declarations: Declarations,
 }

@@ -3,6 +3,7 @@
 use num_rational::BigRational;
 
 use crate::error::Place;
+use crate::solve::Direction;
 
 /// An expression and where it starts.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,6 +37,134 @@ pub enum ExprKind {
     If(Box<Expr>, Box<Expr>, Box<Expr>),
     /// A function.
     Call(Function, Vec<Expr>),
+    /// The value of a property, or whether it holds; in properties only.
+    Property(Box<Property>),
+    /// Whether a path is as it says; within the brackets of properties only.
+    Temporal(Box<Temporal>),
+}
+
+/// What is asked of a model.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Property {
+    /// `P`: a probability.
+    Probability(Question, Path),
+    /// `R`: an expected reward, with the name of its structure where there is one.
+    Reward(Question, Option<String>, RewardPath),
+    /// `S`: in which share of the time, in the long run, states hold.
+    SteadyState(Question, Expr),
+    /// Several objectives at once.
+    Multi(Vec<Self>),
+    /// Something of the values of a property in some states; all of them unless it says which.
+    Filter(Filter, Expr, Option<Expr>),
+    /// A number or a truth value that is made of properties and of what holds in a state.
+    Expression(Expr),
+}
+
+/// What a filter makes of the values in several states.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the names are those of the operators")]
+pub enum Filter {
+    Min,
+    Max,
+    Sum,
+    Average,
+    Count,
+    ForAll,
+    Exists,
+    /// The value in the first of the states, by the values of the variables.
+    First,
+    /// The value in the only state.
+    State,
+    /// The least and the greatest value.
+    Range,
+    /// The states with their values, without those that are zero or false.
+    Print,
+    /// The states with their values.
+    PrintAll,
+    /// The states with the least value.
+    ArgMin,
+    /// The states with the greatest value.
+    ArgMax,
+}
+
+/// For the value, or whether it keeps a bound.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Question {
+    /// Least or greatest; none where the model has one policy only, or the bound says it.
+    pub direction: Option<Direction>,
+    /// The bound; none for the value.
+    pub bound: Option<(BinaryOp, Expr)>,
+}
+
+/// Paths.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Path {
+    /// The first state is one of these.
+    State(Expr),
+    /// The path is not of that kind.
+    Not(Box<Self>),
+    /// `X`: in the next state.
+    Next(Expr),
+    /// `U`, and `F` with `true` on the left: the right one holds some day (in so many steps), the left one until then.
+    Until(Expr, Expr, Option<Steps>),
+    /// `G`: always (in so many steps).
+    Globally(Expr, Option<Steps>),
+    /// `W`: `U`, or the left one holds always.
+    WeakUntil(Expr, Expr, Option<Steps>),
+    /// `R`: the right one holds until the left one does, too, or always.
+    Release(Expr, Expr, Option<Steps>),
+    /// `G F`: again and again.
+    Repeatedly(Expr),
+    /// `F G`: from some day on.
+    Persistently(Expr),
+}
+
+/// Bounds on the number of steps, or on a reward that is earned on the way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Steps {
+    /// At least so many, or more than that.
+    pub least: Option<StepBound>,
+    /// At most so many, or less than that.
+    pub most: Option<StepBound>,
+    /// The reward that is bounded in place of the steps, with its name where it has one.
+    pub reward: Option<Option<String>>,
+}
+
+/// A number of steps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepBound {
+    /// The number.
+    pub limit: Expr,
+    /// Whether the number itself is excluded.
+    pub strict: bool,
+}
+
+/// Over what a reward is summed.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RewardPath {
+    /// `F`: until a state is reached.
+    Reach(Expr),
+    /// `C<=k`: over so many steps.
+    Steps(StepBound),
+    /// `C`: for ever.
+    Total,
+    /// `I=k`: that of the state after so many steps.
+    Instant(Expr),
+    /// `S`: the average of a step in the long run.
+    LongRun,
+}
+
+/// A temporal operator with what it is applied to; the left side is `true` for operators that have one side.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Temporal {
+    /// The letter of the operator.
+    pub letter: char,
+    /// Its bounds.
+    pub steps: Option<Steps>,
+    /// Its left side.
+    pub left: Expr,
+    /// Its right side.
+    pub right: Expr,
 }
 
 /// Operators between two expressions.
@@ -280,6 +409,8 @@ pub struct Model {
     pub rewards: Vec<Rewards>,
     /// Its labels.
     pub labels: Vec<Named>,
+    /// `init … endinit`: where it can start.
+    pub initial: Option<Expr>,
 }
 
 impl Expr {
@@ -324,16 +455,32 @@ impl Expr {
                 }
             }
             ExprKind::Call(_, arguments) => arguments.iter().for_each(|argument| argument.names(found)),
-            ExprKind::Bool(_) | ExprKind::Int(_) | ExprKind::Number(_) | ExprKind::Label(_) => {}
+            ExprKind::Bool(_)
+            | ExprKind::Int(_)
+            | ExprKind::Number(_)
+            | ExprKind::Label(_)
+            | ExprKind::Property(_)
+            | ExprKind::Temporal(_) => {}
         }
     }
 
     /// The same with each name replaced, where the function has something for it.
     #[must_use]
     pub fn replace(&self, with: &dyn Fn(&str) -> Option<Self>) -> Self {
-        let again = |part: &Self| Box::new(part.replace(with));
+        self.rewrite(&mut |part| match &part.kind {
+            ExprKind::Name(name) => Some(with(name).unwrap_or_else(|| part.clone())),
+            _ => None,
+        })
+    }
+
+    /// The same with each part replaced, where the function has something for it; larger parts are asked for first.
+    #[must_use]
+    pub fn rewrite(&self, with: &mut dyn FnMut(&Self) -> Option<Self>) -> Self {
+        if let Some(other) = with(self) {
+            return other;
+        }
+        let mut again = |part: &Self| Box::new(part.rewrite(with));
         let kind = match &self.kind {
-            ExprKind::Name(name) => return with(name).unwrap_or_else(|| self.clone()),
             ExprKind::Not(inner) => ExprKind::Not(again(inner)),
             ExprKind::Negative(inner) => ExprKind::Negative(again(inner)),
             ExprKind::Binary(op, left, right) => ExprKind::Binary(*op, again(left), again(right)),
@@ -341,7 +488,7 @@ impl Expr {
                 ExprKind::If(again(condition), again(then), again(otherwise))
             }
             ExprKind::Call(function, arguments) => {
-                ExprKind::Call(*function, arguments.iter().map(|argument| argument.replace(with)).collect())
+                ExprKind::Call(*function, arguments.iter().map(|argument| *again(argument)).collect())
             }
             other => other.clone(),
         };

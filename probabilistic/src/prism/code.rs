@@ -147,6 +147,23 @@ impl Code {
         })
     }
 
+    /// The least number that is above all of its variables.
+    pub fn variables_below(&self) -> u32 {
+        let most = |parts: &[&Self]| parts.iter().map(|part| part.variables_below()).max().unwrap_or(0);
+        match self {
+            Self::Whole(_) | Self::Number(_) => 0,
+            Self::Variable(variable) => variable.saturating_add(1),
+            Self::Not(inner) | Self::Negative(inner, _) => inner.variables_below(),
+            Self::All(parts) | Self::Any(parts) | Self::Call(_, _, parts) => {
+                most(&parts.iter().collect::<Vec<_>>())
+            }
+            Self::Iff(left, right)
+            | Self::Compare(_, _, left, right)
+            | Self::Arithmetic(_, _, left, right) => most(&[left, right]),
+            Self::If(condition, then, otherwise) => most(&[condition, then, otherwise]),
+        }
+    }
+
     /// Whether no variable occurs in it.
     pub fn is_constant(&self) -> bool {
         match self {
@@ -173,13 +190,7 @@ pub fn from_whole(value: i64) -> BigRational {
 
 /// A probability or a reward in the kind of number that is solved in.
 pub fn rounded<N: Number>(value: &BigRational) -> Result<N> {
-    let number = N::from_rational(value);
-    let magnitude = number.to_f64().abs();
-    // Doubles beyond lose digits that the bounds on results count on.
-    if N::EXACT || Zero::is_zero(value) || (1e-250..=1e250).contains(&magnitude) {
-        return Ok(number);
-    }
-    Err(Fault("a number that is too large or too small for doubles"))
+    crate::number::rounded(value).ok_or(Fault("a number that is too large or too small for doubles"))
 }
 
 fn compare(op: BinaryOp, order: Option<std::cmp::Ordering>) -> bool {

@@ -166,6 +166,11 @@ impl Names {
         }
     }
 
+    /// What a label stands for.
+    pub fn label(&self, name: &str) -> Option<&Expr> {
+        self.labels.get(name)
+    }
+
     /// The names of all labels, sorted.
     pub fn labels(&self) -> Vec<&str> {
         let mut labels: Vec<_> = self.labels.keys().map(String::as_str).collect();
@@ -221,8 +226,12 @@ impl Names {
             ExprKind::Name(name) => self.name(name, expression.place)?,
             ExprKind::Label(label) => {
                 let Some(inner) = self.labels.get(label).cloned() else {
-                    let text =
-                        format!("there is no label `\"{label}\"`; there are: {}", self.labels().join(", "));
+                    let text = match self.labels().join(", ") {
+                        none if none.is_empty() => {
+                            format!("there is no label `\"{label}\"`, and no other one")
+                        }
+                        known => format!("there is no label `\"{label}\"`; there are: {known}"),
+                    };
                     return Err(Diagnostic::new("Q202", expression.place, text));
                 };
                 self.nested(&format!("\"{label}\""), &inner, expression.place)?
@@ -247,6 +256,10 @@ impl Names {
                 (Code::If(Box::new(condition), Box::new(then), Box::new(other)), kind)
             }
             ExprKind::Call(function, arguments) => self.call(*function, arguments, expression.place)?,
+            ExprKind::Property(_) | ExprKind::Temporal(_) => {
+                let text = "a property has a value in a state of a model only, and cannot stand here";
+                return Err(Diagnostic::new("Q205", expression.place, text));
+            }
         })
     }
 

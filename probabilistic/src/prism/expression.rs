@@ -4,12 +4,14 @@ use crate::error::{Diagnostic, Place};
 use crate::number::parse_decimal;
 use crate::prism::ast::{BinaryOp, Expr, ExprKind, Function};
 use crate::prism::lexer::{Kind, Token};
-use crate::prism::reserved::is_reserved;
+use crate::prism::reserved::is_keyword;
 
 /// How deep expressions may be nested.
 const DEPTH: usize = 200;
 /// How many operators of arithmetic (and of implication) an expression may have, and how many others.
 const OPERATORS: [usize; 2] = [500, 20_000];
+/// How many of either kind an expression of a property may have.
+const PROPERTY: usize = 2_000;
 
 /// Tokens and how far they are read.
 #[derive(Debug)]
@@ -19,6 +21,17 @@ pub struct Cursor<'a> {
     depth: usize,
     /// The operators of the expression at hand, as [`OPERATORS`] counts them.
     operators: [usize; 2],
+    /// What expressions of properties have besides.
+    besides: Option<Besides>,
+}
+
+/// What expressions of properties have besides those of models.
+#[derive(Debug, Clone, Copy)]
+pub struct Besides {
+    /// What starts with a word, if the next one is such a word.
+    pub start: fn(&mut Cursor<'_>) -> Read<Option<ExprKind>>,
+    /// What continues an expression.
+    pub go_on: fn(&mut Cursor<'_>, Expr) -> Read<Expr>,
 }
 
 /// What reading returns.
@@ -27,7 +40,12 @@ pub type Read<T> = Result<T, Diagnostic>;
 impl<'a> Cursor<'a> {
     /// At the first token; the last one must be the end.
     pub fn new(tokens: &'a [Token]) -> Self {
-        Self { tokens, at: 0, depth: 0, operators: [0; 2] }
+        Self { tokens, at: 0, depth: 0, operators: [0; 2], besides: None }
+    }
+
+    /// The same for the expressions of properties.
+    pub fn of_properties(tokens: &'a [Token], besides: Besides) -> Self {
+        Self { besides: Some(besides), ..Self::new(tokens) }
     }
 
     /// How many tokens are read.
@@ -114,7 +132,7 @@ impl<'a> Cursor<'a> {
     pub fn name(&mut self, what: &str) -> Read<(String, Place)> {
         let place = self.place();
         match self.peek() {
-            Kind::Name(name) if !is_reserved(name) => {
+            Kind::Name(name) if !is_keyword(name) => {
                 self.advance();
                 Ok((name.clone(), place))
             }
@@ -177,7 +195,8 @@ impl<'a> Cursor<'a> {
         while let Some((op, strength)) = self.operator().filter(|(_, strength)| *strength >= least) {
             let kind = usize::from(!op.is_arithmetic() && op != BinaryOp::Implies);
             self.operators[kind] += 1;
-            if self.operators[kind] > OPERATORS[kind] {
+            let most = if self.besides.is_some() { OPERATORS[kind].min(PROPERTY) } else { OPERATORS[kind] };
+            if self.operators[kind] > most {
                 return Err(Diagnostic::new("Q104", self.place(), "this expression is too long"));
             }
             self.advance();
@@ -215,6 +234,11 @@ impl<'a> Cursor<'a> {
 
     fn primary(&mut self) -> Read<Expr> {
         let place = self.place();
+        if let Some(besides) = self.besides
+            && let Some(kind) = (besides.start)(self)?
+        {
+            return Ok(Expr { kind, place });
+        }
         let kind = match self.peek() {
             Kind::Number(text) => {
                 self.advance();
@@ -226,7 +250,10 @@ impl<'a> Cursor<'a> {
             }
             Kind::Sign("(") => {
                 self.advance();
-                let inner = self.expression()?;
+                let mut inner = self.expression()?;
+                if let Some(besides) = self.besides {
+                    inner = (besides.go_on)(self, inner)?;
+                }
                 self.need(")")?;
                 return Ok(Expr { place, ..inner });
             }
@@ -237,12 +264,12 @@ impl<'a> Cursor<'a> {
                 }
                 "func" => return self.function_by_word(),
                 _ => match Function::ALL.iter().find(|(name, _)| name == word) {
-                    Some((_, function)) => {
+                    Some((_, function)) if matches!(self.peek_at(1), Kind::Sign("(")) => {
                         self.advance();
                         self.need("(")?;
                         self.arguments(*function)?
                     }
-                    None => ExprKind::Name(self.name("an expression")?.0),
+                    _ => ExprKind::Name(self.name("an expression")?.0),
                 },
             },
             _ => return Err(self.expected("an expression")),

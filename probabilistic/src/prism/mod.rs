@@ -17,6 +17,7 @@ mod parser;
 mod rename;
 mod reserved;
 mod run;
+mod starts;
 mod state;
 mod write;
 
@@ -25,6 +26,7 @@ pub(crate) use compile::Names;
 pub use compile::Settings;
 pub use model::Program;
 pub use parser::parse;
+pub(crate) use parser::{constant_declaration, named_expression};
 pub use reserved::is_reserved;
 pub use state::{Packed, Valuation};
 pub(crate) use write::decimal;

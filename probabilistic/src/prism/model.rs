@@ -14,6 +14,7 @@ use crate::prism::ast::{self, Model, ModelKind, Type};
 use crate::prism::build::{compile_command, declare, reward_item};
 use crate::prism::command::{Command, RewardItem, Variable};
 use crate::prism::compile::{Names, Settings};
+use crate::prism::starts::starts;
 use crate::prism::state::{Layout, Packed, Valuation, above_least};
 
 /// The action number of commands without name.
@@ -67,6 +68,8 @@ pub struct Program<N> {
     pub(super) rewards: Vec<Structure<N>>,
     /// Which rewards are computed.
     pub(super) wanted: Vec<usize>,
+    /// Where it can start.
+    pub(super) starts: Vec<Packed>,
 }
 
 impl<N: Number> Program<N> {
@@ -89,6 +92,7 @@ impl<N: Number> Program<N> {
             masks: Vec::new(),
             rewards: Vec::new(),
             wanted: Vec::new(),
+            starts: Vec::new(),
         };
         let modules = model.modules.iter().map(|module| &module.variables);
         for variable in std::iter::once(&model.globals).chain(modules).flatten() {
@@ -147,9 +151,26 @@ impl<N: Number> Program<N> {
                 problems.push(problem);
             }
         }
+        match program.find_starts(model, &mut names) {
+            Ok(starts) => program.starts = starts,
+            Err(problem) => problems.push(problem),
+        }
         program.names = names;
         program.index();
         if problems.is_empty() { Ok(program) } else { Err(Error::Model(problems)) }
+    }
+
+    fn find_starts(&self, model: &Model, names: &mut Names) -> Result<Vec<Packed>, Diagnostic> {
+        let Some(condition) = &model.initial else {
+            let values: Valuation = self.variables.iter().map(|variable| variable.initial).collect();
+            return Ok(vec![self.layout.pack(&values)]);
+        };
+        let place = condition.place;
+        let found = starts(names.typed(condition, Type::Bool)?, place, &self.variables, &self.layout)?;
+        if found.is_empty() {
+            return Err(Diagnostic::new("Q307", place, "there is no state in which `init` holds"));
+        }
+        Ok(found)
     }
 
     /// Chooses the reward structures that are computed.

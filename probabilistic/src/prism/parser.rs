@@ -24,6 +24,7 @@ pub fn parse(text: &str) -> Result<Model, Vec<Diagnostic>> {
         modules: Vec::new(),
         rewards: Vec::new(),
         labels: Vec::new(),
+        initial: None,
     };
     let mut problems = Vec::new();
     let mut kind = None;
@@ -36,10 +37,6 @@ pub fn parse(text: &str) -> Result<Model, Vec<Diagnostic>> {
                 cursor.advance();
             }
         }
-    }
-    if kind.is_none() && problems.is_empty() {
-        let text = "the model does not say what it is; write `mdp` or `dtmc` at its start";
-        problems.push(Diagnostic::new("Q107", Place { line: 1, column: 1 }, text));
     }
     if model.modules.is_empty() && problems.is_empty() {
         problems.push(Diagnostic::new("Q107", cursor.place(), "the model has no module"));
@@ -99,7 +96,8 @@ fn part(
             let text = format!("models of the kind `{word}` are not handled; `mdp` and `dtmc` are");
             return Err(Diagnostic::new("Q401", place, text));
         }
-        "system" | "init" | "observables" | "invariant" | "player" => {
+        "init" => return initial(cursor, model),
+        "system" | "observables" | "invariant" | "player" => {
             cursor.advance();
             let text = format!("`{word}` declarations are not handled");
             return Err(Diagnostic::new("Q401", place, text));
@@ -110,7 +108,24 @@ fn part(
     Ok(())
 }
 
+fn initial(cursor: &mut Cursor<'_>, model: &mut Model) -> Read<()> {
+    let place = cursor.place();
+    cursor.advance();
+    let states = cursor.expression()?;
+    cursor.need_word("endinit")?;
+    match model.initial.replace(states) {
+        None => Ok(()),
+        Some(_) => Err(Diagnostic::new("Q107", place, "the model has said before where it starts")),
+    }
+}
+
 fn constant(cursor: &mut Cursor<'_>, model: &mut Model) -> Read<()> {
+    model.constants.push(constant_declaration(cursor)?);
+    Ok(())
+}
+
+/// `const type name = value;`
+pub fn constant_declaration(cursor: &mut Cursor<'_>) -> Read<Constant> {
     cursor.advance();
     let kind = match cursor.peek() {
         Kind::Name(word) => match word.as_str() {
@@ -127,11 +142,18 @@ fn constant(cursor: &mut Cursor<'_>, model: &mut Model) -> Read<()> {
     let (name, place) = cursor.name("the name of a constant")?;
     let value = if cursor.take("=") { Some(cursor.expression()?) } else { None };
     cursor.need(";")?;
-    model.constants.push(Constant { name, kind: kind.unwrap_or(Type::Int), value, place });
-    Ok(())
+    Ok(Constant { name, kind: kind.unwrap_or(Type::Int), value, place })
 }
 
 fn named(cursor: &mut Cursor<'_>, model: &mut Model) -> Read<()> {
+    let is_label = cursor.is_word("label");
+    let named = named_expression(cursor)?;
+    if is_label { &mut model.labels } else { &mut model.formulas }.push(named);
+    Ok(())
+}
+
+/// `label "name" = expression;`, `formula name = expression;`
+pub fn named_expression(cursor: &mut Cursor<'_>) -> Read<Named> {
     let is_label = cursor.is_word("label");
     cursor.advance();
     let place = cursor.place();
@@ -146,9 +168,7 @@ fn named(cursor: &mut Cursor<'_>, model: &mut Model) -> Read<()> {
     cursor.need("=")?;
     let expression = cursor.expression()?;
     cursor.need(";")?;
-    let list = if is_label { &mut model.labels } else { &mut model.formulas };
-    list.push(Named { name, expression, place });
-    Ok(())
+    Ok(Named { name, expression, place })
 }
 
 fn variable(cursor: &mut Cursor<'_>) -> Read<Variable> {

@@ -55,26 +55,18 @@ const RESERVED: [&str; 50] = [
 ];
 
 /// More of them.
-const RESERVED_TOO: [&str; 16] = [
-    "R",
-    "S",
-    "stochastic",
-    "system",
-    "U",
-    "W",
-    "smg",
-    "floor",
-    "ceil",
-    "round",
-    "pow",
-    "mod",
-    "log",
-    "ma",
-    "player",
-    "endplayer",
-];
+const RESERVED_TOO: [&str; 10] =
+    ["R", "S", "stochastic", "system", "U", "W", "smg", "ma", "player", "endplayer"];
+
+/// Functions, which PRISM takes as names where no bracket follows; other tools do not everywhere.
+const FUNCTIONS: [&str; 6] = ["floor", "ceil", "round", "pow", "mod", "log"];
 
 /// Whether a word cannot be a name.
-pub fn is_reserved(word: &str) -> bool {
+pub fn is_keyword(word: &str) -> bool {
     RESERVED.contains(&word) || RESERVED_TOO.contains(&word)
+}
+
+/// Whether a word should not be a name in a model that is written.
+pub fn is_reserved(word: &str) -> bool {
+    is_keyword(word) || FUNCTIONS.contains(&word)
 }

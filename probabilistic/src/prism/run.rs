@@ -150,6 +150,11 @@ fn enabled<'a, N: Number>(
 }
 
 impl<N: Number> Program<N> {
+    /// The reward of a state alone, by the number of its structure.
+    pub(crate) fn state_reward(&self, structure: usize, values: &[i64]) -> Result<N, Error> {
+        sum(&self.rewards[structure].states, values)
+    }
+
     fn state_rewards(&self, values: &[i64]) -> Result<Sums<N>, Error> {
         self.wanted.iter().map(|structure| sum(&self.rewards[*structure].states, values)).collect()
     }
@@ -272,8 +277,11 @@ impl<N: Number> Generator<N> for Program<N> {
     type State = Packed;
 
     fn initial(&self) -> Packed {
-        let values: Valuation = self.variables.iter().map(|variable| variable.initial).collect();
-        self.layout.pack(&values)
+        self.starts.first().cloned().unwrap_or_default()
+    }
+
+    fn starts(&self) -> Vec<Packed> {
+        self.starts.clone()
     }
 
     fn rewards(&self) -> usize {

@@ -68,6 +68,9 @@ pub fn write(model: &Model) -> String {
         }
         text.push_str("endrewards\n");
     }
+    if let Some(states) = &model.initial {
+        let _ = writeln!(text, "\ninit {} endinit", expression(states));
+    }
     if !model.labels.is_empty() {
         text.push('\n');
     }
@@ -115,6 +118,8 @@ fn strong(expression: &Expr, least: u8) -> String {
             let arguments: Vec<_> = arguments.iter().map(|argument| strong(argument, 0)).collect();
             (format!("{}({})", function.name(), arguments.join(",")), 20)
         }
+        // They stand in no model.
+        ExprKind::Property(_) | ExprKind::Temporal(_) => ("true".to_owned(), 20),
     };
     if strength < least { format!("({text})") } else { text }
 }

@@ -11,8 +11,6 @@ use crate::solve::problem::Direction;
 use crate::solve::quotient::Quotient;
 use crate::solve::work::Work;
 
-/// Bounds that are wider, relative to the value, are not tight.
-const TIGHT: f64 = 1e-7;
 /// What a component may cost in rationals, where doubles cannot tell enough of it; and the blocks that it may have.
 const RATIONAL: (u64, usize) = (1_000_000_000, 3000);
 
@@ -25,31 +23,32 @@ pub fn enclosed<N: Number>(
     quotient: &Quotient<N>,
     found: Option<Iterated<N>>,
     direction: Direction,
+    tight: f64,
 ) -> Option<Enclosed<N>> {
-    let Some(found) = found else { return interval::enclose(quotient, direction) };
+    let Some(found) = found else { return interval::enclose(quotient, direction, tight) };
     let is_chain = (0..quotient.blocks()).all(|block| quotient.range(block).len() <= 1);
     let mut errors: Vec<f64> = if is_chain {
         found.values.iter().zip(&found.relative).map(|(value, relative)| value.to_f64() * relative).collect()
     } else {
         certify(quotient, &found.policy, &found.values, direction)
     };
-    if is_chain && !is_tight(&found.values, &errors) {
+    if is_chain && !is_tight(&found.values, &errors, tight) {
         let certified = certify(quotient, &found.policy, &found.values, direction);
         for (error, certified) in errors.iter_mut().zip(certified) {
             *error = error.min(certified);
         }
     }
-    let is_good = is_tight(&found.values, &errors);
+    let is_good = is_tight(&found.values, &errors, tight);
     let rounded = Enclosed { policy: found.policy, values: found.values, errors };
     if is_good {
         return Some(rounded);
     }
     let exact = (quotient.blocks() <= RATIONAL.1).then(|| in_rationals(quotient, &rounded.policy, direction));
-    exact.flatten().or_else(|| interval::enclose(quotient, direction)).or(Some(rounded))
+    exact.flatten().or_else(|| interval::enclose(quotient, direction, tight)).or(Some(rounded))
 }
 
-fn is_tight<N: Number>(values: &[N], errors: &[f64]) -> bool {
-    values.iter().zip(errors).all(|(value, error)| value.is_zero() || *error <= TIGHT * value.to_f64())
+fn is_tight<N: Number>(values: &[N], errors: &[f64], tight: f64) -> bool {
+    values.iter().zip(errors).all(|(value, error)| value.is_zero() || *error <= tight * 0.5 * value.to_f64())
 }
 
 /// The best values of the rounded rows, exactly. Each entry of a row is off by a few roundings, and so a value by as many for

@@ -21,20 +21,18 @@ pub struct Enclosed<N> {
     pub errors: Vec<f64>,
 }
 
-/// The width of the bounds that is aimed at, relative to the value.
-const WIDTH: f64 = 1e-7;
 /// Rows that are evaluated at most.
 const WORK: u64 = 2_000_000_000;
 /// Sweeps from above before the values from below are made better.
 const UPPER_SWEEPS: usize = 40;
 
-/// Bounds on the values of all blocks; none where they do not get close in time.
-pub fn enclose<N: Number>(quotient: &Quotient<N>, direction: Direction) -> Option<Enclosed<N>> {
+/// Bounds on the values of all blocks whose width is `width`, relative to the value; none where they do not get close in time.
+pub fn enclose<N: Number>(quotient: &Quotient<N>, direction: Direction, width: f64) -> Option<Enclosed<N>> {
     let rows = Rows::new(quotient, direction);
     let blocks = quotient.blocks();
     let mut lower = vec![0.0_f64; blocks];
     let mut next = lower.clone();
-    let (mut sweeps, mut work, mut threshold) = (0.0_f64, 0_u64, WIDTH * 0.05);
+    let (mut sweeps, mut work, mut threshold) = (0.0_f64, 0_u64, width * 0.05);
     while work < WORK {
         loop {
             // All at once, and not one after the other, so that each sweep adds one rounding error only.
@@ -46,7 +44,7 @@ pub fn enclose<N: Number>(quotient: &Quotient<N>, direction: Direction) -> Optio
                 break;
             }
         }
-        let mut upper: Vec<f64> = lower.iter().map(|value| value * (1.0 + WIDTH * 0.5)).collect();
+        let mut upper: Vec<f64> = lower.iter().map(|value| value * (1.0 + width * 0.5)).collect();
         for _ in 0..UPPER_SWEEPS {
             work = work.saturating_add(rows.constants.len() as u64);
             let before = upper.clone();
@@ -166,7 +164,7 @@ mod tests {
     fn bounds_enclose_what_elimination_finds() {
         for direction in [Direction::Min, Direction::Max] {
             let quotient = square(12);
-            let found = enclose(&quotient, direction).expect("it converges");
+            let found = enclose(&quotient, direction, 1e-7).expect("it converges");
             let values = chain::solve_chain(
                 &quotient.rows,
                 &found.policy,

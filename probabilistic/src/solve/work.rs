@@ -5,16 +5,21 @@ use crate::number::Number;
 /// How much exact arithmetic may cost, in units of about a nanosecond, before it is given up.
 pub const MOST: u64 = 3_000_000_000;
 
-/// What is left of a budget of exact arithmetic. Doubles cost nothing.
+/// How wide bounds in doubles may be, relative to the value, unless it is said.
+pub const TIGHT: f64 = 1e-7;
+
+/// What is left of a budget of exact arithmetic, and how tight bounds in doubles have to be. Doubles cost nothing.
 #[derive(Debug, Clone, Copy)]
 pub struct Work {
     left: u64,
+    /// How wide bounds may be, relative to the value; no more is done once they are within.
+    pub tight: f64,
 }
 
 impl Work {
     /// A budget of so many units.
     pub const fn new(left: u64) -> Self {
-        Self { left }
+        Self { left, tight: TIGHT }
     }
 
     /// Pays for so many operations whose results are about as long as this one; none where the budget is spent.

@@ -1,0 +1,150 @@
+//! Probabilities of reaching something before a reward exceeds a bound.
+//!
+//! The rewards are whole numbers. For each budget, from 0 on, choices that earn nothing stay within it, and choices that earn
+//! something lead to states with the values of a smaller budget, which are known (Hartmanns, Junges, Katoen and Quatmann,
+//! "Multi-Cost Bounded Reachability in MDP", TACAS 2018).
+
+use fixedbitset::FixedBitSet;
+use num_traits::{Signed, ToPrimitive};
+
+use crate::check::ask::{Asked, property_error, refusal, worked};
+use crate::check::paths::Valued;
+use crate::check::query::Query;
+use crate::check::vector::{Span, Vector};
+use crate::mdp::{Mdp, dense};
+use crate::number::Number;
+use crate::prism::ast::Steps;
+use crate::solve::{Problem, solve_within};
+
+/// Budgets that are kept at most.
+const BUDGETS: usize = 100_000;
+
+impl<N: Number> Query<'_, N> {
+    /// The probabilities of reaching the end of a problem while a reward is at most as large as it says.
+    pub fn until_within_reward(
+        &self,
+        problem: Problem<'_, N>,
+        name: Option<&str>,
+        steps: &Steps,
+    ) -> Asked<Valued<N>> {
+        if self.given.is_some() || steps.least.is_some() {
+            return Err(refusal(
+                "Q403",
+                "of bounds on rewards, those from above are handled, without a given policy",
+            ));
+        }
+        let Some(bound) = &steps.most else { return self.solved(problem) };
+        let limit = self.constant(&bound.limit)?;
+        let place = bound.limit.place;
+        let out_of_range = || property_error("Q503", place, "the bound must be at least 0 and below 100,000");
+        if limit.is_negative() || bound.strict && !limit.is_positive() {
+            return Err(out_of_range().into());
+        }
+        let whole = if bound.strict {
+            limit.ceil() - num_rational::BigRational::from_integer(1.into())
+        } else {
+            limit.floor()
+        };
+        let budgets = whole.to_usize().filter(|budget| *budget < BUDGETS).ok_or_else(out_of_range)?;
+        let earned = self.whole_rewards(self.rewards(name)?)?;
+        let layers = Layers::new(self.mdp(), problem, &earned)?;
+        let n = self.mdp().states();
+        let greatest = earned.iter().max().copied().unwrap_or(0);
+        // The values of the last budgets, as many as a choice can reach back.
+        let mut known: Vec<Vec<N>> = Vec::new();
+        let mut vector = Vector::exactly(vec![N::zero(); n], Span::Probability);
+        let mut error = 0.0_f64;
+        for budget in 0..=budgets {
+            let mut worth = vec![N::zero(); layers.mdp.states()];
+            for state in problem.terminal.ones() {
+                worth[state] = N::one();
+            }
+            for (number, choice) in layers.paid.iter().enumerate() {
+                let Some(before) = budget.checked_sub(earned[*choice]) else { continue };
+                let age = budget.saturating_sub(before);
+                let values = &known[known.len().saturating_sub(age)];
+                worth[n.saturating_add(number)] = self
+                    .mdp()
+                    .transitions(*choice)
+                    .fold(N::zero(), |sum, (target, p)| sum.plus(&p.times(&values[target])));
+            }
+            let layer = Problem {
+                mdp: &layers.mdp,
+                direction: problem.direction,
+                rewards: None,
+                terminal: &layers.ends,
+                terminal_values: Some(&worth),
+                blocked: problem.blocked.map(|_| &layers.blocked),
+                allowed: None,
+            };
+            let solution = worked(solve_within(layer, None, &mut self.work.borrow_mut()))?;
+            let own = solution.errors.iter().fold(0.0_f64, |most, error| most.max(*error));
+            // The sums over the targets round, too.
+            error += own + 256.0 * f64::EPSILON;
+            let mut values = solution.values;
+            values.truncate(n);
+            if known.len() > greatest {
+                known.remove(0);
+            }
+            known.push(values.clone());
+            vector.values = values;
+        }
+        vector.errors.iter_mut().for_each(|known| *known = error);
+        Ok(vector.into())
+    }
+
+    /// The rewards as whole numbers.
+    fn whole_rewards(&self, rewards: &[N]) -> Asked<Vec<usize>> {
+        let whole = |reward: &N| {
+            let value = reward.to_f64();
+            let exact = reward.to_rational().is_none_or(|exact| exact.is_integer());
+            (exact && value.fract() == 0.0).then(|| value.to_usize()).flatten()
+        };
+        let found: Option<Vec<usize>> = rewards.iter().map(whole).collect();
+        found.ok_or_else(|| {
+            refusal("Q403", "a bound on a reward is handled where all rewards are whole numbers")
+        })
+    }
+}
+
+/// A process in which choices that earn something end.
+struct Layers<N> {
+    mdp: Mdp<N>,
+    /// The choices that earn something; each leads to a state behind those of the process.
+    paid: Vec<usize>,
+    ends: FixedBitSet,
+    blocked: FixedBitSet,
+}
+
+impl<N: Number> Layers<N> {
+    fn new(mdp: &Mdp<N>, problem: Problem<'_, N>, earned: &[usize]) -> Asked<Self> {
+        let n = mdp.states();
+        let mut result = Mdp::default();
+        let mut paid = Vec::new();
+        for state in 0..n {
+            for choice in mdp.choices(state) {
+                if earned[choice] > 0 {
+                    result.push_transition(dense(n.saturating_add(paid.len())), N::one());
+                    paid.push(choice);
+                } else {
+                    for (target, probability) in mdp.transitions(choice) {
+                        result.push_transition(dense(target), probability.clone());
+                    }
+                }
+                result.end_choice(mdp.action(choice))?;
+            }
+            result.end_state();
+        }
+        for number in 0..paid.len() {
+            result.push_transition(dense(n.saturating_add(number)), N::one());
+            result.end_choice(0)?;
+            result.end_state();
+        }
+        let mut ends = problem.terminal.clone();
+        ends.grow(result.states());
+        ends.insert_range(n..);
+        let mut blocked = problem.blocked.cloned().unwrap_or_default();
+        blocked.grow(result.states());
+        Ok(Self { mdp: result, paid, ends, blocked })
+    }
+}

@@ -1,0 +1,188 @@
+//! What a filter makes of the values in several states.
+
+use fixedbitset::FixedBitSet;
+use num_bigint::BigInt;
+use num_rational::BigRational;
+
+use crate::check::answer::{Answer, Listed, Quantity};
+use crate::check::ask::{Asked, refusal};
+use crate::check::query::Query;
+use crate::check::vector::Vector;
+use crate::number::{Number, count};
+use crate::prism::ast::{Expr, Filter, Type};
+
+/// What came out of a filter.
+#[derive(Debug, Clone)]
+pub enum Filtered {
+    /// A number.
+    Number(Answer),
+    /// A truth value.
+    Truth(bool),
+    /// The least and the greatest number.
+    Range(Answer, Answer),
+    /// Some states, with their values.
+    States(Vec<Listed>),
+}
+
+/// The values of what is filtered.
+enum Values<N> {
+    Numbers(Vector<N>),
+    Truth(FixedBitSet),
+}
+
+impl<N: Number> Query<'_, N> {
+    /// Applies a filter.
+    pub fn filtered(&self, filter: Filter, inner: &Expr, states: Option<&Expr>) -> Asked<Filtered> {
+        let chosen = states.map_or_else(|| Ok(self.every()), |states| self.truth(states))?;
+        let values = match self.kind_of(inner)? {
+            Type::Bool => Values::Truth(self.truth(inner)?),
+            _ => Values::Numbers(self.numbers(inner)?),
+        };
+        if chosen.is_clear() {
+            return Err(refusal("Q509", "there is no state that the filter is about"));
+        }
+        match values {
+            Values::Truth(holds) => self.of_truth(filter, &holds, &chosen),
+            Values::Numbers(vector) => self.of_numbers(filter, &vector, &chosen),
+        }
+    }
+
+    fn of_truth(&self, filter: Filter, holds: &FixedBitSet, chosen: &FixedBitSet) -> Asked<Filtered> {
+        let both = || chosen.intersection(holds);
+        let listed = |state: usize| Listed {
+            values: self.values_of(state),
+            truth: Some(holds.contains(state)),
+            answer: None,
+        };
+        Ok(match filter {
+            Filter::Count => Filtered::Number(whole(both().count())),
+            Filter::ForAll => Filtered::Truth(chosen.is_subset(holds)),
+            Filter::Exists => Filtered::Truth(both().next().is_some()),
+            Filter::First => Filtered::Truth(holds.contains(self.first(chosen))),
+            Filter::State => Filtered::Truth(holds.contains(only(chosen)?)),
+            Filter::Print => Filtered::States(self.sorted(both()).into_iter().map(listed).collect()),
+            Filter::PrintAll => {
+                Filtered::States(self.sorted(chosen.ones()).into_iter().map(listed).collect())
+            }
+            _ => return Err(refusal("Q203", "this filter takes numbers, and not truth values")),
+        })
+    }
+
+    fn of_numbers(&self, filter: Filter, vector: &Vector<N>, chosen: &FixedBitSet) -> Asked<Filtered> {
+        let listed = |state: usize| Listed {
+            values: self.values_of(state),
+            truth: None,
+            answer: Some(vector.answer(state)),
+        };
+        let all = |states: Vec<usize>| Filtered::States(states.into_iter().map(listed).collect());
+        let is_something =
+            |state: &usize| vector.infinite.contains(*state) || !vector.values[*state].is_zero();
+        Ok(match filter {
+            Filter::Min => Filtered::Number(extreme(vector, chosen, false)),
+            Filter::Max => Filtered::Number(extreme(vector, chosen, true)),
+            Filter::Range => Filtered::Range(extreme(vector, chosen, false), extreme(vector, chosen, true)),
+            Filter::Sum => Filtered::Number(sum(vector, chosen, 1)),
+            Filter::Average => Filtered::Number(sum(vector, chosen, chosen.count_ones(..))),
+            Filter::First => Filtered::Number(vector.answer(self.first(chosen))),
+            Filter::State => Filtered::Number(vector.answer(only(chosen)?)),
+            Filter::Print => all(self.sorted(chosen.ones().filter(is_something))),
+            Filter::PrintAll => all(self.sorted(chosen.ones())),
+            Filter::ArgMin | Filter::ArgMax => {
+                let best = extreme(vector, chosen, filter == Filter::ArgMax);
+                all(self.sorted(chosen.ones().filter(|state| can_be(&vector.answer(*state), &best))))
+            }
+            Filter::Count | Filter::ForAll | Filter::Exists => {
+                return Err(refusal("Q203", "this filter takes truth values, and not numbers"));
+            }
+        })
+    }
+
+    /// The values of the variables of a state.
+    fn values_of(&self, state: usize) -> Vec<i64> {
+        let mut values = Vec::new();
+        self.program.unpack(&self.explored.states[state], &mut values);
+        values
+    }
+
+    /// States by the values of their variables.
+    fn sorted(&self, states: impl Iterator<Item = usize>) -> Vec<usize> {
+        let mut states: Vec<usize> = states.collect();
+        states.sort_by_cached_key(|state| self.values_of(*state));
+        states
+    }
+
+    fn first(&self, chosen: &FixedBitSet) -> usize {
+        chosen.ones().min_by_key(|state| self.values_of(*state)).unwrap_or(0)
+    }
+}
+
+fn whole(number: usize) -> Answer {
+    Answer::from_exact(BigRational::from(BigInt::from(number)))
+}
+
+/// The only state of a set.
+fn only(chosen: &FixedBitSet) -> Asked<usize> {
+    let mut states = chosen.ones();
+    match (states.next(), states.next()) {
+        (Some(state), None) => Ok(state),
+        _ => Err(refusal("Q509", "the filter `state` takes one state, and there are several")),
+    }
+}
+
+/// The least or the greatest value; its bounds enclose the true one, whichever state has it.
+pub fn extreme<N: Number>(vector: &Vector<N>, chosen: &FixedBitSet, greatest: bool) -> Answer {
+    let mut best: Option<Quantity> = None;
+    for state in chosen.ones() {
+        let Answer::Finite(next) = vector.answer(state) else {
+            if greatest {
+                return Answer::Infinite;
+            }
+            continue;
+        };
+        let Some(known) = &mut best else {
+            best = Some(next);
+            continue;
+        };
+        let pick = |a: f64, b: f64| if greatest { a.max(b) } else { a.min(b) };
+        let better = match (&known.exact, &next.exact) {
+            (Some(known), Some(next)) => (next > known) == greatest && next != known,
+            _ => (next.value > known.value) == greatest,
+        };
+        if better {
+            (known.value, known.exact) = (next.value, next.exact);
+        }
+        (known.lower, known.upper) = (pick(known.lower, next.lower), pick(known.upper, next.upper));
+    }
+    best.map_or(Answer::Infinite, Answer::Finite)
+}
+
+/// Whether a value can be the best one, as far as the bounds tell.
+fn can_be(answer: &Answer, best: &Answer) -> bool {
+    match (answer, best) {
+        (Answer::Finite(a), Answer::Finite(b)) => match (&a.exact, &b.exact) {
+            (Some(a), Some(b)) => a == b,
+            _ => a.lower <= b.upper && b.lower <= a.upper,
+        },
+        (Answer::Infinite, Answer::Infinite) => true,
+        _ => false,
+    }
+}
+
+fn sum<N: Number>(vector: &Vector<N>, chosen: &FixedBitSet, parts: usize) -> Answer {
+    if !chosen.is_disjoint(&vector.infinite) {
+        return Answer::Infinite;
+    }
+    let sum = chosen.ones().fold(N::zero(), |sum, state| sum.plus(&vector.values[state]));
+    let parts = N::from_rational(&BigRational::from(BigInt::from(parts)));
+    let value = sum.over(&parts);
+    if let Some(exact) = value.to_rational() {
+        return Answer::from_exact(exact);
+    }
+    let errors: f64 =
+        chosen.ones().map(|state| vector.error(state) + vector.values[state].to_f64().abs() * 1e-300).sum();
+    let sizes: f64 = chosen.ones().map(|state| vector.values[state].to_f64().abs()).sum();
+    let rounding = sizes * count(chosen.count_ones(..)) * f64::EPSILON;
+    let error = (errors + rounding) / parts.to_f64() * (1.0 + 1e-12);
+    let value = value.to_f64();
+    Answer::between(value, [(value - error).next_down(), (value + error).next_up()])
+}

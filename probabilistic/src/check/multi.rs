@@ -1,0 +1,116 @@
+//! Two objectives at once.
+
+use crate::check::answer::{Answer, Outcome};
+use crate::check::ask::{Asked, Stop, property_error, refusal};
+use crate::check::query::Query;
+use crate::error::Place;
+use crate::number::Number;
+use crate::pareto::{Bounded, Constrained, Objective, Pareto};
+use crate::prism::ast::{BinaryOp, Expr, ExprKind, Path, Property, RewardPath};
+use crate::solve::Direction;
+
+impl<N: Number> Query<'_, N> {
+    /// A Pareto front, or the best value under a bound.
+    pub fn multi(&self, parts: &[Property]) -> Asked<Outcome> {
+        let place = Place { line: 1, column: 1 };
+        let [first, second] = parts else {
+            return Err(property_error("Q403", place, "`multi` is handled with two objectives").into());
+        };
+        let (first, second, swapped) =
+            if bound_of(first).is_some() { (second, first, true) } else { (first, second, false) };
+        if bound_of(first).is_some() {
+            return Err(property_error("Q403", place, "one objective of `multi` must ask for a value").into());
+        }
+        let objectives = [self.objective(first)?, self.objective(second)?];
+        let Ok(pareto) = Pareto::new(self.mdp(), &objectives) else { return Err(Stop::TooMuchWork) };
+        let shown = |number: usize, loss: &N, error: f64| {
+            let value = match objectives[number].rewards {
+                Some(_) => loss.clone(),
+                None => N::one().minus(loss),
+            };
+            let answer = Answer::from_number(&value, error);
+            if objectives[number].rewards.is_none() { answer.probability() } else { answer }
+        };
+        if let Some((_, bound)) = bound_of(second) {
+            let bound = N::from_rational(&self.constant(bound)?);
+            let limit = if objectives[1].rewards.is_some() { bound } else { N::one().minus(&bound) };
+            let Ok(found) = pareto.constrained(&limit) else { return Err(Stop::TooMuchWork) };
+            let shown = |found: Bounded<N>| {
+                if N::EXACT {
+                    return shown(0, &found.value, 0.0);
+                }
+                let answer = Answer::between(found.value.to_f64(), [found.lower, found.upper]);
+                if objectives[0].rewards.is_none() { answer.complement() } else { answer }
+            };
+            return Ok(constrained(found, shown));
+        }
+        let Ok(vertices) = pareto.vertices(None) else { return Err(Stop::TooMuchWork) };
+        let pairs = vertices.iter().map(|vertex| {
+            let pair = [0, 1].map(|number| shown(number, &vertex.losses[number], vertex.errors[number]));
+            if swapped {
+                let [a, b] = pair;
+                [b, a]
+            } else {
+                pair
+            }
+        });
+        Ok(Outcome::Front(pairs.collect()))
+    }
+
+    fn objective(&self, property: &Property) -> Asked<Objective<N>> {
+        let refuse = |text: &str| Err(refusal("Q403", text));
+        match property {
+            Property::Reward(question, name, path) if reaches(path) => {
+                let RewardPath::Reach(goal) = path else { return refuse("only `F`") };
+                let least = question.direction == Some(Direction::Min)
+                    || matches!(question.bound, Some((BinaryOp::LessEqual, _)));
+                if !least {
+                    return refuse("rewards in `multi` are minimised, or bounded with `<=`");
+                }
+                let rewards = Some(self.rewards(name.as_deref())?.to_vec());
+                Ok(Objective { rewards, target: self.truth(goal)? })
+            }
+            Property::Probability(question, Path::Until(left, goal, None))
+                if left.kind == ExprKind::Bool(true) =>
+            {
+                let greatest = question.direction == Some(Direction::Max)
+                    || matches!(question.bound, Some((BinaryOp::GreaterEqual, _)));
+                if !greatest {
+                    return refuse("probabilities in `multi` are maximised, or bounded with `>=`");
+                }
+                Ok(Objective { rewards: None, target: self.truth(goal)? })
+            }
+            _ => refuse("objectives of `multi` are `R…min=? [ F … ]` and `Pmax=? [ F … ]`"),
+        }
+    }
+}
+
+fn bound_of(property: &Property) -> Option<&(BinaryOp, Expr)> {
+    match property {
+        Property::Probability(question, _) | Property::Reward(question, ..) => question.bound.as_ref(),
+        _ => None,
+    }
+}
+
+fn constrained<N: Number>(found: Option<Constrained<N>>, shown: impl Fn(Bounded<N>) -> Answer) -> Outcome {
+    match found {
+        None => Outcome::Constrained {
+            randomised: Answer::Undefined,
+            deterministic: Answer::Undefined,
+            proved: true,
+        },
+        Some(found) => {
+            let proved = found.deterministic.as_ref().is_some_and(|(_, proved)| *proved);
+            Outcome::Constrained {
+                randomised: shown(found.randomised),
+                deterministic: found.deterministic.map_or(Answer::Undefined, |(value, _)| shown(value)),
+                proved,
+            }
+        }
+    }
+}
+
+/// Whether a property sums rewards until something is reached.
+fn reaches(path: &RewardPath) -> bool {
+    matches!(path, RewardPath::Reach(_))
+}

@@ -1,0 +1,242 @@
+//! Paths, and rewards along them, to the values of all states.
+
+use fixedbitset::FixedBitSet;
+use num_traits::ToPrimitive;
+
+use crate::check::ask::{Asked, property_error, refusal, worked};
+use crate::check::query::Query;
+use crate::check::steps;
+use crate::check::vector::{Span, Vector};
+use crate::number::Number;
+use crate::policy::with_secondary;
+use crate::prism::ast::{ModelKind, Path, RewardPath, StepBound, Steps};
+use crate::solve::{Direction, Problem, Solution, draft, solve_within};
+
+/// Fewer steps than this are counted one by one.
+const STEPS: u32 = 1_000_000_000;
+
+/// Values, and a policy that has them where there is one that can be written.
+#[derive(Debug)]
+pub struct Valued<N> {
+    pub vector: Vector<N>,
+    pub policy: Option<Vec<u32>>,
+}
+
+impl<N> From<Vector<N>> for Valued<N> {
+    fn from(vector: Vector<N>) -> Self {
+        Self { vector, policy: None }
+    }
+}
+
+/// Numbers of steps: at least, and at most where there is a bound.
+#[derive(Debug, Clone, Copy)]
+pub struct Range {
+    pub least: u32,
+    pub most: Option<u32>,
+}
+
+pub fn opposite(direction: Direction) -> Direction {
+    if direction == Direction::Min { Direction::Max } else { Direction::Min }
+}
+
+impl<N: Number> Query<'_, N> {
+    /// The least or greatest probabilities of a path.
+    pub fn path(&self, direction: Direction, path: &Path) -> Asked<Valued<N>> {
+        let n = self.mdp().states();
+        match path {
+            Path::State(states) => Ok(Vector::indicator(&self.truth(states)?, n).into()),
+            Path::Not(inner) => Ok(complement(self.path(opposite(direction), inner)?)),
+            Path::Next(goal) => {
+                let values = Vector::<N>::indicator(&self.truth(goal)?, n).values;
+                let none = FixedBitSet::with_capacity(n);
+                let found = self.stepped(self.problem(direction, None, &none), values, 1)?;
+                Ok(Vector::stepped(found, Span::Probability).into())
+            }
+            Path::Until(left, right, steps) => {
+                self.until(direction, &self.truth(left)?, &self.truth(right)?, steps.as_ref())
+            }
+            Path::Globally(goal, steps) => {
+                let all = self.every();
+                let bad = inverse(self.truth(goal)?);
+                Ok(complement(self.until(opposite(direction), &all, &bad, steps.as_ref())?))
+            }
+            Path::WeakUntil(left, right, steps) => {
+                // Not: the left one, without the right one, until neither holds.
+                let (left, right) = (self.truth(left)?, inverse(self.truth(right)?));
+                let (mut keep, mut bad) = (left.clone(), inverse(left));
+                keep.intersect_with(&right);
+                bad.intersect_with(&right);
+                Ok(complement(self.until(opposite(direction), &keep, &bad, steps.as_ref())?))
+            }
+            Path::Release(left, right, steps) => {
+                let (keep, bad) = (inverse(self.truth(left)?), inverse(self.truth(right)?));
+                Ok(complement(self.until(opposite(direction), &keep, &bad, steps.as_ref())?))
+            }
+            Path::Repeatedly(goal) => self.repeatedly(direction, &self.truth(goal)?),
+            Path::Persistently(goal) => {
+                let bad = inverse(self.truth(goal)?);
+                Ok(complement(self.repeatedly(opposite(direction), &bad)?))
+            }
+        }
+    }
+
+    /// The probabilities of reaching a state of `right`, through states of `left` only, in the number of steps that is asked for.
+    fn until(
+        &self,
+        direction: Direction,
+        left: &FixedBitSet,
+        right: &FixedBitSet,
+        steps: Option<&Steps>,
+    ) -> Asked<Valued<N>> {
+        let mut blocked = left.clone();
+        blocked.union_with(right);
+        blocked.toggle_range(..);
+        let problem = Problem { blocked: Some(&blocked), ..self.problem(direction, None, right) };
+        let Some(steps) = steps else { return self.solved(problem) };
+        if let Some(name) = &steps.reward {
+            return self.until_within_reward(problem, name.as_deref(), steps);
+        }
+        let Range { least, most } = self.span(steps)?;
+        let then = match most {
+            None => self.solved(problem)?.vector,
+            Some(most) => {
+                let values = Vector::<N>::indicator(right, self.mdp().states()).values;
+                let found = self.stepped(problem, values, most.saturating_sub(least))?;
+                Vector::stepped(found, Span::Probability)
+            }
+        };
+        if least == 0 {
+            return Ok(then.into());
+        }
+        // Before, the left one has to hold, whether the right one does or not.
+        let (none, outside) = (FixedBitSet::with_capacity(left.len()), inverse(left.clone()));
+        let before = Problem { blocked: Some(&outside), ..self.problem(direction, None, &none) };
+        let errors = then.errors;
+        let mut values = self.stepped(before, then.values, 1)?.values;
+        for state in outside.ones() {
+            values[state] = N::zero();
+        }
+        let found = self.stepped(before, values, least.saturating_sub(1))?;
+        let mut vector = Vector::stepped(found, Span::Probability);
+        let first = errors.iter().fold(0.0_f64, |most, error| most.max(*error));
+        for (error, value) in vector.errors.iter_mut().zip(&vector.values) {
+            // The first step rounds, too.
+            *error += first + 64.0 * f64::EPSILON * value.to_f64();
+        }
+        Ok(vector.into())
+    }
+
+    /// The numbers of steps that a path may have.
+    fn span(&self, steps: &Steps) -> Asked<Range> {
+        let least = match &steps.least {
+            None => 0,
+            Some(bound) => self.limit(bound)?.saturating_add(u32::from(bound.strict)),
+        };
+        let Some(bound) = &steps.most else { return Ok(Range { least, most: None }) };
+        let most = self.limit(bound)?.checked_sub(u32::from(bound.strict)).filter(|most| *most >= least);
+        let place = bound.limit.place;
+        let most =
+            most.ok_or_else(|| property_error("Q503", place, "no number of steps is within these bounds"))?;
+        Ok(Range { least, most: Some(most) })
+    }
+
+    /// The number of a bound.
+    pub fn limit(&self, bound: &StepBound) -> Asked<u32> {
+        // It is whole, which `validate` has seen to.
+        let limit = self.constant(&bound.limit)?.to_integer();
+        Ok(limit.to_u32().filter(|most| *most < STEPS).ok_or_else(|| {
+            let text = "the number of steps must be at least 0 and below 10^9";
+            property_error("Q503", bound.limit.place, text)
+        })?)
+    }
+
+    /// Expected rewards.
+    pub fn reward(&self, direction: Direction, name: Option<&str>, path: &RewardPath) -> Asked<Valued<N>> {
+        let n = self.mdp().states();
+        let none = FixedBitSet::with_capacity(n);
+        match path {
+            RewardPath::Reach(goal) => {
+                let terminal = self.truth(goal)?;
+                self.solved(self.problem(direction, Some(self.rewards(name)?), &terminal))
+            }
+            RewardPath::Steps(bound) => {
+                let limit = self.limit(bound)?.checked_sub(u32::from(bound.strict));
+                let limit = limit.ok_or_else(|| {
+                    property_error("Q503", bound.limit.place, "no number of steps is within these bounds")
+                })?;
+                let problem = self.problem(direction, Some(self.rewards(name)?), &none);
+                let found = self.stepped(problem, vec![N::zero(); n], limit)?;
+                Ok(Vector::stepped(found, Span::Positive).into())
+            }
+            RewardPath::Instant(limit) => {
+                let limit = self.limit(&StepBound { limit: limit.clone(), strict: false })?;
+                let values = self.state_rewards(name)?;
+                let found = self.stepped(self.problem(direction, None, &none), values, limit)?;
+                Ok(Vector::stepped(found, Span::Positive).into())
+            }
+            RewardPath::Total => self.total(direction, self.rewards(name)?),
+            RewardPath::LongRun if self.program.kind == ModelKind::Dtmc => self.long_run(self.rewards(name)?),
+            RewardPath::LongRun => {
+                Err(refusal("Q403", "`S` is handled for Markov chains, and not for decision processes"))
+            }
+        }
+    }
+
+    /// The least or greatest value after so many steps, or that of the policy that was given.
+    fn stepped(&self, problem: Problem<'_, N>, values: Vec<N>, steps: u32) -> Asked<steps::Stepped<N>> {
+        let problem = Problem { allowed: self.given.as_ref(), ..problem };
+        worked(steps::apply(problem, values, steps, &mut self.work.borrow_mut()))
+    }
+
+    pub fn problem<'p>(
+        &'p self,
+        direction: Direction,
+        rewards: Option<&'p [N]>,
+        terminal: &'p FixedBitSet,
+    ) -> Problem<'p, N> {
+        Problem::new(self.mdp(), direction, rewards, terminal)
+    }
+
+    /// Solves a problem, or evaluates the policy that was given; breaks the ties of the policy.
+    pub fn solved(&self, problem: Problem<'_, N>) -> Asked<Valued<N>> {
+        let span = if problem.rewards.is_none() { Span::Probability } else { Span::Positive };
+        let problem = Problem { allowed: self.given.as_ref(), ..problem };
+        let solution = worked(self.solve_hinted(problem))?;
+        let mut policy = solution.policy.clone();
+        if self.options.policy && self.given.is_none() {
+            let secondary = match &self.options.secondary {
+                Some(name) => self.rewards(Some(name))?.to_vec(),
+                None => vec![N::one(); self.mdp().choice_count()],
+            };
+            if let Some(second) = with_secondary(&problem, &solution, &secondary) {
+                for (choice, better) in policy.iter_mut().zip(&second.policy) {
+                    *choice = *better;
+                }
+            }
+        }
+        Ok(Valued { vector: Vector::solved(solution, span), policy: Some(policy) })
+    }
+
+    /// Solves a problem, from a policy that is good in doubles where arithmetic is exact.
+    fn solve_hinted(&self, problem: Problem<'_, N>) -> Option<Solution<N>> {
+        let doubles = self.doubles.as_ref().filter(|_| problem.allowed.is_none());
+        let hint = doubles.and_then(|mdp| {
+            let rewards: Option<Vec<f64>> =
+                problem.rewards.map(|rewards| rewards.iter().map(Number::to_f64).collect());
+            let Problem { direction, terminal, blocked, .. } = problem;
+            draft(Problem { blocked, ..Problem::new(mdp, direction, rewards.as_deref(), terminal) })
+        });
+        solve_within(problem, hint.as_deref(), &mut self.work.borrow_mut())
+    }
+}
+
+/// The probabilities of the opposite; a policy that is best for one is best for the other.
+fn complement<N: Number>(found: Valued<N>) -> Valued<N> {
+    Valued { vector: found.vector.complement(), policy: found.policy }
+}
+
+/// All other states.
+pub fn inverse(mut set: FixedBitSet) -> FixedBitSet {
+    set.toggle_range(..);
+    set
+}

@@ -1,0 +1,310 @@
+//! Expressions of properties to the states in which they hold, and to numbers, with properties in them.
+
+use fixedbitset::FixedBitSet;
+use num_rational::BigRational;
+
+use crate::check::ask::{Asked, Stop, property_error, refusal};
+use crate::check::query::Query;
+use crate::check::vector::{Span, Vector};
+use crate::error::{Diagnostic, Error};
+use crate::explore::DEADLOCK;
+use crate::number::{Number, enclosing};
+use crate::prism::ast::{BinaryOp, Expr, ExprKind, Property, Type};
+use crate::prism::{Code, Names};
+
+/// The names of sets of states that are worked out before an expression; nothing in a text has such a name.
+const PREFIX: &str = "#";
+
+/// Whether a property has a number as its value.
+pub fn is_number(property: &Property) -> bool {
+    use crate::prism::ast::Filter;
+    match property {
+        Property::Probability(question, _)
+        | Property::Reward(question, ..)
+        | Property::SteadyState(question, _) => question.bound.is_none(),
+        Property::Filter(filter, inner, _) => match filter {
+            Filter::ForAll | Filter::Exists => false,
+            Filter::Count | Filter::Sum | Filter::Average => true,
+            _ => is_numeric(inner),
+        },
+        Property::Expression(inner) => is_numeric(inner),
+        Property::Multi(_) => true,
+    }
+}
+
+/// Whether an expression has a property with a number in it, and is itself not a truth value.
+fn is_numeric(expression: &Expr) -> bool {
+    match &expression.kind {
+        ExprKind::Property(property) => is_number(property),
+        ExprKind::Negative(inner) => is_numeric(inner),
+        ExprKind::Binary(op, left, right) => op.is_arithmetic() && (is_numeric(left) || is_numeric(right)),
+        ExprKind::If(_, then, otherwise) => is_numeric(then) || is_numeric(otherwise),
+        ExprKind::Call(_, arguments) => arguments.iter().any(is_numeric),
+        _ => false,
+    }
+}
+
+fn is_comparison(op: BinaryOp) -> bool {
+    !op.is_arithmetic() && !matches!(op, BinaryOp::And | BinaryOp::Or | BinaryOp::Implies | BinaryOp::Iff)
+}
+
+/// The labels that are known without declaration.
+pub fn is_built_in(label: &str, names: &Names) -> bool {
+    ["init", "deadlock"].contains(&label) && names.label(label).is_none()
+}
+
+/// The same with truth values and numbers in the place of properties, for its type.
+pub fn with_placeholders(expression: &Expr, names: &Names) -> Expr {
+    expression.rewrite(&mut |part| match &part.kind {
+        ExprKind::Property(property) if is_number(property) => {
+            let kind = ExprKind::Number(BigRational::default());
+            Some(Expr { kind, place: part.place })
+        }
+        ExprKind::Property(_) => Some(Expr { kind: ExprKind::Bool(true), place: part.place }),
+        ExprKind::Label(label) if is_built_in(label, names) => {
+            Some(Expr { kind: ExprKind::Bool(true), place: part.place })
+        }
+        ExprKind::Label(label) => {
+            // Labels of a file of properties may use those that are built in.
+            let inner = names.label(label).filter(|inner| mentions_built_in(inner, names))?;
+            Some(with_placeholders(inner, names))
+        }
+        _ => None,
+    })
+}
+
+fn mentions_built_in(expression: &Expr, names: &Names) -> bool {
+    let mut found = false;
+    let _ = expression.rewrite(&mut |part| {
+        found |= matches!(&part.kind, ExprKind::Label(label) if is_built_in(label, names));
+        found |= matches!(&part.kind, ExprKind::Property(_));
+        None
+    });
+    found
+}
+
+impl<N: Number> Query<'_, N> {
+    /// The type of an expression with properties in it.
+    pub fn kind_of(&self, expression: &Expr) -> Asked<Type> {
+        let names = &self.program.names;
+        let found = names.clone().compile(&with_placeholders(expression, names));
+        found.map(|(_, kind)| kind).map_err(|problem| Stop::Wrong(Error::Property(vec![problem])))
+    }
+
+    /// All states.
+    pub fn every(&self) -> FixedBitSet {
+        let mut all = FixedBitSet::with_capacity(self.mdp().states());
+        all.insert_range(..);
+        all
+    }
+
+    /// The states in which an expression holds.
+    pub fn truth(&self, expression: &Expr) -> Asked<FixedBitSet> {
+        let (code, sets) = self.prepared(expression, Type::Bool)?;
+        let n = self.mdp().states();
+        let mut found = FixedBitSet::with_capacity(n);
+        let mut values = Vec::new();
+        for (number, state) in self.explored.states.iter().enumerate() {
+            self.program.unpack(state, &mut values);
+            values.extend(sets.iter().map(|set| i64::from(set.contains(number))));
+            let holds =
+                code.holds(&values).map_err(|fault| property_error("Q303", expression.place, fault.0))?;
+            found.set(number, holds);
+        }
+        Ok(found)
+    }
+
+    /// An expression as code, and the sets of states that its last variables stand for.
+    fn prepared(&self, expression: &Expr, kind: Type) -> Asked<(Code, Vec<FixedBitSet>)> {
+        let mut sets = Vec::new();
+        let mut stopped = None;
+        let written = self.with_sets(expression, &mut sets, &mut stopped);
+        if let Some(stop) = stopped {
+            return Err(stop);
+        }
+        let mut names = self.program.names.clone();
+        let mut problems = Vec::new();
+        for number in 0..sets.len() {
+            let variable = crate::mdp::dense(self.program.variables.len().saturating_add(number));
+            names.variable(
+                &format!("{PREFIX}{number}"),
+                variable,
+                Type::Bool,
+                expression.place,
+                &mut problems,
+            );
+        }
+        let code = names.typed(&written, kind).map_err(|problem| Error::Property(vec![problem]))?;
+        Ok((code, sets))
+    }
+
+    /// The same with names of sets of states in the place of what is no expression of the model.
+    fn with_sets(&self, expression: &Expr, sets: &mut Vec<FixedBitSet>, stopped: &mut Option<Stop>) -> Expr {
+        expression.rewrite(&mut |part| {
+            let set = match &part.kind {
+                ExprKind::Property(property) => self.property_truth(property),
+                ExprKind::Label(label) if is_built_in(label, &self.program.names) => Ok(self.built_in(label)),
+                ExprKind::Label(label) => {
+                    let names = &self.program.names;
+                    let inner = names.label(label).filter(|inner| mentions_built_in(inner, names))?.clone();
+                    return Some(self.with_sets(&inner, sets, stopped));
+                }
+                ExprKind::Binary(op, left, right)
+                    if is_comparison(*op) && (is_numeric(left) || is_numeric(right)) =>
+                {
+                    self.compared(*op, left, right)
+                }
+                _ => return None,
+            };
+            match set {
+                Ok(set) => {
+                    let name = format!("{PREFIX}{}", sets.len());
+                    sets.push(set);
+                    Some(Expr { kind: ExprKind::Name(name), place: part.place })
+                }
+                Err(stop) => {
+                    stopped.get_or_insert(stop);
+                    Some(Expr { kind: ExprKind::Bool(false), place: part.place })
+                }
+            }
+        })
+    }
+
+    fn built_in(&self, label: &str) -> FixedBitSet {
+        let mdp = self.mdp();
+        let mut found = FixedBitSet::with_capacity(mdp.states());
+        if label == "init" {
+            found.insert_range(..self.explored.starts);
+            return found;
+        }
+        for state in 0..mdp.states() {
+            found.set(state, mdp.choices(state).any(|choice| mdp.action(choice) == DEADLOCK));
+        }
+        found
+    }
+
+    /// The states in which a comparison of numbers holds.
+    fn compared(&self, op: BinaryOp, left: &Expr, right: &Expr) -> Asked<FixedBitSet> {
+        let (left, right) = (self.numbers(left)?, self.numbers(right)?);
+        let mut found = FixedBitSet::with_capacity(self.mdp().states());
+        for state in 0..self.mdp().states() {
+            let order = |a: &BigRational, b: &BigRational| compare(op, a.cmp(b));
+            let holds = match (left.ends(state), right.ends(state)) {
+                (Some((a, b)), Some((c, d))) => {
+                    let corners = [order(&a, &c), order(&a, &d), order(&b, &c), order(&b, &d)];
+                    let equal = matches!(op, BinaryOp::Equal | BinaryOp::NotEqual) && (a != b || c != d);
+                    let apart = b < c || d < a;
+                    let decided = corners.iter().all(|corner| *corner == corners[0]) && (!equal || apart);
+                    decided.then_some(corners[0])
+                }
+                (None, Some(_)) => Some(compare(op, std::cmp::Ordering::Greater)),
+                (Some(_), None) => Some(compare(op, std::cmp::Ordering::Less)),
+                (None, None) => Some(compare(op, std::cmp::Ordering::Equal)),
+            };
+            found.set(state, holds.ok_or_else(undecided)?);
+        }
+        Ok(found)
+    }
+
+    /// The values of an expression in all states.
+    pub fn numbers(&self, expression: &Expr) -> Asked<Vector<N>> {
+        match &expression.kind {
+            ExprKind::Property(property) if is_number(property) => self.property_numbers(property),
+            ExprKind::Negative(inner) if is_numeric(inner) => {
+                let zero = Vector::exactly(vec![N::zero(); self.mdp().states()], Span::Any);
+                joined(BinaryOp::Minus, &zero, &self.numbers(inner)?, expression)
+            }
+            ExprKind::Binary(op, left, right) if op.is_arithmetic() && is_numeric(expression) => {
+                joined(*op, &self.numbers(left)?, &self.numbers(right)?, expression)
+            }
+            _ if is_numeric(expression) => Err(property_error(
+                "Q403",
+                expression.place,
+                "of the values of properties, sums, differences, products and quotients are handled",
+            )
+            .into()),
+            _ => self.plain_numbers(expression),
+        }
+    }
+
+    fn plain_numbers(&self, expression: &Expr) -> Asked<Vector<N>> {
+        let (code, sets) = self.prepared(expression, Type::Double)?;
+        let mut values = Vec::new();
+        let mut vector = Vector::exactly(Vec::new(), Span::Any);
+        for (number, state) in self.explored.states.iter().enumerate() {
+            self.program.unpack(state, &mut values);
+            values.extend(sets.iter().map(|set| i64::from(set.contains(number))));
+            let value =
+                code.number(&values).map_err(|fault| property_error("Q303", expression.place, fault.0))?;
+            if !N::EXACT {
+                let (lower, upper) = enclosing(&value);
+                vector.errors.push(upper - lower);
+            }
+            vector.values.push(N::from_rational(&value));
+        }
+        vector.infinite.grow(vector.values.len());
+        Ok(vector)
+    }
+
+    /// The value of an expression without variables.
+    pub fn constant(&self, expression: &Expr) -> Asked<BigRational> {
+        let mut names = self.program.names.clone();
+        let code = names.constant(expression, Type::Double);
+        let value = code.and_then(|code| {
+            code.number(&[]).map_err(|fault| Diagnostic::new("Q303", expression.place, fault.0))
+        });
+        Ok(value.map_err(|problem| Error::Property(vec![problem]))?)
+    }
+}
+
+pub fn undecided() -> Stop {
+    let text = "the bounds on a value do not decide whether a part of the property holds in some state; solve exactly \
+                (`--exact`)";
+    refusal("Q508", text)
+}
+
+pub fn compare(op: BinaryOp, order: std::cmp::Ordering) -> bool {
+    match op {
+        BinaryOp::Less => order.is_lt(),
+        BinaryOp::LessEqual => order.is_le(),
+        BinaryOp::Greater => order.is_gt(),
+        BinaryOp::Equal => order.is_eq(),
+        BinaryOp::NotEqual => order.is_ne(),
+        _ => order.is_ge(),
+    }
+}
+
+/// Arithmetic state by state. Errors are those of the operands and of the operation.
+fn joined<N: Number>(op: BinaryOp, left: &Vector<N>, right: &Vector<N>, at: &Expr) -> Asked<Vector<N>> {
+    let wrong = |text: &str| Stop::Wrong(property_error("Q303", at.place, text));
+    let mut vector = Vector::exactly(Vec::with_capacity(left.values.len()), Span::Any);
+    vector.infinite.grow(left.values.len());
+    for (state, (a, b)) in left.values.iter().zip(&right.values).enumerate() {
+        let ends = [left.infinite.contains(state), right.infinite.contains(state)];
+        let (value, infinite) = match (op, ends) {
+            (BinaryOp::Divide, [false, _]) if ends[1] => (N::zero(), false),
+            (BinaryOp::Divide, [false, false]) if b.is_zero() => return Err(wrong("a division by zero")),
+            (BinaryOp::Plus, [false, false]) => (a.plus(b), false),
+            (BinaryOp::Minus, [false, false]) => (a.minus(b), false),
+            (BinaryOp::Times, [false, false]) => (a.times(b), false),
+            (BinaryOp::Divide, [false, false]) => (a.over(b), false),
+            (BinaryOp::Plus, _) | (BinaryOp::Minus, [true, false]) => (N::zero(), true),
+            _ => return Err(wrong("an operation with an infinite value")),
+        };
+        vector.infinite.set(state, infinite);
+        if !N::EXACT {
+            let (e, f) = (left.error(state), right.error(state));
+            let (x, y) = (a.to_f64().abs(), b.to_f64().abs());
+            let error = match op {
+                _ if infinite || ends[1] => 0.0,
+                BinaryOp::Plus | BinaryOp::Minus => e + f,
+                BinaryOp::Times => x * f + y * e + e * f,
+                _ if f >= y => f64::INFINITY,
+                _ => (e + x / y * f) / (y - f),
+            };
+            vector.errors.push((error + value.to_f64().abs() * f64::EPSILON) * (1.0 + 16.0 * f64::EPSILON));
+        }
+        vector.values.push(value);
+    }
+    Ok(vector)
+}

@@ -1,0 +1,133 @@
+//! The values of a property in all states.
+
+use fixedbitset::FixedBitSet;
+use num_rational::BigRational;
+
+use crate::check::answer::{Answer, Quantity};
+use crate::check::steps::Stepped;
+use crate::number::{Number, enclosing};
+use crate::solve::Solution;
+
+/// What values can be by their nature.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Span {
+    /// From 0 to 1.
+    Probability,
+    /// At least 0.
+    Positive,
+    /// Anything.
+    Any,
+}
+
+/// The values of a property in all states.
+#[derive(Debug, Clone)]
+pub struct Vector<N> {
+    /// For each state its value, 0 where it is infinite.
+    pub values: Vec<N>,
+    /// How far each can be from the truth; empty where arithmetic is exact.
+    pub errors: Vec<f64>,
+    /// Where they are infinite.
+    pub infinite: FixedBitSet,
+    /// What they can be.
+    pub span: Span,
+}
+
+impl<N: Number> Vector<N> {
+    /// Values without error.
+    pub fn exactly(values: Vec<N>, span: Span) -> Self {
+        let errors = if N::EXACT { Vec::new() } else { vec![0.0; values.len()] };
+        Self { infinite: FixedBitSet::with_capacity(values.len()), values, errors, span }
+    }
+
+    /// 1 in some states, 0 in the others.
+    pub fn indicator(set: &FixedBitSet, states: usize) -> Self {
+        let values = (0..states).map(|state| if set.contains(state) { N::one() } else { N::zero() });
+        Self::exactly(values.collect(), Span::Probability)
+    }
+
+    /// What was solved for.
+    pub fn solved(solution: Solution<N>, span: Span) -> Self {
+        let Solution { values, errors, infinite, .. } = solution;
+        Self { values, errors, infinite, span }
+    }
+
+    /// What was found step by step.
+    pub fn stepped(found: Stepped<N>, span: Span) -> Self {
+        let states = found.values.len();
+        let errors =
+            if N::EXACT { Vec::new() } else { (0..states).map(|state| found.error(state)).collect() };
+        Self { values: found.values, errors, infinite: FixedBitSet::with_capacity(states), span }
+    }
+
+    /// How far the value of a state can be from the truth.
+    pub fn error(&self, state: usize) -> f64 {
+        self.errors.get(state).copied().unwrap_or(0.0)
+    }
+
+    /// The probabilities of the opposite.
+    #[must_use]
+    pub fn complement(mut self) -> Self {
+        for (state, value) in self.values.iter_mut().enumerate() {
+            let rest = N::one().minus(value);
+            if let Some(error) = self.errors.get_mut(state)
+                && (*error > 0.0 || !(value.is_zero() || rest.is_zero()))
+            {
+                *error += f64::EPSILON;
+            }
+            // Rounding can put a probability a little above one.
+            *value = if rest < N::zero() { N::zero() } else { rest };
+        }
+        self
+    }
+
+    /// The value of a state, with its bounds.
+    pub fn answer(&self, state: usize) -> Answer {
+        if self.infinite.contains(state) {
+            return Answer::Infinite;
+        }
+        if let Some(exact) = self.values[state].to_rational() {
+            return Answer::from_exact(exact);
+        }
+        let (value, error) = (self.values[state].to_f64(), self.error(state));
+        let (mut lower, mut upper) = if error == 0.0 {
+            (value, value)
+        } else {
+            ((value - error).next_down(), (value + error).next_up())
+        };
+        if self.span <= Span::Positive {
+            lower = lower.max(0.0);
+        }
+        if self.span == Span::Probability {
+            upper = upper.min(1.0);
+        }
+        let value = if self.span == Span::Probability { value.min(1.0) } else { value };
+        Answer::Finite(Quantity { value, lower, upper, exact: None })
+    }
+
+    /// The least and the greatest number that the value of a state can be; none where it is infinite.
+    pub fn ends(&self, state: usize) -> Option<(BigRational, BigRational)> {
+        match self.answer(state) {
+            Answer::Finite(Quantity { exact: Some(exact), .. }) => Some((exact.clone(), exact)),
+            Answer::Finite(quantity) => Some((
+                BigRational::from_float(quantity.lower)?,
+                // What has no bound is above all that it is compared with.
+                BigRational::from_float(quantity.upper).or_else(|| BigRational::from_float(f64::MAX))?,
+            )),
+            _ => None,
+        }
+    }
+
+    /// A number that is the same everywhere.
+    pub fn everywhere(value: &BigRational, states: usize) -> Self {
+        let rounded = N::from_rational(value);
+        let (lower, upper) = enclosing(value);
+        let error = if N::EXACT || lower.to_bits() == upper.to_bits() { 0.0 } else { upper - lower };
+        let errors = if N::EXACT { Vec::new() } else { vec![error; states] };
+        Self {
+            values: vec![rounded; states],
+            errors,
+            infinite: FixedBitSet::with_capacity(states),
+            span: Span::Any,
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! Series of constants, and the tables that they make.
+
+use metaplan::message::Message;
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::{One, Signed};
+use probabilistic::Error;
+use probabilistic::check::{Answer, Outcome, Report};
+use probabilistic::number::parse_decimal;
+use probabilistic::prism::Settings;
+
+use crate::cli::check_text::{number, shown};
+use crate::cli::common::Failure;
+use crate::cli::output;
+
+/// Values that a series may have, and combinations of them.
+const MOST: usize = 100_000;
+
+/// Values of all constants that are set.
+pub struct Combination {
+    pub settings: Settings,
+    /// Those of the constants that have several, in the order of the command line.
+    pub varied: Vec<(String, String)>,
+}
+
+/// A combination with what was found for each property.
+pub type Row<'a> = (&'a Combination, &'a [Result<Report, Error>]);
+
+/// All combinations of the values of the constants; those of the last one change first.
+pub fn combinations(constants: &[(String, String)]) -> Result<Vec<Combination>, Failure> {
+    let mut all = vec![Combination { settings: Settings::new(), varied: Vec::new() }];
+    for (name, text) in constants {
+        let values = values(name, text).map_err(|text| Failure::usage(Message::error("M107", text)))?;
+        if all.len().saturating_mul(values.len()) > MOST {
+            let text = format!("more than {MOST} combinations of the values of constants");
+            return Err(Failure::usage(Message::error("M107", text)));
+        }
+        let mut next = Vec::new();
+        for known in &all {
+            for value in &values {
+                let mut settings = known.settings.clone();
+                settings.insert(name.clone(), value.clone());
+                let mut varied = known.varied.clone();
+                if values.len() > 1 {
+                    varied.push((name.clone(), value.clone()));
+                }
+                next.push(Combination { settings, varied });
+            }
+        }
+        all = next;
+    }
+    Ok(all)
+}
+
+/// The values of a constant: one, or those of a series, as PRISM writes it: `first:last`, `first:step:last`.
+fn values(name: &str, text: &str) -> Result<Vec<String>, String> {
+    let parts: Vec<&str> = text.split(':').map(str::trim).collect();
+    let (first, step, last) = match parts[..] {
+        [_] => return Ok(vec![text.to_owned()]),
+        [first, last] => (first, "1", last),
+        [first, step, last] => (first, step, last),
+        _ => return Err(format!("`{name}={text}` is no series; write `first:last` or `first:step:last`")),
+    };
+    let read = |part: &str| {
+        let (negative, digits) = part.strip_prefix('-').map_or((false, part), |digits| (true, digits));
+        let value = parse_decimal(digits)
+            .ok_or_else(|| format!("`{part}` of the series `{name}={text}` is not a number"))?;
+        Ok::<_, String>(if negative { -value } else { value })
+    };
+    let (first, step, last) = (read(first)?, read(step)?, read(last)?);
+    if !step.is_positive() {
+        return Err(format!("the step of the series `{name}={text}` must be positive"));
+    }
+    if &first + &step > last {
+        return Err(format!(
+            "the series `{name}={text}` has less than two values; a series is `first:step:last`, as PRISM writes it"
+        ));
+    }
+    let count = ((&last - &first) / &step).to_integer();
+    if count >= BigInt::from(MOST) {
+        return Err(format!("the series `{name}={text}` has more than {MOST} values"));
+    }
+    let mut all = Vec::new();
+    let mut value = first;
+    while value <= last {
+        all.push(decimal(&value));
+        value += &step;
+    }
+    Ok(all)
+}
+
+/// A decimal as it is written; all values of a series are sums of such.
+fn decimal(value: &BigRational) -> String {
+    let (mut scaled, mut places) = (value.clone(), 0_usize);
+    while !scaled.denom().is_one() {
+        scaled *= BigInt::from(10);
+        places += 1;
+    }
+    let digits = format!("{:0>width$}", scaled.numer().abs().to_string(), width = places + 1);
+    let (whole, fraction) = digits.split_at(digits.len() - places);
+    let sign = if value.is_negative() { "-" } else { "" };
+    if fraction.is_empty() { format!("{sign}{whole}") } else { format!("{sign}{whole}.{fraction}") }
+}
+
+/// What was found, in one cell.
+fn cell(report: &Result<Report, Error>, text: impl Fn(&Answer) -> String) -> String {
+    match report {
+        Err(_) => "no answer".to_owned(),
+        Ok(report) => match &report.outcome {
+            Outcome::Value(answer) => text(answer),
+            Outcome::Truth(holds, _) => holds.to_string(),
+            Outcome::Undecided(_) => "not decided".to_owned(),
+            Outcome::Range(least, greatest) => format!("{}..{}", text(least), text(greatest)),
+            Outcome::Constrained { randomised, .. } => text(randomised),
+            Outcome::Front(vertices) => {
+                let pairs = vertices.iter().map(|pair| pair.each_ref().map(&text).join(" "));
+                pairs.collect::<Vec<_>>().join("; ")
+            }
+            Outcome::States(states) => format!("{} states", states.len()),
+        },
+    }
+}
+
+/// As a table for people.
+pub fn table(heads: &[&str], rows: &[Row<'_>]) -> String {
+    let header = header(heads, rows);
+    let lines = rows.iter().map(|(combination, reports)| {
+        let values = combination.varied.iter().map(|(_, value)| value.clone());
+        values.chain(reports.iter().map(|report| cell(report, shown))).collect()
+    });
+    output::table(&header, lines)
+}
+
+fn header<'a>(heads: &[&'a str], rows: &[Row<'a>]) -> Vec<&'a str> {
+    let varied = rows.first().map_or(&[][..], |(combination, _)| &combination.varied);
+    varied.iter().map(|(name, _)| &name[..]).chain(heads.iter().copied()).collect()
+}
+
+/// As comma-separated values; a value is exact where that is known and short, and the nearest double otherwise.
+pub fn csv(heads: &[&str], rows: &[Row<'_>]) -> String {
+    let plain = |answer: &Answer| match answer {
+        Answer::Finite(quantity) => number(quantity.value),
+        other => shown(other),
+    };
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let mut write = |fields: Vec<String>| writer.write_record(fields).expect("invariant: memory takes all");
+    write(header(heads, rows).into_iter().map(str::to_owned).collect());
+    for (combination, reports) in rows {
+        let values = combination.varied.iter().map(|(_, value)| value.clone());
+        write(values.chain(reports.iter().map(|report| cell(report, plain))).collect());
+    }
+    let bytes = writer.into_inner().expect("invariant: memory takes all");
+    String::from_utf8(bytes).expect("invariant: made of text")
+}

@@ -1,0 +1,82 @@
+//! What `metaplan check` has found, for people.
+
+use std::fmt::Write as _;
+
+use probabilistic::check::{Answer, Listed, Outcome, Report};
+
+use crate::cli::output;
+
+pub fn as_text(report: &Report, verbose: bool) -> String {
+    let mut text = match &report.outcome {
+        Outcome::Value(answer) => format!("{}\n", shown(answer)),
+        Outcome::Truth(holds, answer) => {
+            let value = answer.as_ref().map(|answer| format!(" ({})", shown(answer))).unwrap_or_default();
+            format!("{holds}{value}\n")
+        }
+        Outcome::Undecided(answer) => format!("not decided: {}\n", shown(answer)),
+        Outcome::Range(least, greatest) => format!("from {} to {}\n", shown(least), shown(greatest)),
+        Outcome::States(states) => states_text(&report.variables, states),
+        Outcome::Front(vertices) => {
+            let rows = vertices.iter().map(|pair| pair.iter().map(shown).collect());
+            output::table(&["first", "second"], rows)
+        }
+        Outcome::Constrained { randomised, deterministic, proved } => {
+            let note = if *proved { "" } else { " (perhaps not the least)" };
+            format!("randomised: {}\ndeterministic: {}{note}\n", shown(randomised), shown(deterministic))
+        }
+    };
+    if verbose {
+        let Report { states, choices, transitions, deadlocks, build, solve, .. } = report;
+        let _ = writeln!(
+            text,
+            "{states} states, {choices} choices, {transitions} transitions, {deadlocks} deadlocks; \
+             built in {:.3} s, solved in {:.3} s",
+            build.as_secs_f64(),
+            solve.as_secs_f64()
+        );
+    }
+    text
+}
+
+/// A line for each state, with the values of its variables.
+fn states_text(variables: &[(String, bool)], states: &[Listed]) -> String {
+    if states.is_empty() {
+        return "no state\n".to_owned();
+    }
+    let mut header: Vec<&str> = variables.iter().map(|(name, _)| &name[..]).collect();
+    header.push("value");
+    let rows = states.iter().map(|listed| {
+        let values = variables.iter().zip(&listed.values).map(|((_, is_bool), value)| {
+            if *is_bool { (*value != 0).to_string() } else { value.to_string() }
+        });
+        let value = listed.answer.as_ref().map(shown).or_else(|| listed.truth.map(|truth| truth.to_string()));
+        values.chain([value.unwrap_or_default()]).collect()
+    });
+    output::table(&header, rows)
+}
+
+/// A value for people: exactly, or with its bounds.
+pub fn shown(answer: &Answer) -> String {
+    match answer {
+        Answer::Infinite => "infinite".to_owned(),
+        Answer::Undefined => "undefined: no policy does this".to_owned(),
+        Answer::Finite(quantity) => match &quantity.exact {
+            Some(exact) if exact.is_integer() => exact.to_string(),
+            Some(exact) if exact.denom().bits() + exact.numer().bits() <= 128 => {
+                format!("{} ({exact})", number(quantity.value))
+            }
+            Some(_) => format!("{} (exact, rounded)", number(quantity.value)),
+            None if quantity.lower >= quantity.upper => number(quantity.value),
+            None => {
+                let [value, lower, upper] = [quantity.value, quantity.lower, quantity.upper].map(number);
+                format!("{value} (between {lower} and {upper})")
+            }
+        },
+    }
+}
+
+/// A double, with an exponent where there would be many zeros.
+pub fn number(value: f64) -> String {
+    let size = value.abs();
+    if value != 0.0 && size < 1e-6 || size >= 1e21 { format!("{value:e}") } else { value.to_string() }
+}
