@@ -175,6 +175,7 @@ fn random_model(random: &mut Random) -> Model {
                 place: place(),
             },
         ],
+        initial: None,
     }
 }
 

@@ -36,8 +36,8 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "Q107",
         "The model is incomplete.",
-        "It does not begin with `mdp` or `dtmc`, says so twice, or has no module.",
-        "Begin with the kind of model, and write at least one `module … endmodule`.",
+        "It says twice what kind of model it is or where it starts, or has no module.",
+        "Say each once, and write at least one `module … endmodule`.",
     ],
     [
         "Q201",
@@ -124,9 +124,15 @@ pub const CODES: &[[&str; 4]] = &[
         "Use fewer modules with the same action, or fewer alternatives in each.",
     ],
     [
+        "Q307",
+        "It cannot be told where the model starts.",
+        "`init … endinit` holds in no state, or too many combinations of values would have to be tried to find where.",
+        "Correct the condition, or write one that fixes most variables by themselves.",
+    ],
+    [
         "Q401",
         "A kind of model or declaration is not handled.",
-        "Models are `mdp` or `dtmc`; `system`, `init … endinit`, `invariant` and others are not read.",
+        "Models are `mdp` or `dtmc`; `system`, `invariant` and others are not read.",
         "Write the model without it.",
     ],
     [
@@ -138,8 +144,8 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "Q403",
         "A kind of property is not handled.",
-        "Handled are `P`, `R` with `F` and `C<=k`, `U`, `G`, and `multi` of two objectives.",
-        "Ask for it in another form.",
+        "CTL, LTL apart from `G F` and `F G`, `S` of decision processes, and `multi` of more than two objectives are not.",
+        "Ask for it in another form, or for its parts one at a time.",
     ],
     [
         "Q404",
@@ -164,5 +170,17 @@ pub const CODES: &[[&str; 4]] = &[
         "A number of steps is wrong.",
         "A bound on steps must be a whole number that is at least 0.",
         "Correct it.",
+    ],
+    [
+        "Q508",
+        "Bounds do not decide a part of a property.",
+        "A value is so near to what it is compared with that the bounds on it lie on both sides.",
+        "Solve exactly (`--exact`), or compare with another number.",
+    ],
+    [
+        "Q509",
+        "A filter has no state, or too many.",
+        "The states that a filter is about are none, or several where it takes one.",
+        "Correct the condition of the filter, or use another filter.",
     ],
 ];

@@ -182,7 +182,7 @@ fn start(cursor: &mut Cursor<'_>) -> Read<Option<ExprKind>> {
         "X" | "F" | "G" => {
             let letter = word.chars().next().unwrap_or('F');
             cursor.advance();
-            let steps = if letter == 'X' { None } else { steps(cursor)? };
+            let steps = if letter == 'X' { None } else { steps(cursor)?.map(Box::new) };
             let right = cursor.expression()?;
             let temporal = Temporal { letter, steps, left: Expr::bool(true), right };
             return Ok(Some(ExprKind::Temporal(Box::new(temporal))));
@@ -206,7 +206,7 @@ fn go_on(cursor: &mut Cursor<'_>, left: Expr) -> Read<Expr> {
     };
     let place = left.place;
     cursor.advance();
-    let steps = steps(cursor)?;
+    let steps = steps(cursor)?.map(Box::new);
     let right = cursor.expression()?;
     Ok(Expr { kind: ExprKind::Temporal(Box::new(Temporal { letter, steps, left, right })), place })
 }
@@ -348,7 +348,7 @@ fn steps(cursor: &mut Cursor<'_>) -> Read<Option<Steps>> {
             cursor.advance();
             cursor.need("}")?;
         }
-        let found = one_sided(cursor, |cursor| cursor.expression())?;
+        let found = one_sided(cursor, any_number)?;
         cursor.need("}")?;
         let found = found.ok_or_else(|| cursor.expected("a bound (`<=10`)"))?;
         return Ok(Some(Steps { reward: Some(name), ..found }));
@@ -378,6 +378,11 @@ fn one_sided(cursor: &mut Cursor<'_>, limit: impl Fn(&mut Cursor<'_>) -> Read<Ex
         return Ok(Some(Steps { least, most, reward: None }));
     }
     Ok(None)
+}
+
+/// Any expression, where a bracket ends it.
+fn any_number(cursor: &mut Cursor<'_>) -> Read<Expr> {
+    cursor.expression()
 }
 
 /// `F<=10 "goal"`: the number ends before the state formula; in parentheses it can be any expression.
@@ -411,7 +416,7 @@ fn path(written: Expr) -> Read<Path> {
         ExprKind::Temporal(temporal) => {
             let Temporal { letter, steps, left, right } = *temporal;
             if has_temporal(&left) || has_temporal(&right) {
-                return nested(letter, steps.as_ref(), right, place);
+                return nested(letter, steps.as_deref(), right, place);
             }
             Ok(match letter {
                 'X' => Path::Next(right),

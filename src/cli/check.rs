@@ -60,6 +60,13 @@ pub struct Arguments {
     /// Solve in doubles with certified bounds, however small the model is.
     #[arg(long)]
     inexact: bool,
+    #[command(flatten)]
+    tightness: Tightness,
+}
+
+/// How tight bounds have to be.
+#[derive(Debug, Args)]
+struct Tightness {
     /// How far apart the bounds on a value may be, as a part of the value unless `--absolute` is given.
     #[arg(long, value_name = "WIDTH", value_parser = width)]
     precision: Option<f64>,
@@ -220,10 +227,8 @@ impl Checked<'_> {
 }
 
 fn precision(arguments: &Arguments) -> Option<Precision> {
-    arguments.precision.map(|width| match arguments.absolute {
-        true => Precision::Absolute(width),
-        false => Precision::Relative(width),
-    })
+    let Tightness { precision, absolute, .. } = arguments.tightness;
+    precision.map(if absolute { Precision::Absolute } else { Precision::Relative })
 }
 
 /// Whether the answer is as sure and as tight as was asked for.

@@ -46,7 +46,7 @@ impl<N: Number> Query<'_, N> {
             limit.floor()
         };
         let budgets = whole.to_usize().filter(|budget| *budget < BUDGETS).ok_or_else(out_of_range)?;
-        let earned = self.whole_rewards(self.rewards(name)?)?;
+        let earned = whole_rewards(self.rewards(name)?)?;
         let layers = Layers::new(self.mdp(), problem, &earned)?;
         let n = self.mdp().states();
         let greatest = earned.iter().max().copied().unwrap_or(0);
@@ -89,22 +89,20 @@ impl<N: Number> Query<'_, N> {
             known.push(values.clone());
             vector.values = values;
         }
-        vector.errors.iter_mut().for_each(|known| *known = error);
+        vector.errors.fill(error);
         Ok(vector.into())
     }
+}
 
-    /// The rewards as whole numbers.
-    fn whole_rewards(&self, rewards: &[N]) -> Asked<Vec<usize>> {
-        let whole = |reward: &N| {
-            let value = reward.to_f64();
-            let exact = reward.to_rational().is_none_or(|exact| exact.is_integer());
-            (exact && value.fract() == 0.0).then(|| value.to_usize()).flatten()
-        };
-        let found: Option<Vec<usize>> = rewards.iter().map(whole).collect();
-        found.ok_or_else(|| {
-            refusal("Q403", "a bound on a reward is handled where all rewards are whole numbers")
-        })
-    }
+/// The rewards as whole numbers.
+fn whole_rewards<N: Number>(rewards: &[N]) -> Asked<Vec<usize>> {
+    let whole = |reward: &N| {
+        let value = reward.to_f64();
+        let exact = reward.to_rational().is_none_or(|exact| exact.is_integer());
+        (exact && value.fract() == 0.0).then(|| value.to_usize()).flatten()
+    };
+    let found: Option<Vec<usize>> = rewards.iter().map(whole).collect();
+    found.ok_or_else(|| refusal("Q403", "a bound on a reward is handled where all rewards are whole numbers"))
 }
 
 /// A process in which choices that earn something end.

@@ -83,10 +83,8 @@ impl<N: Number> Query<'_, N> {
         let found = Vector::solved(solution, Span::Positive);
         let place = |state: usize| merged.place[state] as usize;
         let finite = |state: &usize| !infinite.contains(*state);
-        let values = (0..mdp.states()).map(|state| match finite(&state) {
-            true => found.values[place(state)].clone(),
-            false => N::zero(),
-        });
+        let values = (0..mdp.states())
+            .map(|state| if finite(&state) { found.values[place(state)].clone() } else { N::zero() });
         let values = values.collect();
         let errors =
             (0..mdp.states()).map(|state| if finite(&state) { found.error(place(state)) } else { 0.0 });
@@ -205,7 +203,9 @@ fn end_components<N: Number>(mdp: &Mdp<N>, inside: &FixedBitSet) -> Ends {
             &edges[first[state]..first[state.saturating_add(1)]]
         };
         for (number, members) in components(n, edges_of).iter().enumerate() {
-            members.iter().for_each(|state| component[*state as usize] = dense(number));
+            for state in members {
+                component[*state as usize] = dense(number);
+            }
         }
         let leaves = |choice: &usize| {
             let own = component[mdp.owner(*choice)];
@@ -215,7 +215,9 @@ fn end_components<N: Number>(mdp: &Mdp<N>, inside: &FixedBitSet) -> Ends {
         if lost.is_empty() {
             break;
         }
-        lost.into_iter().for_each(|choice| alive.set(choice, false));
+        for choice in lost {
+            alive.set(choice, false);
+        }
     }
     let (mut block, mut count) = (vec![NONE; n], 0_usize);
     let mut numbers = vec![NONE; n];

@@ -36,7 +36,7 @@ pub use options::{Exactness, Options};
 pub use table::{PolicyTable, Row};
 
 /// Transitions up to which a model is explored in rationals unless asked otherwise.
-const SMALL: usize = 20_000;
+const SMALL: usize = 150_000;
 
 /// What exact arithmetic may cost a model with so many transitions unless it was asked for, in units of about a nanosecond.
 fn budget(transitions: usize) -> u64 {
@@ -72,8 +72,8 @@ pub struct Report {
 /// # Errors
 /// Everything that is wrong with model, property, constants or policy, or that a limit was reached.
 pub fn check(model: &Model, property: &Property, options: &Options<'_>) -> Result<Report, Error> {
-    let mut reports = check_all(model, &[property], options)?;
-    reports.pop().expect("invariant: one report for each property")
+    let reports = check_all(model, &[property], options)?;
+    reports.into_iter().next().unwrap_or_else(|| Err(Error::Property(Vec::new())))
 }
 
 /// Checks several properties of a model, which is explored once.

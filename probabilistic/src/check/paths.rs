@@ -53,12 +53,12 @@ impl<N: Number> Query<'_, N> {
                 Ok(Vector::stepped(found, Span::Probability).into())
             }
             Path::Until(left, right, steps) => {
-                self.until(direction, &self.truth(left)?, &self.truth(right)?, steps.as_ref())
+                self.until(direction, &self.truth(left)?, &self.truth(right)?, steps.as_deref())
             }
             Path::Globally(goal, steps) => {
                 let all = self.every();
                 let bad = inverse(self.truth(goal)?);
-                Ok(complement(self.until(opposite(direction), &all, &bad, steps.as_ref())?))
+                Ok(complement(self.until(opposite(direction), &all, &bad, steps.as_deref())?))
             }
             Path::WeakUntil(left, right, steps) => {
                 // Not: the left one, without the right one, until neither holds.
@@ -66,11 +66,11 @@ impl<N: Number> Query<'_, N> {
                 let (mut keep, mut bad) = (left.clone(), inverse(left));
                 keep.intersect_with(&right);
                 bad.intersect_with(&right);
-                Ok(complement(self.until(opposite(direction), &keep, &bad, steps.as_ref())?))
+                Ok(complement(self.until(opposite(direction), &keep, &bad, steps.as_deref())?))
             }
             Path::Release(left, right, steps) => {
                 let (keep, bad) = (inverse(self.truth(left)?), inverse(self.truth(right)?));
-                Ok(complement(self.until(opposite(direction), &keep, &bad, steps.as_ref())?))
+                Ok(complement(self.until(opposite(direction), &keep, &bad, steps.as_deref())?))
             }
             Path::Repeatedly(goal) => self.repeatedly(direction, &self.truth(goal)?),
             Path::Persistently(goal) => {
@@ -130,20 +130,26 @@ impl<N: Number> Query<'_, N> {
     fn span(&self, steps: &Steps) -> Asked<Range> {
         let least = match &steps.least {
             None => 0,
-            Some(bound) => self.limit(bound)?.saturating_add(u32::from(bound.strict)),
+            Some(bound) => self.limit(bound, i8::from(bound.strict))?,
         };
         let Some(bound) = &steps.most else { return Ok(Range { least, most: None }) };
-        let most = self.limit(bound)?.checked_sub(u32::from(bound.strict)).filter(|most| *most >= least);
-        let place = bound.limit.place;
-        let most =
-            most.ok_or_else(|| property_error("Q503", place, "no number of steps is within these bounds"))?;
+        let most = self.at_most(bound)?;
+        if most < least {
+            let text = "no number of steps is within these bounds";
+            return Err(property_error("Q503", bound.limit.place, text).into());
+        }
         Ok(Range { least, most: Some(most) })
     }
 
-    /// The number of a bound.
-    pub fn limit(&self, bound: &StepBound) -> Asked<u32> {
+    /// The number of a bound from above.
+    fn at_most(&self, bound: &StepBound) -> Asked<u32> {
+        self.limit(bound, 0_i8.saturating_sub(i8::from(bound.strict)))
+    }
+
+    /// The number of a bound, and a little more or less.
+    fn limit(&self, bound: &StepBound, more: i8) -> Asked<u32> {
         // It is whole, which `validate` has seen to.
-        let limit = self.constant(&bound.limit)?.to_integer();
+        let limit = self.constant(&bound.limit)?.to_integer() + more;
         Ok(limit.to_u32().filter(|most| *most < STEPS).ok_or_else(|| {
             let text = "the number of steps must be at least 0 and below 10^9";
             property_error("Q503", bound.limit.place, text)
@@ -160,16 +166,13 @@ impl<N: Number> Query<'_, N> {
                 self.solved(self.problem(direction, Some(self.rewards(name)?), &terminal))
             }
             RewardPath::Steps(bound) => {
-                let limit = self.limit(bound)?.checked_sub(u32::from(bound.strict));
-                let limit = limit.ok_or_else(|| {
-                    property_error("Q503", bound.limit.place, "no number of steps is within these bounds")
-                })?;
+                let limit = self.at_most(bound)?;
                 let problem = self.problem(direction, Some(self.rewards(name)?), &none);
                 let found = self.stepped(problem, vec![N::zero(); n], limit)?;
                 Ok(Vector::stepped(found, Span::Positive).into())
             }
             RewardPath::Instant(limit) => {
-                let limit = self.limit(&StepBound { limit: limit.clone(), strict: false })?;
+                let limit = self.at_most(&StepBound { limit: limit.clone(), strict: false })?;
                 let values = self.state_rewards(name)?;
                 let found = self.stepped(self.problem(direction, None, &none), values, limit)?;
                 Ok(Vector::stepped(found, Span::Positive).into())

@@ -131,10 +131,8 @@ impl<'a, N: Number> Query<'a, N> {
             Property::SteadyState(_, states) if self.program.kind == ModelKind::Dtmc => {
                 let holds = self.truth(states)?;
                 let mdp = self.mdp();
-                let paid = (0..mdp.choice_count()).map(|choice| match holds.contains(mdp.owner(choice)) {
-                    true => N::one(),
-                    false => N::zero(),
-                });
+                let paid = (0..mdp.choice_count())
+                    .map(|choice| if holds.contains(mdp.owner(choice)) { N::one() } else { N::zero() });
                 let mut found = self.long_run(&paid.collect::<Vec<_>>())?;
                 found.vector.span = Span::Probability;
                 Ok(found)
@@ -162,22 +160,18 @@ impl<'a, N: Number> Query<'a, N> {
 
     fn everywhere(&self, answer: &Answer) -> Vector<N> {
         let n = self.mdp().states();
-        match answer {
-            Answer::Finite(quantity) => {
-                let value = quantity.exact.clone().or_else(|| BigRational::from_float(quantity.value));
-                let mut vector = Vector::everywhere(&value.unwrap_or_default(), n);
-                let error = (quantity.upper - quantity.value).max(quantity.value - quantity.lower);
-                for known in &mut vector.errors {
-                    *known = known.max(error.next_up());
-                }
-                vector
-            }
-            _ => {
-                let mut vector = Vector::exactly(vec![N::zero(); n], Span::Any);
-                vector.infinite.insert_range(..);
-                vector
-            }
+        let Answer::Finite(quantity) = answer else {
+            let mut vector = Vector::exactly(vec![N::zero(); n], Span::Any);
+            vector.infinite.insert_range(..);
+            return vector;
+        };
+        let value = quantity.exact.clone().or_else(|| BigRational::from_float(quantity.value));
+        let mut vector = Vector::everywhere(&value.unwrap_or_default(), n);
+        let error = (quantity.upper - quantity.value).max(quantity.value - quantity.lower);
+        for known in &mut vector.errors {
+            *known = known.max(error.next_up());
         }
+        vector
     }
 
     /// The states in which a property that is part of another one holds.

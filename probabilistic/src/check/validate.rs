@@ -28,9 +28,15 @@ pub fn properties_in<'a>(expression: &'a Expr, found: &mut Vec<&'a Property>) {
             properties_in(right, found);
         }
         ExprKind::If(condition, then, otherwise) => {
-            [condition, then, otherwise].into_iter().for_each(|part| properties_in(part, found));
+            for part in [condition, then, otherwise] {
+                properties_in(part, found);
+            }
         }
-        ExprKind::Call(_, arguments) => arguments.iter().for_each(|argument| properties_in(argument, found)),
+        ExprKind::Call(_, arguments) => {
+            for argument in arguments {
+                properties_in(argument, found);
+            }
+        }
         _ => {}
     }
 }
@@ -68,7 +74,7 @@ pub fn steps_of(path: &Path) -> Option<&Steps> {
         Path::Globally(_, steps)
         | Path::Until(_, _, steps)
         | Path::WeakUntil(_, _, steps)
-        | Path::Release(_, _, steps) => steps.as_ref(),
+        | Path::Release(_, _, steps) => steps.as_deref(),
         _ => None,
     }
 }
@@ -76,15 +82,23 @@ pub fn steps_of(path: &Path) -> Option<&Steps> {
 impl Validation {
     fn property(&mut self, property: &Property) {
         match property {
-            Property::Multi(parts) => parts.iter().for_each(|part| self.property(part)),
+            Property::Multi(parts) => {
+                for part in parts {
+                    self.property(part);
+                }
+            }
             Property::Probability(question, path) => {
-                of_path(path).into_iter().for_each(|states| self.typed(states, Type::Bool));
+                for states in of_path(path) {
+                    self.typed(states, Type::Bool);
+                }
                 self.bound(question);
                 let steps = steps_of(path);
                 let kind =
                     if steps.is_some_and(|steps| steps.reward.is_some()) { Type::Double } else { Type::Int };
                 let bounds = steps.into_iter().flat_map(|steps| steps.least.iter().chain(&steps.most));
-                bounds.for_each(|bound| self.typed(&bound.limit, kind));
+                for bound in bounds {
+                    self.typed(&bound.limit, kind);
+                }
             }
             Property::Reward(question, _, path) => {
                 match path {
@@ -101,7 +115,9 @@ impl Validation {
             }
             Property::Filter(_, inner, states) => {
                 self.any(inner);
-                states.iter().for_each(|states| self.typed(states, Type::Bool));
+                if let Some(states) = states {
+                    self.typed(states, Type::Bool);
+                }
             }
             Property::Expression(inner) => self.any(inner),
         }
@@ -132,6 +148,8 @@ impl Validation {
     fn within(&mut self, expression: &Expr) {
         let mut parts = Vec::new();
         properties_in(expression, &mut parts);
-        parts.into_iter().for_each(|part| self.property(part));
+        for part in parts {
+            self.property(part);
+        }
     }
 }

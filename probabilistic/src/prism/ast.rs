@@ -106,13 +106,13 @@ pub enum Path {
     /// `X`: in the next state.
     Next(Expr),
     /// `U`, and `F` with `true` on the left: the right one holds some day (in so many steps), the left one until then.
-    Until(Expr, Expr, Option<Steps>),
+    Until(Expr, Expr, Option<Box<Steps>>),
     /// `G`: always (in so many steps).
-    Globally(Expr, Option<Steps>),
+    Globally(Expr, Option<Box<Steps>>),
     /// `W`: `U`, or the left one holds always.
-    WeakUntil(Expr, Expr, Option<Steps>),
+    WeakUntil(Expr, Expr, Option<Box<Steps>>),
     /// `R`: the right one holds until the left one does, too, or always.
-    Release(Expr, Expr, Option<Steps>),
+    Release(Expr, Expr, Option<Box<Steps>>),
     /// `G F`: again and again.
     Repeatedly(Expr),
     /// `F G`: from some day on.
@@ -160,7 +160,7 @@ pub struct Temporal {
     /// The letter of the operator.
     pub letter: char,
     /// Its bounds.
-    pub steps: Option<Steps>,
+    pub steps: Option<Box<Steps>>,
     /// Its left side.
     pub left: Expr,
     /// Its right side.
