@@ -7,6 +7,7 @@ mod filters;
 mod longrun;
 mod multi;
 mod options;
+mod outcome;
 mod paths;
 mod query;
 mod state;
@@ -224,7 +225,7 @@ impl Processes {
 fn report<N: Number>(
     program: &Program<N>,
     explored: &Explored<Packed, N>,
-    (outcome, policy): query::Found,
+    (outcome, policy): outcome::Found,
     options: &Options<'_>,
 ) -> Report {
     let mdp = &explored.mdp;

@@ -1,25 +1,19 @@
-//! A property and an explored model to an outcome, in one kind of number.
+//! A model that was explored, and how it is asked.
 
 use std::cell::RefCell;
 
 use fixedbitset::FixedBitSet;
-use num_rational::BigRational;
 
-use crate::check::answer::{Answer, Outcome, Precision};
-use crate::check::ask::{Asked, Stop, property_error, refusal};
-use crate::check::filters::Filtered;
+use crate::check::answer::Precision;
+use crate::check::ask::{Asked, property_error};
 use crate::check::options::Options;
-use crate::check::paths::Valued;
-use crate::check::state::{compare, is_number, undecided};
-use crate::check::vector::{Span, Vector};
 use crate::error::{Error, Place};
 use crate::explore::Explored;
 use crate::mdp::Mdp;
 use crate::number::Number;
 use crate::policy::choices_of;
-use crate::prism::ast::{BinaryOp, Filter, ModelKind, Property, Question, Type};
 use crate::prism::{Packed, Program};
-use crate::solve::{Direction, Work};
+use crate::solve::Work;
 
 /// What a query needs.
 pub struct Query<'a, N> {
@@ -35,9 +29,6 @@ pub struct Query<'a, N> {
     /// The choices of the policy that is evaluated.
     pub given: Option<FixedBitSet>,
 }
-
-/// An outcome, and the policy that has it.
-pub type Found = (Outcome, Option<Vec<u32>>);
 
 /// The number of a reward structure.
 pub fn structure(names: &[String], name: Option<&str>) -> Result<usize, Error> {
@@ -81,177 +72,6 @@ impl<'a, N: Number> Query<'a, N> {
         &self.explored.mdp
     }
 
-    /// Answers a property; none where exact arithmetic takes too long.
-    pub fn answer(&self, property: &Property) -> Result<Option<Found>, Error> {
-        match self.outcome(property) {
-            Ok(found) => Ok(Some(found)),
-            Err(Stop::TooMuchWork) => Ok(None),
-            Err(Stop::Wrong(error)) => Err(error),
-        }
-    }
-
-    fn outcome(&self, property: &Property) -> Asked<Found> {
-        match property {
-            Property::Multi(_) if self.given.is_some() => {
-                Err(refusal("Q403", "a policy is evaluated for one objective at a time"))
-            }
-            Property::Multi(_) if self.explored.starts > 1 => {
-                Err(refusal("Q403", "`multi` is handled for models that start in one state"))
-            }
-            Property::Multi(parts) => Ok((self.multi(parts)?, None)),
-            Property::Probability(question, _)
-            | Property::Reward(question, ..)
-            | Property::SteadyState(question, _) => {
-                let Valued { vector, policy } = self.valued(property)?;
-                Ok((self.judged(&vector, question)?, policy))
-            }
-            Property::Filter(filter, inner, states) => {
-                Ok((shown(self.filtered(*filter, inner, states.as_ref())?), None))
-            }
-            Property::Expression(inner) => match self.kind_of(inner)? {
-                Type::Bool => {
-                    let holds = self.truth(inner)?;
-                    Ok((
-                        Outcome::Truth((0..self.explored.starts).all(|start| holds.contains(start)), None),
-                        None,
-                    ))
-                }
-                _ => Ok((self.of_starts(&self.numbers(inner)?), None)),
-            },
-        }
-    }
-
-    /// The values of an operator in all states.
-    fn valued(&self, property: &Property) -> Asked<Valued<N>> {
-        match property {
-            Property::Probability(question, path) => self.path(self.direction(question)?, path),
-            Property::Reward(question, name, path) => {
-                self.reward(self.direction(question)?, name.as_deref(), path)
-            }
-            Property::SteadyState(_, states) if self.program.kind == ModelKind::Dtmc => {
-                let holds = self.truth(states)?;
-                let mdp = self.mdp();
-                let paid = (0..mdp.choice_count())
-                    .map(|choice| if holds.contains(mdp.owner(choice)) { N::one() } else { N::zero() });
-                let mut found = self.long_run(&paid.collect::<Vec<_>>())?;
-                found.vector.span = Span::Probability;
-                Ok(found)
-            }
-            Property::SteadyState(..) => {
-                Err(refusal("Q403", "`S` is handled for Markov chains, and not for decision processes"))
-            }
-            _ => Err(refusal("Q403", "`multi` cannot be a part of another property")),
-        }
-    }
-
-    /// The values of a property that is part of another one.
-    pub fn property_numbers(&self, property: &Property) -> Asked<Vector<N>> {
-        match property {
-            Property::Expression(inner) => self.numbers(inner),
-            Property::Filter(filter, inner, states) => {
-                let Filtered::Number(answer) = self.filtered(*filter, inner, states.as_ref())? else {
-                    return Err(refusal("Q403", "a filter that is part of a property must have one value"));
-                };
-                Ok(self.everywhere(&answer))
-            }
-            _ => Ok(self.valued(property)?.vector),
-        }
-    }
-
-    fn everywhere(&self, answer: &Answer) -> Vector<N> {
-        let n = self.mdp().states();
-        let Answer::Finite(quantity) = answer else {
-            let mut vector = Vector::exactly(vec![N::zero(); n], Span::Any);
-            vector.infinite.insert_range(..);
-            return vector;
-        };
-        let value = quantity.exact.clone().or_else(|| BigRational::from_float(quantity.value));
-        let mut vector = Vector::everywhere(&value.unwrap_or_default(), n);
-        let error = (quantity.upper - quantity.value).max(quantity.value - quantity.lower);
-        for known in &mut vector.errors {
-            *known = known.max(error.next_up());
-        }
-        vector
-    }
-
-    /// The states in which a property that is part of another one holds.
-    pub fn property_truth(&self, property: &Property) -> Asked<FixedBitSet> {
-        let n = self.mdp().states();
-        match property {
-            Property::Expression(inner) => self.truth(inner),
-            Property::Filter(Filter::Print | Filter::PrintAll, ..) => {
-                Err(refusal("Q403", "a filter that is part of a property must have one value"))
-            }
-            Property::Filter(filter, inner, states) => {
-                let mut found = FixedBitSet::with_capacity(n);
-                let Filtered::Truth(holds) = self.filtered(*filter, inner, states.as_ref())? else {
-                    return Err(refusal("Q203", "a truth value is needed here, not a number"));
-                };
-                found.set_range(.., holds);
-                Ok(found)
-            }
-            _ if is_number(property) => Err(refusal("Q203", "a truth value is needed here, not a number")),
-            Property::Probability(question, _)
-            | Property::Reward(question, ..)
-            | Property::SteadyState(question, _) => {
-                let Some((op, bound)) = &question.bound else { return Err(undecided()) };
-                let bound = self.constant(bound)?;
-                let vector = self.valued(property)?.vector;
-                let mut found = FixedBitSet::with_capacity(n);
-                for state in 0..n {
-                    found.set(state, holds(&vector, state, *op, &bound).ok_or_else(undecided)?);
-                }
-                Ok(found)
-            }
-            Property::Multi(_) => Err(refusal("Q403", "`multi` cannot be a part of another property")),
-        }
-    }
-
-    /// Least or greatest: as it is asked, or as the bound needs it for all policies.
-    fn direction(&self, question: &Question) -> Asked<Direction> {
-        match (question.direction, &question.bound) {
-            (Some(direction), _) => Ok(direction),
-            (None, Some((BinaryOp::Less | BinaryOp::LessEqual, _))) => Ok(Direction::Max),
-            (None, Some(_)) => Ok(Direction::Min),
-            (None, None) if self.program.kind == ModelKind::Dtmc => Ok(Direction::Max),
-            (None, None) => {
-                let text = "a decision process has many policies: ask for `min` or `max`";
-                Err(refusal("Q502", text))
-            }
-        }
-    }
-
-    fn judged(&self, vector: &Vector<N>, question: &Question) -> Asked<Outcome> {
-        let Some((op, bound)) = &question.bound else { return Ok(self.of_starts(vector)) };
-        let bound = self.constant(bound)?;
-        let starts = 0..self.explored.starts;
-        let verdicts: Vec<_> = starts.map(|start| holds(vector, start, *op, &bound)).collect();
-        let answer = vector.answer(0);
-        if let [verdict] = verdicts[..] {
-            return Ok(match verdict {
-                Some(verdict) => Outcome::Truth(verdict, Some(answer)),
-                None => Outcome::Undecided(answer),
-            });
-        }
-        Ok(match verdicts.iter().position(|verdict| *verdict != Some(true)) {
-            None => Outcome::Truth(true, None),
-            Some(_) if verdicts.contains(&Some(false)) => Outcome::Truth(false, None),
-            Some(at) => Outcome::Undecided(vector.answer(at)),
-        })
-    }
-
-    /// The value where it starts; the range of values, if it can start in several states.
-    fn of_starts(&self, vector: &Vector<N>) -> Outcome {
-        if self.explored.starts == 1 {
-            return Outcome::Value(vector.answer(0));
-        }
-        let mut starts = FixedBitSet::with_capacity(self.mdp().states());
-        starts.insert_range(..self.explored.starts);
-        let [least, greatest] =
-            [false, true].map(|greatest| crate::check::filters::extreme(vector, &starts, greatest));
-        Outcome::Range(least, greatest)
-    }
-
     /// The rewards of a structure, for each choice.
     pub fn rewards(&self, name: Option<&str>) -> Result<&[N], Error> {
         let number = structure(&self.program.reward_names, name)?;
@@ -270,25 +90,5 @@ impl<'a, N: Number> Query<'a, N> {
             rewards.push(self.program.state_reward(number, &values)?);
         }
         Ok(rewards)
-    }
-}
-
-/// Whether the value of a state keeps a bound; none where the bounds on the value do not tell.
-fn holds<N: Number>(vector: &Vector<N>, state: usize, op: BinaryOp, bound: &BigRational) -> Option<bool> {
-    match vector.ends(state) {
-        None => Some(compare(op, std::cmp::Ordering::Greater)),
-        Some((low, high)) => {
-            let (low, high) = (compare(op, low.cmp(bound)), compare(op, high.cmp(bound)));
-            (low == high).then_some(low)
-        }
-    }
-}
-
-fn shown(filtered: Filtered) -> Outcome {
-    match filtered {
-        Filtered::Number(answer) => Outcome::Value(answer),
-        Filtered::Truth(holds) => Outcome::Truth(holds, None),
-        Filtered::Range(least, greatest) => Outcome::Range(least, greatest),
-        Filtered::States(states) => Outcome::States(states),
     }
 }
