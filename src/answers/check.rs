@@ -15,8 +15,8 @@ pub struct CheckAnswer<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     name: Option<&'a str>,
     /// The values of the constants that have several.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    constants: BTreeMap<&'a str, &'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    constants: Option<BTreeMap<&'a str, &'a str>>,
     #[serde(flatten)]
     found: Found,
     statistics: SizePart,
@@ -170,7 +170,7 @@ impl<'a> CheckAnswer<'a> {
             deadlocks: *deadlocks,
             milliseconds,
         };
-        let (name, constants) = (None, BTreeMap::new());
+        let (name, constants) = (None, None);
         Self { format: "metaplan-check/1", property, name, constants, found, statistics }
     }
 
@@ -182,7 +182,8 @@ impl<'a> CheckAnswer<'a> {
         constants: impl IntoIterator<Item = (&'a str, &'a str)>,
     ) -> Self {
         self.name = name;
-        self.constants = constants.into_iter().collect();
+        self.constants =
+            Some(constants.into_iter().collect()).filter(|values: &BTreeMap<_, _>| !values.is_empty());
         self
     }
 }

@@ -172,7 +172,7 @@ impl<N: Number> Run<'_, N> {
                 Some(Enclosed { policy, values, errors: Vec::new() })
             }
             None if self.draft => None,
-            found => doubles::enclosed(&quotient, found, direction, self.work.tight),
+            found => doubles::enclosed(&quotient, found, direction, &mut self.work),
         };
         let Some(Enclosed { policy, values, errors }) = found else {
             self.unknown(local);

@@ -9,10 +9,12 @@ use crate::solve::interval::{self, Enclosed};
 use crate::solve::iterate::{Iterated, iterate};
 use crate::solve::problem::Direction;
 use crate::solve::quotient::Quotient;
-use crate::solve::work::Work;
+use crate::solve::work::{TIGHT, Work};
 
 /// What a component may cost in rationals, where doubles cannot tell enough of it; and the blocks that it may have.
 const RATIONAL: (u64, usize) = (1_000_000_000, 3000);
+/// What it may cost where they tell enough for most purposes.
+const TIGHTER: u64 = 100_000_000;
 
 /// Bounds on the values of all blocks; none where no method finds any.
 ///
@@ -23,8 +25,9 @@ pub fn enclosed<N: Number>(
     quotient: &Quotient<N>,
     found: Option<Iterated<N>>,
     direction: Direction,
-    tight: f64,
+    work: &mut Work,
 ) -> Option<Enclosed<N>> {
+    let tight = work.tight;
     let Some(found) = found else { return interval::enclose(quotient, direction, tight) };
     let is_chain = (0..quotient.blocks()).all(|block| quotient.range(block).len() <= 1);
     let mut errors: Vec<f64> = if is_chain {
@@ -43,8 +46,16 @@ pub fn enclosed<N: Number>(
     if is_good {
         return Some(rounded);
     }
-    let exact = (quotient.blocks() <= RATIONAL.1).then(|| in_rationals(quotient, &rounded.policy, direction));
-    exact.flatten().or_else(|| interval::enclose(quotient, direction, tight)).or(Some(rounded))
+    // Bounds that are there, but wide, are made better while that is cheap, or because it was asked for.
+    let is_usual = tight >= TIGHT && rounded.errors.iter().all(|error| error.is_finite());
+    let most = if is_usual { TIGHTER } else { RATIONAL.0 };
+    let exact = (quotient.blocks() <= RATIONAL.1)
+        .then(|| work.spared(most, |work| in_rationals(quotient, &rounded.policy, direction, work)));
+    let found = exact.flatten();
+    if is_usual {
+        return found.or(Some(rounded));
+    }
+    found.or_else(|| interval::enclose(quotient, direction, tight)).or(Some(rounded))
 }
 
 fn is_tight<N: Number>(values: &[N], errors: &[f64], tight: f64) -> bool {
@@ -57,6 +68,7 @@ fn in_rationals<N: Number>(
     quotient: &Quotient<N>,
     policy: &[u32],
     direction: Direction,
+    work: &mut Work,
 ) -> Option<Enclosed<N>> {
     let exact = |numbers: &[N]| {
         numbers.iter().map(|number| BigRational::from_float(number.to_f64())).collect::<Option<Vec<_>>>()
@@ -74,7 +86,7 @@ fn in_rationals<N: Number>(
         choices: quotient.choices.clone(),
         widest: quotient.widest,
     };
-    let found = iterate(&rational, policy.to_vec(), direction, &mut Work::new(RATIONAL.0))?;
+    let found = iterate(&rational, policy.to_vec(), direction, work)?;
     let relative = (count(quotient.blocks()) + 4.0) * 2.0 * (count(quotient.widest) + 8.0) * f64::EPSILON;
     let values: Vec<N> = found.values.iter().map(N::from_rational).collect();
     let errors = values.iter().map(|value| value.to_f64() * relative).collect();

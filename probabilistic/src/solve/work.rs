@@ -14,12 +14,17 @@ pub struct Work {
     left: u64,
     /// How wide bounds may be, relative to the value; no more is done once they are within.
     pub tight: f64,
+    /// What may still be spent on components that doubles cannot tell enough of.
+    spare: u64,
 }
+
+/// What may be spent on such components, all together.
+const SPARE: u64 = 1_000_000_000;
 
 impl Work {
     /// A budget of so many units.
     pub const fn new(left: u64) -> Self {
-        Self { left, tight: TIGHT }
+        Self { left, tight: TIGHT, spare: SPARE }
     }
 
     /// Pays for so many operations whose results are about as long as this one; none where the budget is spent.
@@ -34,6 +39,15 @@ impl Work {
         let cost = one.saturating_mul(u64::try_from(operations).unwrap_or(u64::MAX));
         self.left = self.left.saturating_sub(cost);
         if self.is_spent() { None } else { Some(()) }
+    }
+
+    /// Does something in rationals within a part of what is spare.
+    pub fn spared<T>(&mut self, most: u64, what: impl FnOnce(&mut Self) -> T) -> T {
+        let given = self.spare.min(most);
+        let mut work = Self::new(given);
+        let result = what(&mut work);
+        self.spare = self.spare.saturating_sub(given.saturating_sub(work.left));
+        result
     }
 
     /// Whether nothing is left.
