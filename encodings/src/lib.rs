@@ -79,3 +79,8 @@ pub use sat::{Backend, BackendError};
 pub use task::Task;
 pub use words::UnknownWord;
 pub use {num_rational::BigRational, pddl};
+
+/// The example of the README is compiled and run with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

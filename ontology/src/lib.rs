@@ -36,3 +36,8 @@ pub use ntriples::ntriples;
 pub use owl::*;
 pub use read::{ReadOptions, Syntax, read_files, read_text};
 pub use write::{OutputSyntax, convert_files, turtle};
+
+/// The example of the README is compiled and run with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

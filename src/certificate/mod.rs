@@ -15,7 +15,7 @@ use num_rational::BigRational;
 use pddl::ast::Problem;
 use pddl::{print_domain, print_problem};
 
-pub use ::verify::{Claim, Verification, VerifiedPart, conditions, verify};
+pub use ::verify::{Claim, Verification, VerifiedPart, Verifier};
 
 use ::verify::digest::digest_of;
 use ::verify::files::text;

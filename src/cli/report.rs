@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 use encodings::{Limits, Solution};
-use metaplan::certificate::{Verification, verify};
+use metaplan::certificate::{Verification, Verifier};
 use metaplan::journal::JournalReport;
 use metaplan::message::Message;
 use metaplan::mission::Mission;
@@ -80,7 +80,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let checked = arguments
         .certificate
         .as_deref()
-        .map(|directory| checked(&verify(directory, Some(&setup.mission), &|| limits.reached())));
+        .map(|directory| Verifier::new(directory).mission(&setup.mission).stop(|| limits.reached()))
+        .map(|verifier| checked(&verifier.verify()));
     let (status, said) = (answer.solution.status, answer.solution.verdict());
     let report = page(arguments, &setup, before, answer, checked);
     if let Some(directory) = &arguments.svg {
@@ -174,7 +175,7 @@ fn checked(report: &Verification) -> Checked {
         let (Ok(said) | Err(said)) = &part.result;
         (part.part.to_owned(), part.result.is_ok(), said.clone())
     });
-    let text = ::verify::text(report);
+    let text = report.to_string();
     let verdict = text.lines().last().unwrap_or_default().to_owned();
     Checked { verified: report.verified(), verdict, parts: parts.collect() }
 }

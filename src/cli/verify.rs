@@ -4,9 +4,9 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use metaplan::certificate::{Verification, conditions, verify};
+use metaplan::certificate::{Verification, Verifier};
 
-use ::verify::{Watch, json, text};
+use ::verify::{Watch, json};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::output;
@@ -43,9 +43,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let format = common.format;
     let watch =
         Watch::start(arguments.time_limit, move |report| std::process::exit(show(report, format) as i32));
-    let stop = || watch.reached();
+    let verifier = Verifier::new(&arguments.directory).stop(|| watch.reached());
     if let Some(file) = &arguments.smt {
-        output::write_file(file, &conditions(&arguments.directory, &stop)?)?;
+        output::write_file(file, &verifier.conditions()?)?;
     }
     let mission = match &arguments.mission {
         Some(manifest) => {
@@ -58,13 +58,13 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         }
         None => None,
     };
-    Ok(show(&watch.end(verify(&arguments.directory, mission.as_ref(), &stop)), format))
+    Ok(show(&watch.end(verifier.mission(mission.as_ref()).verify()), format))
 }
 
 fn show(report: &Verification, format: Format) -> Exit {
     output::document(&match format {
         Format::Json => json(report),
-        _ => text(report),
+        _ => report.to_string(),
     });
     if report.verified() { Exit::Done } else { Exit::Invalid }
 }

@@ -54,7 +54,16 @@ impl AdaptationSection {
 }
 
 /// How eager the loop is.
+///
+/// ```
+/// use std::time::Duration;
+/// use metaplan::mapek::Settings;
+///
+/// let settings = Settings::default().with_time_limit(Duration::from_secs(2)).with_settle(Duration::from_millis(500));
+/// assert!(!settings.stay_close);
+/// ```
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Settings {
     /// Another plan replaces one that could be kept only if its metric is better by this much, in the metric's unit.
     pub minimum_benefit: BigRational,
@@ -65,6 +74,32 @@ pub struct Settings {
     /// Whether, of plans that are as good and as long, one is chosen that has most steps of the plan at hand. The choice then
     /// depends on what has happened, and no longer on the situation alone.
     pub stay_close: bool,
+}
+
+impl Settings {
+    /// Another plan replaces one that could be kept only if its metric is better by this much.
+    #[must_use]
+    pub fn with_minimum_benefit(self, minimum_benefit: BigRational) -> Self {
+        Self { minimum_benefit, ..self }
+    }
+
+    /// So long must a design be available again before a better plan is looked for.
+    #[must_use]
+    pub fn with_settle(self, settle: Duration) -> Self {
+        Self { settle, ..self }
+    }
+
+    /// How long one plan may take; none for as long as it takes.
+    #[must_use]
+    pub fn with_time_limit(self, time_limit: impl Into<Option<Duration>>) -> Self {
+        Self { time_limit: time_limit.into(), ..self }
+    }
+
+    /// Whether, of plans that are as good and as long, one is chosen that has most steps of the plan at hand.
+    #[must_use]
+    pub fn with_stay_close(self, stay_close: bool) -> Self {
+        Self { stay_close, ..self }
+    }
 }
 
 impl Default for Settings {

@@ -55,7 +55,7 @@ pub fn check(
     }
     // That it is too slow on a busy machine is not what is asked.
     let limits = Limits::none().with_time(30 * case.limit);
-    let report = certificate::verify(&directory, None, &|| limits.reached());
+    let report = certificate::Verifier::new(&directory).stop(|| limits.reached()).verify();
     let refuted = match (&case.truth, &solution.plan) {
         (Truth::Best(best, _), Some(plan)) => rational(&plan.cost) != *best,
         (Truth::Open(Some((found, _))), Some(plan)) => {

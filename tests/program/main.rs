@@ -11,6 +11,7 @@ mod common;
 mod concurrent;
 mod configure;
 mod doubts;
+mod examples;
 mod explain;
 mod export;
 mod help;

@@ -1,6 +1,6 @@
 //! What came of a verification, for people and programs.
 
-use std::fmt::Write as _;
+use std::fmt::{self, Write as _};
 
 use mission::visible::{pretty, visible, visible_json};
 use serde::Serialize;
@@ -42,8 +42,14 @@ impl<'a> VerificationAnswer<'a> {
     }
 }
 
-/// For people: a line for each part, and the verdict.
-pub fn text(report: &Verification) -> String {
+/// For people: a line for each part, and the verdict, with no character that a terminal takes for a command.
+impl fmt::Display for Verification {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&text(self))
+    }
+}
+
+fn text(report: &Verification) -> String {
     let mut text = String::new();
     for part in &report.parts {
         let _ = match &part.result {

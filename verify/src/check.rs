@@ -1,12 +1,14 @@
 //! What a certificate claims, checked part by part.
 
+use std::fmt;
 use std::fs;
 use std::io::BufReader;
 use std::path::Path;
+use std::time::{Duration, Instant};
 
 use certificate::{Checked, Inputs, check, check_refutation, verification_conditions};
 use mission::Mission;
-use mission::message::Message;
+use mission::message::{Errors, Message};
 use num_rational::BigRational;
 
 use crate::about::about;
@@ -19,34 +21,91 @@ use crate::plan::plan;
 use crate::task::{read_pddl, same_task};
 use crate::{derivations, knowledge};
 
-/// Checks a certificate without trusting what wrote it, and whether it is about a mission, if one is given. The comparison of the task
-/// with the files ends when `stop` says so.
-pub fn verify(directory: &Path, mission: Option<&Mission>, stop: &dyn Fn() -> bool) -> Verification {
-    let mut report = Verification { claim: None, parts: Vec::new() };
-    match read(directory) {
-        Ok((manifest, contents)) => {
-            report.claim = Some(manifest.claim.clone());
-            let bytes: u64 = manifest.files.iter().map(|file| file.bytes).sum();
-            let files = format!("{} files, {bytes} bytes, as the manifest has them", manifest.files.len());
-            report.parts.push(VerifiedPart { part: "files", result: Ok(files) });
-            report.parts.extend(parts(directory, &manifest, &contents, stop));
-            if let Some(mission) = mission {
-                let written = written(&contents);
-                let domain = text(&contents, DOMAIN);
-                let result = about(written.as_ref(), (domain, text(&contents, PROBLEM)), mission);
-                report.parts.push(VerifiedPart { part: "mission", result });
-            }
-        }
-        Err(reason) => report.parts.push(VerifiedPart { part: "files", result: Err(reason) }),
-    }
-    report
+/// Checks the certificate in a directory, without trusting what wrote it.
+///
+/// ```
+/// use std::path::Path;
+/// use std::time::Duration;
+/// use metaplan_verify::Verifier;
+///
+/// let verification = Verifier::new(Path::new("no/such/directory")).time_limit(Duration::from_secs(60)).verify();
+/// assert!(!verification.verified());
+/// assert!(verification.to_string().starts_with("files       failed: manifest.json: cannot be read"));
+/// ```
+pub struct Verifier<'a> {
+    directory: &'a Path,
+    mission: Option<&'a Mission>,
+    until: Option<Instant>,
+    stop: Box<dyn Fn() -> bool + 'a>,
 }
 
-/// The argument of a certificate as verification conditions in SMT-LIB 2; it is not checked here.
-///
-/// # Errors
-/// The certificate cannot be read, or its task has derived variables, for which there are no such conditions.
-pub fn conditions(directory: &Path, stop: &dyn Fn() -> bool) -> Result<String, Message> {
+impl<'a> Verifier<'a> {
+    /// There is no limit, and the certificate may be about any mission.
+    pub fn new(directory: &'a Path) -> Self {
+        Self { directory, mission: None, until: None, stop: Box::new(|| false) }
+    }
+
+    /// Also checks that the certificate is about a mission in its present situation.
+    #[must_use]
+    pub fn mission(self, mission: impl Into<Option<&'a Mission>>) -> Self {
+        Self { mission: mission.into(), ..self }
+    }
+
+    /// The comparison of the task with the files, which can take long, fails after this long, counted from now.
+    #[must_use]
+    pub fn time_limit(self, time: Duration) -> Self {
+        Self { until: Instant::now().checked_add(time), ..self }
+    }
+
+    /// That comparison also fails when this says so.
+    #[must_use]
+    pub fn stop(self, stop: impl Fn() -> bool + 'a) -> Self {
+        Self { stop: Box::new(stop), ..self }
+    }
+
+    /// Checks part by part. What is wrong with the certificate is a part that fails, and no error.
+    pub fn verify(&self) -> Verification {
+        let mut report = Verification { claim: None, parts: Vec::new() };
+        match read(self.directory) {
+            Ok((manifest, contents)) => {
+                report.claim = Some(manifest.claim.clone());
+                let bytes: u64 = manifest.files.iter().map(|file| file.bytes).sum();
+                let files =
+                    format!("{} files, {bytes} bytes, as the manifest has them", manifest.files.len());
+                report.parts.push(VerifiedPart { part: "files", result: Ok(files) });
+                report.parts.extend(parts(self.directory, &manifest, &contents, &|| self.is_over()));
+                if let Some(mission) = self.mission {
+                    let written = written(&contents);
+                    let domain = text(&contents, DOMAIN);
+                    let result = about(written.as_ref(), (domain, text(&contents, PROBLEM)), mission);
+                    report.parts.push(VerifiedPart { part: "mission", result });
+                }
+            }
+            Err(reason) => report.parts.push(VerifiedPart { part: "files", result: Err(reason) }),
+        }
+        report
+    }
+
+    /// The argument of the certificate as verification conditions in SMT-LIB 2; it is not checked here.
+    ///
+    /// # Errors
+    /// M121: the certificate cannot be read, or its task has derived variables, for which there are no such conditions.
+    pub fn conditions(&self) -> Result<String, Errors> {
+        conditions(self.directory, &|| self.is_over()).map_err(Errors::from)
+    }
+
+    fn is_over(&self) -> bool {
+        self.until.is_some_and(|until| Instant::now() >= until) || (self.stop)()
+    }
+}
+
+impl fmt::Debug for Verifier<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Verifier").field("directory", &self.directory).finish_non_exhaustive()
+    }
+}
+
+fn conditions(directory: &Path, stop: &dyn Fn() -> bool) -> Result<String, Message> {
     let wrong = |reason: String| Message::at("M121", &directory.display().to_string(), None, reason);
     let (Manifest { claim, .. }, contents) = read(directory).map_err(wrong)?;
     let text = |name: &str| text(&contents, name);

@@ -33,8 +33,8 @@ pub mod plan;
 pub mod task;
 pub mod watch;
 
-pub use answer::{VerificationAnswer, json, text};
-pub use check::{conditions, verify};
+pub use answer::{VerificationAnswer, json};
+pub use check::Verifier;
 pub use codes::CODES;
 pub use manifest::{Claim, Verification, VerifiedPart};
 pub use watch::{Watch, seconds};

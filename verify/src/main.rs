@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::{Parser, ValueEnum};
-use metaplan_verify::{Verification, Watch, conditions, json, seconds, text, verify};
+use metaplan_verify::{Verification, Verifier, Watch, json, seconds};
 use mission::file;
 use mission::message::{ErrorAnswer, Message};
 use mission::visible::{pretty, visible, visible_json};
@@ -49,32 +49,32 @@ fn main() -> ExitCode {
     let outcome = std::panic::catch_unwind(|| run(&arguments));
     ExitCode::from(match outcome {
         Ok(Ok(report)) => show(&report, arguments.format),
-        Ok(Err(message)) => {
-            fail(&message, arguments.format);
+        Ok(Err(messages)) => {
+            fail(&messages, arguments.format);
             BAD_INPUT
         }
         Err(panic) => {
-            fail(&Message::of_panic(&*panic), arguments.format);
+            fail(&[Message::of_panic(&*panic)], arguments.format);
             FAULT
         }
     })
 }
 
 /// Checks the certificate.
-fn run(arguments: &Arguments) -> Result<Verification, Message> {
+fn run(arguments: &Arguments) -> Result<Verification, Errors> {
     let Arguments { directory, format, smt, time_limit } = arguments.clone();
     let watch = Watch::start(time_limit, move |report| std::process::exit(show(report, format).into()));
-    let stop = || watch.reached();
+    let verifier = Verifier::new(&directory).stop(|| watch.reached());
     if let Some(file) = &smt {
-        file::write(file, &conditions(&directory, &stop)?)?;
+        file::write(file, &verifier.conditions()?)?;
     }
-    Ok(watch.end(verify(&directory, None, &stop)))
+    Ok(watch.end(verifier.verify()))
 }
 
 /// Writes what came of it; returns the status.
 fn show(report: &Verification, format: Format) -> u8 {
     let written = document(&match format {
-        Format::Text => text(report),
+        Format::Text => report.to_string(),
         Format::Json => json(report),
     });
     match (written, report.verified()) {
@@ -85,14 +85,15 @@ fn show(report: &Verification, format: Format) -> u8 {
 }
 
 /// Writes an error: text on standard error, or a JSON object as the answer.
-fn fail(message: &Message, format: Format) {
+fn fail(messages: &[Message], format: Format) {
     match format {
         Format::Text => {
-            let _ = std::io::stderr().write_all(visible(message.text()).as_bytes());
+            for message in messages {
+                let _ = std::io::stderr().write_all(visible(message.text()).as_bytes());
+            }
         }
         Format::Json => {
-            let messages = [message.clone()];
-            document(&visible_json(&pretty(&ErrorAnswer::new(&messages))));
+            document(&visible_json(&pretty(&ErrorAnswer::new(messages))));
         }
     }
 }

@@ -10,12 +10,14 @@
 //!
 //! - \[1\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
 
+mod builder;
 mod candidates;
 mod knowledge;
 mod objective;
 mod select;
 mod state;
 
+pub use builder::RuntimeBuilder;
 pub use candidates::{Candidate, Missed};
 pub use knowledge::{Mode, Runtime};
 pub use objective::NewObjective;

@@ -1,0 +1,31 @@
+//! A bound on all plans of a ground task, checked without a planner.
+//!
+//! `cargo run -p metaplan-certificate --example argument`
+#![expect(clippy::print_stdout, reason = "an example prints")]
+
+use metaplan_certificate::{Fault, check};
+use num_rational::BigRational;
+
+/// A task without operators, whose goal holds at first.
+const TASK: &str = r#"{"format": "metaplan-task/1", "objects": [], "schemas": [],
+  "variables": [["(p)", "none of these"]], "basic": 1, "values": [0], "numbers": [], "fluents": [], "number_scale": 1,
+  "slots": [], "uses": [], "exclusions": [], "tables": [], "operators": [], "axioms": [], "goal": {"facts": [[0, 0]]},
+  "objective": {"scale": 1, "offset": 0, "maximize": false}, "time_scale": 1}"#;
+const ARGUMENT: &str =
+    r#"{"format": "metaplan-argument/1", "potentials": [], "needs": [], "labels": [[[0], [], 0]]}"#;
+
+fn main() {
+    for cost in [0, 1] {
+        let cost = BigRational::from_integer(cost.into());
+        match check(TASK, ARGUMENT, Some(&cost)) {
+            Ok(_) => println!("no plan costs less than {cost}"),
+            Err(fault) => println!("not proved that no plan costs less than {cost}: {fault}"),
+        }
+    }
+    // That there is no plan is not true, and nothing shows it.
+    match check(TASK, ARGUMENT, None) {
+        Ok(_) => println!("there is no plan"),
+        Err(Fault::Goal(label)) => println!("there may be a plan: label {label} is a goal"),
+        Err(fault) => println!("not proved: {fault}"),
+    }
+}

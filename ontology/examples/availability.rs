@@ -1,0 +1,34 @@
+//! Which function designs of a knowledge base can be used, and what the failure of each component costs.
+//!
+//! `cargo run -p metaplan-ontology --example availability -- KNOWLEDGE_BASE`
+#![expect(clippy::print_stdout, reason = "an example prints")]
+
+use std::error::Error;
+
+use metaplan_ontology::runtime::Runtime;
+use metaplan_ontology::tomasys::change::Status;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let own = concat!(env!("CARGO_MANIFEST_DIR"), "/kb/ugv.ttl");
+    let file =
+        std::env::args().nth(1).filter(|word| !word.starts_with('-')).unwrap_or_else(|| own.to_owned());
+    let (runtime, warnings) = Runtime::builder().file(file).build()?;
+    for warning in warnings {
+        println!("{warning}");
+    }
+    let designs = runtime.view().function_designs();
+    println!("{} designs", designs.len());
+    for component in runtime.view().components() {
+        // A copy shares everything that does not change.
+        let mut broken = runtime.clone();
+        broken.report_component(&component.individual.name, Status::Failed)?;
+        let lost = broken.view().function_designs();
+        let lost: Vec<&str> = lost
+            .iter()
+            .filter(|design| !design.available)
+            .map(|design| design.individual.name.as_str())
+            .collect();
+        println!("without {}: {}", component.individual.name, lost.join(", "));
+    }
+    Ok(())
+}

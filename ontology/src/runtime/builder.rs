@@ -1,0 +1,111 @@
+//! The front door: documents and rules to knowledge at run time.
+
+use std::path::PathBuf;
+
+use rules::{Engine, Limits, Prefixes, Symbols, Syntax, parse_rules_together};
+
+use crate::error::{Error, Errors, Warning};
+use crate::lower::{Equality, lower_together};
+use crate::read::{ReadOptions, read_files};
+use crate::runtime::knowledge::{Mode, Runtime};
+
+/// Puts documents and rules together; [`Runtime::builder`] makes it.
+///
+/// ```
+/// use metaplan_ontology::runtime::Runtime;
+/// use metaplan_ontology::tomasys::change::Status;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let (mut runtime, warnings) =
+///     Runtime::builder().file("kb/ugv.ttl").rules("coadaptation", rules::COADAPTATION_RULES).build()?;
+/// assert!(warnings.is_empty());
+/// assert!(runtime.view().function_designs().iter().all(|design| design.available));
+///
+/// runtime.report_component("c_kinect", Status::Failed)?;
+/// let designs = runtime.view().function_designs();
+/// let lost = designs.iter().filter(|design| !design.available).map(|design| &design.individual.name);
+/// assert_eq!(lost.collect::<Vec<_>>(), ["fd_amcl_kinect", "fd_mrpt_kinect"]);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug, Clone, Default)]
+pub struct RuntimeBuilder {
+    files: Vec<PathBuf>,
+    options: ReadOptions,
+    rules: Vec<(String, String)>,
+    equality: Equality,
+    mode: Mode,
+    limits: Limits,
+}
+
+impl RuntimeBuilder {
+    /// A document, in any syntax that is read, with all that it imports.
+    #[must_use]
+    pub fn file(mut self, file: impl Into<PathBuf>) -> Self {
+        self.files.push(file.into());
+        self
+    }
+
+    /// Where imports are looked for.
+    #[must_use]
+    pub fn options(self, options: ReadOptions) -> Self {
+        Self { options, ..self }
+    }
+
+    /// Rules in SWRL's human-readable syntax besides those of the documents; `source` names the text in errors. What one text asks for,
+    /// another may conclude.
+    #[must_use]
+    pub fn rules(mut self, source: &str, text: &str) -> Self {
+        self.rules.push((source.to_owned(), text.to_owned()));
+        self
+    }
+
+    /// Whether two names may stand for one individual; as in OWL unless said otherwise.
+    #[must_use]
+    pub fn equality(self, equality: Equality) -> Self {
+        Self { equality, ..self }
+    }
+
+    /// What becomes of a conclusion whose cause is gone; it goes, too, unless said otherwise.
+    #[must_use]
+    pub fn mode(self, mode: Mode) -> Self {
+        Self { mode, ..self }
+    }
+
+    /// The limits of the first derivation and of each later update.
+    #[must_use]
+    pub fn limits(self, limits: Limits) -> Self {
+        Self { limits, ..self }
+    }
+
+    /// Reads everything, and derives what follows; beside it what was left out or may be other than meant.
+    ///
+    /// # Errors
+    /// All errors of all documents and rules: O101 to O112; those of rules and of the engine are [`Error::Engine`].
+    pub fn build(self) -> Result<(Runtime, Vec<Warning>), Errors> {
+        let mut symbols = Symbols::new();
+        let texts: Vec<(&str, &str)> =
+            self.rules.iter().map(|(source, text)| (source.as_str(), text.as_str())).collect();
+        let rules = parse_rules_together(&texts, &mut symbols, &Prefixes::default(), &Syntax::default());
+        let read = read_files(&self.files, &self.options);
+        let (ontology, rules) = match (read, rules) {
+            (Ok(ontology), Ok(rules)) => (ontology, rules),
+            (read, rules) => {
+                let wrong = rules.err().into_iter().flatten().map(Error::Engine);
+                return Err(read.err().into_iter().flatten().chain(wrong).collect());
+            }
+        };
+        let lowered = lower_together(&ontology, rules.rules, self.equality, &mut symbols);
+        let engine = Engine::with_limits(symbols, lowered.program, lowered.facts, self.limits)
+            .map_err(|errors| errors.map(Error::Engine))?;
+        let warnings = ontology.warnings.into_iter().chain(lowered.warnings).collect();
+        Ok((Runtime::new(engine, self.mode), warnings))
+    }
+}
+
+impl Runtime {
+    /// To read documents and rules.
+    pub fn builder() -> RuntimeBuilder {
+        RuntimeBuilder::default()
+    }
+}
