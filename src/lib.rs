@@ -5,6 +5,7 @@
 //! `metaplan-mission` joins OWL and PDDL, [`mission`] plans with both, and `metaplan-verify` checks what is claimed of plans. Order lives
 //! here, not logic.
 
+pub use ::{probabilistic, verify};
 pub use ::mission::{Errors, Message, file, knowledge, message, visible};
 pub use ::verify::measure;
 pub use {encodings, ontology, pddl, picture, rules};

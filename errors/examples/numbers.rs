@@ -5,7 +5,7 @@
 
 use std::num::ParseIntError;
 
-use metaplan_errors::Errors;
+use errors::Errors;
 
 fn numbers(line: &str) -> Result<Vec<u8>, Errors<ParseIntError>> {
     let (read, wrong): (Vec<_>, Vec<_>) =

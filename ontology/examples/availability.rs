@@ -5,8 +5,8 @@
 
 use std::error::Error;
 
-use metaplan_ontology::runtime::Runtime;
-use metaplan_ontology::tomasys::change::Status;
+use ontology::runtime::Runtime;
+use ontology::tomasys::change::Status;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let own = concat!(env!("CARGO_MANIFEST_DIR"), "/kb/ugv.ttl");

@@ -5,8 +5,7 @@
 
 use std::error::Error;
 
-use metaplan_pddl::validate::Validator;
-use metaplan_pddl::{Source, read};
+use metaplan_pddl::{Source, Validator, read};
 
 const OWN: [(&str, &str); 3] = [
     (
@@ -37,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     let verdict = Validator::new(&domain, &problem).validate(&source(2)?)?;
     match &verdict.violation {
-        None => println!("valid, {} steps", verdict.steps),
+        None => println!("valid, total time {}", verdict.total_time),
         Some(violation) => println!("not valid: {}", violation.message),
     }
     Ok(())

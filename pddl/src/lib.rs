@@ -28,6 +28,7 @@ pub mod source;
 mod strata;
 mod types;
 pub mod validate;
+mod validator;
 
 pub use check::{check, check_domain};
 pub use codes::CODES;
@@ -39,6 +40,7 @@ pub use portable::portable;
 pub use print::{print_domain, print_problem};
 pub use source::{Position, Source};
 pub use types::TypeHierarchy;
+pub use validator::Validator;
 
 use ast::{Direction, Domain, Metric, Problem};
 

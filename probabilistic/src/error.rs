@@ -1,5 +1,6 @@
 //! What can be wrong with a model or a property, and with how large it is.
 
+use errors::Errors;
 use thiserror::Error;
 
 /// A place in a text: line and column from 1, the column in characters.
@@ -35,11 +36,11 @@ impl Diagnostic {
 #[non_exhaustive]
 pub enum Error {
     /// The model cannot be read, or does something in a reachable state that it must not do.
-    #[error("the model is wrong in {} places", .0.len())]
-    Model(Vec<Diagnostic>),
+    #[error("the model is wrong:\n{0}")]
+    Model(Errors<Diagnostic>),
     /// The property cannot be read, or does not fit the model.
-    #[error("the property is wrong in {} places", .0.len())]
-    Property(Vec<Diagnostic>),
+    #[error("the property is wrong:\n{0}")]
+    Property(Errors<Diagnostic>),
     /// A constant that is set from outside is not there, or a value does not fit it.
     #[error("{0}")]
     Constant(String),
@@ -62,8 +63,18 @@ pub enum Error {
     Policy(String),
 }
 
+impl Error {
+    /// What is wrong with the text of the model or of the property, with places; nothing where it is not for them.
+    pub fn diagnostics(&self) -> &[Diagnostic] {
+        match self {
+            Self::Model(problems) | Self::Property(problems) => problems,
+            _ => &[],
+        }
+    }
+}
+
 impl From<Diagnostic> for Error {
     fn from(diagnostic: Diagnostic) -> Self {
-        Self::Model(vec![diagnostic])
+        Self::Model(diagnostic.into())
     }
 }

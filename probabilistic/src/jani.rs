@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use num_traits::ToPrimitive;
 use serde_json::{Value, json};
 
-use crate::error::Diagnostic;
+use crate::error::{Diagnostic, Error};
 use crate::prism::ast::{
     BinaryOp, Command, Expr, ExprKind, Function, Model, ModelKind, Module, Named, RewardItem, Rewards, Type,
     Variable,
@@ -18,11 +18,11 @@ use crate::prism::ast::{
 ///
 /// # Errors
 /// What JANI cannot say: rewards of commands without action; formulas that contain themselves.
-pub fn write(name: &str, model: &Model) -> Result<Value, Vec<Diagnostic>> {
+pub fn write(name: &str, model: &Model) -> Result<Value, Error> {
     let endless: Vec<Diagnostic> =
         model.formulas.iter().filter_map(|formula| endless(model, formula)).collect();
     if !endless.is_empty() {
-        return Err(endless);
+        return Err(Error::Model(endless.into()));
     }
     let writer = Writer { formulas: &model.formulas };
     let mut problems = Vec::new();
@@ -52,7 +52,7 @@ pub fn write(name: &str, model: &Model) -> Result<Value, Vec<Diagnostic>> {
         }
     }
     if !problems.is_empty() {
-        return Err(problems);
+        return Err(Error::Model(problems.into()));
     }
     let constants = model.constants.iter().map(|constant| {
         let mut entry = json!({ "name": constant.name, "type": type_name(constant.kind) });

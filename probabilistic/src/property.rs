@@ -73,7 +73,7 @@ pub struct Listed {
 /// # Errors
 /// What is wrong with it.
 pub fn parse(text: &str) -> Result<Property, Error> {
-    let tokens = tokens(text).map_err(Error::Property)?;
+    let tokens = tokens(text).map_err(|problems| Error::Property(problems.into()))?;
     let mut cursor = Cursor::of_properties(&tokens, BESIDES);
     let read = property(&mut cursor).and_then(|property| {
         cursor.take(";");
@@ -83,7 +83,7 @@ pub fn parse(text: &str) -> Result<Property, Error> {
             Err(cursor.expected("the end of the property"))
         }
     });
-    read.map_err(|problem| Error::Property(vec![problem]))
+    read.map_err(|problem| Error::Property(problem.into()))
 }
 
 /// Reads a file of properties, with its constants and labels.
@@ -91,7 +91,7 @@ pub fn parse(text: &str) -> Result<Property, Error> {
 /// # Errors
 /// All that is wrong with it; after a wrong property, reading goes on behind the next `;`.
 pub fn parse_file(text: &str) -> Result<File, Error> {
-    let tokens = tokens(text).map_err(Error::Property)?;
+    let tokens = tokens(text).map_err(|problems| Error::Property(problems.into()))?;
     let mut cursor = Cursor::of_properties(&tokens, BESIDES);
     let (mut file, mut problems) = (File::default(), Vec::new());
     while *cursor.peek() != Kind::End {
@@ -106,7 +106,7 @@ pub fn parse_file(text: &str) -> Result<File, Error> {
             }
         }
     }
-    if problems.is_empty() { Ok(file) } else { Err(Error::Property(problems)) }
+    if problems.is_empty() { Ok(file) } else { Err(Error::Property(problems.into())) }
 }
 
 fn entry(cursor: &mut Cursor<'_>, text: &str, file: &mut File) -> Read<()> {

@@ -17,7 +17,7 @@ fn ask(model: &str, question: &str) -> String {
 fn asked(model: &str, question: &str, exactness: Exactness) -> String {
     let model = match prism::parse(model) {
         Ok(model) => model,
-        Err(problems) => return first(&problems),
+        Err(error) => return first(error.diagnostics()),
     };
     let property = match property::parse(question) {
         Ok(property) => property,

@@ -161,8 +161,7 @@ fn filters() {
 /// States in which it can start: each by the same equations as for the others, P [ F d=1 ] as above.
 #[test]
 fn several_states_to_start_in() {
-    let model =
-        CHAIN.replace(" init 0;", ";").replace("d : [0..3]", "d : [0..3]") + " init s<=2 & d=0 endinit";
+    let model = CHAIN.replace(" init 0;", ";") + " init s<=2 & d=0 endinit";
     let found = outcome(&model, "P=? [ F d=1 ]", Exactness::Auto);
     let Outcome::Range(least, greatest) = found else { panic!("{found:?}") };
     let exact = |answer: &Answer| answer.quantity().and_then(|found| found.exact.clone()).expect("exact");

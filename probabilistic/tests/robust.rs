@@ -63,7 +63,10 @@ fn formulas_that_contain_themselves_are_refused() {
     let model = "mdp formula a = b; formula b = a; module m s:[0..1] init 0; [] a -> (s'=1); endmodule";
     survive(&format!("{model} label \"goal\" = a;"));
     let problems = jani::write("m", &prism::parse(model).expect("a model")).expect_err("refused");
-    assert_eq!(problems.iter().map(|problem| problem.code).collect::<Vec<_>>(), ["Q204", "Q204"]);
+    assert_eq!(
+        problems.diagnostics().iter().map(|problem| problem.code).collect::<Vec<_>>(),
+        ["Q204", "Q204"]
+    );
 }
 
 #[test]

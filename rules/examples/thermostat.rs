@@ -7,12 +7,12 @@ use std::error::Error;
 
 use metaplan_rules::{Delta, Engine, Fact, Literal};
 
-const RULES: &str = r#"
+const RULES: &str = r"
     @prefix : <http://example.org/#> .
     [cold]   Room(?r) ^ temperature(?r, ?t) ^ swrlb:lessThan(?t, 18) -> Cold(?r) .
     [heat]   Cold(?r) ^ not windowOpen(?r, true) -> heated(?r, true) .
     [rooms]  -> Room(kitchen) ^ Room(study) .
-"#;
+";
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut engine = Engine::builder().rules("thermostat.swrl", RULES).build()?;

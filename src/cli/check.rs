@@ -15,7 +15,7 @@ use probabilistic::{Error, prism, property};
 
 use crate::cli::check_series::{Combination, combinations, csv, table};
 use crate::cli::check_text::as_text;
-use crate::cli::common::{Common, Exit, Failure, Format, in_file, process_failure};
+use crate::cli::common::{Common, Exit, Failure, Format, process_failure};
 use crate::cli::output;
 use crate::cli::progress::Progress;
 use crate::cli::values::setting;
@@ -101,7 +101,7 @@ struct Answered<'a> {
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let file = source(&arguments.model)?;
     let model_text = (file.name(), file.text());
-    let model = prism::parse(file.text()).map_err(|problems| in_file(&problems, model_text))?;
+    let model = prism::parse(file.text()).map_err(|error| process_failure(error, model_text, ("", "")))?;
     let mut asked = asked(arguments)?;
     let declarations = std::mem::take(&mut asked.declarations);
     let (file, text) = (asked.file.clone(), asked.text.clone());
@@ -301,11 +301,9 @@ fn write_all(
 
 /// What is wrong, in words.
 fn said(error: &Error) -> Vec<String> {
-    match error {
-        Error::Model(problems) | Error::Property(problems) => {
-            problems.iter().map(|problem| problem.message.clone()).collect()
-        }
-        other => vec![other.to_string()],
+    match error.diagnostics() {
+        [] => vec![error.to_string()],
+        problems => problems.iter().map(|problem| problem.message.clone()).collect(),
     }
 }
 

@@ -106,10 +106,10 @@ fn process(
     let text = match arguments.target {
         Language::Jani => match probabilistic::jani::write(&mission.name, &model) {
             Ok(json) => output::pretty(&json),
-            Err(problems) => {
+            Err(error) => {
                 let message =
                     |problem: &probabilistic::Diagnostic| Message::error(problem.code, &problem.message);
-                return Err(problems.iter().map(message).collect::<Vec<_>>().into());
+                return Err(error.diagnostics().iter().map(message).collect::<Vec<_>>().into());
             }
         },
         _ => probabilistic::prism::write(&model),

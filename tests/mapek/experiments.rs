@@ -240,12 +240,10 @@ fn a_better_design_returns() {
     let detour = |benefit: i64, settle: u64| {
         let mut ugv = control("ugv");
         let mission = ugv.beliefs().mission().clone();
-        let settings = metaplan::mapek::Settings {
-            minimum_benefit: num_rational::BigRational::from_integer(benefit.into()),
-            settle: std::time::Duration::from_secs(settle),
-            time_limit: None,
-            stay_close: false,
-        };
+        let settings = metaplan::mapek::Settings::default()
+            .with_minimum_benefit(num_rational::BigRational::from_integer(benefit.into()))
+            .with_settle(std::time::Duration::from_secs(settle))
+            .with_time_limit(None);
         ugv = Loop::new(mission, settings).expect("a loop");
         ugv.start();
         for line in [

@@ -46,7 +46,7 @@ fn examples_say_what_they_are_to_say() {
         .collect();
     assert_eq!(heated, [false, true, false], "{text}");
     assert!(printed("availability").contains("without c_kinect: fd_amcl_kinect, fd_mrpt_kinect\n"));
-    assert_eq!(printed("judge"), "valid, 2 steps\n");
+    assert_eq!(printed("judge"), "valid, total time 0\n");
     let text = printed("filled");
     let [before, after] = text.split("; without c_kinect\n").collect::<Vec<_>>()[..] else {
         panic!("{text}")
@@ -69,5 +69,8 @@ fn examples_say_what_they_are_to_say() {
     assert!(printed("gamble").contains("Pmax=? [ F \"there\" ]: 1 (in [1, 1])\n"));
     assert!(printed("timeline").contains("lidar"));
     let text = printed("adapt");
-    assert!(text.contains("the certificate is verified\n") && text.contains("\"answer\":\"plan\""), "{text}");
+    assert!(
+        text.contains("the certificate is verified\n") && text.contains("\"answer\":\"plan_found\""),
+        "{text}"
+    );
 }

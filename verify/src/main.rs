@@ -8,7 +8,7 @@ use std::time::Duration;
 use clap::{Parser, ValueEnum};
 use metaplan_verify::{Verification, Verifier, Watch, json, seconds};
 use mission::file;
-use mission::message::{ErrorAnswer, Message};
+use mission::message::{ErrorAnswer, Errors, Message};
 use mission::visible::{pretty, visible, visible_json};
 
 /// The statuses of `metaplan verify`.

@@ -12,8 +12,8 @@ use crate::runtime::knowledge::{Mode, Runtime};
 /// Puts documents and rules together; [`Runtime::builder`] makes it.
 ///
 /// ```
-/// use metaplan_ontology::runtime::Runtime;
-/// use metaplan_ontology::tomasys::change::Status;
+/// use ontology::runtime::Runtime;
+/// use ontology::tomasys::change::Status;
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let (mut runtime, warnings) =

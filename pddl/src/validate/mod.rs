@@ -25,7 +25,6 @@ mod solve;
 mod step;
 mod targets;
 mod trajectory;
-mod validator;
 mod verdict;
 mod world;
 
@@ -38,7 +37,6 @@ pub use advance::{Advance, ValueChange, advance, advance_each, metric_after};
 pub use course::{Course, CourseMoment, NumberBound, course};
 pub use options::Options;
 pub use plan::{PlanStep, PlanText};
-pub use validator::Validator;
 pub use verdict::{Unmet, Verdict, Violation, ViolationKind};
 
 use evaluate::{Bindings, Evaluator};

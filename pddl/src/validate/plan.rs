@@ -2,11 +2,10 @@
 
 use num_rational::BigRational;
 
-use crate::Source;
 use crate::ast::{Name, Span};
 use crate::diagnostic::{Errors, Sink};
 use crate::number::{Literal, literal};
-use crate::source::place;
+use crate::source::{Source, place};
 
 /// A plan as somebody wrote it: the steps in the order of the text.
 #[derive(Debug, Clone, Default)]

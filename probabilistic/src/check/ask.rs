@@ -27,7 +27,7 @@ pub fn worked<T>(found: Option<T>) -> Asked<T> {
 
 /// Something that is wrong with a property.
 pub fn property_error(code: &'static str, place: Place, text: &str) -> Error {
-    Error::Property(vec![Diagnostic::new(code, place, text)])
+    Error::Property(Diagnostic::new(code, place, text).into())
 }
 
 /// Something that is wrong with a property, at a place that is not known.

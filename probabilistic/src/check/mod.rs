@@ -74,7 +74,7 @@ pub struct Report {
 /// Everything that is wrong with model, property, constants or policy, or that a limit was reached.
 pub fn check(model: &Model, property: &Property, options: &Options<'_>) -> Result<Report, Error> {
     let reports = check_all(model, &[property], options)?;
-    reports.into_iter().next().unwrap_or_else(|| Err(Error::Property(Vec::new())))
+    reports.into_iter().next().unwrap_or_else(|| Err(Error::Property(Vec::new().into())))
 }
 
 /// Checks several properties of a model, which is explored once.

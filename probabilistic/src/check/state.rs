@@ -88,7 +88,7 @@ impl<N: Number> Query<'_, N> {
     pub fn kind_of(&self, expression: &Expr) -> Asked<Type> {
         let names = &self.program.names;
         let found = names.clone().compile(&with_placeholders(expression, names));
-        found.map(|(_, kind)| kind).map_err(|problem| Stop::Wrong(Error::Property(vec![problem])))
+        found.map(|(_, kind)| kind).map_err(|problem| Stop::Wrong(Error::Property(problem.into())))
     }
 
     /// All states.
@@ -134,7 +134,7 @@ impl<N: Number> Query<'_, N> {
                 &mut problems,
             );
         }
-        let code = names.typed(&written, kind).map_err(|problem| Error::Property(vec![problem]))?;
+        let code = names.typed(&written, kind).map_err(|problem| Error::Property(problem.into()))?;
         Ok((code, sets))
     }
 
@@ -253,7 +253,7 @@ impl<N: Number> Query<'_, N> {
         let value = code.and_then(|code| {
             code.number(&[]).map_err(|fault| Diagnostic::new("Q303", expression.place, fault.0))
         });
-        Ok(value.map_err(|problem| Error::Property(vec![problem]))?)
+        Ok(value.map_err(|problem| Error::Property(problem.into()))?)
     }
 }
 

@@ -15,7 +15,7 @@ struct Validation {
 pub fn validate<N: Number>(program: &Program<N>, property: &Property) -> Result<(), Error> {
     let mut validation = Validation { names: program.names.clone(), problems: Vec::new() };
     validation.property(property);
-    if validation.problems.is_empty() { Ok(()) } else { Err(Error::Property(validation.problems)) }
+    if validation.problems.is_empty() { Ok(()) } else { Err(Error::Property(validation.problems.into())) }
 }
 
 /// The properties in an expression.

@@ -115,7 +115,7 @@ impl Names {
             }
         }
         if !problems.is_empty() {
-            return Err(Error::Model(problems));
+            return Err(Error::Model(problems.into()));
         }
         if !missing.is_empty() {
             return Err(Error::Constant(format!("constants without value: {}", missing.join(", "))));

@@ -108,7 +108,7 @@ impl<N: Number> Program<N> {
             }
         }
         if !problems.is_empty() {
-            return Err(Error::Model(problems));
+            return Err(Error::Model(problems.into()));
         }
         let mut numbers: FxHashMap<&str, u32> = FxHashMap::default();
         for command in model.modules.iter().flat_map(|module| &module.commands) {
@@ -157,7 +157,7 @@ impl<N: Number> Program<N> {
         }
         program.names = names;
         program.index();
-        if problems.is_empty() { Ok(program) } else { Err(Error::Model(problems)) }
+        if problems.is_empty() { Ok(program) } else { Err(Error::Model(problems.into())) }
     }
 
     fn find_starts(&self, model: &Model, names: &mut Names) -> Result<Vec<Packed>, Diagnostic> {

@@ -1,6 +1,6 @@
 //! Tokens to the syntax tree of a model.
 
-use crate::error::{Diagnostic, Place};
+use crate::error::{Diagnostic, Error, Place};
 use crate::prism::ast::{
     Command, Constant, Expr, Model, ModelKind, Module, Named, RewardItem, Rewards, Type, Update, Variable,
 };
@@ -12,8 +12,8 @@ use crate::prism::rename;
 ///
 /// # Errors
 /// All that is wrong with its syntax; after a wrong part, reading goes on with the next one.
-pub fn parse(text: &str) -> Result<Model, Vec<Diagnostic>> {
-    let tokens = tokens(text)?;
+pub fn parse(text: &str) -> Result<Model, Error> {
+    let tokens = tokens(text).map_err(|problems| Error::Model(problems.into()))?;
     let mut cursor = Cursor::new(&tokens);
     let mut model = Model {
         kind: ModelKind::Mdp,
@@ -42,7 +42,7 @@ pub fn parse(text: &str) -> Result<Model, Vec<Diagnostic>> {
         problems.push(Diagnostic::new("Q107", cursor.place(), "the model has no module"));
     }
     model.kind = kind.unwrap_or(ModelKind::Mdp);
-    if problems.is_empty() { Ok(model) } else { Err(problems) }
+    if problems.is_empty() { Ok(model) } else { Err(Error::Model(problems.into())) }
 }
 
 /// After a mistake: to the end of a declaration, or to a word that starts another.

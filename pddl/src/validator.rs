@@ -11,8 +11,7 @@ use crate::validate::{Options, PlanText, Verdict, validate};
 /// have.
 ///
 /// ```
-/// use metaplan_pddl::validate::Validator;
-/// use metaplan_pddl::{Source, read};
+/// use metaplan_pddl::{Source, Validator, read};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let domain = Source::new("d.pddl", "(define (domain d) (:predicates (open))
