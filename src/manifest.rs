@@ -26,17 +26,22 @@ pub struct ManifestPath {
 /// The file cannot be read, is no manifest, or has other sections or keys: all that is wrong with them.
 pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, ManifestPath), Errors> {
     let source = source(file)?;
-    let (name, text) = (source.name().to_owned(), source.text());
-    file::expect(Kind::Manifest, &name, text)?;
-    let sections = toml::from_str(text).map_err(|error| mistakes::<S>(text, error, &name))?;
-    Ok((
-        sections,
-        ManifestPath {
-            file: name,
-            directory: file.parent().map(Path::to_owned).unwrap_or_default(),
-            text: text.into(),
-        },
-    ))
+    parse(source.name(), source.text(), &file.parent().map(Path::to_owned).unwrap_or_default())
+}
+
+/// A manifest from its text, whose paths are relative to a directory; `name` stands for the file in messages.
+///
+/// # Errors
+/// It is no manifest, or has other sections or keys: all that is wrong with them.
+pub fn parse<S: DeserializeOwned>(
+    name: &str,
+    text: &str,
+    directory: &Path,
+) -> Result<(S, ManifestPath), Errors> {
+    file::expect(Kind::Manifest, name, text)?;
+    let sections = toml::from_str(text).map_err(|error| mistakes::<S>(text, error, name))?;
+    let (file, directory, text) = (name.to_owned(), directory.to_owned(), text.into());
+    Ok((sections, ManifestPath { file, directory, text }))
 }
 
 impl ManifestPath {

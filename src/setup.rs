@@ -13,7 +13,7 @@ use crate::file::source;
 use crate::knowledge::Knowledge;
 use crate::manifest::{self, ManifestPath};
 use crate::mapek::{AdaptationSection, Settings};
-use crate::message::{Errors, Message};
+use crate::message::{Errors, Message, did_you_mean};
 use crate::mission::{BindingsSection, KnowledgeSection, Mission, PlanningSection, Scenario};
 use crate::report::{Positions, ReportSection};
 use crate::simulate::Simulation;
@@ -62,7 +62,20 @@ impl Setup {
     /// # Errors
     /// All that is wrong with the manifest and with the files that it names.
     pub fn read(manifest: &Path) -> Result<Self, Errors> {
-        let (sections, origin): (Sections, ManifestPath) = manifest::read(manifest)?;
+        let (sections, origin) = manifest::read(manifest)?;
+        Self::of(sections, origin)
+    }
+
+    /// Reads a manifest from its text, and the files that it names by paths relative to a directory; `name` stands for the file in messages.
+    ///
+    /// # Errors
+    /// All that is wrong with the manifest and with the files that it names.
+    pub fn parse(name: &str, text: &str, directory: &Path) -> Result<Self, Errors> {
+        let (sections, origin) = manifest::parse(name, text, directory)?;
+        Self::of(sections, origin)
+    }
+
+    fn of(sections: Sections, origin: ManifestPath) -> Result<Self, Errors> {
         let (settings, bindings) =
             (sections.adaptation.settings(&origin), sections.bindings.bindings(&origin));
         let mut wrong: Vec<Message> = settings.as_ref().err().into_iter().cloned().collect();
@@ -89,6 +102,23 @@ impl Setup {
         mission.change_warnings(|warnings| origin.quote(warnings));
         let Sections { description, probabilistic: roles, report, scenarios, .. } = sections;
         Ok(Self { mission, description, settings, roles, scenarios, report, origin })
+    }
+
+    /// Brings the mission into a situation of the manifest.
+    ///
+    /// # Errors
+    /// M108, there is no such scenario; or the first of its settings that does not fit the mission.
+    pub fn apply(&mut self, scenario: &str) -> Result<(), Message> {
+        let Some(found) = self.scenarios.get(scenario) else {
+            let known: Vec<_> = self.scenarios.keys().map(String::as_str).collect();
+            let text = format!(
+                "the mission has no scenario `{scenario}`; it has: {}{}",
+                known.join(", "),
+                did_you_mean(scenario, known.iter().copied())
+            );
+            return Err(Message::error("M108", text));
+        };
+        found.apply(&mut self.mission).map_err(|message| self.in_scenario(scenario, &message))
     }
 
     /// Where the places lie, which only pictures ask for.

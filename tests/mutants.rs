@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 use serde::Deserialize;
 
 /// What is copied of the workspace.
-const PARTS: [&str; 21] = [
+const PARTS: [&str; 22] = [
     "Cargo.toml",
     "Cargo.lock",
     "README.md",
@@ -33,6 +33,7 @@ const PARTS: [&str; 21] = [
     "verify",
     "probabilistic",
     "picture",
+    "python",
     "ros",
     "tests",
     "benches",

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use metaplan::file::source;
 use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
-use metaplan::message::{Message, did_you_mean};
+use metaplan::message::Message;
 use metaplan::mission::{Bindings, Mission, Names};
 use metaplan::planner;
 use metaplan::setup::Setup;
@@ -121,17 +121,10 @@ impl Situation {
                 }
                 let mut setup = Setup::read(manifest)?;
                 if let Some(name) = &self.scenario {
-                    let scenario = setup.scenarios.get(name).ok_or_else(|| {
-                        let known: Vec<_> = setup.scenarios.keys().map(String::as_str).collect();
-                        let text = format!(
-                            "the mission has no scenario `{name}`; it has: {}{}",
-                            known.join(", "),
-                            did_you_mean(name, known.iter().copied())
-                        );
-                        Failure::usage(Message::error("M108", text))
+                    setup.apply(name).map_err(|message| match message.code.as_str() {
+                        "M108" => Failure::usage(message),
+                        _ => message.into(),
                     })?;
-                    let applied = scenario.apply(&mut setup.mission);
-                    applied.map_err(|message| setup.in_scenario(name, &message))?;
                 }
                 setup
             }

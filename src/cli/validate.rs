@@ -7,17 +7,14 @@ use clap::Args;
 use metaplan::answers::VerdictAnswer;
 use metaplan::file::source;
 use metaplan::message::Message;
-use metaplan::mission::Mission;
+use metaplan::mission::{Mission, read_plan};
 use num_rational::BigRational;
-use pddl::Source;
-use pddl::ast::Name;
-use pddl::validate::{Options, PlanStep, PlanText, Verdict, validate};
-use serde_json::Value;
+use pddl::validate::{Options, Verdict, validate};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::output;
 use crate::cli::situation::Situation;
-use crate::cli::values::{decimal, time};
+use crate::cli::values::time;
 
 /// Arguments of `validate`.
 #[derive(Debug, Args)]
@@ -58,42 +55,6 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         _ => output::answer(&text(&mission, &verdict)),
     }
     Ok(if verdict.valid { Exit::Done } else { Exit::Invalid })
-}
-
-fn read_plan(source: &Source, mission: &Mission) -> Result<PlanText, Failure> {
-    if source.text().trim_start().starts_with('{') {
-        return json_plan(source, mission);
-    }
-    PlanText::parse(source).map_err(|diagnostics| Message::from_pddl(&diagnostics, &[source]).into())
-}
-
-/// The steps of a `metaplan-plan/1` document. Where the knowledge base has given an action of a plain domain its designs, they stand in the
-/// configuration only.
-fn json_plan(source: &Source, mission: &Mission) -> Result<PlanText, Failure> {
-    let bad = |place, text: &str| {
-        Message::at("M111", source.name(), place, text.to_owned()).with_source(source.text())
-    };
-    let document: Value = serde_json::from_str(source.text())
-        .map_err(|error| bad(Some((error.line(), error.column())), &format!("not JSON: {error}")))?;
-    let steps =
-        document["steps"].as_array().ok_or_else(|| bad(None, "no `steps`: not a plan of `metaplan plan`"))?;
-    let mut plan = PlanText::default();
-    for (index, step) in steps.iter().enumerate() {
-        let name = |value: &Value| value.as_str().map(Name::new);
-        let arguments =
-            step["arguments"].as_array().map(|all| all.iter().map(name).collect::<Option<Vec<_>>>());
-        let (Some(action), Some(Some(mut arguments))) = (name(&step["action"]), arguments) else {
-            let text = format!("step {} has no `action` with `arguments`", index + 1);
-            return Err(bad(None, &text).into());
-        };
-        if mission.written_arguments(action.as_str()) == Some(arguments.len()) {
-            let configuration = step["configuration"].as_object();
-            arguments.extend(configuration.into_iter().flat_map(|all| all.values()).filter_map(name));
-        }
-        let (start, duration) = (decimal(&step["start"]), decimal(&step["duration"]));
-        plan.steps.push(PlanStep { action, arguments, start, duration, line: 0 });
-    }
-    Ok(plan)
 }
 
 fn text(mission: &Mission, verdict: &Verdict) -> String {

@@ -9,6 +9,7 @@ mod lean;
 mod planning;
 mod plansys2;
 mod sections;
+mod steps;
 
 pub use ::mission::{Bindings, CoAdaptation, Mission, Names};
 pub use blocking::{Blocking, blocking};
@@ -19,3 +20,4 @@ pub use planning::Planning;
 pub(crate) use planning::{ground_with, replanner};
 pub use plansys2::{PlanLine, instant, plan_lines, popf_text, spaced};
 pub use sections::{BindingsSection, KnowledgeSection, PlanningSection, Scenario};
+pub use steps::read_plan;

@@ -1,0 +1,74 @@
+"""Errors with all that is wrong, each with its place."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Message:
+    """One thing that is wrong, or may be other than meant."""
+
+    code: str
+    """The stable code of the cause; :func:`metaplan.explain_code` says what it means."""
+    severity: str
+    """``error`` or ``warning``."""
+    message: str
+    """What is wrong, and what would be right."""
+    file: str | None = None
+    line: int | None = None
+    """From 1."""
+    column: int | None = None
+    """From 1, in characters."""
+
+    def __str__(self) -> str:
+        place = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
+        return f"{place + ': ' if place else ''}{self.severity}[{self.code}]: {self.message}"
+
+
+def messages_of(text: str) -> list[Message]:
+    """The messages of an answer in JSON."""
+    fields = ("code", "severity", "message", "file", "line", "column")
+    return [
+        Message(**{name: own[name] for name in fields if own.get(name) is not None})
+        for own in json.loads(text)["messages"]
+    ]
+
+
+class Error(Exception):
+    """Why there is no answer: everything that is wrong with the input.
+
+    ``code``, ``file``, ``line`` and ``column`` are those of the first message.
+    """
+
+    def __init__(self, messages: list[Message]) -> None:
+        super().__init__("\n".join(map(str, messages)))
+        self.messages = messages
+
+    @classmethod
+    def _of(cls, text: str) -> Error:
+        return cls(messages_of(text))
+
+    @property
+    def code(self) -> str:
+        """The code of the first message."""
+        return self.messages[0].code
+
+    @property
+    def file(self) -> str | None:
+        """The file of the first message."""
+        return self.messages[0].file
+
+    @property
+    def line(self) -> int | None:
+        """The line of the first message, from 1."""
+        return self.messages[0].line
+
+    @property
+    def column(self) -> int | None:
+        """The column of the first message, from 1, in characters."""
+        return self.messages[0].column
+
+    def __reduce__(self) -> tuple[type[Error], tuple[list[Message]]]:
+        return type(self), (self.messages,)

@@ -1,0 +1,76 @@
+"""Knowledge bases from Python: owlready2 worlds and rdflib graphs in, what follows from them out.
+
+>>> import metaplan.kb
+>>> knowledge = metaplan.kb.load(world)  # an owlready2 world or ontology, or an rdflib graph
+>>> mission = metaplan.Mission.from_files(domain, problem, [knowledge.path])
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import rdflib
+
+from metaplan._answers import Answer
+from metaplan._mission import reason
+
+__all__ = ["Knowledge", "load"]
+
+
+class Knowledge:
+    """A knowledge base as a document that Metaplan reads; it is gone with this object unless it was given a path."""
+
+    def __init__(self, graph: rdflib.Graph, path: str | os.PathLike[str] | None = None) -> None:
+        self._temporary = None
+        if path is None:
+            self._temporary = tempfile.TemporaryDirectory(prefix="metaplan-kb-")
+            path = Path(self._temporary.name) / "knowledge.nt"
+        self.path = Path(path)
+        """The document, in N-Triples."""
+        text = graph.serialize(format="nt", encoding="utf-8")
+        # The same graph gives the same document.
+        self.path.write_bytes(b"".join(sorted(text.splitlines(keepends=True))))
+
+    def __fspath__(self) -> str:
+        return os.fspath(self.path)
+
+    def reason(self, **options: Any) -> Answer:
+        """What follows from it; ``options`` are those of :func:`metaplan.reason`."""
+        return reason(self.path, **options)
+
+    def inferred(self, **options: Any) -> rdflib.Graph:
+        """The assertions that follow from it, as a graph; ``options`` are those of :func:`metaplan.reason`."""
+        graph = rdflib.Graph()
+        graph.parse(data="\n".join(self.reason(**options).to_dict()["inferred"]), format="nt")
+        return graph
+
+    def into(self, world: Any, **options: Any) -> None:
+        """Adds what follows to an owlready2 world."""
+        graph = world.as_rdflib_graph()
+        with world.get_ontology("http://metaplan.invalid/inferred#"):
+            for triple in self.inferred(**options):
+                graph.add(triple)
+
+
+def load(source: Any, path: str | os.PathLike[str] | None = None) -> Knowledge:
+    """From an owlready2 world or ontology, an rdflib graph, or a mapping of these; with ``path`` the document stays there."""
+    if isinstance(source, Mapping):
+        joined = rdflib.Graph()
+        for own in source.values():
+            joined += _graph(own)
+        return Knowledge(joined, path)
+    return Knowledge(_graph(source), path)
+
+
+def _graph(source: Any) -> rdflib.Graph:
+    if isinstance(source, rdflib.Graph) and not hasattr(source, "world"):
+        return source
+    world = getattr(source, "world", source)
+    plain = rdflib.Graph()
+    for triple in world.as_rdflib_graph():
+        plain.add(triple)
+    return plain

@@ -1,0 +1,118 @@
+//! Questions without a mission: certificates, knowledge bases, models, codes.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use metaplan::answers::{CheckAnswer, CodeAnswer, ReasonAnswer, VerificationAnswer};
+use metaplan::certificate::Verifier;
+use metaplan::codes;
+use metaplan::knowledge::{Knowledge, Sources};
+use metaplan::message::{Errors, Message};
+use metaplan::probabilistic::check::{Exactness, Options, check as checked};
+use metaplan::probabilistic::{Error, prism, property};
+use pyo3::exceptions::PyKeyError;
+use pyo3::prelude::*;
+
+use crate::failure::raise;
+use crate::mission::{Mission, seconds};
+use crate::wait::detached;
+
+fn json(answer: &impl serde::Serialize) -> String {
+    serde_json::to_string(answer).unwrap_or_default()
+}
+
+/// What came of a verification: JSON and text.
+#[pyfunction]
+#[pyo3(signature = (directory, mission=None, time_limit=None))]
+pub(crate) fn verify(
+    py: Python<'_>,
+    directory: PathBuf,
+    mission: Option<&Mission>,
+    time_limit: Option<f64>,
+) -> PyResult<(String, String)> {
+    let interrupt = AtomicBool::new(false);
+    let time = time_limit.map(|time| seconds("time_limit", time)).transpose()?;
+    let setup = mission.map(Mission::read);
+    let mission = setup.as_ref().map(|setup| &setup.mission);
+    let (report, stopped) = detached(py, &interrupt, || {
+        let mut verifier =
+            Verifier::new(&directory).mission(mission).stop(|| interrupt.load(Ordering::Relaxed));
+        if let Some(time) = time {
+            verifier = verifier.time_limit(time);
+        }
+        verifier.verify()
+    });
+    stopped.map_or_else(|| Ok((json(&VerificationAnswer::new(&report)), report.to_string())), Err)
+}
+
+/// What follows from knowledge bases and rules, as JSON.
+#[pyfunction]
+#[pyo3(signature = (documents, rules, fail, set))]
+pub(crate) fn reason(
+    py: Python<'_>,
+    documents: Vec<PathBuf>,
+    rules: Vec<String>,
+    fail: Vec<String>,
+    set: Vec<(String, String)>,
+) -> PyResult<String> {
+    let concluded = || -> Result<String, Errors> {
+        let mut knowledge = Knowledge::read(&Sources { documents, rules, ..Sources::default() })?;
+        for component in &fail {
+            knowledge.fail(component)?;
+        }
+        for (attribute, value) in &set {
+            knowledge.measure(attribute, value)?;
+        }
+        let contradictions = knowledge.contradictions();
+        Ok(json(&ReasonAnswer::new(&knowledge, &contradictions)))
+    };
+    py.detach(concluded).map_err(|messages| raise(py, &messages))
+}
+
+/// The value of a property of a PRISM model, as JSON.
+#[pyfunction]
+#[pyo3(signature = (name, model, property, constants, exact=None))]
+pub(crate) fn check(
+    py: Python<'_>,
+    name: &str,
+    model: &str,
+    property: &str,
+    constants: BTreeMap<String, String>,
+    exact: Option<bool>,
+) -> PyResult<String> {
+    let exactness = match exact {
+        Some(true) => Exactness::Always,
+        Some(false) => Exactness::Never,
+        None => Exactness::Auto,
+    };
+    let answered = || -> Result<String, Error> {
+        let read = prism::parse(model)?;
+        let asked = property::parse(property)?;
+        let options = Options { settings: constants.into_iter().collect(), exactness, ..Options::default() };
+        Ok(json(&CheckAnswer::new(property, &checked(&read, &asked, &options)?)))
+    };
+    py.detach(answered).map_err(|error| {
+        let (file, text) =
+            if matches!(error, Error::Model(_)) { (name, model) } else { ("property", property) };
+        let messages: Vec<Message> = match error.diagnostics() {
+            [] => vec![Message::at("Q506", file, None, error.to_string())],
+            problems => problems
+                .iter()
+                .map(|problem| {
+                    let place = Some((problem.place.line, problem.place.column));
+                    Message::at(problem.code, file, place, problem.message.clone()).with_source(text)
+                })
+                .collect(),
+        };
+        raise(py, &messages)
+    })
+}
+
+/// What a code of a message means, as JSON.
+#[pyfunction]
+pub(crate) fn explain_code(code: &str) -> PyResult<String> {
+    codes::find(code)
+        .map(|found| json(&CodeAnswer::from(found)))
+        .ok_or_else(|| PyKeyError::new_err(format!("there is no code {code:?}")))
+}

@@ -1,0 +1,369 @@
+//! Missions and their plans.
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
+use std::time::Duration;
+
+use metaplan::answers::{ChangesAnswer, DesignAnswer, PlanAnswer, VerdictAnswer};
+use metaplan::encodings::{Config, Exact, Limits, Plan};
+use metaplan::file::source;
+use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
+use metaplan::message::{Errors, Message};
+use metaplan::mission::{self as missions, Bindings, Names, read_plan};
+use metaplan::pddl::{Source, validate};
+use metaplan::planner::{Planned as Found, Planner, consistent};
+use metaplan::setup::Setup;
+use metaplan::{explain, report};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::failure::{listed, raise, raise_one};
+use crate::wait::detached;
+
+/// A mission in its present situation.
+#[pyclass(module = "metaplan._native", frozen)]
+pub(crate) struct Mission {
+    setup: RwLock<Setup>,
+}
+
+/// What was found for a mission.
+#[pyclass(module = "metaplan._native", frozen)]
+pub(crate) struct Planned {
+    /// The answer in the JSON format of `metaplan plan`, or of `metaplan plan --pareto`.
+    #[pyo3(get)]
+    json: String,
+    /// The plan with a step on each line; nothing if there is none, or for a front.
+    #[pyo3(get)]
+    text: Option<String>,
+    /// What is claimed, in a sentence.
+    #[pyo3(get)]
+    verdict: String,
+    /// What may be other than meant, as JSON.
+    #[pyo3(get)]
+    warnings: String,
+    picture: Option<metaplan::picture::Plan>,
+}
+
+#[pymethods]
+impl Planned {
+    /// The plan as a timeline in SVG; nothing if there is none.
+    fn svg(&self) -> Option<String> {
+        self.picture.as_ref().map(metaplan::picture::Plan::svg)
+    }
+}
+
+/// What is wanted of a plan.
+struct Wanted {
+    config: Config,
+    minimize: Vec<String>,
+    pareto: Option<[String; 2]>,
+    alternatives: Option<usize>,
+    separation: Option<Exact>,
+    certificate: Option<PathBuf>,
+}
+
+/// A number of a keyword from its text.
+fn number(name: &str, text: &str) -> PyResult<Exact> {
+    text.parse().map_err(|error| PyValueError::new_err(format!("{name}: {error}")))
+}
+
+/// A word of a keyword.
+fn word<T: std::str::FromStr<Err: std::fmt::Display>>(name: &str, text: &str) -> PyResult<T> {
+    text.parse().map_err(|error| PyValueError::new_err(format!("{name}: {error}")))
+}
+
+/// Seconds of a keyword.
+pub(crate) fn seconds(name: &str, value: f64) -> PyResult<Duration> {
+    Duration::try_from_secs_f64(value)
+        .map_err(|_| PyValueError::new_err(format!("{name} must be a number of seconds, not {value}")))
+}
+
+impl Mission {
+    pub(crate) fn read(&self) -> RwLockReadGuard<'_, Setup> {
+        self.setup.read().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn write(&self) -> RwLockWriteGuard<'_, Setup> {
+        self.setup.write().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[pymethods]
+impl Mission {
+    /// From a manifest.
+    #[staticmethod]
+    fn load(py: Python<'_>, manifest: PathBuf) -> PyResult<Self> {
+        made(py, move || Setup::read(&manifest))
+    }
+
+    /// From the text of a manifest, whose paths are relative to a directory.
+    #[staticmethod]
+    fn parse(py: Python<'_>, name: String, text: String, directory: PathBuf) -> PyResult<Self> {
+        made(py, move || Setup::parse(&name, &text, &directory))
+    }
+
+    /// From a domain and a problem, each a path or a name and a text, and perhaps knowledge bases.
+    #[staticmethod]
+    fn join(
+        py: Python<'_>,
+        name: String,
+        files: [(PathBuf, Option<String>); 2],
+        knowledge: Vec<PathBuf>,
+        rules: Vec<String>,
+        bindings: std::collections::BTreeMap<String, String>,
+        names: Vec<(String, String)>,
+    ) -> PyResult<Self> {
+        made(py, move || joined(&name, files, knowledge, rules, &bindings, &names))
+    }
+
+    /// Another mission in the same situation.
+    fn copy(&self) -> Self {
+        Self { setup: RwLock::new(self.read().clone()) }
+    }
+
+    /// The mission's name.
+    #[getter]
+    fn name(&self) -> String {
+        self.read().mission.name.clone()
+    }
+
+    /// What it is about.
+    #[getter]
+    fn description(&self) -> String {
+        self.read().description.clone()
+    }
+
+    /// The names of its scenarios.
+    #[getter]
+    fn scenarios(&self) -> Vec<String> {
+        self.read().scenarios.keys().cloned().collect()
+    }
+
+    /// What may be other than meant, as JSON.
+    #[getter]
+    fn warnings(&self) -> String {
+        listed(self.read().mission.warnings())
+    }
+
+    /// The domain and the filled problem as PDDL.
+    fn pddl(&self, py: Python<'_>) -> PyResult<(String, String)> {
+        let setup = self.read();
+        let (problem, _) = setup.mission.filled().map_err(|messages| raise(py, &messages))?;
+        let domain = metaplan::pddl::print_domain(setup.mission.domain());
+        Ok((domain, metaplan::pddl::print_problem(&problem)))
+    }
+
+    /// Brings the mission into a scenario of its manifest.
+    fn scenario(&self, py: Python<'_>, name: &str) -> PyResult<()> {
+        self.write().apply(name).map_err(|message| raise_one(py, message))
+    }
+
+    /// A component has failed.
+    fn fail(&self, py: Python<'_>, component: &str) -> PyResult<()> {
+        self.write().mission.fail(component).map_err(|message| raise_one(py, message))
+    }
+
+    /// A measured attribute, a numeric fluent or a fact has a value.
+    fn set(&self, py: Python<'_>, name: &str, value: &str) -> PyResult<()> {
+        self.write().mission.set(name, value).map_err(|message| raise_one(py, message))
+    }
+
+    /// The best plan, or a front.
+    #[pyo3(signature = (*, minimize, pareto=None, alternatives=None, concurrent=None, horizon=None, engine=None, strategy=None, confirm=false,
+        time_limit=None, memory_limit=None, certificate=None, on_improvement=None))]
+    #[allow(clippy::too_many_arguments, reason = "keywords")]
+    fn plan(
+        &self,
+        py: Python<'_>,
+        minimize: Vec<String>,
+        pareto: Option<[String; 2]>,
+        alternatives: Option<usize>,
+        concurrent: Option<String>,
+        horizon: Option<usize>,
+        engine: Option<String>,
+        strategy: Option<String>,
+        confirm: bool,
+        time_limit: Option<f64>,
+        memory_limit: Option<usize>,
+        certificate: Option<PathBuf>,
+        on_improvement: Option<Py<PyAny>>,
+    ) -> PyResult<Planned> {
+        let mut limits = Limits::none();
+        if let Some(time) = time_limit {
+            limits = limits.with_time(seconds("time_limit", time)?);
+        }
+        if let Some(megabytes) = memory_limit {
+            limits = limits.with_room(megabytes.saturating_mul(1 << 20));
+        }
+        let mut config = Config::default().with_horizon(horizon).with_confirmation(confirm);
+        if let Some(engine) = &engine {
+            config = config.with_engine(word("engine", engine)?);
+        }
+        if let Some(strategy) = &strategy {
+            config = config.with_strategy(word("strategy", strategy)?);
+        }
+        let separation = concurrent.as_deref().map(|text| number("concurrent", text)).transpose()?;
+        let interrupt = limits.interrupt();
+        let config = config.with_limits(limits);
+        let wanted = Wanted { config, minimize, pareto, alternatives, separation, certificate };
+        let setup = self.read();
+        let (found, stopped) =
+            detached(py, &interrupt, || planned(&setup.mission, wanted, on_improvement.as_ref()));
+        match (found, stopped) {
+            (Ok(planned), None) => Ok(planned),
+            // The best plan so far is what Ctrl-C is for.
+            (Ok(planned), Some(_)) if planned.text.is_some() => Ok(planned),
+            (_, Some(error)) | (Err(Stop::Raised(error)), None) => Err(error),
+            (Err(Stop::Wrong(messages)), None) => Err(raise(py, &messages)),
+        }
+    }
+
+    /// What the validator says of a plan, as JSON.
+    fn validate(&self, py: Python<'_>, plan: &str, concurrent: bool, tolerance: &str) -> PyResult<String> {
+        let tolerance = number("tolerance", tolerance)?.to_rational();
+        let setup = self.read();
+        let mission = &setup.mission;
+        let judged = || {
+            let (problem, _) = mission.filled()?;
+            let plan = read_plan(&Source::new("plan", plan), mission)?;
+            let options = validate::Options { concurrent, tolerance };
+            let verdict = validate::validate(mission.domain(), &problem, &plan, &options);
+            Ok(serde_json::to_string(&VerdictAnswer::new(&verdict)).unwrap_or_default())
+        };
+        py.detach(judged).map_err(|messages: Errors| raise(py, &messages))
+    }
+
+    /// Why a design is available or not, chosen or not; or what would change the plan. As JSON.
+    fn explain(&self, py: Python<'_>, design: Option<String>, time_limit: Option<f64>) -> PyResult<String> {
+        let mut limits = Limits::none();
+        if let Some(time) = time_limit {
+            limits = limits.with_time(seconds("time_limit", time)?);
+        }
+        let interrupt = limits.interrupt();
+        let setup = self.read();
+        let (found, stopped) = detached(py, &interrupt, || {
+            let mission = &setup.mission;
+            let best = explain::best(mission, &limits)?;
+            let json = if let Some(design) = &design {
+                let found = explain::design(mission, design, &limits)?;
+                serde_json::to_string(&DesignAnswer::new(&mission.name, &best, &found))
+            } else {
+                let changes = explain::smallest_changes(mission, &limits)?;
+                serde_json::to_string(&ChangesAnswer::new(&mission.name, &best, &changes))
+            };
+            Ok(json.unwrap_or_default())
+        });
+        match stopped {
+            Some(error) => Err(error),
+            None => found.map_err(|messages: Errors| raise(py, &messages)),
+        }
+    }
+}
+
+/// Reads a mission without the interpreter's lock.
+fn made(py: Python<'_>, read: impl FnOnce() -> Result<Setup, Errors> + Send) -> PyResult<Mission> {
+    let checked = move || {
+        let setup = read()?;
+        // What does not fit is told at once, and not when something is asked.
+        setup.mission.filled()?;
+        Ok(setup)
+    };
+    let setup = py.detach(checked).map_err(|messages: Errors| raise(py, &messages))?;
+    Ok(Mission { setup: RwLock::new(setup) })
+}
+
+fn joined(
+    name: &str,
+    files: [(PathBuf, Option<String>); 2],
+    documents: Vec<PathBuf>,
+    rules: Vec<String>,
+    bindings: &std::collections::BTreeMap<String, String>,
+    own_names: &[(String, String)],
+) -> Result<Setup, Errors> {
+    let [domain, problem] = files.map(|(path, text)| match text {
+        Some(text) => Ok(Source::new(path.display().to_string(), text)),
+        None => source(&path),
+    });
+    let mut names = Names::default();
+    for (individual, object) in own_names {
+        names.add(individual, object, None);
+    }
+    let text = domain.as_ref().map_or("", |domain| domain.text());
+    let rules = if rules.is_empty() { vec![COADAPTATION.to_owned()] } else { rules };
+    let sources = Sources { documents, rules, ..Sources::default() };
+    let knowledge = (!sources.documents.is_empty()).then(|| Knowledge::read_for(&sources, text));
+    let bindings = Bindings::with(bindings).map_err(|text| Message::error("M105", text))?.naming(names);
+    Ok(missions::Mission::new(name, knowledge, bindings, domain, problem)?.into())
+}
+
+/// Why there is no answer.
+enum Stop {
+    Wrong(Errors),
+    Raised(PyErr),
+}
+
+impl From<Errors> for Stop {
+    fn from(messages: Errors) -> Self {
+        Self::Wrong(messages)
+    }
+}
+
+fn planned(
+    mission: &missions::Mission,
+    wanted: Wanted,
+    on_improvement: Option<&Py<PyAny>>,
+) -> Result<Planned, Stop> {
+    consistent(mission.knowledge())?;
+    let raised: Mutex<Option<PyErr>> = Mutex::default();
+    let tell = |better: &metaplan::encodings::Improvement| {
+        let Some(listener) = on_improvement else { return ControlFlow::Continue(()) };
+        let (cost, bound) = (better.cost.to_string(), better.lower_bound.to_string());
+        let heard = Python::attach(|py| {
+            listener.call1(py, (cost, bound, better.gap(), better.horizon)).and_then(|said| said.extract(py))
+        });
+        match heard {
+            Ok(Some(false)) => ControlFlow::Break(()),
+            Ok(_) => ControlFlow::Continue(()),
+            Err(error) => {
+                *raised.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
+                ControlFlow::Break(())
+            }
+        }
+    };
+    let planner = Planner::new(mission)?;
+    let warnings = listed(mission.warnings().chain(planner.warnings()));
+    let planner = planner
+        .config(wanted.config)
+        .minimize(wanted.minimize)
+        .concurrent(wanted.separation.map(|separation| separation.to_rational()))
+        .alternatives(wanted.alternatives)
+        .on_improvement(tell);
+    let answer = match &wanted.pareto {
+        Some([first, second]) => {
+            let front = planner.pareto([first, second])?;
+            let json = serde_json::to_string(&front.answer()).unwrap_or_default();
+            let verdict = front.front.status.to_string();
+            Planned { json, text: None, verdict, warnings, picture: None }
+        }
+        None => answered(planner.plan()?, wanted.certificate, warnings)?,
+    };
+    match raised.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        Some(error) => Err(Stop::Raised(error)),
+        None => Ok(answer),
+    }
+}
+
+fn answered(found: Found<'_>, certificate: Option<PathBuf>, warnings: String) -> Result<Planned, Errors> {
+    if let Some(directory) = certificate {
+        found.certify(&directory)?;
+    }
+    let answer: PlanAnswer = found.answer();
+    Ok(Planned {
+        json: serde_json::to_string(&answer).unwrap_or_default(),
+        text: found.solution.plan.as_ref().map(Plan::to_string),
+        verdict: found.solution.verdict(),
+        warnings,
+        picture: found.solution.plan.as_ref().map(|_| found.picture(&report::Positions::Unknown)),
+    })
+}

@@ -1,0 +1,54 @@
+//! Work without the interpreter's lock, and with signals.
+
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::thread;
+use std::time::Duration;
+
+use pyo3::prelude::*;
+
+/// How often signals are looked at.
+const INTERVAL: Duration = Duration::from_millis(20);
+/// The stack of a thread that works: as much as a main thread has.
+const STACK: usize = 8 << 20;
+
+/// Does some work while other threads of the interpreter go on. Where a signal raises an exception, such as `KeyboardInterrupt`, the flag is
+/// set, and the work is waited for; the exception comes beside what it has found until then.
+pub(crate) fn detached<T: Send>(
+    py: Python<'_>,
+    interrupt: &AtomicBool,
+    work: impl FnOnce() -> T + Send,
+) -> (T, Option<PyErr>) {
+    py.detach(|| {
+        thread::scope(|scope| {
+            let (sender, receiver) = channel();
+            let worker = move || {
+                let found = catch_unwind(AssertUnwindSafe(work));
+                // Who listens goes on listening until something comes.
+                let _ = sender.send(found);
+            };
+            let started = thread::Builder::new().stack_size(STACK).spawn_scoped(scope, worker);
+            let mut stopped = None;
+            loop {
+                match receiver.recv_timeout(INTERVAL) {
+                    Ok(Ok(found)) => return (found, stopped),
+                    Ok(Err(panic)) => resume_unwind(panic),
+                    Err(RecvTimeoutError::Timeout) => {
+                        // A path to the method is not general enough in its lifetime.
+                        #[expect(clippy::redundant_closure_for_method_calls, reason = "see above")]
+                        let signal = Python::attach(|py| py.check_signals());
+                        if let (None, Err(error)) = (&stopped, signal) {
+                            interrupt.store(true, Ordering::Relaxed);
+                            stopped = Some(error);
+                        }
+                    }
+                    Err(RecvTimeoutError::Disconnected) => match &started {
+                        Ok(_) => unreachable!("a worker sends before it ends"),
+                        Err(error) => panic!("no thread can be started: {error}"),
+                    },
+                }
+            }
+        })
+    })
+}

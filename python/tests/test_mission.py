@@ -1,0 +1,189 @@
+"""Missions: what the command line answers is what the package answers."""
+
+import asyncio
+import json
+import subprocess
+import threading
+from decimal import Decimal
+from pathlib import Path
+
+import pytest
+
+import metaplan
+
+ROOT = Path(__file__).resolve().parents[2]
+UGV = ROOT / "missions/ugv.toml"
+
+DOMAIN = """(define (domain d) (:requirements :typing :action-costs) (:types place)
+ (:predicates (at ?p - place) (way ?a ?b - place)) (:functions (total-cost) - number (length ?a ?b - place) - number)
+ (:action go :parameters (?a ?b - place) :precondition (and (at ?a) (way ?a ?b))
+  :effect (and (not (at ?a)) (at ?b) (increase (total-cost) (length ?a ?b)))))"""
+PROBLEM = """(define (problem p) (:domain d) (:objects a b c - place)
+ (:init (at a) (way a b) (way b c) (= (total-cost) 0) (= (length a b) 1.5) (= (length b c) 2))
+ (:goal (at c)) (:metric minimize (total-cost)))"""
+
+
+def test_a_plan_has_what_the_command_line_prints():
+    plan = metaplan.Mission.load(UGV).plan()
+    assert plan.optimal and plan and plan.cost == 408 and len(plan) == 4
+    assert plan.steps[0].action == "move" and plan.steps[0].configuration == {"f_localization": "fd_amcl_kinect"}
+    assert plan.to_dict()["format"] == "metaplan-plan/1"
+    assert plan.lower_bound == plan.cost and plan.verdict.startswith("optimal, proved")
+    assert plan.svg().startswith("<?xml") and "</p><svg" in plan._repr_html_()
+
+
+def test_what_fails_changes_the_plan_and_copies_keep_a_situation():
+    mission = metaplan.Mission.load(UGV)
+    before = mission.copy()
+    after = mission.fail("c_kinect").set(robot_at="wp2").plan()
+    assert after.cost != before.plan().cost
+    assert "fd_amcl_kinect" not in {design for step in after for design in step.configuration.values()}
+
+
+def test_numbers_are_exact():
+    plan = metaplan.Mission.from_files(DOMAIN, PROBLEM).plan()
+    assert plan.cost == Decimal("3.5") and isinstance(plan.cost, Decimal)
+    assert plan.text == "(go a b)\n(go b c)\n"
+    assert plan.to_df()["cost"].sum() == 3.5
+
+
+def test_errors_have_code_and_place():
+    with pytest.raises(metaplan.Error) as caught:
+        metaplan.Mission.from_files(DOMAIN.replace("(at ?a) (way", "(at ?a) (ways"), PROBLEM)
+    error = caught.value
+    assert error.file == "domain" and error.line == 3 and error.column > 1 and error.code[0] == "P"
+    assert metaplan.explain_code(error.code).to_dict()["code"] == error.code
+    with pytest.raises(metaplan.Error) as caught:
+        metaplan.Mission.load(UGV).fail("c_kinekt")
+    assert "c_kinect" in str(caught.value)
+    with pytest.raises(KeyError):
+        metaplan.explain_code("X999")
+
+
+def test_manifests_are_files_texts_and_mappings():
+    text = UGV.read_text()
+    assert metaplan.Mission.load(text, ROOT / "missions").plan().cost == 408
+    own = {
+        "name": "mine",
+        "knowledge": {"files": ["ontology/kb/ugv.ttl"]},
+        "planning": {"domain": "encodings/ugv/domain.pddl", "problem": "encodings/ugv/problem.pddl"},
+    }
+    mission = metaplan.Mission.load(own, ROOT)
+    assert mission.name == "mine" and mission.plan()
+    with pytest.raises(metaplan.Error):
+        metaplan.Mission.load({**own, "planing": {}}, ROOT)
+
+
+def test_objectives_fronts_and_alternatives():
+    mission = metaplan.Mission.from_files(DOMAIN, PROBLEM)
+    assert mission.plan(minimize=["total-cost"]).objectives == {"total-cost": Decimal("3.5")}
+    front = mission.plan(pareto=("total-cost", "total-time"))
+    assert front.status == "optimal" and len(front) == 1 and front.to_df().shape == (1, 3)
+    assert mission.plan(alternatives=3).alternatives == []
+
+
+def test_plans_are_validated():
+    mission = metaplan.Mission.from_files(DOMAIN, PROBLEM)
+    plan = mission.plan()
+    assert mission.validate(plan).valid and mission.validate(plan.text).metric == Decimal("3.5")
+    verdict = metaplan.validate(DOMAIN, PROBLEM, "(go a c)\n")
+    assert not verdict and verdict.violation["step"] == 1
+
+
+def test_certificates_are_written_and_checked(tmp_path):
+    mission = metaplan.Mission.load(UGV)
+    verification = mission.certify(tmp_path / "proof")
+    assert verification and "verified: the plan is optimal" in str(verification)
+    (tmp_path / "proof/plan.txt").write_text("")
+    assert not metaplan.verify(tmp_path / "proof")
+    assert not metaplan.verify(tmp_path / "nothing").verified
+
+
+def test_explanations():
+    mission = metaplan.Mission.load(UGV)
+    assert mission.explain().to_dict()["changes"]
+    assert mission.explain("fd_amcl_lidar").to_dict()["available"] is True
+
+
+def test_reasoning():
+    answer = metaplan.reason(ROOT / "ontology/kb/ugv.ttl", rules=["coadaptation"], fail=["c_kinect"]).to_dict()
+    assert answer["format"].startswith("metaplan-reason/")
+    lost = [design["name"] for design in answer["designs"] if not design["available"]]
+    assert "fd_amcl_kinect" in lost
+
+
+def test_model_checking():
+    model = "dtmc\nmodule m\n s:[0..2] init 0;\n [] s=0 -> p:(s'=1)+(1-p):(s'=2);\nendmodule\nconst double p;\nlabel \"goal\" = s=1;\n"
+    answer = metaplan.check(model, 'P=? [ F "goal" ]', constants={"p": 0.25}).to_dict()
+    assert answer["value"] == 0.25
+    with pytest.raises(metaplan.Error) as caught:
+        metaplan.check(model, "P=? [ F goal")
+    assert caught.value.line == 1
+
+
+def test_the_loop_is_that_of_the_command_line():
+    events = [
+        {"event": "action_succeeded", "action": 1, "time": 5},
+        {"event": "component_status", "component": "c_kinect", "status": "FALSE", "time": 6},
+    ]
+    answers = list(metaplan.Mission.load(UGV).run(events))
+    kinds = [answer.kind for answer in answers]
+    assert "error" not in kinds, answers
+    assert "plan_found" in kinds and answers[0].to_dict()["answer"] == answers[0].kind
+
+    async def heard():
+        async def stream():
+            for event in events:
+                yield event
+
+        return [answer.kind async for answer in metaplan.Mission.load(UGV).arun(stream())]
+
+    assert asyncio.run(heard()) == kinds
+
+
+def test_improvements_are_heard_and_end_the_search():
+    heard = []
+    plan = metaplan.Mission.from_files(DOMAIN, PROBLEM).plan(on_improvement=lambda *own: heard.append(own))
+    assert plan.optimal and all(bound <= cost for cost, bound, _, _ in heard)
+
+    def wrong(*_):
+        raise RuntimeError("no")
+
+    if heard:
+        with pytest.raises(RuntimeError):
+            metaplan.Mission.from_files(DOMAIN, PROBLEM).plan(on_improvement=wrong)
+
+
+def test_threads_plan_at_once():
+    mission = metaplan.Mission.load(UGV)
+    costs = []
+    threads = [threading.Thread(target=lambda: costs.append(mission.plan().cost)) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert costs == [408] * 4
+
+
+def test_answers_are_those_of_the_program():
+    program = ROOT / "target/debug/metaplan"
+    if not program.exists():
+        pytest.skip("the program has not been built")
+    output = subprocess.run([program, "plan", UGV, "--format", "json"], capture_output=True, check=True)
+    said, own = json.loads(output.stdout), metaplan.Mission.load(UGV).plan().to_dict()
+    for answer in (said, own):
+        del answer["statistics"]["milliseconds"]
+    assert said == own
+
+
+def test_memory_does_not_grow():
+    resource = pytest.importorskip("resource", reason="not on this platform")
+    mission = metaplan.Mission.load(UGV)
+
+    def peak():
+        for _ in range(250):
+            mission.plan()
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+    peaks = [peak() for _ in range(4)]
+    assert peaks[-1] - peaks[0] < 4096, peaks  # in KiB

@@ -1,0 +1,59 @@
+//! Plans that somebody else hands in.
+
+use num_rational::BigRational;
+use num_traits::Num as _;
+use pddl::Source;
+use pddl::ast::Name;
+use pddl::validate::{PlanStep, PlanText};
+use serde_json::Value;
+
+use ::mission::Mission;
+
+use crate::message::{Errors, Message};
+
+/// The steps of a plan: as text with a step on each line, or a `metaplan-plan/1` document.
+///
+/// # Errors
+/// All lines that are no steps; M111, what is wrong with the document.
+pub fn read_plan(source: &Source, mission: &Mission) -> Result<PlanText, Errors> {
+    if source.text().trim_start().starts_with('{') {
+        return json_plan(source, mission);
+    }
+    PlanText::parse(source).map_err(|diagnostics| Message::from_pddl(&diagnostics, &[source]).into())
+}
+
+/// The steps of a `metaplan-plan/1` document. Where the knowledge base has given an action of a plain domain its designs, they stand in the
+/// configuration only.
+fn json_plan(source: &Source, mission: &Mission) -> Result<PlanText, Errors> {
+    let bad = |place, text: &str| {
+        Message::at("M111", source.name(), place, text.to_owned()).with_source(source.text())
+    };
+    let document: Value = serde_json::from_str(source.text())
+        .map_err(|error| bad(Some((error.line(), error.column())), &format!("not JSON: {error}")))?;
+    let steps =
+        document["steps"].as_array().ok_or_else(|| bad(None, "no `steps`: not a plan of `metaplan plan`"))?;
+    let mut plan = PlanText::default();
+    for (index, step) in steps.iter().enumerate() {
+        let name = |value: &Value| value.as_str().map(Name::new);
+        let arguments =
+            step["arguments"].as_array().map(|all| all.iter().map(name).collect::<Option<Vec<_>>>());
+        let (Some(action), Some(Some(mut arguments))) = (name(&step["action"]), arguments) else {
+            let text = format!("step {} has no `action` with `arguments`", index + 1);
+            return Err(bad(None, &text).into());
+        };
+        if mission.written_arguments(action.as_str()) == Some(arguments.len()) {
+            let configuration = step["configuration"].as_object();
+            arguments.extend(configuration.into_iter().flat_map(|all| all.values()).filter_map(name));
+        }
+        let (start, duration) = (decimal(&step["start"]), decimal(&step["duration"]));
+        plan.steps.push(PlanStep { action, arguments, start, duration, line: 0 });
+    }
+    Ok(plan)
+}
+
+/// An exact number from a decimal of JSON.
+fn decimal(value: &Value) -> Option<BigRational> {
+    let text = value.as_number()?.to_string();
+    let (whole, fraction) = text.split_once('.').unwrap_or((&text, ""));
+    BigRational::from_str_radix(&format!("{whole}{fraction}/1{}", "0".repeat(fraction.len())), 10).ok()
+}
