@@ -110,6 +110,19 @@ fn solve(
 
 /// Explains one design, by its local name.
 ///
+/// ```
+/// use std::path::Path;
+/// use metaplan::{encodings::Limits, explain, setup::Setup};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let mut mission = Setup::read(Path::new("missions/ugv.toml"))?.mission;
+/// mission.fail("c_kinect")?;
+/// let found = explain::design(&mission, "fd_amcl_kinect", &Limits::none())?;
+/// assert!(!found.available && !found.because.is_empty());
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Errors
 /// There is no such design, or the mission cannot be planned for.
 pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignExplanation, Errors> {

@@ -6,6 +6,16 @@ use crate::setup::Setup;
 use crate::simulate::Simulation;
 
 /// What there is to say of a mission that could be read, errors first.
+///
+/// ```
+/// use std::path::Path;
+/// use metaplan::{lint::lint, setup::Setup};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// assert!(lint(&Setup::read(Path::new("missions/ugv.toml"))?).is_empty());
+/// # Ok(())
+/// # }
+/// ```
 pub fn lint(setup: &Setup) -> Vec<Message> {
     let mission = &setup.mission;
     let mut messages: Vec<Message> = mission.warnings().cloned().collect();

@@ -59,6 +59,17 @@ pub struct Setup {
 impl Setup {
     /// Reads a manifest, and the files that it names.
     ///
+    /// ```
+    /// use std::path::Path;
+    /// use metaplan::setup::Setup;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let setup = Setup::read(Path::new("missions/ugv.toml"))?;
+    /// assert_eq!(setup.mission.name, "ugv");
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
     /// # Errors
     /// All that is wrong with the manifest and with the files that it names.
     pub fn read(manifest: &Path) -> Result<Self, Errors> {

@@ -58,6 +58,13 @@ pub struct Bindings {
 impl Bindings {
     /// The defaults, and on top of them the given ones.
     ///
+    /// ```
+    /// use std::collections::BTreeMap;
+    /// use metaplan_mission::Bindings;
+    ///
+    /// assert!(Bindings::with(&BTreeMap::from([("speed".to_owned(), "no such query".to_owned())])).is_err());
+    /// ```
+    ///
     /// # Errors
     /// A sentence about the first query that is none.
     pub fn with(own: &BTreeMap<String, String>) -> Result<Self, String> {

@@ -69,6 +69,15 @@ pub fn read_objective(
 
 /// A domain and a problem from their texts, with the warnings about both.
 ///
+/// ```
+/// use metaplan_pddl::{Source, read};
+///
+/// let domain = Source::new("d.pddl", "(define (domain d) (:predicates (open))\n  (:action go :effect (opn)))");
+/// let problem = Source::new("p.pddl", "(define (problem p) (:domain d) (:goal (open)))");
+/// let wrong = read(&domain, &problem).expect_err("a predicate is not declared");
+/// assert_eq!((wrong.len(), wrong[0].code), (1, "P121"));
+/// ```
+///
 /// # Errors
 ///
 /// All that is wrong, together with the warnings: the domain's messages first, each file's in its order.

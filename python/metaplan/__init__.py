@@ -7,13 +7,14 @@
 True
 """
 
-from metaplan._answers import Answer, Front, LoopAnswer, Number, Plan, Step, Verdict, Verification
+from metaplan._answers import Answer, Comparison, Front, LoopAnswer, Number, Plan, Step, Verdict, Verification
 from metaplan._errors import Error, Message
 from metaplan._mission import File, Loop, Mission, check, explain_code, reason, validate, verify
 from metaplan._native import __version__
 
 __all__ = [
     "Answer",
+    "Comparison",
     "Error",
     "File",
     "Front",

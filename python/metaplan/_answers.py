@@ -210,6 +210,33 @@ class Front(Answer):
         return f"<table><tr>{head}</tr>{cells}</table>"
 
 
+class Comparison(Answer):
+    """The plan beside the policies of probabilistic model checking, all evaluated in one process."""
+
+    @property
+    def candidates(self) -> list[dict[str, Any]]:
+        """Ways to decide, ``kind`` `a` to `f` and ``name``, with the measures of each; ``None`` where one has no value."""
+        return self.to_dict()["comparisons"][0]["candidates"]
+
+    @property
+    def front(self) -> list[tuple[float, float]]:
+        """The front of the process's policies: probability of the goal, and time."""
+        return [(first, second) for first, second in self.to_dict()["comparisons"][0]["front"]]
+
+    def to_df(self) -> pandas.DataFrame:
+        """A row for each candidate, a column for each measure."""
+        return frame(self.candidates)
+
+    def _repr_html_(self) -> str:
+        measures = [name for name in self.candidates[0] if name not in ("kind", "name")]
+        head = "".join(f"<th>{html.escape(name)}</th>" for name in ["", *measures])
+        rows = []
+        for own in self.candidates:
+            cells = ("" if own[name] is None else f"{own[name]:.4g}" for name in measures)
+            rows.append(f"<tr><td>{html.escape(own['name'])}</td>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>")
+        return f"<table><tr>{head}</tr>{''.join(rows)}</table>"
+
+
 class Verdict(Answer):
     """What the validator says of a plan."""
 

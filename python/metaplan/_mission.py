@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from metaplan import _native
-from metaplan._answers import Answer, Front, LoopAnswer, Plan, Verdict, Verification, exact
+from metaplan._answers import Answer, Comparison, Front, LoopAnswer, Plan, Verdict, Verification, exact
 from metaplan._errors import Message, messages_of
 
 File = str | os.PathLike[str]
@@ -209,6 +209,22 @@ class Mission:
     def explain(self, design: str | None = None, *, time_limit: float | None = None) -> Answer:
         """Why a design is available or not, chosen or not, and what that is worth; without one, the smallest changes of measurements that lead to another plan."""
         return Answer(self._native.explain(design, time_limit))
+
+    def compare(
+        self,
+        *,
+        loss: tuple[str, float] | None = None,
+        battery_unit: int | None = None,
+        penalty: float | None = None,
+        state_limit: int = 20_000_000,
+    ) -> Comparison:
+        """The plan beside the policies of probabilistic model checking (Cámara et al. 2020), all evaluated in one process.
+
+        :param loss: the component that may be lost on the way, and with which probability at each move
+        :param battery_unit: how much battery a level of the process stands for
+        :param penalty: the time that a mission costs which does not get to its goal; ten times our plan's unless given
+        """
+        return Comparison(self._native.compare(loss, battery_unit, penalty, state_limit))
 
     def validate(self, plan: Plan | File, *, concurrent: bool = False, tolerance: float | str | Decimal = "0.001") -> Verdict:
         """What a plan does by the definition of PDDL: a :class:`Plan`, its text, a path, or a ``metaplan-plan/1`` document.

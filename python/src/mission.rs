@@ -5,7 +5,10 @@ use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 use std::time::Duration;
 
-use metaplan::answers::{ChangesAnswer, DesignAnswer, PlanAnswer, VerdictAnswer};
+use metaplan::answers::{
+    ChangesAnswer, CompareAnswer, ComparisonAnswer, DesignAnswer, PlanAnswer, VerdictAnswer,
+};
+use metaplan::comparison::{self, Coadaptation, Compared, NoResult, Risk, Tasked};
 use metaplan::encodings::{Config, Exact, Limits, Plan};
 use metaplan::file::source;
 use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
@@ -217,6 +220,43 @@ impl Mission {
             (_, Some(error)) | (Err(Stop::Raised(error)), None) => Err(error),
             (Err(Stop::Wrong(messages)), None) => Err(raise(py, &messages)),
         }
+    }
+
+    /// The plan beside the policies of probabilistic model checking, as JSON.
+    fn compare(
+        &self,
+        py: Python<'_>,
+        loss: Option<(String, f64)>,
+        battery_unit: Option<u32>,
+        penalty: Option<f64>,
+        state_limit: usize,
+    ) -> PyResult<String> {
+        let setup = self.read();
+        let mut roles = setup.roles.clone();
+        if let Some((component, rate)) = loss {
+            (roles.loss_component, roles.loss_rate) = (Some(component), rate);
+        }
+        roles.battery_unit = battery_unit.unwrap_or(roles.battery_unit);
+        let mission = &setup.mission;
+        let beside = || -> Result<String, NoResult> {
+            let (problem, _) = mission.filled()?;
+            let spelt_out = Coadaptation::is_spelt_out(&problem, &roles);
+            let tasked = if spelt_out { None } else { Some(Tasked::new(mission, &problem, &roles)?) };
+            let own = match &tasked {
+                Some(tasked) => tasked.coadaptation.clone(),
+                None => Coadaptation::new(mission, &problem, &roles)?,
+            };
+            let compared = Compared { mission, roles: &roles, coadaptation: &own, tasked: tasked.as_ref() };
+            let (risk, memory) = (Risk::all(&own), &|| None);
+            let config = comparison::Config { risk, penalty, priority: 0, states: state_limit, memory };
+            let comparison = compared.compare(&config, &mut |_, _| {})?;
+            let answer = CompareAnswer::new(vec![ComparisonAnswer::new(None, &comparison)], &[], &[]);
+            Ok(serde_json::to_string(&answer).unwrap_or_default())
+        };
+        py.detach(beside).map_err(|error| match error {
+            NoResult::Planner(messages) => raise(py, &messages),
+            NoResult::Process(error) => raise_one(py, Message::error("Q506", error.to_string())),
+        })
     }
 
     /// What the validator says of a plan, as JSON.

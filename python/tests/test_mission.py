@@ -141,6 +141,13 @@ def test_the_loop_is_that_of_the_command_line():
     assert asyncio.run(heard()) == kinds
 
 
+def test_the_plan_is_compared_with_policies():
+    comparison = metaplan.Mission.load(ROOT / "missions/camara_like.toml").compare()
+    kinds = {own["kind"] for own in comparison.candidates}
+    assert {"a", "f"} <= kinds and comparison.front
+    assert len(comparison.to_df()) == len(comparison.candidates) and "<table>" in comparison._repr_html_()
+
+
 def test_improvements_are_heard_and_end_the_search():
     heard = []
     plan = metaplan.Mission.from_files(DOMAIN, PROBLEM).plan(on_improvement=lambda *own: heard.append(own))

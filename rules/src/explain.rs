@@ -18,6 +18,18 @@ use crate::vocabulary::{DIFFERENT_FROM, SAME_AS};
 impl Engine {
     /// Why a fact holds: the derivation by which it was first concluded, down to what is stated. `None` where it does
     /// not hold. Takes time proportional to the answer. A fact that is stated and derived is reported as stated.
+    ///
+    /// ```
+    /// use metaplan_rules::{Engine, Fact};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let mut engine = Engine::builder().prefix("", "e:").rules("text", "-> :Wet(:grass) . [slip] :Wet(?x) -> :Slippery(?x) .").build()?;
+    /// let [slippery, grass] = ["e:Slippery", "e:grass"].map(|name| engine.name(name));
+    /// let derivation = engine.why(&Fact::new(slippery, [grass])).ok_or("it holds")?;
+    /// assert_eq!(derivation.steps.len(), 2);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn why(&self, fact: &Fact) -> Option<Derivation> {
         if let Some(equality) = &self.equality {
             return equality.holds(self, fact).then(|| equality.why(self, fact));

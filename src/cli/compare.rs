@@ -1,19 +1,16 @@
 //! `metaplan compare`.
 
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use encodings::Limits;
 use metaplan::answers::Pair;
 use metaplan::comparison::{
-    Action, Candidate, Coadaptation, Comparison, Config, Costs, Listener, NoResult, Planned, Risk, Roles,
-    Stages, Tasked, Valuation, compare,
+    Candidate, Coadaptation, Compared, Comparison, Config, Costs, Listener, NoResult, Risk, Roles, Tasked,
 };
-use metaplan::message::{Errors, Message};
-use metaplan::mission::{Mission, Planning as _};
+use metaplan::message::Message;
+use metaplan::mission::Mission;
 use metaplan::setup::Setup;
-use pddl::ast::Problem;
 
 use crate::cli::common::{Common, Exit, Failure, process_failure};
 use crate::cli::compare_so_far::{Begun, Shared};
@@ -134,7 +131,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             let (pair, candidates, costs) = (pair.clone(), candidates.to_vec(), costs.clone());
             so_far.change(|own| own.begun = Some(Begun { pair, candidates, costs }));
         };
-        let comparison = one(arguments, &mission, &coadaptation, &roles, tasked.as_ref(), &mut report)?;
+        let (mission, coadaptation, tasked) = (&mission, &coadaptation, tasked.as_ref());
+        let compared = Compared { mission, roles: &roles, coadaptation, tasked };
+        let comparison = one(arguments, &compared, &mut report)?;
         so_far.change(|own| {
             own.begun = None;
             own.done.push((pair, comparison));
@@ -173,13 +172,10 @@ fn missions(
 
 fn one(
     arguments: &Arguments,
-    mission: &Mission,
-    coadaptation: &Coadaptation,
-    roles: &Roles,
-    tasked: Option<&Tasked>,
+    compared: &Compared<'_>,
     report: &mut Listener<'_>,
 ) -> Result<Comparison, Failure> {
-    let mut risk = Risk::all(coadaptation);
+    let mut risk = Risk::all(compared.coadaptation);
     risk.battery &= !arguments.no_battery;
     let config = Config {
         risk,
@@ -188,77 +184,8 @@ fn one(
         states: arguments.state_limit,
         memory: &memory_since,
     };
-    let mut planner = |situation: &Valuation| match tasked {
-        Some(tasked) => solve(
-            mission,
-            |mission| tasked.problem(mission, situation),
-            |steps| tasked.actions(situation, steps),
-        ),
-        None => plan(mission, coadaptation, roles, risk, *situation),
-    };
-    compare(coadaptation, &config, &mut planner, report).map_err(|error| match error {
-        NoResult::Process(error) => process_failure(error, (&mission.name, ""), ("property", "")),
+    compared.compare(&config, report).map_err(|error| match error {
+        NoResult::Process(error) => process_failure(error, (&compared.mission.name, ""), ("property", "")),
         NoResult::Planner(messages) => messages.into(),
     })
-}
-
-/// The SAT planner's plan from a situation.
-fn plan(
-    mission: &Mission,
-    coadaptation: &Coadaptation,
-    roles: &Roles,
-    risk: Risk,
-    situation: Valuation,
-) -> Result<Planned, Errors> {
-    let one = |message| vec![message];
-    let mut mission = mission.clone();
-    mission.set(&roles.location, &coadaptation.places[situation.place]).map_err(one)?;
-    let configuration = &coadaptation.configurations[situation.configuration].name;
-    mission.set(&roles.configured, configuration).map_err(one)?;
-    if let Some(battery) = coadaptation.battery.filter(|_| risk.battery) {
-        let left = u64::from(situation.battery) * u64::from(battery.unit);
-        mission.set(&roles.battery, &left.to_string()).map_err(one)?;
-    }
-    if let Some(loss) = coadaptation.loss.as_ref().filter(|_| situation.lost) {
-        mission.fail(&loss.component).map_err(one)?;
-    }
-    let actions = |steps: &[encodings::Step]| {
-        Some(steps.iter().filter_map(|step| action(coadaptation, &step.arguments)).collect())
-    };
-    solve(&mission, |mission| mission.filled().map(|(problem, _)| problem), actions)
-}
-
-/// The plan of a problem, and what it took.
-fn solve(
-    mission: &Mission,
-    problem: impl FnOnce(&Mission) -> Result<Problem, Errors>,
-    actions: impl FnOnce(&[encodings::Step]) -> Option<Vec<Action>>,
-) -> Result<Planned, Errors> {
-    let started = Instant::now();
-    let problem = problem(mission)?;
-    let task = mission.ground(&problem, &[], &Limits::none())?;
-    let ground = started.elapsed();
-    let solution = encodings::optimize(&task, &encodings::Config::default(), &mut |_| {});
-    let actions = solution.plan.and_then(|plan| actions(&plan.steps));
-    let statistics = &solution.statistics;
-    let (build, solve) = (ground + statistics.encode, statistics.search + statistics.solve);
-    let extract = started.elapsed().saturating_sub(build + solve);
-    Ok(Planned {
-        actions,
-        variables: statistics.variables as u64,
-        clauses: statistics.clauses as u64,
-        time: Stages { build, solve, extract },
-    })
-}
-
-/// What a step does: between two places, or to the last design that it names.
-fn action(mission: &Coadaptation, arguments: &[String]) -> Option<Action> {
-    let same = |a: &str, b: &str| a.eq_ignore_ascii_case(b);
-    let place = |name: &String| mission.places.iter().position(|known| same(known, name));
-    let places: Vec<usize> = arguments.iter().filter_map(place).collect();
-    if let [from, to] = places[..] {
-        return mission.arcs.iter().position(|arc| (arc.from, arc.to) == (from, to)).map(Action::Move);
-    }
-    let design = arguments.last()?;
-    mission.configurations.iter().position(|known| same(&known.name, design)).map(Action::Change)
 }

@@ -36,6 +36,10 @@ pub fn all() -> Vec<Code> {
 }
 
 /// The code of that name, in capitals or not.
+///
+/// ```
+/// assert_eq!(metaplan::codes::find("m110").map(|code| code.code), Some("M110"));
+/// ```
 pub fn find(name: &str) -> Option<Code> {
     all().into_iter().find(|code| code.code.eq_ignore_ascii_case(name))
 }

@@ -6,6 +6,7 @@
 
 mod coadaptation;
 mod compare;
+mod compared;
 mod hindsight;
 mod import;
 mod map;
@@ -22,6 +23,7 @@ mod task;
 
 pub use coadaptation::{Arc, Battery, Coadaptation, Configuration, Loss, Roles, Switch, Traversal};
 pub use compare::{Candidate, Comparison, Config, Listener, compare};
+pub use compared::Compared;
 pub use hindsight::{Hindsight, LossAt, LossReport};
 pub use import::{Files, MapOptions, import_map};
 pub use planned::{Costs, NoResult, PlanFinder, Planned, Stages};

@@ -94,6 +94,22 @@ impl Loop {
     }
 
     /// Takes an observation over, at a time since the start of the mission that never goes back, and says what follows.
+    ///
+    /// ```
+    /// use std::{path::Path, time::Duration};
+    /// use metaplan::mapek::{Loop, Observation};
+    /// use metaplan::setup::Setup;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let Setup { mission, settings, .. } = Setup::read(Path::new("missions/ugv.toml"))?;
+    /// let mut control = Loop::new(mission, settings)?;
+    /// control.start();
+    /// let event = r#"{"event": "component_status", "component": "c_kinect", "status": "FALSE"}"#;
+    /// let answers = control.handle(&Observation::parse(event), Duration::from_secs(3));
+    /// assert!(answers.iter().any(|answer| answer.to_json()["answer"] == "plan_found"));
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn handle(&mut self, observation: &Observation, now: Duration) -> Vec<Answer> {
         let _span = info_span!("handle", line = self.beliefs.lines + 1).entered();
         let mut answers = Vec::new();

@@ -7,13 +7,13 @@ use std::sync::OnceLock;
 use crate::common::root;
 
 /// The folder of the examples. They belong to other packages, too, for which cargo makes them with all tests; where only these tests are
-/// made, they are asked for in the same way, so that nothing else is compiled anew.
+/// made, they are asked for here; nothing else is compiled anew.
 fn folder() -> &'static Path {
     static FOLDER: OnceLock<std::path::PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| {
         let own = Path::new(env!("CARGO_BIN_EXE_metaplan")).parent().expect("a folder");
         let mut cargo = Command::new(env!("CARGO"));
-        cargo.args(["test", "--no-run", "--quiet", "--offline", "--locked", "--examples"]);
+        cargo.args(["build", "--quiet", "--offline", "--locked", "--examples"]);
         if own.ends_with("release") {
             cargo.arg("--release");
         }

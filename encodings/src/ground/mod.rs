@@ -48,6 +48,25 @@ use vocabulary::world::World;
 
 /// Grounds a domain and a problem that have passed `pddl::check`.
 ///
+/// ```
+/// use metaplan_encodings::{GroundConfig, ground};
+/// # use metaplan_encodings::pddl::{Source, read};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let domain = Source::new("d", "(define (domain d) (:requirements :typing :numeric-fluents) (:types place)
+/// #   (:predicates (at ?p - place) (way ?a ?b - place)) (:functions (time) (energy))
+/// #   (:action walk :parameters (?a ?b - place) :precondition (and (at ?a) (way ?a ?b))
+/// #     :effect (and (not (at ?a)) (at ?b) (increase (time) 5) (increase (energy) 1)))
+/// #   (:action ride :parameters (?a ?b - place) :precondition (and (at ?a) (way ?a ?b))
+/// #     :effect (and (not (at ?a)) (at ?b) (increase (time) 1) (increase (energy) 4))))");
+/// # let problem = Source::new("p", "(define (problem p) (:domain d) (:objects a b c - place)
+/// #   (:init (at a) (way a b) (way b c) (= (time) 0) (= (energy) 0)) (:goal (at c)) (:metric minimize (time)))");
+/// let (domain, problem, _warnings) = read(&domain, &problem)?;
+/// let task = ground(&domain, &problem, &GroundConfig::default())?;
+/// assert!(task.is_timed());
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Errors
 /// Every construct that the planner does not handle, with its place.
 pub fn ground(domain: &Domain, problem: &Problem, config: &Config) -> Result<Task, Errors> {

@@ -38,6 +38,29 @@ pub struct Front {
 
 /// Finds a plan that is best by the first objective of the task, among those best by the second, and so on.
 /// The values by all objectives come with it; they are empty if there is no plan.
+///
+/// ```
+/// use metaplan_encodings::pddl::{ast::Direction, read_objective};
+/// use metaplan_encodings::{Config, GroundConfig, ground, lexicographic};
+/// # use metaplan_encodings::pddl::{Source, read};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let domain = Source::new("d", "(define (domain d) (:requirements :typing :numeric-fluents) (:types place)
+/// #   (:predicates (at ?p - place) (way ?a ?b - place)) (:functions (time) (energy))
+/// #   (:action walk :parameters (?a ?b - place) :precondition (and (at ?a) (way ?a ?b))
+/// #     :effect (and (not (at ?a)) (at ?b) (increase (time) 5) (increase (energy) 1)))
+/// #   (:action ride :parameters (?a ?b - place) :precondition (and (at ?a) (way ?a ?b))
+/// #     :effect (and (not (at ?a)) (at ?b) (increase (time) 1) (increase (energy) 4))))");
+/// # let problem = Source::new("p", "(define (problem p) (:domain d) (:objects a b c - place)
+/// #   (:init (at a) (way a b) (way b c) (= (time) 0) (= (energy) 0)) (:goal (at c)) (:metric minimize (time)))");
+/// # let (domain, problem, _warnings) = read(&domain, &problem)?;
+/// let objective = |text: &str| read_objective(Direction::Minimize, &Source::new("objective", text), &domain, &problem);
+/// let objectives = vec![objective("(time)")?, objective("(energy)")?];
+/// let task = ground(&domain, &problem, &GroundConfig::default().with_objectives(objectives))?;
+/// let point = lexicographic(&task, &Config::default(), &mut |_| {});
+/// assert_eq!(point.values.iter().map(ToString::to_string).collect::<Vec<_>>(), ["2", "8"]);
+/// # Ok(())
+/// # }
+/// ```
 pub fn lexicographic(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement)) -> Point {
     let order: Vec<usize> = (0..=task.others.len()).collect();
     in_order(task, &order, &[], config, report)
@@ -45,6 +68,29 @@ pub fn lexicographic(task: &Task, config: &Config, report: &mut dyn FnMut(Improv
 
 /// Enumerates the plans of which no other one is better by one of the first two objectives and not worse by
 /// the other, one plan for each pair of values.
+///
+/// ```
+/// use metaplan_encodings::pddl::{ast::Direction, read_objective};
+/// use metaplan_encodings::{Config, GroundConfig, Status, ground, pareto};
+/// # use metaplan_encodings::pddl::{Source, read};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let domain = Source::new("d", "(define (domain d) (:requirements :typing :numeric-fluents) (:types place)
+/// #   (:predicates (at ?p - place) (way ?a ?b - place)) (:functions (time) (energy))
+/// #   (:action walk :parameters (?a ?b - place) :precondition (and (at ?a) (way ?a ?b))
+/// #     :effect (and (not (at ?a)) (at ?b) (increase (time) 5) (increase (energy) 1)))
+/// #   (:action ride :parameters (?a ?b - place) :precondition (and (at ?a) (way ?a ?b))
+/// #     :effect (and (not (at ?a)) (at ?b) (increase (time) 1) (increase (energy) 4))))");
+/// # let problem = Source::new("p", "(define (problem p) (:domain d) (:objects a b c - place)
+/// #   (:init (at a) (way a b) (way b c) (= (time) 0) (= (energy) 0)) (:goal (at c)) (:metric minimize (time)))");
+/// # let (domain, problem, _warnings) = read(&domain, &problem)?;
+/// let objective = |text: &str| read_objective(Direction::Minimize, &Source::new("objective", text), &domain, &problem);
+/// let objectives = vec![objective("(time)")?, objective("(energy)")?];
+/// let task = ground(&domain, &problem, &GroundConfig::default().with_objectives(objectives))?;
+/// let front = pareto(&task, &Config::default(), &mut |_| {});
+/// assert_eq!((front.status, front.points.len()), (Status::Optimal, 3));
+/// # Ok(())
+/// # }
+/// ```
 pub fn pareto(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement)) -> Front {
     let mut points = Vec::new();
     let mut budgets: Vec<(usize, Int)> = Vec::new();

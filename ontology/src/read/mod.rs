@@ -53,6 +53,17 @@ pub fn read_files<P: AsRef<Path>>(files: &[P], options: &ReadOptions) -> Result<
 
 /// Reads an ontology from a text in any supported syntax; `name` stands for the file in messages.
 ///
+/// ```
+/// use ontology::{ReadOptions, read_text};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let text = "@prefix : <http://e.org/#> . @prefix owl: <http://www.w3.org/2002/07/owl#> . :Robot a owl:Class . :r2 a :Robot .";
+/// let read = read_text(text, "robots.ttl", &ReadOptions::default())?;
+/// assert_eq!(read.axioms.len(), 1);
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Errors
 /// As [`read_files`].
 pub fn read_text(text: &str, name: &str, options: &ReadOptions) -> Result<Ontology, Errors> {

@@ -32,6 +32,16 @@ pub enum OutputSyntax {
 
 /// Reads documents with all that they import, and writes them as one document.
 ///
+/// ```
+/// use ontology::{OutputSyntax, ReadOptions, convert_files};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let (text, _warnings) = convert_files(&["kb/ugv.ttl"], &ReadOptions::default(), OutputSyntax::NTriples)?;
+/// assert!(text.lines().all(|line| line.ends_with(" .")));
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Errors
 /// As [`crate::read_files`]; [`Error::Unwritable`] where the syntax has no form for something.
 pub fn convert_files<P: AsRef<Path>>(

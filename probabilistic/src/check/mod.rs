@@ -70,6 +70,19 @@ pub struct Report {
 
 /// Checks a property.
 ///
+/// ```
+/// use metaplan_probabilistic::check::{Answer, Options, Outcome, check};
+/// use metaplan_probabilistic::{prism, property};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let model = prism::parse("dtmc module m s:[0..2] init 0; [] s=0 -> 1/3:(s'=1) + 2/3:(s'=2); endmodule")?;
+/// let report = check(&model, &property::parse("P=? [ F s=1 ]")?, &Options::default())?;
+/// let Outcome::Value(Answer::Finite(found)) = report.outcome else { panic!("a probability is finite") };
+/// assert!(found.lower <= 1.0 / 3.0 && found.upper >= 1.0 / 3.0);
+/// # Ok(())
+/// # }
+/// ```
+///
 /// # Errors
 /// Everything that is wrong with model, property, constants or policy, or that a limit was reached.
 pub fn check(model: &Model, property: &Property, options: &Options<'_>) -> Result<Report, Error> {

@@ -10,6 +10,13 @@ use crate::prism::rename;
 
 /// Reads a model.
 ///
+/// ```
+/// use metaplan_probabilistic::prism;
+///
+/// let wrong = prism::parse("mdp\nmodule m\n s:[0..1] init 0;\n [] s=0 -> (s'=1)\nendmodule").expect_err("no semicolon");
+/// assert_eq!(wrong.diagnostics()[0].place.line, 5);
+/// ```
+///
 /// # Errors
 /// All that is wrong with its syntax; after a wrong part, reading goes on with the next one.
 pub fn parse(text: &str) -> Result<Model, Error> {

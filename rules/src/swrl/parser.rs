@@ -27,6 +27,13 @@ pub struct Syntax {
 /// Reads rules. `source` names the text in rule identities and errors; prefixes that the text declares come on top
 /// of those given.
 ///
+/// ```
+/// use metaplan_rules::{Prefixes, Symbols, parse_rules};
+///
+/// let wrong = parse_rules("Lamp(?l -> Dark(?l) .", "lamps.swrl", &mut Symbols::new(), &Prefixes::new()).expect_err("no bracket");
+/// assert!(wrong.to_string().starts_with("lamps.swrl:1:"));
+/// ```
+///
 /// # Errors
 /// All errors of the text: R101, R102, R104.
 pub fn parse_rules(

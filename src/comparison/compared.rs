@@ -1,0 +1,100 @@
+//! A mission beside its process: the SAT planner's plans are what is compared.
+
+use std::time::Instant;
+
+use encodings::{Limits, Step};
+use pddl::ast::Problem;
+
+use crate::comparison::coadaptation::{Coadaptation, Roles};
+use crate::comparison::compare::{Comparison, Config, Listener, compare};
+use crate::comparison::planned::{NoResult, Planned, Stages};
+use crate::comparison::process::{Action, Risk, Valuation};
+use crate::comparison::task::Tasked;
+use crate::message::Errors;
+use crate::mission::{Mission, Planning as _};
+
+/// A mission, and the process that it stands for.
+#[derive(Debug, Clone, Copy)]
+pub struct Compared<'m> {
+    /// The mission.
+    pub mission: &'m Mission,
+    /// The symbols of the process.
+    pub roles: &'m Roles,
+    /// The process.
+    pub coadaptation: &'m Coadaptation,
+    /// The same for a task whose problem does not spell out places and configurations.
+    pub tasked: Option<&'m Tasked>,
+}
+
+impl Compared<'_> {
+    /// Plans by the SAT planner beside the policies of model checking, in one process.
+    ///
+    /// # Errors
+    /// The process is too large, or cannot be solved; or the planner cannot plan.
+    pub fn compare(&self, config: &Config<'_>, report: &mut Listener<'_>) -> Result<Comparison, NoResult> {
+        let mut planner = |situation: &Valuation| match self.tasked {
+            Some(tasked) => solve(
+                self.mission,
+                |mission| tasked.problem(mission, situation),
+                |steps| tasked.actions(situation, steps),
+            ),
+            None => self.plan(config.risk, *situation),
+        };
+        compare(self.coadaptation, config, &mut planner, report)
+    }
+
+    /// The SAT planner's plan from a situation.
+    fn plan(&self, risk: Risk, situation: Valuation) -> Result<Planned, Errors> {
+        let Self { roles, coadaptation, .. } = *self;
+        let mut mission = self.mission.clone();
+        mission.set(&roles.location, &coadaptation.places[situation.place])?;
+        let configuration = &coadaptation.configurations[situation.configuration].name;
+        mission.set(&roles.configured, configuration)?;
+        if let Some(battery) = coadaptation.battery.filter(|_| risk.battery) {
+            let left = u64::from(situation.battery) * u64::from(battery.unit);
+            mission.set(&roles.battery, &left.to_string())?;
+        }
+        if let Some(loss) = coadaptation.loss.as_ref().filter(|_| situation.lost) {
+            mission.fail(&loss.component)?;
+        }
+        let actions = |steps: &[Step]| {
+            Some(steps.iter().filter_map(|step| action(coadaptation, &step.arguments)).collect())
+        };
+        solve(&mission, |mission| mission.filled().map(|(problem, _)| problem), actions)
+    }
+}
+
+/// The plan of a problem, and what it took.
+fn solve(
+    mission: &Mission,
+    problem: impl FnOnce(&Mission) -> Result<Problem, Errors>,
+    actions: impl FnOnce(&[Step]) -> Option<Vec<Action>>,
+) -> Result<Planned, Errors> {
+    let started = Instant::now();
+    let problem = problem(mission)?;
+    let task = mission.ground(&problem, &[], &Limits::none())?;
+    let ground = started.elapsed();
+    let solution = encodings::optimize(&task, &encodings::Config::default(), &mut |_| {});
+    let actions = solution.plan.and_then(|plan| actions(&plan.steps));
+    let statistics = &solution.statistics;
+    let (build, solve) = (ground + statistics.encode, statistics.search + statistics.solve);
+    let extract = started.elapsed().saturating_sub(build + solve);
+    Ok(Planned {
+        actions,
+        variables: statistics.variables as u64,
+        clauses: statistics.clauses as u64,
+        time: Stages { build, solve, extract },
+    })
+}
+
+/// What a step does: between two places, or to the last design that it names.
+fn action(mission: &Coadaptation, arguments: &[String]) -> Option<Action> {
+    let same = |a: &str, b: &str| a.eq_ignore_ascii_case(b);
+    let place = |name: &String| mission.places.iter().position(|known| same(known, name));
+    let places: Vec<usize> = arguments.iter().filter_map(place).collect();
+    if let [from, to] = places[..] {
+        return mission.arcs.iter().position(|arc| (arc.from, arc.to) == (from, to)).map(Action::Move);
+    }
+    let design = arguments.last()?;
+    mission.configurations.iter().position(|known| same(&known.name, design)).map(Action::Change)
+}
