@@ -2,20 +2,21 @@
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
 use std::time::Duration;
 
 use metaplan::answers::{
     ChangesAnswer, CompareAnswer, ComparisonAnswer, DesignAnswer, PlanAnswer, VerdictAnswer,
 };
 use metaplan::comparison::{self, Coadaptation, Compared, NoResult, Risk, Tasked};
-use metaplan::encodings::{Config, Exact, Limits, Plan};
+use metaplan::encodings::{Config, Exact, Limits, Plan, Solution};
 use metaplan::file::source;
 use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
 use metaplan::message::{Errors, Message};
 use metaplan::mission::{self as missions, Bindings, Names, read_plan};
 use metaplan::pddl::{Source, validate};
 use metaplan::planner::{Planned as Found, Planner, consistent};
+use metaplan::report::{Positions, Seen};
 use metaplan::setup::Setup;
 use metaplan::{explain, report};
 use pyo3::exceptions::PyValueError;
@@ -24,10 +25,10 @@ use pyo3::prelude::*;
 use crate::failure::{listed, raise, raise_one};
 use crate::wait::detached;
 
-/// A mission in its present situation.
+/// A mission in its present situation. What has begun with one situation goes on with it when another thread changes the mission.
 #[pyclass(module = "metaplan._native", frozen)]
 pub(crate) struct Mission {
-    setup: RwLock<Setup>,
+    setup: RwLock<Arc<Setup>>,
 }
 
 /// What was found for a mission.
@@ -45,14 +46,23 @@ pub(crate) struct Planned {
     /// What may be other than meant, as JSON.
     #[pyo3(get)]
     warnings: String,
-    picture: Option<metaplan::picture::Plan>,
+    seen: Option<Drawable>,
+}
+
+/// What a plan is drawn from, when somebody looks.
+struct Drawable {
+    setup: Arc<Setup>,
+    problem: metaplan::pddl::ast::Problem,
+    solution: Solution,
 }
 
 #[pymethods]
 impl Planned {
     /// The plan as a timeline in SVG; nothing if there is none.
     fn svg(&self) -> Option<String> {
-        self.picture.as_ref().map(metaplan::picture::Plan::svg)
+        let Drawable { setup, problem, solution } = self.seen.as_ref()?;
+        let seen = Seen { mission: &setup.mission, problem, positions: &Positions::Unknown };
+        Some(report::plan_picture(seen, solution).svg())
     }
 }
 
@@ -83,12 +93,12 @@ pub(crate) fn seconds(name: &str, value: f64) -> PyResult<Duration> {
 }
 
 impl Mission {
-    pub(crate) fn read(&self) -> RwLockReadGuard<'_, Setup> {
-        self.setup.read().unwrap_or_else(PoisonError::into_inner)
+    pub(crate) fn read(&self) -> Arc<Setup> {
+        Arc::clone(&self.setup.read().unwrap_or_else(PoisonError::into_inner))
     }
 
-    fn write(&self) -> RwLockWriteGuard<'_, Setup> {
-        self.setup.write().unwrap_or_else(PoisonError::into_inner)
+    fn change<T>(&self, change: impl FnOnce(&mut Setup) -> T) -> T {
+        change(Arc::make_mut(&mut self.setup.write().unwrap_or_else(PoisonError::into_inner)))
     }
 }
 
@@ -122,7 +132,7 @@ impl Mission {
 
     /// Another mission in the same situation.
     fn copy(&self) -> Self {
-        Self { setup: RwLock::new(self.read().clone()) }
+        Self { setup: RwLock::new(self.read()) }
     }
 
     /// The mission's name.
@@ -159,17 +169,17 @@ impl Mission {
 
     /// Brings the mission into a scenario of its manifest.
     fn scenario(&self, py: Python<'_>, name: &str) -> PyResult<()> {
-        self.write().apply(name).map_err(|message| raise_one(py, message))
+        self.change(|setup| setup.apply(name)).map_err(|message| raise_one(py, message))
     }
 
     /// A component has failed.
     fn fail(&self, py: Python<'_>, component: &str) -> PyResult<()> {
-        self.write().mission.fail(component).map_err(|message| raise_one(py, message))
+        self.change(|setup| setup.mission.fail(component)).map_err(|message| raise_one(py, message))
     }
 
     /// A measured attribute, a numeric fluent or a fact has a value.
     fn set(&self, py: Python<'_>, name: &str, value: &str) -> PyResult<()> {
-        self.write().mission.set(name, value).map_err(|message| raise_one(py, message))
+        self.change(|setup| setup.mission.set(name, value)).map_err(|message| raise_one(py, message))
     }
 
     /// The best plan, or a front.
@@ -211,8 +221,7 @@ impl Mission {
         let config = config.with_limits(limits);
         let wanted = Wanted { config, minimize, pareto, alternatives, separation, certificate };
         let setup = self.read();
-        let (found, stopped) =
-            detached(py, &interrupt, || planned(&setup.mission, wanted, on_improvement.as_ref()));
+        let (found, stopped) = detached(py, &interrupt, || planned(&setup, wanted, on_improvement.as_ref()));
         match (found, stopped) {
             (Ok(planned), None) => Ok(planned),
             // The best plan so far is what Ctrl-C is for.
@@ -310,7 +319,7 @@ fn made(py: Python<'_>, read: impl FnOnce() -> Result<Setup, Errors> + Send) -> 
         Ok(setup)
     };
     let setup = py.detach(checked).map_err(|messages: Errors| raise(py, &messages))?;
-    Ok(Mission { setup: RwLock::new(setup) })
+    Ok(Mission { setup: RwLock::new(Arc::new(setup)) })
 }
 
 fn joined(
@@ -349,11 +358,8 @@ impl From<Errors> for Stop {
     }
 }
 
-fn planned(
-    mission: &missions::Mission,
-    wanted: Wanted,
-    on_improvement: Option<&Py<PyAny>>,
-) -> Result<Planned, Stop> {
+fn planned(setup: &Arc<Setup>, wanted: Wanted, on_improvement: Option<&Py<PyAny>>) -> Result<Planned, Stop> {
+    let mission = &setup.mission;
     consistent(mission.knowledge())?;
     let raised: Mutex<Option<PyErr>> = Mutex::default();
     let tell = |better: &metaplan::encodings::Improvement| {
@@ -384,9 +390,9 @@ fn planned(
             let front = planner.pareto([first, second])?;
             let json = serde_json::to_string(&front.answer()).unwrap_or_default();
             let verdict = front.front.status.to_string();
-            Planned { json, text: None, verdict, warnings, picture: None }
+            Planned { json, text: None, verdict, warnings, seen: None }
         }
-        None => answered(planner.plan()?, wanted.certificate, warnings)?,
+        None => answered(setup, planner.plan()?, wanted.certificate, warnings)?,
     };
     match raised.into_inner().unwrap_or_else(PoisonError::into_inner) {
         Some(error) => Err(Stop::Raised(error)),
@@ -394,16 +400,20 @@ fn planned(
     }
 }
 
-fn answered(found: Found<'_>, certificate: Option<PathBuf>, warnings: String) -> Result<Planned, Errors> {
+fn answered(
+    setup: &Arc<Setup>,
+    found: Found<'_>,
+    certificate: Option<PathBuf>,
+    warnings: String,
+) -> Result<Planned, Errors> {
     if let Some(directory) = certificate {
         found.certify(&directory)?;
     }
     let answer: PlanAnswer = found.answer();
-    Ok(Planned {
-        json: serde_json::to_string(&answer).unwrap_or_default(),
-        text: found.solution.plan.as_ref().map(Plan::to_string),
-        verdict: found.solution.verdict(),
-        warnings,
-        picture: found.solution.plan.as_ref().map(|_| found.picture(&report::Positions::Unknown)),
-    })
+    let json = serde_json::to_string(&answer).unwrap_or_default();
+    let (verdict, problem) = (found.solution.verdict(), found.problem().clone());
+    let solution = found.solution;
+    let text = solution.plan.as_ref().map(Plan::to_string);
+    let seen = text.is_some().then(|| Drawable { setup: Arc::clone(setup), problem, solution });
+    Ok(Planned { json, text, verdict, warnings, seen })
 }

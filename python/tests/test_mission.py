@@ -2,7 +2,9 @@
 
 import asyncio
 import json
+import signal
 import subprocess
+import sys
 import threading
 from decimal import Decimal
 from pathlib import Path
@@ -148,17 +150,52 @@ def test_the_plan_is_compared_with_policies():
     assert len(comparison.to_df()) == len(comparison.candidates) and "<table>" in comparison._repr_html_()
 
 
+def tour(places):
+    """A tour of all places: a plan is found at once, the best one is not."""
+    names = [f"p{index}" for index in range(places)]
+    length = {(a, b): 10 + (7 * i * i + 13 * j * j + 5 * i * j) % 83 for i, a in enumerate(names) for j, b in enumerate(names) if a != b}
+    facts = " ".join(f"(way {a} {b}) (= (length {a} {b}) {far})" for (a, b), far in length.items())
+    domain = DOMAIN.replace("(at ?p - place)", "(at ?p - place) (seen ?p - place)").replace("(at ?b) (inc", "(at ?b) (seen ?b) (inc")
+    problem = f"""(define (problem p) (:domain d) (:objects {" ".join(names)} - place) (:init (at p0) {facts} (= (total-cost) 0))
+      (:goal (and {" ".join(f"(seen {name})" for name in names)})) (:metric minimize (total-cost)))"""
+    return domain, problem
+
+
 def test_improvements_are_heard_and_end_the_search():
     heard = []
-    plan = metaplan.Mission.from_files(DOMAIN, PROBLEM).plan(on_improvement=lambda *own: heard.append(own))
-    assert plan.optimal and all(bound <= cost for cost, bound, _, _ in heard)
+    mission = metaplan.Mission.from_files(*tour(8))
+    plan = mission.plan(on_improvement=lambda *own: heard.append(own))
+    assert plan.optimal and heard and all(bound <= cost for cost, bound, _, _ in heard)
+    ended = metaplan.Mission.from_files(*tour(25)).plan(on_improvement=lambda *_: False)
+    assert not ended.optimal and ended.steps
 
     def wrong(*_):
         raise RuntimeError("no")
 
-    if heard:
-        with pytest.raises(RuntimeError):
-            metaplan.Mission.from_files(DOMAIN, PROBLEM).plan(on_improvement=wrong)
+    with pytest.raises(RuntimeError):
+        mission.plan(on_improvement=wrong)
+
+
+def test_control_c_gives_the_best_plan_so_far(tmp_path):
+    (tmp_path / "d.pddl").write_text((texts := tour(25))[0])
+    (tmp_path / "p.pddl").write_text(texts[1])
+    program = """
+import metaplan, sys
+first = True
+def heard(*_):
+    global first
+    if first: print("begun", flush=True)
+    first = False
+plan = metaplan.Mission.from_files(open(sys.argv[1]).read(), open(sys.argv[2]).read()).plan(on_improvement=heard)
+print(plan.status, len(plan.steps))
+"""
+    command = [sys.executable, "-c", program, tmp_path / "d.pddl", tmp_path / "p.pddl"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "begun\n"
+        process.send_signal(signal.SIGINT)
+        status, steps = process.stdout.readline().split()
+        assert process.wait(60) == 0
+    assert status != "optimal" and int(steps) >= 24
 
 
 def test_threads_plan_at_once():
@@ -170,6 +207,20 @@ def test_threads_plan_at_once():
     for thread in threads:
         thread.join()
     assert costs == [408] * 4
+
+
+def test_a_mission_changes_while_it_is_planned_for():
+    mission = metaplan.Mission.load(UGV)
+
+    def heard(*_):
+        changing = threading.Thread(target=mission.fail, args=("c_kinect",))
+        changing.start()
+        changing.join(30)
+        assert not changing.is_alive()
+
+    plan = mission.plan(on_improvement=heard)
+    assert plan.cost == 408 and "<svg" in plan.svg()
+    assert mission.plan().cost > 408
 
 
 def test_answers_are_those_of_the_program():

@@ -2,8 +2,11 @@
 //!
 //! From below, values are iterated from zero. They are then taken a little higher, and if no equation raises any of them
 //! any more they are upper bounds, because end components are merged (optimistic value iteration: Hartmanns and
-//! Kaminski, CAV 2020; see also Haddad and Monmege, TCS 735, 2018). Rounding errors are added to what comes from above, and
-//! taken off what comes from below, one share for each sweep.
+//! Kaminski, CAV 2020; see also Haddad and Monmege, TCS 735, 2018). Each evaluation of an equation is rounded towards its side, so
+//! that every value is a bound at any time, in whichever order the equations are taken: each uses what those before it in
+//! the same sweep have found (Gauss-Seidel), and the blocks that are left soonest come first.
+
+use std::collections::VecDeque;
 
 use num_rational::BigRational;
 
@@ -21,37 +24,47 @@ pub struct Enclosed<N> {
     pub errors: Vec<f64>,
 }
 
-/// Rows that are evaluated at most.
-const WORK: u64 = 2_000_000_000;
+/// Transitions that are looked at, at most.
+const WORK: u64 = 30_000_000_000;
 /// Sweeps from above before the values from below are made better.
 const UPPER_SWEEPS: usize = 40;
+/// Sweeps over the rows of one policy between two sweeps over all rows.
+const POLICY_SWEEPS: usize = 25;
 
 /// Bounds on the values of all blocks whose width is `width`, relative to the value; none where they do not get close in time.
 pub fn enclose<N: Number>(quotient: &Quotient<N>, direction: Direction, width: f64) -> Option<Enclosed<N>> {
     let rows = Rows::new(quotient, direction);
-    let blocks = quotient.blocks();
-    let mut lower = vec![0.0_f64; blocks];
-    let mut next = lower.clone();
-    let (mut sweeps, mut work, mut threshold) = (0.0_f64, 0_u64, width * 0.05);
+    let (down, up) = (1.0 - rows.rounding, 1.0 + rows.rounding);
+    let all = rows.columns.len().saturating_add(rows.constants.len()) as u64;
+    let mut lower = vec![0.0_f64; quotient.blocks()];
+    let mut policy = vec![NONE; quotient.blocks()];
+    let (mut work, mut threshold) = (0_u64, width * 0.05);
     while work < WORK {
         loop {
-            // All at once, and not one after the other, so that each sweep adds one rounding error only.
-            let change = rows.sweep(&lower, &mut next, 1.0);
-            std::mem::swap(&mut lower, &mut next);
-            sweeps += 1.0;
-            work = work.saturating_add(rows.constants.len() as u64);
+            let mut change = rows.sweep(&mut lower, &mut policy, down);
+            work = work.saturating_add(all);
+            // Some policy is not better than the best one, and so its values are lower bounds where the greatest ones are asked for.
+            if direction == Direction::Max && change > threshold {
+                for _ in 0..POLICY_SWEEPS {
+                    let (grown, looked) = rows.follow(&mut lower, &policy, down);
+                    work = work.saturating_add(looked);
+                    change = grown;
+                    if change <= threshold || work >= WORK {
+                        break;
+                    }
+                }
+                // What other rows are worth is seen by the next sweep.
+                continue;
+            }
             if change <= threshold || work >= WORK {
                 break;
             }
         }
         let mut upper: Vec<f64> = lower.iter().map(|value| value * (1.0 + width * 0.5)).collect();
         for _ in 0..UPPER_SWEEPS {
-            work = work.saturating_add(rows.constants.len() as u64);
-            let before = upper.clone();
-            rows.sweep(&before, &mut upper, 1.0 + rows.rounding);
-            if upper.iter().zip(&before).all(|(after, before)| after <= before) {
-                let rounded = 1.0 - sweeps * rows.rounding * 2.0;
-                return Some(rows.enclosed(&lower, &upper, rounded.max(0.0)));
+            work = work.saturating_add(all);
+            if !rows.raises(&mut upper, up) {
+                return Some(rows.enclosed(quotient, &lower, &upper));
             }
         }
         threshold *= 0.1;
@@ -59,75 +72,189 @@ pub fn enclose<N: Number>(quotient: &Quotient<N>, direction: Direction, width: f
     None
 }
 
-/// The rows in doubles.
-struct Rows<'a, N> {
-    quotient: &'a Quotient<N>,
+/// The rows in doubles, in the order in which they are swept.
+struct Rows {
     direction: Direction,
-    constants: Vec<f64>,
+    /// The block at each place of the order.
+    order: Vec<u32>,
+    /// For each place its first row, and the end.
+    blocks: Vec<u32>,
+    /// For each row its first transition, and the end.
+    first: Vec<u32>,
+    /// Places that rows lead to.
+    columns: Vec<u32>,
     probabilities: Vec<f64>,
+    constants: Vec<f64>,
+    /// The number of each row in the component.
+    numbers: Vec<u32>,
     /// The relative error of evaluating one row.
     rounding: f64,
 }
 
-impl<'a, N: Number> Rows<'a, N> {
-    fn new(quotient: &'a Quotient<N>, direction: Direction) -> Self {
-        let rows = &quotient.rows;
-        Self {
-            quotient,
-            direction,
-            constants: rows.constants.iter().map(Number::to_f64).collect(),
-            probabilities: rows.probabilities.iter().map(Number::to_f64).collect(),
-            rounding: (count(quotient.widest) + 16.0) * f64::EPSILON,
+impl Rows {
+    fn new<N: Number>(quotient: &Quotient<N>, direction: Direction) -> Self {
+        let order = order(quotient);
+        let mut places = vec![0_u32; order.len()];
+        for (place, block) in order.iter().enumerate() {
+            places[*block as usize] = dense(place);
         }
+        let mut rows = Self {
+            direction,
+            blocks: vec![0],
+            first: vec![0],
+            columns: Vec::with_capacity(quotient.rows.columns.len()),
+            probabilities: Vec::with_capacity(quotient.rows.columns.len()),
+            constants: Vec::with_capacity(quotient.rows.len()),
+            numbers: Vec::with_capacity(quotient.rows.len()),
+            rounding: (count(quotient.widest) + 16.0) * f64::EPSILON,
+            order: Vec::new(),
+        };
+        for block in &order {
+            for row in quotient.range(*block as usize) {
+                for at in quotient.rows.range(row) {
+                    rows.columns.push(places[quotient.rows.columns[at] as usize]);
+                    rows.probabilities.push(quotient.rows.probabilities[at].to_f64());
+                }
+                rows.constants.push(quotient.rows.constants[row].to_f64());
+                rows.numbers.push(dense(row));
+                rows.first.push(dense(rows.columns.len()));
+            }
+            rows.blocks.push(dense(rows.constants.len()));
+        }
+        rows.order = order;
+        rows
     }
 
+    #[expect(clippy::arithmetic_side_effects, reason = "the end is listed, too")]
     fn apply(&self, row: usize, values: &[f64]) -> f64 {
-        self.quotient.rows.range(row).fold(self.constants[row], |sum, at| {
-            sum + self.probabilities[at] * values[self.quotient.rows.columns[at] as usize]
+        let range = self.first[row] as usize..self.first[row + 1] as usize;
+        let transitions = self.columns[range.clone()].iter().zip(&self.probabilities[range]);
+        transitions.fold(self.constants[row], |sum, (column, probability)| {
+            sum + probability * values[*column as usize]
         })
     }
 
-    /// The best row of a block with its value; blocks that nothing leaves are worth nothing.
-    fn best(&self, block: usize, values: &[f64]) -> (u32, f64) {
+    /// The best row of a place with its value; places that nothing leaves are worth nothing.
+    #[expect(clippy::arithmetic_side_effects, reason = "the end is listed, too")]
+    fn best(&self, place: usize, values: &[f64]) -> (u32, f64) {
         let mut best = (NONE, 0.0);
-        for row in self.quotient.range(block) {
-            let value = self.apply(row, values);
+        for row in self.blocks[place]..self.blocks[place + 1] {
+            let value = self.apply(row as usize, values);
             let better = match self.direction {
                 Direction::Min => value < best.1,
                 Direction::Max => value > best.1,
             };
             if best.0 == NONE || better {
-                best = (dense(row), value);
+                best = (row, value);
             }
         }
         best
     }
 
-    /// All values once more; the greatest relative growth.
-    fn sweep(&self, before: &[f64], after: &mut [f64], scale: f64) -> f64 {
+    /// All values once more, and the rows that give them; the greatest relative growth.
+    fn sweep(&self, values: &mut [f64], policy: &mut [u32], scale: f64) -> f64 {
         let mut change = 0.0_f64;
-        for (block, (before_, after)) in before.iter().zip(after).enumerate() {
-            *after = self.best(block, before).1 * scale;
-            if *after > *before_ {
-                change = change.max((*after - *before_) / *after);
-            }
+        for (place, chosen) in policy.iter_mut().enumerate() {
+            let (row, value) = self.best(place, values);
+            *chosen = row;
+            change = change.max(grow(&mut values[place], value * scale));
         }
         change
     }
 
-    fn enclosed(&self, lower: &[f64], upper: &[f64], rounded: f64) -> Enclosed<N> {
+    /// All values once more by the rows of a policy; the greatest relative growth, and how many transitions were looked at.
+    fn follow(&self, values: &mut [f64], policy: &[u32], scale: f64) -> (f64, u64) {
+        let (mut change, mut looked) = (0.0_f64, 0_u64);
+        for (place, row) in policy.iter().enumerate().filter(|(_, row)| **row != NONE) {
+            let value = self.apply(*row as usize, values) * scale;
+            looked = looked.saturating_add(2);
+            change = change.max(grow(&mut values[place], value));
+        }
+        (change, looked)
+    }
+
+    /// All values once more from above; whether any is raised. If none is, they are upper bounds: each equation was taken with values that
+    /// are at least as great as those that are left.
+    fn raises(&self, values: &mut [f64], scale: f64) -> bool {
+        let mut raised = false;
+        for place in 0..values.len() {
+            let value = self.best(place, values).1 * scale;
+            raised |= value > values[place];
+            values[place] = value;
+        }
+        raised
+    }
+
+    fn enclosed<N: Number>(&self, quotient: &Quotient<N>, lower: &[f64], upper: &[f64]) -> Enclosed<N> {
         // The choices that keep a bound from getting worse have values that are within it.
         let kept = if self.direction == Direction::Min { upper } else { lower };
-        let policy = (0..lower.len()).map(|block| self.best(block, kept).0).collect();
-        let (mut values, mut errors) = (Vec::new(), Vec::new());
-        for (lower, upper) in lower.iter().map(|lower| lower * rounded).zip(upper) {
-            let middle = f64::midpoint(lower, *upper);
-            let exact = BigRational::from_float(middle).unwrap_or_default();
-            values.push(N::from_rational(&exact));
-            errors.push((upper - lower) * 0.5 + middle * 4.0 * f64::EPSILON);
+        let blocks = quotient.blocks();
+        let mut found = Enclosed {
+            policy: vec![NONE; blocks],
+            values: vec![N::zero(); blocks],
+            errors: vec![0.0; blocks],
+        };
+        for (place, block) in self.order.iter().enumerate() {
+            let block = *block as usize;
+            let (row, _) = self.best(place, kept);
+            found.policy[block] = if row == NONE { NONE } else { self.numbers[row as usize] };
+            let middle = f64::midpoint(lower[place], upper[place]);
+            found.values[block] = N::from_rational(&BigRational::from_float(middle).unwrap_or_default());
+            found.errors[block] = (upper[place] - lower[place]) * 0.5 + middle * 4.0 * f64::EPSILON;
         }
-        Enclosed { policy, values, errors }
+        found
     }
+}
+
+/// Writes a value; how much it has grown, relative to itself.
+fn grow(old: &mut f64, new: f64) -> f64 {
+    let change = if new > *old { (new - *old) / new } else { 0.0 };
+    *old = new;
+    change
+}
+
+/// The blocks in the order in which they are left, by rows that lead out soonest; those that nothing leaves come last.
+fn order<N: Number>(quotient: &Quotient<N>) -> Vec<u32> {
+    let blocks = quotient.blocks();
+    let mut seen = vec![false; blocks];
+    let mut starts = vec![0_u32; blocks.saturating_add(1)];
+    let owned =
+        |block: usize| quotient.range(block).flat_map(|row| &quotient.rows.columns[quotient.rows.range(row)]);
+    for column in (0..blocks).flat_map(owned) {
+        starts[*column as usize] = starts[*column as usize].saturating_add(1);
+    }
+    let mut end = 0_u32;
+    for start in &mut starts {
+        end = end.saturating_add(*start);
+        *start = end;
+    }
+    let mut users = vec![0_u32; quotient.rows.columns.len()];
+    for block in (0..blocks).rev() {
+        for column in owned(block) {
+            let at = &mut starts[*column as usize];
+            *at = at.saturating_sub(1);
+            users[*at as usize] = dense(block);
+        }
+    }
+    let mut order = Vec::with_capacity(blocks);
+    let mut queue = VecDeque::new();
+    for (block, seen) in seen.iter_mut().enumerate() {
+        if quotient.range(block).any(|row| !quotient.rows.leaving[row].is_zero()) {
+            *seen = true;
+            queue.push_back(dense(block));
+        }
+    }
+    while let Some(block) = queue.pop_front() {
+        order.push(block);
+        let next = (block as usize).saturating_add(1);
+        for user in &users[starts[block as usize] as usize..starts[next] as usize] {
+            if !std::mem::replace(&mut seen[*user as usize], true) {
+                queue.push_back(*user);
+            }
+        }
+    }
+    order.extend((0..dense(blocks)).filter(|block| !seen[*block as usize]));
+    order
 }
 
 #[cfg(test)]
