@@ -38,7 +38,7 @@ pub fn all() -> Vec<Code> {
 /// The code of that name, in capitals or not.
 ///
 /// ```
-/// assert_eq!(metaplan::codes::find("m110").map(|code| code.code), Some("M110"));
+/// assert_eq!(metaplan::codes::find(&"M110".to_lowercase()).map(|code| code.code), Some("M110"));
 /// ```
 pub fn find(name: &str) -> Option<Code> {
     all().into_iter().find(|code| code.code.eq_ignore_ascii_case(name))
