@@ -6,7 +6,6 @@ use std::io::{self, Seek as _, Write as _};
 use std::path::Path;
 use std::time::Duration;
 
-use serde_json::Value;
 
 use super::directory::{End, JournalFiles, OLD_FORMAT, Segment, broken, closing, open_private, path};
 use super::record::{Link, Record};
@@ -113,36 +112,13 @@ impl Replay<'_> {
 
     /// Compares answers with those that were written.
     fn compare(&mut self, written: &Record, answers: &[Answer]) -> Result<(), Message> {
-        let made = self.control.decision(answers).answers;
-        let essence = |answers: Vec<Value>| answers.into_iter().map(essence).collect::<Vec<_>>();
-        if essence(written.list(0)) == essence(made) {
+        if self.control.decision(answers).agrees(&written.list(0)) {
             return Ok(());
         }
         let text =
             format!("the mission now leads to another decision than the one in record {}", written.number);
         Err(broken(self.directory, &text))
     }
-}
-
-/// An answer without explanations: of several that are right, which one is given depends on what came before the
-/// snapshot.
-fn essence(mut answer: Value) -> Value {
-    let kind = answer["answer"].as_str().unwrap_or_default().to_owned();
-    let mut strip = |list: &str, field: &str| {
-        let objects = answer.get_mut(list).and_then(Value::as_array_mut).into_iter().flatten();
-        for object in objects.filter_map(Value::as_object_mut) {
-            object.remove(field);
-        }
-    };
-    match kind.as_str() {
-        "inferred" => {
-            strip("designs", "because");
-            strip("objectives", "because");
-        }
-        "contradicted" => strip("contradictions", "facts"),
-        _ => {}
-    }
-    answer
 }
 
 /// Completes what a crash has left at the end of the last segments, and opens the last one to be written on.

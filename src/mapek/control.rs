@@ -162,7 +162,7 @@ impl Loop {
     }
 
     /// A checksum of the mission before anything has happened, to tell missions apart.
-    pub(crate) fn digest(&self) -> String {
+    pub fn digest(&self) -> String {
         self.digest.clone()
     }
 

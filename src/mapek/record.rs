@@ -23,6 +23,35 @@ pub struct Decision {
     pub plans: Vec<Value>,
 }
 
+impl Decision {
+    /// Whether answers to the same observation that were written once are these, explanations apart: of several that are right,
+    /// which one is given depends on what came before the snapshot.
+    pub fn agrees(&self, written: &[Value]) -> bool {
+        let essence = |answers: &[Value]| answers.iter().cloned().map(essence).collect::<Vec<_>>();
+        essence(&self.answers) == essence(written)
+    }
+}
+
+/// An answer without explanations.
+fn essence(mut answer: Value) -> Value {
+    let kind = answer["answer"].as_str().unwrap_or_default().to_owned();
+    let mut strip = |list: &str, field: &str| {
+        let objects = answer.get_mut(list).and_then(Value::as_array_mut).into_iter().flatten();
+        for object in objects.filter_map(Value::as_object_mut) {
+            object.remove(field);
+        }
+    };
+    match kind.as_str() {
+        "inferred" => {
+            strip("designs", "because");
+            strip("objectives", "because");
+        }
+        "contradicted" => strip("contradictions", "facts"),
+        _ => {}
+    }
+    answer
+}
+
 /// All that a loop knows, as data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Snapshot(pub Value);

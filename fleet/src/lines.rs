@@ -1,0 +1,276 @@
+//! Lines in and out.
+
+use std::collections::BTreeMap;
+use std::io::{self, Write as _};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use comfy_table::{CellAlignment, Table, TableStyle};
+use futures::StreamExt as _;
+use futures::stream::select_all;
+use metaplan::message::Message;
+use metaplan_fleet::partition::Shared;
+use metaplan_fleet::robots::{Sender, Status};
+use metaplan_fleet::store::local::Local;
+use metaplan_fleet::store::{Fault, Store, Stored, Stream};
+use metaplan_fleet::wire::{Address, Decided, is_name};
+use metaplan_fleet::worker;
+use serde_json::{Value, json};
+use tokio::io::{AsyncBufReadExt as _, BufReader, stdin};
+use tokio::sync::{mpsc, watch};
+
+/// Lines that wait to be stored, for each robot.
+const AHEAD: usize = 1024;
+
+fn fault(fault: &Fault) -> Message {
+    Message::error("N312", format!("the log cannot be used: {fault}"))
+}
+
+fn unwritten(error: &io::Error) -> Message {
+    Message::error("N313", format!("standard output cannot be written: {error}"))
+}
+
+/// Reads lines `ROBOT EVENT` to their end, or until `stop`; gives the number of those that were stored.
+async fn feed<S: Store>(store: &S, session: &str, mut stop: watch::Receiver<bool>) -> Result<u64, Message> {
+    let mut robots: BTreeMap<String, mpsc::Sender<String>> = BTreeMap::new();
+    let mut senders = tokio::task::JoinSet::new();
+    let mut lines = BufReader::new(stdin()).split(b'\n');
+    let mut number = 0_u64;
+    let mut wrong = 0;
+    loop {
+        let line = tokio::select! {
+            line = lines.next_segment() => line,
+            _ = stop.changed() => break,
+        };
+        let Some(line) = line.map_err(|error| Message::error("N314", format!("standard input: {error}")))?
+        else {
+            break;
+        };
+        number += 1;
+        let line = String::from_utf8_lossy(&line).trim().to_owned();
+        if line.is_empty() {
+            continue;
+        }
+        let Some((robot, event)) = line.split_once(' ').filter(|(robot, _)| is_name(robot)) else {
+            wrong += 1;
+            let text = format!("line {number}: a line is `ROBOT EVENT`; a robot's name has letters, digits, `-` and `_` only");
+            say(&Message::error("N314", text));
+            continue;
+        };
+        if !robots.contains_key(robot) {
+            let (tell, mut told) = mpsc::channel::<String>(AHEAD);
+            let mut sender = Sender::new(store.clone(), robot, session);
+            senders.spawn(async move {
+                let mut stored = 0;
+                while let Some(event) = told.recv().await {
+                    match sender.send(&event).await {
+                        Ok(_) => stored += 1,
+                        Err(own) => say(&fault(&own)),
+                    }
+                }
+                stored
+            });
+            robots.insert(robot.to_owned(), tell);
+        }
+        if let Some(tell) = robots.get(robot) {
+            // It is there for as long as we are.
+            let _ = tell.send(event.to_owned()).await;
+        }
+    }
+    drop(robots);
+    let mut stored = 0;
+    while let Some(count) = senders.join_next().await {
+        stored += count.unwrap_or(0);
+    }
+    if wrong > 0 {
+        return Err(Message::error("N314", format!("{wrong} lines were not understood; {stored} events were stored")));
+    }
+    Ok(stored)
+}
+
+#[expect(clippy::print_stderr, reason = "it is said while the program goes on")]
+fn say(message: &Message) {
+    eprint!("{}", message.text());
+}
+
+/// Stores what comes from standard input.
+pub(crate) async fn send<S: Store>(store: S, session: &str) -> Result<(), Message> {
+    let (_goes_on, stop) = watch::channel(false);
+    feed(&store, session, stop).await.map(|_| ())
+}
+
+/// A decision as a line.
+fn line(message: &Stored) -> Option<(String, String)> {
+    let address = Address::parse(&message.subject)?;
+    let decided = Decided::parse(&message.payload)?;
+    let mut line = json!({"decision": message.sequence, "event": decided.event, "answers": decided.answers});
+    if let (Some(mission), Some(object)) = (decided.enrolled, line.as_object_mut()) {
+        object.insert("enrolled".to_owned(), Value::String(mission));
+    }
+    if let (true, Some(object)) = (decided.retired, line.as_object_mut()) {
+        object.insert("retired".to_owned(), Value::Bool(true));
+    }
+    Some((address.robot, line.to_string()))
+}
+
+/// Writes decisions for as long as somebody reads them.
+pub(crate) async fn follow<S: Store>(store: S, robot: Option<&str>, after: Option<u64>) -> Result<(), Message> {
+    let partitions: Vec<u32> = match robot {
+        Some(robot) => vec![Address::of(robot, store.partitions()).partition],
+        None => (0..store.partitions()).collect(),
+    };
+    let reached = Mutex::new(beginning(&store, partitions, after).await?);
+    write_decisions(&store, robot, &reached).await
+}
+
+/// From where on decisions are written: as asked for, or those that are new.
+async fn beginning<S: Store>(
+    store: &S,
+    partitions: Vec<u32>,
+    after: Option<u64>,
+) -> Result<BTreeMap<u32, u64>, Message> {
+    let mut reached = BTreeMap::new();
+    for partition in partitions {
+        let own = match after {
+            Some(after) => after,
+            None => store.end(Stream::Decisions, partition).await.map_err(|own| fault(&own))?,
+        };
+        reached.insert(partition, own);
+    }
+    Ok(reached)
+}
+
+/// Writes decisions of partitions after those that are reached, for as long as somebody reads them.
+async fn write_decisions<S: Store>(
+    store: &S,
+    robot: Option<&str>,
+    reached: &Mutex<BTreeMap<u32, u64>>,
+) -> Result<(), Message> {
+    loop {
+        let from = reached.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let mut streams = Vec::new();
+        for (partition, after) in from {
+            let stream = store.follow(Stream::Decisions, partition, after).await.map_err(|own| fault(&own))?;
+            streams.push(stream.map(move |message| (partition, message)).boxed());
+        }
+        let mut decisions = select_all(streams);
+        while let Some((partition, message)) = decisions.next().await {
+            // Where reading was interrupted, it goes on.
+            let Ok(message) = message else { break };
+            if let Some((own, text)) = line(&message)
+                && robot.is_none_or(|robot| robot == own)
+            {
+                let mut out = io::stdout().lock();
+                match writeln!(out, "{own} {text}").and_then(|()| out.flush()) {
+                    Err(error) if error.kind() == io::ErrorKind::BrokenPipe => return Ok(()),
+                    other => other.map_err(|error| unwritten(&error))?,
+                }
+            }
+            let mut reached = reached.lock().unwrap_or_else(PoisonError::into_inner);
+            reached.insert(partition, message.sequence);
+        }
+        tokio::time::sleep(Duration::from_millis(fastrand::u64(50..500))).await;
+    }
+}
+
+/// A fleet in a directory, from standard input to standard output.
+pub(crate) async fn up(
+    shared: Arc<Shared<Local>>,
+    lease: Duration,
+    after: Option<u64>,
+    mut stop: watch::Receiver<bool>,
+) -> Result<(), Message> {
+    let store = shared.store.clone();
+    let all = (0..store.partitions()).collect();
+    let written = Arc::new(Mutex::new(beginning(&store, all, after).await?));
+    let mut notices = store.notices();
+    tokio::spawn(async move {
+        while let Ok((subject, text)) = notices.recv().await {
+            let robot = Address::parse(&subject).map_or(subject, |address| address.robot);
+            say(&Message::warning("N320", format!("robot `{robot}`: {text}")));
+        }
+    });
+    let (order, orders) = watch::channel(false);
+    let working = tokio::spawn(worker::run(Arc::clone(&shared), lease, orders));
+    let (reader, own) = (store.clone(), Arc::clone(&written));
+    let writing = tokio::spawn(async move { write_decisions(&reader, None, &own).await });
+    let session = format!("{:016x}.", fastrand::u64(..));
+    let fed = feed(&store, &session, stop.clone()).await;
+    // What was stored is decided and written before it ends, unless it was asked to end, or nobody reads.
+    while !*stop.borrow_and_update() && !writing.is_finished() && !is_done(&shared, &written).await? {
+        tokio::select! {
+            _ = stop.changed() => {}
+            () = tokio::time::sleep(Duration::from_millis(20)) => {}
+        }
+    }
+    order.send_replace(true);
+    // A worker has nothing to say at its end.
+    let _ = working.await;
+    writing.abort();
+    if let Ok(outcome) = writing.await {
+        outcome?;
+    }
+    fed.map(|_| ())
+}
+
+/// Whether all events are decided or refused, and written.
+async fn is_done(shared: &Shared<Local>, written: &Mutex<BTreeMap<u32, u64>>) -> Result<bool, Message> {
+    let store = &shared.store;
+    for partition in 0..store.partitions() {
+        let at = |all: &Mutex<BTreeMap<u32, u64>>| {
+            all.lock().unwrap_or_else(PoisonError::into_inner).get(&partition).copied().unwrap_or_default()
+        };
+        for (stream, all) in [(Stream::Events, &shared.counts.reached), (Stream::Decisions, written)] {
+            if store.end(stream, partition).await.map_err(|own| fault(&own))? > at(all) {
+                return Ok(false);
+            }
+        }
+    }
+    Ok(true)
+}
+
+/// Writes what is known of a fleet.
+pub(crate) fn status(status: &Status, as_json: bool) -> Result<(), Message> {
+    let text = if as_json {
+        format!("{}\n", serde_json::to_string(status).unwrap_or_default())
+    } else {
+        status_text(status)
+    };
+    io::stdout().write_all(text.as_bytes()).map_err(|error| unwritten(&error))
+}
+
+fn status_text(status: &Status) -> String {
+    let mut workers = Table::new();
+    workers.load_style(TableStyle::new()).set_header([
+        "worker", "partitions", "robots", "ready", "waiting", "decided", "refused", "load", "",
+    ]);
+    for (name, own) in &status.workers {
+        workers.add_row([
+            name.clone(),
+            own.partitions.to_string(),
+            own.robots.to_string(),
+            own.warm.to_string(),
+            own.waiting.to_string(),
+            own.decided.to_string(),
+            own.refused.to_string(),
+            format!("{:.0} %", own.load * 100.0),
+            if own.draining { "is ending".to_owned() } else { String::new() },
+        ]);
+    }
+    let mut partitions = Table::new();
+    partitions.load_style(TableStyle::new()).set_header(["partition", "worker", "epoch", "saved up to event"]);
+    for own in &status.partitions {
+        partitions.add_row([
+            own.partition.to_string(),
+            own.worker.clone().unwrap_or_else(|| "nobody".to_owned()),
+            own.epoch.to_string(),
+            own.events.to_string(),
+        ]);
+    }
+    for table in [&mut workers, &mut partitions] {
+        for column in table.column_iter_mut().skip(1) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    format!("{workers}\n\n{partitions}\n")
+}

@@ -1,0 +1,253 @@
+//! The program `metaplan-fleet`.
+#![expect(clippy::print_stderr, reason = "a program says there what is wrong")]
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Duration;
+
+use clap::{Args, Parser, Subcommand};
+use metaplan::message::{Errors, Message};
+use metaplan_fleet::missions::Missions;
+use metaplan_fleet::partition::{Settings, Shared};
+use metaplan_fleet::robots::status;
+use metaplan_fleet::store::Store;
+use metaplan_fleet::store::local::Local;
+use metaplan_fleet::store::nats::{Access, Layout, Nats};
+use metaplan_fleet::worker;
+use tokio::sync::watch;
+
+mod lines;
+
+/// The adaptation loops of many robots: on NATS JetStream, or in one directory without a server.
+///
+/// Lines in are `ROBOT EVENT`, lines out `ROBOT DECISION`; events are those of `metaplan run`, after
+/// `{"event": "enrol", "mission": NAME}`.
+#[derive(Debug, Parser)]
+#[command(version)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Take partitions of robots, run their loops, and store what they decide, until SIGTERM.
+    Worker {
+        #[command(flatten)]
+        server: Server,
+        #[command(flatten)]
+        work: Work,
+        /// A name that no other worker has; host and process, unless it is given.
+        #[arg(long, value_name = "NAME")]
+        name: Option<String>,
+    },
+    /// All in one process: events from standard input, decisions to standard output.
+    Up {
+        /// The directory that takes the place of a server.
+        #[arg(long, value_name = "DIR", num_args = 0..=1, default_missing_value = "metaplan-fleet", required = true)]
+        local: PathBuf,
+        /// Also write decisions after that number that were made before.
+        #[arg(long, value_name = "DECISION")]
+        after: Option<u64>,
+        #[command(flatten)]
+        work: Work,
+        #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=65536))]
+        /// Partitions of a directory that is made.
+        partitions: u32,
+    },
+    /// Store events: lines `ROBOT EVENT` from standard input. Ends when all are stored.
+    Send {
+        #[command(flatten)]
+        server: Server,
+        /// What message ids begin with; who sends the same lines with the same word again stores them once.
+        #[arg(long, value_name = "WORD")]
+        session: Option<String>,
+    },
+    /// Write decisions as they are made.
+    Follow {
+        #[command(flatten)]
+        server: Server,
+        /// Only that robot's.
+        #[arg(value_name = "ROBOT")]
+        robot: Option<String>,
+        /// Begin after that decision; with 0, at the first one.
+        #[arg(long, value_name = "DECISION")]
+        after: Option<u64>,
+    },
+    /// Who has which partitions, how far they are, and how busy workers are.
+    Status {
+        #[command(flatten)]
+        server: Server,
+        /// Text for people, JSON for programs.
+        #[arg(long, default_value = "text", value_parser = ["text", "json"])]
+        format: String,
+    },
+}
+
+/// Which missions, and how much at a time.
+#[derive(Debug, Args)]
+struct Work {
+    /// A directory of manifests; a robot is enrolled with the name of one, without `.toml`.
+    #[arg(long, value_name = "DIR")]
+    missions: PathBuf,
+    /// Loops that work at the same time; as many as there are processors, unless it is given.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    /// Robots that are kept ready; others are kept as snapshots, and made ready when they are needed.
+    #[arg(long, value_name = "N", default_value_t = Settings::default().warm)]
+    ready: usize,
+    /// Save a robot after so many decisions.
+    #[arg(long, value_name = "N", default_value_t = Settings::default().save_every as u64, value_parser = clap::value_parser!(u64).range(1..))]
+    save_every: u64,
+    /// Where Prometheus reads metrics, as `HOST:PORT`.
+    #[arg(long, value_name = "ADDRESS")]
+    metrics: Option<SocketAddr>,
+}
+
+/// Where the servers are.
+#[derive(Debug, Args)]
+struct Server {
+    /// One or several by comma: `nats://HOST:PORT`, or `tls://HOST:PORT`.
+    #[arg(long, value_name = "URL", env = "NATS_URL")]
+    nats: String,
+    /// A credentials file of NATS.
+    #[arg(long, value_name = "FILE")]
+    creds: Option<PathBuf>,
+    /// A user; the password is in `NATS_PASSWORD`.
+    #[arg(long, value_name = "NAME")]
+    user: Option<String>,
+    /// Authorities that are trusted besides those of the system.
+    #[arg(long, value_name = "FILE")]
+    tls_ca: Option<PathBuf>,
+    /// An own certificate, and its key.
+    #[arg(long, value_names = ["CERTIFICATE", "KEY"], num_args = 2)]
+    tls_cert: Vec<PathBuf>,
+    /// The name of the fleet; streams and buckets begin with it.
+    #[arg(long, value_name = "NAME", default_value = "fleet")]
+    fleet: String,
+    /// Partitions of a fleet that is made; they never change.
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=65536))]
+    partitions: u32,
+    /// On how many servers a fleet that is made is kept: 1, 3 or 5.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    replicas: usize,
+    /// Seconds after which a worker that is not heard of has lost its partitions.
+    #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u64).range(2..=3600))]
+    lease: u64,
+}
+
+impl Server {
+    async fn open(&self) -> Result<Nats, Message> {
+        let certificate = match self.tls_cert.as_slice() {
+            [certificate, key] => Some((certificate.clone(), key.clone())),
+            _ => None,
+        };
+        let password = std::env::var("NATS_PASSWORD").unwrap_or_default();
+        let access = Access {
+            url: self.nats.clone(),
+            credentials: self.creds.clone(),
+            user: self.user.clone().map(|user| (user, password)),
+            authorities: self.tls_ca.clone(),
+            certificate,
+        };
+        let lease = Duration::from_secs(self.lease);
+        let (fleet, partitions, replicas) = (self.fleet.clone(), self.partitions, self.replicas);
+        Nats::open(&access, &Layout { fleet, partitions, replicas, lease }).await
+    }
+}
+
+impl Work {
+    fn settings(&self) -> Settings {
+        let processors = std::thread::available_parallelism().map_or(1, usize::from);
+        Settings {
+            threads: self.threads.map_or(processors, usize::from),
+            warm: self.ready,
+            save_every: self.save_every as usize,
+            ..Settings::default()
+        }
+    }
+
+    fn shared<S: Store>(&self, store: S, name: String) -> Result<Arc<Shared<S>>, Errors> {
+        let missions = Missions::read(&self.missions)?;
+        if let Some(address) = self.metrics {
+            metrics_exporter_prometheus::PrometheusBuilder::new()
+                .with_http_listener(address)
+                .install()
+                .map_err(|error| vec![Message::error("N301", format!("{address}: {error}"))])?;
+        }
+        Ok(Arc::new(Shared::new(store, missions, name, self.settings())))
+    }
+}
+
+#[tokio::main]
+async fn main() -> ExitCode {
+    match run(Arguments::parse().command).await {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(messages) => {
+            for message in &messages {
+                eprint!("{}", message.text());
+            }
+            ExitCode::from(2)
+        }
+    }
+}
+
+async fn run(command: Command) -> Result<(), Errors> {
+    match command {
+        Command::Worker { server, work, name } => {
+            let store = server.open().await.map_err(|message| vec![message])?;
+            let name = name.unwrap_or_else(own_name);
+            let shared = work.shared(store, name)?;
+            worker::run(shared, Duration::from_secs(server.lease), signals()?).await;
+        }
+        Command::Up { local, after, work, partitions } => {
+            let lease = Duration::from_secs(10);
+            let store = Local::open(&local, partitions, lease).map_err(|message| vec![message])?;
+            let shared = work.shared(store, own_name())?;
+            lines::up(shared, lease, after, signals()?).await.map_err(|message| vec![message])?;
+        }
+        Command::Send { server, session } => {
+            let store = server.open().await.map_err(|message| vec![message])?;
+            let session = session.unwrap_or_else(|| format!("{:016x}.", fastrand::u64(..)));
+            lines::send(store, &session).await.map_err(|message| vec![message])?;
+        }
+        Command::Follow { server, robot, after } => {
+            let store = server.open().await.map_err(|message| vec![message])?;
+            let mut stop = signals()?;
+            tokio::select! {
+                done = lines::follow(store, robot.as_deref(), after) => done.map_err(|message| vec![message])?,
+                _ = stop.changed() => {}
+            }
+        }
+        Command::Status { server, format } => {
+            let store = server.open().await.map_err(|message| vec![message])?;
+            let status = status(&store)
+                .await
+                .map_err(|fault| vec![Message::error("N312", format!("the fleet cannot be read: {fault}"))])?;
+            lines::status(&status, format == "json").map_err(|message| vec![message])?;
+        }
+    }
+    Ok(())
+}
+
+/// Host and process, and something by chance: no other worker has it.
+fn own_name() -> String {
+    let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    let host: String = host.trim().chars().filter(|c| c.is_ascii_alphanumeric() || *c == '-').take(40).collect();
+    format!("{host}-{}-{:04x}", std::process::id(), fastrand::u16(..))
+}
+
+/// True from the first SIGTERM or SIGINT on; the second one ends the program at once.
+fn signals() -> Result<watch::Receiver<bool>, Errors> {
+    let (stop, heard) = watch::channel(false);
+    let handler = move || {
+        if stop.send_replace(true) {
+            std::process::exit(130);
+        }
+    };
+    ctrlc::set_handler(handler)
+        .map_err(|error| vec![Message::error("N302", format!("signals cannot be heard: {error}"))])?;
+    Ok(heard)
+}

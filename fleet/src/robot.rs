@@ -1,0 +1,249 @@
+//! One robot: an event in, a decision out. There is no clock, no thread and no network here: the same events at the same times give the
+//! same decisions.
+
+use std::time::Duration;
+
+use metaplan::mapek::{Loop, Observation, Snapshot};
+use serde_json::Value;
+
+use crate::missions::Missions;
+use crate::store::Stored;
+use crate::wire::{Decided, FORMAT, Saved};
+
+/// What a robot is, apart from what waits for it.
+#[derive(Debug, Default)]
+pub struct Robot {
+    /// Its mission; none where it is not enrolled, or not any more.
+    pub mission: Option<String>,
+    /// When it was enrolled, in microseconds since 1970.
+    pub enrolled: u64,
+    /// The last event that it contains.
+    pub event: u64,
+    control: Control,
+}
+
+/// Its loop.
+#[derive(Debug, Default)]
+enum Control {
+    #[default]
+    None,
+    /// Ready to go on.
+    Warm(Box<Loop>),
+    /// As a snapshot, compressed: a few kilobytes.
+    Cold(Vec<u8>),
+}
+
+/// Why an event changes nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Refused {
+    /// The robot is not enrolled.
+    Unknown,
+    /// The robot is enrolled already.
+    Enrolled,
+    /// There is no mission of that name.
+    Mission,
+    /// The message id names another robot.
+    Forged,
+    /// The subject is not that of the robot's partition.
+    Misplaced,
+}
+
+impl Refused {
+    /// A word for metrics.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Unknown => "not_enrolled",
+            Self::Enrolled => "enrolled_already",
+            Self::Mission => "unknown_mission",
+            Self::Forged => "forged_id",
+            Self::Misplaced => "wrong_partition",
+        }
+    }
+
+    /// A sentence for whoever has sent it.
+    pub fn sentence(self) -> &'static str {
+        match self {
+            Self::Unknown => "the robot is not enrolled: send `{\"event\": \"enrol\", \"mission\": NAME}` first",
+            Self::Enrolled => "the robot is enrolled already: send `{\"event\": \"retire\"}` before it gets another mission",
+            Self::Mission => "there is no mission of that name",
+            Self::Forged => "the message id must be that of its robot: `ROBOT:NUMBER`",
+            Self::Misplaced => "the robot belongs to another partition",
+        }
+    }
+}
+
+/// What an event asks for.
+enum Request<'a> {
+    Enrol(&'a str),
+    Retire,
+    Observe,
+}
+
+/// Why a robot cannot go on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Faulted(pub String);
+
+impl Robot {
+    /// A robot as it was saved.
+    ///
+    /// # Errors
+    /// Its mission is not the one that it was saved with.
+    pub fn restore(saved: &Saved, missions: &Missions) -> Result<Self, Faulted> {
+        let mut robot = Self {
+            mission: saved.mission.clone(),
+            enrolled: saved.enrolled,
+            event: saved.event,
+            control: Control::None,
+        };
+        if let Some(name) = &saved.mission {
+            let known = missions
+                .get(name)
+                .ok_or_else(|| Faulted(format!("there is no mission `{name}` in the directory")))?;
+            if known.digest != saved.digest {
+                let text = format!("the files or settings of mission `{name}` are not those that it was enrolled with");
+                return Err(Faulted(text));
+            }
+            robot.control = Control::Cold(compressed(&saved.known));
+        }
+        Ok(robot)
+    }
+
+    /// It as it is saved, after a decision.
+    pub fn save(&self, missions: &Missions, decision: u64) -> Saved {
+        let known = match &self.control {
+            Control::None => Value::Null,
+            Control::Warm(control) => control.snapshot().0,
+            Control::Cold(bytes) => decompressed(bytes),
+        };
+        let template = self.mission.as_deref().and_then(|name| missions.get(name));
+        Saved {
+            mission: self.mission.clone(),
+            digest: template.map(|template| template.digest.clone()).unwrap_or_default(),
+            enrolled: self.enrolled,
+            event: self.event,
+            decision,
+            known,
+        }
+    }
+
+    /// Whether its loop is ready, and takes up the memory for that.
+    pub fn is_warm(&self) -> bool {
+        matches!(self.control, Control::Warm(_))
+    }
+
+    /// Keeps its loop as a snapshot only.
+    pub fn cool(&mut self) {
+        if let Control::Warm(control) = &self.control {
+            self.control = Control::Cold(compressed(&control.snapshot().0));
+        }
+    }
+
+    /// What an event leads to. With `before`, what it has led to once: its plans are taken over, and the answers must be the same.
+    ///
+    /// # Errors
+    /// The robot cannot go on; it is as it was before, or its worth is lost and must be recovered.
+    pub fn decide(
+        &mut self,
+        event: &Stored,
+        missions: &Missions,
+        before: Option<&Decided>,
+    ) -> Result<Result<Decided, Refused>, Faulted> {
+        let text = String::from_utf8_lossy(&event.payload);
+        let head: Value = serde_json::from_str(&text).unwrap_or_default();
+        let mut decided = Decided {
+            format: FORMAT.to_owned(),
+            event: event.sequence,
+            now: 0,
+            enrolled: None,
+            retired: false,
+            answers: Vec::new(),
+            plans: Vec::new(),
+            worker: String::new(),
+            epoch: 0,
+        };
+        match request(&head) {
+            Request::Enrol(name) => {
+                if self.mission.is_some() {
+                    return Ok(Err(Refused::Enrolled));
+                }
+                let Some(template) = missions.get(name) else { return Ok(Err(Refused::Mission)) };
+                let mut control = template.control.clone();
+                let answers = match before {
+                    Some(before) => control.start_again(&before.plans),
+                    None => control.start(),
+                };
+                let made = control.decision(&answers);
+                (decided.answers, decided.plans) = (made.answers, made.plans);
+                decided.enrolled = Some(name.to_owned());
+                (self.mission, self.enrolled) = (Some(name.to_owned()), event.time);
+                self.control = Control::Warm(Box::new(control));
+            }
+            Request::Retire => {
+                if self.mission.take().is_none() {
+                    return Ok(Err(Refused::Unknown));
+                }
+                self.control = Control::None;
+                decided.retired = true;
+            }
+            Request::Observe => {
+                let Some(name) = &self.mission else { return Ok(Err(Refused::Unknown)) };
+                decided.now = event.time.saturating_sub(self.enrolled);
+                let now = Duration::from_micros(decided.now);
+                self.warm(&name.clone(), missions)?;
+                let Control::Warm(control) = &mut self.control else { return Ok(Err(Refused::Unknown)) };
+                let observation = Observation::parse(&text);
+                let answers = match before {
+                    Some(before) => control.handle_again(&observation, now, &before.plans),
+                    None => control.handle(&observation, now),
+                };
+                let made = control.decision(&answers);
+                (decided.answers, decided.plans) = (made.answers, made.plans);
+            }
+        }
+        self.event = event.sequence;
+        if let Some(before) = before
+            && !is_same(&decided, before)
+        {
+            let text = format!("what is written of event {} is not what follows from it", event.sequence);
+            return Err(Faulted(text));
+        }
+        Ok(Ok(decided))
+    }
+
+    fn warm(&mut self, mission: &str, missions: &Missions) -> Result<(), Faulted> {
+        let Control::Cold(bytes) = &self.control else { return Ok(()) };
+        let template = missions
+            .get(mission)
+            .ok_or_else(|| Faulted(format!("there is no mission `{mission}` in the directory")))?;
+        let mut control = template.control.clone();
+        control.restore(&Snapshot(decompressed(bytes))).map_err(|message| Faulted(message.text().to_owned()))?;
+        self.control = Control::Warm(Box::new(control));
+        Ok(())
+    }
+}
+
+fn request(head: &Value) -> Request<'_> {
+    let text = |name: &str| head.get(name).and_then(Value::as_str);
+    match text("event") {
+        Some("enrol") => Request::Enrol(text("mission").unwrap_or_default()),
+        Some("retire") => Request::Retire,
+        _ => Request::Observe,
+    }
+}
+
+/// Whether two decisions say the same; explanations may differ in words, as in a journal.
+fn is_same(left: &Decided, right: &Decided) -> bool {
+    left.enrolled == right.enrolled
+        && left.retired == right.retired
+        && left.decision().agrees(&right.answers)
+}
+
+fn compressed(known: &Value) -> Vec<u8> {
+    lz4_flex::compress_prepend_size(known.to_string().as_bytes())
+}
+
+/// What [`compressed`] has made.
+fn decompressed(bytes: &[u8]) -> Value {
+    let text = lz4_flex::decompress_size_prepended(bytes).unwrap_or_default();
+    serde_json::from_slice(&text).unwrap_or_default()
+}

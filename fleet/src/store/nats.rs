@@ -1,0 +1,385 @@
+//! NATS JetStream as a log.
+//!
+//! Streams `FLEET-events` and `FLEET-decisions`, and a bucket for each [`Bucket`], all with the replicas that they were made with. What is
+//! asked for consistency goes to a stream's leader; what is read by a consumer may be late, so readers know how far they must come.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use async_nats::jetstream::consumer::{AckPolicy, DeliverPolicy, pull};
+use async_nats::jetstream::context::{Context, PublishError, PublishErrorKind};
+use async_nats::jetstream::kv::{self, CreateErrorKind, Operation, UpdateErrorKind};
+use async_nats::jetstream::message::PublishMessage;
+use async_nats::jetstream::stream::{self, LastRawMessageErrorKind};
+use async_nats::jetstream::{self};
+use async_nats::{Client, ConnectOptions};
+use futures::stream::BoxStream;
+use futures::{StreamExt as _, TryStreamExt as _};
+use metaplan::message::Message as Diagnostic;
+
+use super::{Bucket, Entry, Fault, Message, Receipt, Store, Stored, Stream};
+
+/// How to reach the servers.
+#[derive(Debug, Clone, Default)]
+pub struct Access {
+    /// One or several, by comma: `nats://HOST:PORT`, `tls://HOST:PORT`.
+    pub url: String,
+    /// A file of NATS with the user's JWT and seed.
+    pub credentials: Option<PathBuf>,
+    /// User and password.
+    pub user: Option<(String, String)>,
+    /// A file with the certificates of authorities that are trusted besides those of the system.
+    pub authorities: Option<PathBuf>,
+    /// Files with an own certificate and its key.
+    pub certificate: Option<(PathBuf, PathBuf)>,
+}
+
+/// What streams and buckets are made like, where they are not there yet.
+#[derive(Debug, Clone)]
+pub struct Layout {
+    /// The first part of their names; letters, digits, `-` and `_`.
+    pub fleet: String,
+    /// How many partitions; it never changes.
+    pub partitions: u32,
+    /// On how many servers everything is kept: 1, 3 or 5.
+    pub replicas: usize,
+    /// Leases that are not renewed for so long are gone.
+    pub lease: Duration,
+}
+
+/// So many messages are fetched at once.
+const BATCH: usize = 500;
+
+/// So long a request may take.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// A second message of the same id is not stored within this time.
+const WINDOW: Duration = Duration::from_secs(600);
+
+/// JetStream as a log.
+#[derive(Debug, Clone)]
+pub struct Nats {
+    client: Client,
+    context: Context,
+    partitions: u32,
+    fleet: String,
+    streams: [stream::Stream<()>; 2],
+    buckets: [kv::Store; 4],
+}
+
+fn failed(error: impl std::fmt::Display) -> Fault {
+    Fault::Unreachable(error.to_string())
+}
+
+impl Nats {
+    /// Connects, and makes streams and buckets where they are not there.
+    ///
+    /// # Errors
+    /// No server can be reached, it has no JetStream, or it refuses.
+    pub async fn open(access: &Access, layout: &Layout) -> Result<Self, Diagnostic> {
+        let wrong =
+            |error: &dyn std::fmt::Display| Diagnostic::error("N311", format!("{}: {error}", access.url));
+        let mut options = ConnectOptions::new()
+            .name("metaplan-fleet")
+            .request_timeout(Some(PATIENCE))
+            .connection_timeout(PATIENCE);
+        if let Some(file) = &access.credentials {
+            options = options.credentials_file(file).await.map_err(|error| wrong(&error))?;
+        }
+        if let Some((user, password)) = access.user.clone() {
+            options = options.user_and_password(user, password);
+        }
+        if let Some(file) = access.authorities.clone() {
+            options = options.add_root_certificates(file);
+        }
+        if let Some((certificate, key)) = access.certificate.clone() {
+            options = options.add_client_certificate(certificate, key);
+        }
+        let urls: Vec<&str> = access.url.split(',').map(str::trim).collect();
+        let client = async_nats::connect_with_options(urls, options).await.map_err(|error| wrong(&error))?;
+        let mut context = jetstream::new(client.clone());
+        context.set_timeout(PATIENCE);
+        Self::with(client, context, layout).await.map_err(|fault| wrong(&fault))
+    }
+
+    async fn with(client: Client, context: Context, layout: &Layout) -> Result<Self, Fault> {
+        let own = |kind: Stream| stream::Config {
+            name: stream_name(&layout.fleet, kind),
+            subjects: vec![format!("{}.*.*", kind.prefix())],
+            num_replicas: layout.replicas,
+            duplicate_window: WINDOW,
+            // Readable by everybody who uses this fleet, so that all agree on it.
+            description: Some(format!("partitions={}", layout.partitions)),
+            allow_direct: true,
+            ..stream::Config::default()
+        };
+        let mut partitions = layout.partitions;
+        for kind in Stream::ALL {
+            let made = context.get_or_create_stream(own(kind)).await.map_err(failed)?;
+            let known = made.cached_info().config.description.as_deref();
+            let known = known.and_then(|text| text.strip_prefix("partitions=")?.parse().ok());
+            partitions = known.ok_or_else(|| {
+                failed(format!("the stream {} is not one of a fleet", stream_name(&layout.fleet, kind)))
+            })?;
+        }
+        let mut buckets = Vec::new();
+        for kind in Bucket::ALL {
+            let bucket = format!("{}-{}", layout.fleet, kind.name());
+            let config = kv::Config {
+                bucket: bucket.clone(),
+                num_replicas: layout.replicas,
+                max_age: if kind.expires() { layout.lease } else { Duration::ZERO },
+                ..kv::Config::default()
+            };
+            let known = context.get_key_value(&bucket).await;
+            buckets.push(match known {
+                Ok(store) => store,
+                Err(_) => match context.create_key_value(config).await {
+                    Ok(store) => store,
+                    // Somebody else has made it in between.
+                    Err(_) => context.get_key_value(&bucket).await.map_err(failed)?,
+                },
+            });
+        }
+        let [events, decisions] = Stream::ALL.map(|kind| stream_name(&layout.fleet, kind));
+        let streams = [
+            context.get_stream_no_info(events).await.map_err(failed)?,
+            context.get_stream_no_info(decisions).await.map_err(failed)?,
+        ];
+        let buckets = buckets.try_into().map_err(|_| failed("a bucket is missing"))?;
+        Ok(Self { client, context, partitions, fleet: layout.fleet.clone(), streams, buckets })
+    }
+
+    /// Refusals as they come: subjects behind `err.`, and sentences.
+    ///
+    /// # Errors
+    /// The server cannot be reached.
+    pub async fn notices(&self) -> Result<BoxStream<'static, (String, String)>, Fault> {
+        let subscriber = self.client.subscribe("err.*.*").await.map_err(failed)?;
+        let known = subscriber.map(|message| {
+            let subject = message.subject.strip_prefix("err.").unwrap_or_default().to_owned();
+            (subject, String::from_utf8_lossy(&message.payload).into_owned())
+        });
+        Ok(known.boxed())
+    }
+
+    fn stream(&self, stream: Stream) -> &stream::Stream<()> {
+        &self.streams[stream as usize]
+    }
+
+    fn bucket(&self, bucket: Bucket) -> &kv::Store {
+        &self.buckets[bucket as usize]
+    }
+
+    /// All messages of a filter from somewhere to the end, or further: to a sequence that must be reached.
+    async fn read(
+        &self,
+        name: &str,
+        filter: String,
+        from: DeliverPolicy,
+        reach: u64,
+        mut take: impl FnMut(jetstream::Message, u64),
+    ) -> Result<(), Fault> {
+        let config = pull::Config {
+            filter_subject: filter,
+            deliver_policy: from,
+            ack_policy: AckPolicy::None,
+            inactive_threshold: PATIENCE * 6,
+            memory_storage: true,
+            num_replicas: 1,
+            ..pull::Config::default()
+        };
+        let consumer: jetstream::consumer::PullConsumer =
+            self.context.create_consumer_on_stream(config, name).await.map_err(failed)?;
+        let mut pending = consumer.cached_info().num_pending;
+        let (mut last, mut expected) = (0, 1);
+        while pending > 0 || last < reach {
+            let mut batch =
+                consumer.fetch().max_messages(BATCH).expires(PATIENCE).messages().await.map_err(failed)?;
+            let mut got = 0;
+            while let Some(message) = batch.try_next().await.map_err(failed)? {
+                let (sequence, number, rest) = {
+                    let info = message.info().map_err(failed)?;
+                    (info.stream_sequence, info.consumer_sequence, info.pending)
+                };
+                if number != expected {
+                    return Err(failed("messages were lost on their way"));
+                }
+                expected += 1;
+                got += 1;
+                last = sequence;
+                pending = rest;
+                take(message, sequence);
+            }
+            if got == 0 {
+                return Err(failed("the server has no more messages, and should have"));
+            }
+        }
+        // Whoever is not asked any more is forgotten by the server after a while, too.
+        let _ = self
+            .context
+            .delete_consumer_from_stream(consumer.cached_info().name.as_str(), name)
+            .await;
+        Ok(())
+    }
+}
+
+fn stream_name(fleet: &str, stream: Stream) -> String {
+    match stream {
+        Stream::Events => format!("{fleet}-events"),
+        Stream::Decisions => format!("{fleet}-decisions"),
+    }
+}
+
+fn stored(stream: Stream, message: &jetstream::Message) -> Result<Stored, Fault> {
+    let info = message.info().map_err(failed)?;
+    let time = micros(info.published.unix_timestamp_nanos());
+    let id = message.headers.as_ref().and_then(|headers| headers.get("Nats-Msg-Id"));
+    Ok(Stored {
+        sequence: info.stream_sequence,
+        subject: tail(stream, &message.subject),
+        id: id.map(|id| id.as_str().to_owned()),
+        time,
+        payload: message.payload.to_vec(),
+    })
+}
+
+fn tail(stream: Stream, subject: &str) -> String {
+    subject.strip_prefix(stream.prefix()).and_then(|rest| rest.strip_prefix('.')).unwrap_or_default().to_owned()
+}
+
+fn micros(nanos: i128) -> u64 {
+    u64::try_from(nanos / 1000).unwrap_or_default()
+}
+
+fn published(error: &PublishError, bytes: usize) -> Fault {
+    match error.kind() {
+        PublishErrorKind::WrongLastSequence | PublishErrorKind::WrongLastMessageId => Fault::Conflict,
+        PublishErrorKind::MaxPayloadExceeded => Fault::TooLong(bytes),
+        _ => failed(error),
+    }
+}
+
+impl Store for Nats {
+    fn partitions(&self) -> u32 {
+        self.partitions
+    }
+
+    async fn follow(
+        &self,
+        kind: Stream,
+        partition: u32,
+        after: u64,
+    ) -> Result<BoxStream<'static, Result<Stored, Fault>>, Fault> {
+        let config = pull::OrderedConfig {
+            filter_subject: format!("{}.{partition}.*", kind.prefix()),
+            deliver_policy: DeliverPolicy::ByStartSequence { start_sequence: after + 1 },
+            ..pull::OrderedConfig::default()
+        };
+        let consumer = self.stream(kind).create_consumer(config).await.map_err(failed)?;
+        let messages = consumer.messages().await.map_err(failed)?;
+        Ok(messages.map(move |message| stored(kind, &message.map_err(failed)?)).boxed())
+    }
+
+    async fn history(&self, kind: Stream, partition: u32, after: u64) -> Result<Vec<Stored>, Fault> {
+        let filter = format!("{}.{partition}.*", kind.prefix());
+        let reach = self.end(kind, partition).await?;
+        if reach <= after {
+            return Ok(Vec::new());
+        }
+        let mut found = Vec::new();
+        let from = DeliverPolicy::ByStartSequence { start_sequence: after + 1 };
+        let name = stream_name(&self.fleet, kind);
+        self.read(&name, filter, from, reach, |message, _| found.push(stored(kind, &message))).await?;
+        found.into_iter().collect()
+    }
+
+    async fn end(&self, kind: Stream, partition: u32) -> Result<u64, Fault> {
+        let last = self.last(kind, &format!("{partition}.*")).await?;
+        Ok(last.map_or(0, |last| last.sequence))
+    }
+
+    async fn append(&self, kind: Stream, message: Message<'_>) -> Result<Receipt, Fault> {
+        let mut publish = PublishMessage::build().payload(message.payload.to_vec().into());
+        if !message.id.is_empty() {
+            publish = publish.message_id(message.id);
+        }
+        if let Some(after) = message.after {
+            publish = publish.expected_last_subject_sequence(after);
+        }
+        let subject = format!("{}.{}", kind.prefix(), message.subject);
+        let bytes = message.payload.len();
+        let ack = self
+            .context
+            .send_publish(subject, publish)
+            .await
+            .map_err(|error| published(&error, bytes))?
+            .await
+            .map_err(|error| published(&error, bytes))?;
+        Ok(Receipt { sequence: ack.sequence, is_known: ack.duplicate })
+    }
+
+    async fn last(&self, kind: Stream, subject: &str) -> Result<Option<Stored>, Fault> {
+        let name = format!("{}.{subject}", kind.prefix());
+        match self.stream(kind).get_last_raw_message_by_subject(&name).await {
+            Ok(message) => Ok(Some(Stored {
+                sequence: message.sequence,
+                subject: subject.to_owned(),
+                id: message.headers.get("Nats-Msg-Id").map(|id| id.as_str().to_owned()),
+                time: micros(message.time.unix_timestamp_nanos()),
+                payload: message.payload.to_vec(),
+            })),
+            Err(error) if matches!(error.kind(), LastRawMessageErrorKind::NoMessageFound) => Ok(None),
+            Err(error) => Err(failed(error)),
+        }
+    }
+
+    async fn get(&self, bucket: Bucket, key: &str) -> Result<Option<Entry>, Fault> {
+        let found = self.bucket(bucket).entry(key).await.map_err(failed)?;
+        Ok(found.filter(|entry| entry.operation == Operation::Put).map(|entry| Entry {
+            key: key.to_owned(),
+            value: entry.value.to_vec(),
+            revision: entry.revision,
+        }))
+    }
+
+    async fn put(&self, bucket: Bucket, key: &str, value: &[u8], after: u64) -> Result<u64, Fault> {
+        let value = value.to_vec().into();
+        if after == 0 {
+            return self.bucket(bucket).create(key, value).await.map_err(|error| match error.kind() {
+                CreateErrorKind::AlreadyExists => Fault::Conflict,
+                _ => failed(error),
+            });
+        }
+        self.bucket(bucket).update(key, value, after).await.map_err(|error| match error.kind() {
+            UpdateErrorKind::WrongLastRevision => Fault::Conflict,
+            _ => failed(error),
+        })
+    }
+
+    async fn remove(&self, bucket: Bucket, key: &str, revision: u64) -> Result<(), Fault> {
+        self.bucket(bucket).delete_expect_revision(key, Some(revision)).await.map_err(failed)
+    }
+
+    async fn list(&self, bucket: Bucket, partition: Option<u32>, at_least: u64) -> Result<Vec<Entry>, Fault> {
+        let name = format!("KV_{}-{}", self.fleet, bucket.name());
+        let prefix = format!("$KV.{}-{}.", self.fleet, bucket.name());
+        let filter = partition.map_or_else(|| format!("{prefix}>"), |partition| format!("{prefix}{partition}.*"));
+        let mut found = Vec::new();
+        self.read(&name, filter, DeliverPolicy::LastPerSubject, at_least, |message, revision| {
+            let is_gone = message.headers.as_ref().is_some_and(|headers| {
+                headers.get("KV-Operation").is_some() || headers.get("Nats-Marker-Reason").is_some()
+            });
+            if let Some(key) = message.subject.strip_prefix(&prefix).filter(|_| !is_gone) {
+                found.push(Entry { key: key.to_owned(), value: message.payload.to_vec(), revision });
+            }
+        })
+        .await?;
+        Ok(found)
+    }
+
+    async fn notice(&self, subject: &str, text: &str) {
+        // It is not kept, and nobody need listen.
+        let _ = self.client.publish(format!("err.{subject}"), text.to_owned().into()).await;
+    }
+}

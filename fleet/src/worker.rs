@@ -1,0 +1,250 @@
+//! Leases: which worker has which partitions.
+//!
+//! A lease is a value that is gone when it is not renewed. A worker takes partitions that nobody has, up to its share: their number divided
+//! by that of the workers, rounded up. Who has more gives some back, saved and in order. Nothing rests on leases but speed.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use futures::future::join_all;
+use tokio::sync::watch;
+use tokio::task::JoinHandle;
+
+use crate::partition::{End, Order, Shared, serve};
+use crate::store::{Bucket, Entry, Fault, Store};
+use crate::wire::{Presence, partition_of};
+
+/// A partition that a worker has.
+struct Held {
+    revision: u64,
+    /// When the lease was renewed last.
+    renewed: Instant,
+    orders: watch::Sender<Order>,
+    task: JoinHandle<End>,
+}
+
+/// A worker with its leases.
+struct Worker<S> {
+    shared: Arc<Shared<S>>,
+    lease: Duration,
+    held: BTreeMap<u32, Held>,
+    /// The revision of its presence.
+    presence: u64,
+    /// When it was present last, and the busy time until then.
+    looked: (Instant, u64),
+}
+
+/// Runs a worker until `stop` is true; partitions are then given back, saved and in order. Leases last as long as `lease` says unless they are
+/// renewed.
+pub async fn run<S: Store>(shared: Arc<Shared<S>>, lease: Duration, mut stop: watch::Receiver<bool>) {
+    let mut worker =
+        Worker { shared, lease, held: BTreeMap::new(), presence: 0, looked: (Instant::now(), 0) };
+    let mut tick = tokio::time::interval(lease / 4);
+    tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+    loop {
+        tokio::select! {
+            _ = tick.tick() => {}
+            // Whoever could stop it is gone: so is the reason to go on.
+            changed = stop.changed() => if changed.is_err() || *stop.borrow_and_update() { break },
+        }
+        worker.round(false).await;
+    }
+    worker.drain(tick).await;
+}
+
+impl<S: Store> Worker<S> {
+    /// Says that it is there, renews its leases, and takes or gives back what its share asks for.
+    async fn round(&mut self, draining: bool) {
+        self.present(draining).await;
+        self.renew().await;
+        self.collect().await;
+        if draining {
+            return;
+        }
+        let store = &self.shared.store;
+        let (Ok(workers), Ok(leases)) =
+            (store.list(Bucket::Workers, None, 0).await, store.list(Bucket::Leases, None, 0).await)
+        else {
+            return;
+        };
+        let share = share(&workers, &self.shared.worker, store.partitions());
+        self.give_back(share);
+        self.acquire(share, &leases).await;
+    }
+
+    async fn present(&mut self, draining: bool) {
+        let counts = &self.shared.counts;
+        let busy = counts.busy.load(Ordering::Relaxed);
+        let passed = self.looked.0.elapsed().as_micros() as f64 * self.shared.settings.threads as f64;
+        let load = if passed > 0.0 { (busy - self.looked.1) as f64 / passed } else { 0.0 };
+        self.looked = (Instant::now(), busy);
+        let presence = Presence {
+            partitions: self.held.len() as u32,
+            robots: counts.robots.load(Ordering::Relaxed),
+            warm: counts.warm.load(Ordering::Relaxed),
+            waiting: counts.waiting.load(Ordering::Relaxed),
+            decided: counts.decided.load(Ordering::Relaxed),
+            refused: counts.refused.load(Ordering::Relaxed),
+            load: (load.min(1.0) * 1000.0).round() / 1000.0,
+            draining,
+        };
+        metrics::gauge!("metaplan_fleet_partitions").set(f64::from(presence.partitions));
+        metrics::gauge!("metaplan_fleet_robots").set(presence.robots as f64);
+        metrics::gauge!("metaplan_fleet_robots_ready").set(presence.warm as f64);
+        metrics::gauge!("metaplan_fleet_events_waiting").set(presence.waiting as f64);
+        metrics::gauge!("metaplan_fleet_load").set(presence.load);
+        metrics::counter!("metaplan_fleet_decided_total").absolute(presence.decided);
+        let value = serde_json::to_vec(&presence).unwrap_or_default();
+        let (store, name) = (&self.shared.store, &self.shared.worker);
+        self.presence = match store.put(Bucket::Workers, name, &value, self.presence).await {
+            Ok(revision) => revision,
+            // It had expired, or was written without our knowing.
+            Err(Fault::Conflict) => match store.get(Bucket::Workers, name).await {
+                Ok(entry) => entry.map_or(0, |entry| entry.revision),
+                Err(_) => self.presence,
+            },
+            Err(_) => self.presence,
+        };
+    }
+
+    async fn renew(&mut self) {
+        let (store, name) = (&self.shared.store, self.shared.worker.as_bytes());
+        let renewals = self.held.iter().map(|(partition, held)| async move {
+            let key = partition.to_string();
+            let begun = Instant::now();
+            let outcome = match store.put(Bucket::Leases, &key, name, held.revision).await {
+                // A renewal that was not acknowledged may have been written.
+                Err(Fault::Conflict) => match store.get(Bucket::Leases, &key).await {
+                    Ok(Some(entry)) if entry.value == name => Ok(entry.revision),
+                    Ok(_) => Err(Fault::Conflict),
+                    Err(fault) => Err(fault),
+                },
+                other => other,
+            };
+            (*partition, begun, outcome)
+        });
+        for (partition, begun, outcome) in join_all(renewals).await {
+            let Some(held) = self.held.get_mut(&partition) else { continue };
+            match outcome {
+                Ok(revision) => (held.revision, held.renewed) = (revision, begun),
+                Err(Fault::Conflict) => lose(held),
+                Err(_) if held.renewed.elapsed() >= self.lease => lose(held),
+                Err(_) => {}
+            }
+        }
+    }
+
+    /// Looks after partitions that have ended.
+    async fn collect(&mut self) {
+        let ended: Vec<u32> =
+            self.held.iter().filter(|(_, held)| held.task.is_finished()).map(|(own, _)| *own).collect();
+        for partition in ended {
+            let Some(held) = self.held.remove(&partition) else { continue };
+            let order = *held.orders.borrow();
+            let end = held.task.await;
+            match (end, order) {
+                // Somebody has written what only we write, and the lease is ours: it is read again.
+                (Ok(End::Fenced) | Err(_), Order::Go) => {
+                    metrics::counter!("metaplan_fleet_fenced_total").increment(1);
+                    let own = self.serve(partition, held.revision, held.renewed);
+                    self.held.insert(partition, own);
+                }
+                (_, Order::Abandon) => metrics::counter!("metaplan_fleet_lost_total").increment(1),
+                _ => {
+                    // A lease that is not taken away expires.
+                    let key = partition.to_string();
+                    let _ = self.shared.store.remove(Bucket::Leases, &key, held.revision).await;
+                }
+            }
+        }
+    }
+
+    fn give_back(&self, share: usize) {
+        let going = self.held.values().filter(|held| *held.orders.borrow() == Order::Go);
+        for held in going.skip(share) {
+            held.orders.send_replace(Order::Drain);
+        }
+    }
+
+    async fn acquire(&mut self, share: usize, leases: &[Entry]) {
+        let store = &self.shared.store;
+        let all = store.partitions();
+        let first = partition_of(&self.shared.worker, all);
+        let taken: Vec<u32> = leases.iter().filter_map(|lease| lease.key.parse().ok()).collect();
+        let free = (0..all).map(|offset| (first + offset) % all);
+        let free = free.filter(|own| !taken.contains(own) && !self.held.contains_key(own));
+        let wanted: Vec<u32> = free.take(share.saturating_sub(self.held.len())).collect();
+        for partition in wanted {
+            let begun = Instant::now();
+            let name = self.shared.worker.as_bytes();
+            if let Ok(revision) =
+                self.shared.store.put(Bucket::Leases, &partition.to_string(), name, 0).await
+            {
+                let held = self.serve(partition, revision, begun);
+                self.held.insert(partition, held);
+            }
+        }
+    }
+
+    fn serve(&self, partition: u32, revision: u64, renewed: Instant) -> Held {
+        let (orders, heard) = watch::channel(Order::Go);
+        let task = tokio::spawn(serve(Arc::clone(&self.shared), partition, heard));
+        Held { revision, renewed, orders, task }
+    }
+
+    /// Gives everything back.
+    async fn drain(&mut self, mut tick: tokio::time::Interval) {
+        for held in self.held.values() {
+            held.orders.send_if_modified(|order| {
+                let goes = *order == Order::Go;
+                if goes {
+                    *order = Order::Drain;
+                }
+                goes
+            });
+        }
+        self.round(true).await;
+        while !self.held.is_empty() {
+            tokio::select! {
+                _ = tick.tick() => self.round(true).await,
+                () = tokio::time::sleep(Duration::from_millis(20)) => self.collect().await,
+            }
+        }
+        let _ = self.shared.store.remove(Bucket::Workers, &self.shared.worker, self.presence).await;
+    }
+}
+
+fn lose(held: &mut Held) {
+    held.orders.send_replace(Order::Abandon);
+}
+
+/// How many partitions a worker is to have.
+fn share(workers: &[Entry], own: &str, partitions: u32) -> usize {
+    let takes = |entry: &&Entry| {
+        entry.key != own
+            && serde_json::from_slice::<Presence>(&entry.value).is_ok_and(|presence| !presence.draining)
+    };
+    let count = workers.iter().filter(takes).count() + 1;
+    (partitions as usize).div_ceil(count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_suffice_for_all() {
+        let entry = |key: &str, draining| Entry {
+            key: key.to_owned(),
+            value: serde_json::to_vec(&Presence { draining, ..Presence::default() }).expect("plain data"),
+            revision: 1,
+        };
+        let workers = [entry("a", false), entry("b", false), entry("c", true)];
+        assert_eq!(share(&workers, "a", 7), 4);
+        assert_eq!(share(&workers, "b", 7), 4);
+        assert_eq!(share(&[], "a", 7), 7);
+        assert_eq!(share(&workers[2..], "c", 7), 7);
+    }
+}

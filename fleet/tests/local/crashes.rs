@@ -1,0 +1,166 @@
+//! A worker that ends between any two operations: nothing is lost, and nothing is there twice.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use futures::stream::BoxStream;
+use metaplan_fleet::partition::{Order, Settings, serve};
+use metaplan_fleet::store::local::Local;
+use metaplan_fleet::store::{Bucket, Entry, Fault, Message, Receipt, Store, Stored, Stream};
+use tokio::sync::{Notify, watch};
+
+use super::{assert_same, decided, decisions, open, scripts, shared, tell, work};
+
+/// A log that is not there any more after so many operations; the last one may have been carried out without anybody knowing.
+#[derive(Debug, Clone)]
+struct Crashing {
+    inner: Local,
+    left: Arc<AtomicU64>,
+    carries_out: bool,
+    over: Arc<Notify>,
+}
+
+impl Crashing {
+    /// Whether there is an operation left; the last one counts as `carries_out` says.
+    async fn through<T>(&self, operation: impl Future<Output = Result<T, Fault>>) -> Result<T, Fault> {
+        let left = self.left.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |left| left.checked_sub(1));
+        match left {
+            Ok(2..) => operation.await,
+            Ok(_) if self.carries_out => {
+                let _ = operation.await;
+                self.crash().await
+            }
+            _ => self.crash().await,
+        }
+    }
+
+    async fn crash<T>(&self) -> Result<T, Fault> {
+        self.over.notify_one();
+        std::future::pending().await
+    }
+}
+
+impl Store for Crashing {
+    fn partitions(&self) -> u32 {
+        self.inner.partitions()
+    }
+
+    async fn follow(
+        &self,
+        stream: Stream,
+        partition: u32,
+        after: u64,
+    ) -> Result<BoxStream<'static, Result<Stored, Fault>>, Fault> {
+        self.through(self.inner.follow(stream, partition, after)).await
+    }
+
+    async fn history(&self, stream: Stream, partition: u32, after: u64) -> Result<Vec<Stored>, Fault> {
+        self.through(self.inner.history(stream, partition, after)).await
+    }
+
+    async fn end(&self, stream: Stream, partition: u32) -> Result<u64, Fault> {
+        self.through(self.inner.end(stream, partition)).await
+    }
+
+    async fn append(&self, stream: Stream, message: Message<'_>) -> Result<Receipt, Fault> {
+        self.through(self.inner.append(stream, message)).await
+    }
+
+    async fn last(&self, stream: Stream, subject: &str) -> Result<Option<Stored>, Fault> {
+        self.through(self.inner.last(stream, subject)).await
+    }
+
+    async fn get(&self, bucket: Bucket, key: &str) -> Result<Option<Entry>, Fault> {
+        self.through(self.inner.get(bucket, key)).await
+    }
+
+    async fn put(&self, bucket: Bucket, key: &str, value: &[u8], after: u64) -> Result<u64, Fault> {
+        self.through(self.inner.put(bucket, key, value, after)).await
+    }
+
+    async fn remove(&self, bucket: Bucket, key: &str, revision: u64) -> Result<(), Fault> {
+        self.through(self.inner.remove(bucket, key, revision)).await
+    }
+
+    async fn list(&self, bucket: Bucket, partition: Option<u32>, at_least: u64) -> Result<Vec<Entry>, Fault> {
+        self.through(self.inner.list(bucket, partition, at_least)).await
+    }
+
+    async fn notice(&self, subject: &str, text: &str) {
+        self.inner.notice(subject, text).await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_crash_between_any_two_operations_neither_loses_nor_repeats() {
+    let scripts: Vec<_> = [("ugv-a", "ugv", "kinect_at_wp2"), ("uuv-b", "uuv", "suave")]
+        .into_iter()
+        .map(|(robot, mission, scenario)| (robot, scripts::play(mission, scenario, 3, 7)))
+        .collect();
+    let count = scripts.iter().map(|(_, (events, _))| events.len()).sum();
+    let settings = Settings { save_every: 2, ..Settings::default() };
+    let mut crashes = 0;
+    for carries_out in [false, true] {
+        for operations in 1.. {
+            let folder = tempfile::tempdir().expect("a directory");
+            let store = open(folder.path(), 1);
+            let mut sequences = Vec::new();
+            for (robot, (events, _)) in &scripts {
+                sequences.push(tell(&store, robot, events).await);
+            }
+            let left = Arc::new(AtomicU64::new(operations));
+            let over = Arc::new(Notify::new());
+            let crashing =
+                Crashing { inner: store.clone(), left, carries_out, over: Arc::clone(&over) };
+            let (_orders, heard) = watch::channel(Order::Go);
+            let task = tokio::spawn(serve(shared(crashing, "first", settings), 0, heard));
+            let crashed = tokio::select! {
+                () = over.notified() => true,
+                () = decided(&store, count) => false,
+            };
+            task.abort();
+            crashes += u32::from(crashed);
+            work(&store, "second", settings, count).await;
+            let made = decisions(&store).await;
+            for ((robot, (_, answers)), sequences) in scripts.iter().zip(&sequences) {
+                assert_same(robot, &made[*robot], sequences, answers);
+            }
+            if !crashed {
+                break;
+            }
+        }
+    }
+    assert!(crashes > 30, "there were {crashes} crashes");
+}
+
+/// Two workers that both believe that they have a partition: each event is decided once.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn two_owners_of_one_partition_decide_each_event_once() {
+    for seed in 0..4 {
+        let folder = tempfile::tempdir().expect("a directory");
+        let store = open(folder.path(), 1);
+        let (events, answers) = scripts::play("ugv", "kinect_comes_and_goes", seed, 30);
+        let settings = Settings { save_every: 3, ..Settings::default() };
+        let own = |name: &str| shared(store.clone(), name, settings);
+        let (_orders, heard) = watch::channel(Order::Go);
+        let zombie = tokio::spawn(serve(own("zombie"), 0, heard.clone()));
+        let mut sequences = tell(&store, "r", &events[..10]).await;
+        decided(&store, 3 + seed as usize).await;
+        let owner = tokio::spawn({
+            let own = own("owner");
+            async move {
+                // A partition that is fenced by a former owner is read again.
+                loop {
+                    serve(Arc::clone(&own), 0, heard.clone()).await;
+                }
+            }
+        });
+        for event in &events[10..] {
+            sequences.extend(tell(&store, "r", std::slice::from_ref(event)).await);
+            tokio::time::sleep(std::time::Duration::from_millis(fastrand::u64(0..20))).await;
+        }
+        decided(&store, events.len()).await;
+        (zombie.abort(), owner.abort());
+        assert_same("r", &decisions(&store).await["r"], &sequences, &answers);
+    }
+}

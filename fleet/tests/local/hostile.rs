@@ -1,0 +1,122 @@
+//! What nobody should send changes nothing, and is counted.
+
+use std::sync::atomic::Ordering;
+
+use metaplan_fleet::partition::{Order, Settings, serve};
+use metaplan_fleet::robots::Sender;
+use metaplan_fleet::store::{Fault, Message, Store, Stream};
+use metaplan_fleet::wire::Address;
+use tokio::sync::watch;
+
+use super::{assert_same, decided, decisions, open, scripts, shared, work};
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn hostile_messages_change_nothing_and_are_counted() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let store = open(folder.path(), 1);
+    let mut notices = store.notices();
+    let (events, answers) = scripts::play("ugv", "kinect_at_wp2", 1, 12);
+    let subject = Address::of("good", 1).to_string();
+    let long = format!("{{\"event\": \"tick\", \"x\": \"{}\"}}", "a".repeat(1 << 20));
+    let hostile: [(&str, &str, &[u8]); 9] = [
+        ("0.stranger", "", b"{\"event\": \"tick\"}"),
+        ("0.stranger", "", b"\xff\xfe not JSON"),
+        ("0.stranger", "", long.as_bytes()),
+        ("0.stranger", "", b"{\"event\": \"enrol\", \"mission\": \"../ugv\"}"),
+        ("0.stranger", "", b"{\"event\": \"retire\"}"),
+        (&subject, "", b"{\"event\": \"enrol\", \"mission\": \"uuv\"}"),
+        (&subject, "other:1", b"{\"event\": \"retire\"}"),
+        (&subject, "no colon", b"{\"event\": \"retire\"}"),
+        ("0.a b", "", b"{\"event\": \"enrol\", \"mission\": \"ugv\"}"),
+    ];
+    let mut sequences = Vec::new();
+    let mut sender = Sender::new(store.clone(), "good", "");
+    for (number, event) in events.iter().enumerate() {
+        sequences.push(sender.send(event).await.expect("it is our own directory"));
+        if let Some((subject, id, payload)) = hostile.get(number) {
+            let message = Message { subject, id, after: None, payload };
+            store.append(Stream::Events, message).await.expect("it is our own directory");
+        }
+    }
+    let shared = shared(store.clone(), "one", Settings::default());
+    let (orders, heard) = watch::channel(Order::Go);
+    let task = tokio::spawn(serve(std::sync::Arc::clone(&shared), 0, heard));
+    decided(&store, events.len()).await;
+    orders.send_replace(Order::Drain);
+    task.await.expect("it ends in order");
+    let made = decisions(&store).await;
+    assert_eq!(made.keys().collect::<Vec<_>>(), ["good"]);
+    assert_same("good", &made["good"], &sequences, &answers);
+    // What has no address is not in any partition: it is not even read.
+    assert_eq!(shared.counts.refused.load(Ordering::Relaxed), 8);
+    assert_eq!(shared.counts.robots.load(Ordering::Relaxed), 0, "nothing is left behind");
+    let mut told = 0;
+    while notices.try_recv().is_ok() {
+        told += 1;
+    }
+    assert_eq!(told, 8);
+}
+
+/// What an enrolled robot says and nobody understands is answered, as by `metaplan run`.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn nonsense_of_a_robot_is_answered_with_an_error() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let store = open(folder.path(), 3);
+    let mut events = scripts::play("ugv", "kinect_at_wp2", 1, 6).0;
+    events.insert(3, "nonsense".to_owned());
+    events.insert(4, r#"{"event": "component_status", "component": "nobody", "status": "FALSE"}"#.to_owned());
+    let answers = scripts::alone("ugv", &events);
+    let mut sender = Sender::new(store.clone(), "r", "s");
+    let mut sequences = Vec::new();
+    for event in &events {
+        sequences.push(sender.send(event).await.expect("it is our own directory"));
+    }
+    work(&store, "one", Settings::default(), events.len()).await;
+    let made = decisions(&store).await;
+    assert_same("r", &made["r"], &sequences, &answers);
+    assert_eq!(made["r"][3].answers[0]["answer"], "error");
+}
+
+/// Somebody who takes a robot's message ids keeps it from nothing.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn forged_ids_keep_nobody_from_saying_something() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let store = open(folder.path(), 1);
+    for number in 1..=3 {
+        let id = format!("good:s{number}");
+        let message = Message { subject: "0.bad", id: &id, after: None, payload: b"{\"event\": \"tick\"}" };
+        store.append(Stream::Events, message).await.expect("it is our own directory");
+    }
+    let events = scripts::play("ugv", "kinect_at_wp2", 1, 5).0;
+    let mut sender = Sender::new(store.clone(), "good", "s");
+    for event in &events {
+        sender.send(event).await.expect("it is our own directory");
+    }
+    let mut again = Sender::new(store.clone(), "good", "s");
+    for event in &events {
+        again.send(event).await.expect("it is our own directory");
+    }
+    let stored = store.history(Stream::Events, 0, 0).await.expect("it can be read");
+    let good: Vec<&[u8]> =
+        stored.iter().filter(|own| own.subject == "0.good").map(|own| own.payload.as_slice()).collect();
+    assert_eq!(good, events.iter().map(String::as_bytes).collect::<Vec<_>>(), "each once, though sent twice");
+}
+
+/// Whoever was away for long writes behind what is not the last any more, and is refused.
+#[tokio::test]
+async fn an_old_epoch_is_refused() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let store = open(folder.path(), 1);
+    let message = |id: &'static str, after| Message { subject: "0.r", id, after: Some(after), payload: b"x" };
+    let first = store.append(Stream::Decisions, message("a", 0)).await.expect("the first one").sequence;
+    store.append(Stream::Decisions, message("b", first)).await.expect("the second one");
+    assert_eq!(store.append(Stream::Decisions, message("c", first)).await, Err(Fault::Conflict));
+    let again = store.append(Stream::Decisions, message("b", first)).await.expect("it is there");
+    assert!(again.is_known);
+    use metaplan_fleet::store::Bucket::Progress;
+    let old = store.put(Progress, "0", b"1", 0).await.expect("there is none");
+    store.put(Progress, "0", b"2", old).await.expect("it is the last");
+    assert_eq!(store.put(Progress, "0", b"3", old).await, Err(Fault::Conflict));
+    assert_eq!(store.put(Progress, "0", b"3", 0).await, Err(Fault::Conflict));
+    assert_eq!(store.remove(Progress, "0", old).await, Err(Fault::Conflict));
+}

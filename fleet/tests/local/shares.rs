@@ -1,0 +1,66 @@
+//! Several workers: partitions are shared, given back, and taken over when a worker is gone.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use metaplan_fleet::partition::Settings;
+use metaplan_fleet::robots::status;
+use metaplan_fleet::store::local::Local;
+use metaplan_fleet::worker;
+use tokio::sync::watch;
+
+use super::{assert_same, decided, decisions, open, scripts, shared, tell};
+
+const LEASE: Duration = Duration::from_millis(400);
+
+/// Waits until partitions are distributed like that.
+async fn distributed(store: &Local, wanted: &[usize]) {
+    let mut counts = Vec::new();
+    for _ in 0..1000 {
+        let mut held: BTreeMap<String, usize> = BTreeMap::new();
+        for partition in status(store).await.expect("it can be read").partitions {
+            *held.entry(partition.worker.unwrap_or_default()).or_default() += 1;
+        }
+        counts = held.into_values().collect();
+        counts.sort_unstable();
+        if counts == wanted {
+            return;
+        }
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    panic!("partitions are distributed as {counts:?}, not as {wanted:?}");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn partitions_are_shared_and_taken_over() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let store = Local::open(folder.path(), 8, LEASE).unwrap_or_else(|message| panic!("{message}"));
+    let begin = |name: &str| {
+        let (stop, heard) = watch::channel(false);
+        let shared = shared(store.clone(), name, Settings::default());
+        (stop, tokio::spawn(worker::run(shared, LEASE, heard)))
+    };
+    let (events, answers) = scripts::play("ugv", "kinect_comes_and_goes", 5, 30);
+    let mut sequences = tell(&store, "r", &events[..10]).await;
+    let (first_stop, first) = begin("first");
+    distributed(&store, &[8]).await;
+    let (_second_stop, second) = begin("second");
+    distributed(&store, &[4, 4]).await;
+    sequences.extend(tell(&store, "r", &events[10..20]).await);
+    // One is gone without a word, and its leases with it.
+    second.abort();
+    sequences.extend(tell(&store, "r", &events[20..]).await);
+    distributed(&store, &[8]).await;
+    decided(&store, events.len()).await;
+    let (third_stop, third) = begin("third");
+    distributed(&store, &[4, 4]).await;
+    first_stop.send_replace(true);
+    first.await.expect("it ends in order");
+    distributed(&store, &[8]).await;
+    third_stop.send_replace(true);
+    third.await.expect("it ends in order");
+    assert_same("r", &decisions(&store).await["r"], &sequences, &answers);
+    let epochs = status(&store).await.expect("it can be read").partitions;
+    assert!(epochs.iter().all(|own| own.worker.is_none() && own.epoch >= 2), "{epochs:?}");
+    let _ = open;
+}
