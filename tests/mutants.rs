@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 use serde::Deserialize;
 
 /// What is copied of the workspace.
-const PARTS: [&str; 22] = [
+const PARTS: [&str; 23] = [
     "Cargo.toml",
     "Cargo.lock",
     "README.md",
@@ -35,6 +35,7 @@ const PARTS: [&str; 22] = [
     "picture",
     "python",
     "ros",
+    "fleet",
     "tests",
     "benches",
     "missions",

@@ -53,7 +53,9 @@ async fn feed<S: Store>(store: &S, session: &str, mut stop: watch::Receiver<bool
         }
         let Some((robot, event)) = line.split_once(' ').filter(|(robot, _)| is_name(robot)) else {
             wrong += 1;
-            let text = format!("line {number}: a line is `ROBOT EVENT`; a robot's name has letters, digits, `-` and `_` only");
+            let text = format!(
+                "line {number}: a line is `ROBOT EVENT`; a robot's name has letters, digits, `-` and `_` only"
+            );
             say(&Message::error("N314", text));
             continue;
         };
@@ -83,7 +85,10 @@ async fn feed<S: Store>(store: &S, session: &str, mut stop: watch::Receiver<bool
         stored += count.unwrap_or(0);
     }
     if wrong > 0 {
-        return Err(Message::error("N314", format!("{wrong} lines were not understood; {stored} events were stored")));
+        return Err(Message::error(
+            "N314",
+            format!("{wrong} lines were not understood; {stored} events were stored"),
+        ));
     }
     Ok(stored)
 }
@@ -114,7 +119,11 @@ fn line(message: &Stored) -> Option<(String, String)> {
 }
 
 /// Writes decisions for as long as somebody reads them.
-pub(crate) async fn follow<S: Store>(store: S, robot: Option<&str>, after: Option<u64>) -> Result<(), Message> {
+pub(crate) async fn follow<S: Store>(
+    store: S,
+    robot: Option<&str>,
+    after: Option<u64>,
+) -> Result<(), Message> {
     let partitions: Vec<u32> = match robot {
         Some(robot) => vec![Address::of(robot, store.partitions()).partition],
         None => (0..store.partitions()).collect(),
@@ -150,7 +159,8 @@ async fn write_decisions<S: Store>(
         let from = reached.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let mut streams = Vec::new();
         for (partition, after) in from {
-            let stream = store.follow(Stream::Decisions, partition, after).await.map_err(|own| fault(&own))?;
+            let stream =
+                store.follow(Stream::Decisions, partition, after).await.map_err(|own| fault(&own))?;
             streams.push(stream.map(move |message| (partition, message)).boxed());
         }
         let mut decisions = select_all(streams);
@@ -242,7 +252,15 @@ pub(crate) fn status(status: &Status, as_json: bool) -> Result<(), Message> {
 fn status_text(status: &Status) -> String {
     let mut workers = Table::new();
     workers.load_style(TableStyle::new()).set_header([
-        "worker", "partitions", "robots", "ready", "waiting", "decided", "refused", "load", "",
+        "worker",
+        "partitions",
+        "robots",
+        "ready",
+        "waiting",
+        "decided",
+        "refused",
+        "load",
+        "",
     ]);
     for (name, own) in &status.workers {
         workers.add_row([
@@ -258,7 +276,12 @@ fn status_text(status: &Status) -> String {
         ]);
     }
     let mut partitions = Table::new();
-    partitions.load_style(TableStyle::new()).set_header(["partition", "worker", "epoch", "saved up to event"]);
+    partitions.load_style(TableStyle::new()).set_header([
+        "partition",
+        "worker",
+        "epoch",
+        "saved up to event",
+    ]);
     for own in &status.partitions {
         partitions.add_row([
             own.partition.to_string(),

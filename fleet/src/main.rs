@@ -223,9 +223,9 @@ async fn run(command: Command) -> Result<(), Errors> {
         }
         Command::Status { server, format } => {
             let store = server.open().await.map_err(|message| vec![message])?;
-            let status = status(&store)
-                .await
-                .map_err(|fault| vec![Message::error("N312", format!("the fleet cannot be read: {fault}"))])?;
+            let status = status(&store).await.map_err(|fault| {
+                vec![Message::error("N312", format!("the fleet cannot be read: {fault}"))]
+            })?;
             lines::status(&status, format == "json").map_err(|message| vec![message])?;
         }
     }
@@ -235,7 +235,8 @@ async fn run(command: Command) -> Result<(), Errors> {
 /// Host and process, and something by chance: no other worker has it.
 fn own_name() -> String {
     let host = std::fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
-    let host: String = host.trim().chars().filter(|c| c.is_ascii_alphanumeric() || *c == '-').take(40).collect();
+    let host: String =
+        host.trim().chars().filter(|c| c.is_ascii_alphanumeric() || *c == '-').take(40).collect();
     format!("{host}-{}-{:04x}", std::process::id(), fastrand::u16(..))
 }
 

@@ -63,8 +63,12 @@ impl Refused {
     /// A sentence for whoever has sent it.
     pub fn sentence(self) -> &'static str {
         match self {
-            Self::Unknown => "the robot is not enrolled: send `{\"event\": \"enrol\", \"mission\": NAME}` first",
-            Self::Enrolled => "the robot is enrolled already: send `{\"event\": \"retire\"}` before it gets another mission",
+            Self::Unknown => {
+                "the robot is not enrolled: send `{\"event\": \"enrol\", \"mission\": NAME}` first"
+            }
+            Self::Enrolled => {
+                "the robot is enrolled already: send `{\"event\": \"retire\"}` before it gets another mission"
+            }
             Self::Mission => "there is no mission of that name",
             Self::Forged => "the message id must be that of its robot: `ROBOT:NUMBER`",
             Self::Misplaced => "the robot belongs to another partition",
@@ -100,7 +104,9 @@ impl Robot {
                 .get(name)
                 .ok_or_else(|| Faulted(format!("there is no mission `{name}` in the directory")))?;
             if known.digest != saved.digest {
-                let text = format!("the files or settings of mission `{name}` are not those that it was enrolled with");
+                let text = format!(
+                    "the files or settings of mission `{name}` are not those that it was enrolled with"
+                );
                 return Err(Faulted(text));
             }
             robot.control = Control::Cold(compressed(&saved.known));
@@ -216,7 +222,9 @@ impl Robot {
             .get(mission)
             .ok_or_else(|| Faulted(format!("there is no mission `{mission}` in the directory")))?;
         let mut control = template.control.clone();
-        control.restore(&Snapshot(decompressed(bytes))).map_err(|message| Faulted(message.text().to_owned()))?;
+        control
+            .restore(&Snapshot(decompressed(bytes)))
+            .map_err(|message| Faulted(message.text().to_owned()))?;
         self.control = Control::Warm(Box::new(control));
         Ok(())
     }
@@ -233,9 +241,7 @@ fn request(head: &Value) -> Request<'_> {
 
 /// Whether two decisions say the same; explanations may differ in words, as in a journal.
 fn is_same(left: &Decided, right: &Decided) -> bool {
-    left.enrolled == right.enrolled
-        && left.retired == right.retired
-        && left.decision().agrees(&right.answers)
+    left.enrolled == right.enrolled && left.retired == right.retired && left.decision().agrees(&right.answers)
 }
 
 fn compressed(known: &Value) -> Vec<u8> {

@@ -69,7 +69,9 @@ impl<S: Store> Sender<S> {
             // In another partition it is not found, however long one waits.
             return match tokio::time::timeout(LOOK, messages.next()).await {
                 Ok(Some(Ok(found))) => {
-                    found.sequence == sequence && found.subject == subject && found.payload == event.as_bytes()
+                    found.sequence == sequence
+                        && found.subject == subject
+                        && found.payload == event.as_bytes()
                 }
                 Ok(_) => {
                     pause(attempt).await;

@@ -154,10 +154,7 @@ mod tests {
 
     #[test]
     fn addresses_are_spelled_one_way() {
-        assert_eq!(
-            Address::parse("3.ugv-1"),
-            Some(Address { partition: 3, robot: "ugv-1".to_owned() })
-        );
+        assert_eq!(Address::parse("3.ugv-1"), Some(Address { partition: 3, robot: "ugv-1".to_owned() }));
         for wrong in ["", "3", "3.", "03.x", "+3.x", "3.x.y", "x.3", "3.a b", "3.a*", "3.>", "-1.x", "3.ö"] {
             assert_eq!(Address::parse(wrong), None, "{wrong}");
         }

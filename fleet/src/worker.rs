@@ -179,8 +179,7 @@ impl<S: Store> Worker<S> {
         for partition in wanted {
             let begun = Instant::now();
             let name = self.shared.worker.as_bytes();
-            if let Ok(revision) =
-                self.shared.store.put(Bucket::Leases, &partition.to_string(), name, 0).await
+            if let Ok(revision) = self.shared.store.put(Bucket::Leases, &partition.to_string(), name, 0).await
             {
                 let held = self.serve(partition, revision, begun);
                 self.held.insert(partition, held);

@@ -1,5 +1,6 @@
 //! Every code that a message can have: what it means, what causes it, and what to do. Each crate lists its own; here they are one.
 
+mod fleet;
 mod own;
 mod ros;
 
@@ -28,6 +29,7 @@ pub fn all() -> Vec<Code> {
         probabilistic::CODES,
         own::CODES,
         ros::CODES,
+        fleet::CODES,
     ];
     let code = |&[code, meaning, cause, remedy]: &[&'static str; 4]| Code { code, meaning, cause, remedy };
     let mut all: Vec<Code> = tables.into_iter().flatten().map(code).collect();

@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use metaplan::codes::{self, Code};
 
 /// The crates that have a table, and the letters of codes.
-const TABLES: [&str; 9] =
-    ["rules", "ontology", "pddl", "encodings", "probabilistic", "mission", "verify", "src", "ros"];
+const TABLES: [&str; 10] =
+    ["rules", "ontology", "pddl", "encodings", "probabilistic", "mission", "verify", "src", "ros", "fleet"];
 const LETTERS: &str = "EMNOPQR";
 
 /// The codes that stand in a text as words, outside of comments and tests.
@@ -30,13 +30,17 @@ fn is_table(path: &str) -> bool {
 
 type ByCrate = BTreeMap<&'static str, BTreeSet<String>>;
 
-/// By crate: the codes that its files give, and those of its table. What `metaplan-ros` gives is listed in the facade, its only neighbour.
+/// By crate: the codes that its files give, and those of its table. What `metaplan-ros` and `metaplan-fleet` give is listed in the facade, their only neighbour.
 fn found() -> (ByCrate, ByCrate) {
     let (mut used, mut listed) = (BTreeMap::new(), BTreeMap::new());
     for (path, text) in super::files() {
         let is_source = path.starts_with("src/") || path.contains("/src/");
         let Some(own) = owner(&path).filter(|_| is_source && !path.contains("/tests")) else { continue };
-        let own = if path == "src/codes/ros.rs" { "ros" } else { own };
+        let own = match path.as_str() {
+            "src/codes/ros.rs" => "ros",
+            "src/codes/fleet.rs" => "fleet",
+            _ => own,
+        };
         let codes: &mut BTreeMap<_, BTreeSet<String>> = if is_table(&path) { &mut listed } else { &mut used };
         let quoted = |text: &str| -> BTreeSet<String> {
             let quoted = text.split('"').skip(1).step_by(2).filter(|word| codes::is_code(word));

@@ -220,8 +220,12 @@ impl Writer {
     }
 
     fn expire(&mut self, tables: &mut Tables<'_>) -> Result<(), redb::Error> {
-        let gone: Vec<(Bucket, String)> =
-            self.seen.iter().filter(|(_, at)| at.elapsed() > self.lease).map(|(key, _)| key.clone()).collect();
+        let gone: Vec<(Bucket, String)> = self
+            .seen
+            .iter()
+            .filter(|(_, at)| at.elapsed() > self.lease)
+            .map(|(key, _)| key.clone())
+            .collect();
         for key in gone {
             tables.values.remove((key.0 as u8, key.1.as_str()))?;
             self.seen.remove(&key);
@@ -389,7 +393,9 @@ impl Store for Local {
     }
 
     async fn put(&self, bucket: Bucket, key: &str, value: &[u8], after: u64) -> Result<u64, Fault> {
-        self.write(Write::Put { bucket, key: key.to_owned(), value: value.to_owned(), after }).await.map(|own| own.sequence)
+        self.write(Write::Put { bucket, key: key.to_owned(), value: value.to_owned(), after })
+            .await
+            .map(|own| own.sequence)
     }
 
     async fn remove(&self, bucket: Bucket, key: &str, revision: u64) -> Result<(), Fault> {

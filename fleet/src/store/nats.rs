@@ -216,10 +216,7 @@ impl Nats {
             }
         }
         // Whoever is not asked any more is forgotten by the server after a while, too.
-        let _ = self
-            .context
-            .delete_consumer_from_stream(consumer.cached_info().name.as_str(), name)
-            .await;
+        let _ = self.context.delete_consumer_from_stream(consumer.cached_info().name.as_str(), name).await;
         Ok(())
     }
 }
@@ -245,7 +242,11 @@ fn stored(stream: Stream, message: &jetstream::Message) -> Result<Stored, Fault>
 }
 
 fn tail(stream: Stream, subject: &str) -> String {
-    subject.strip_prefix(stream.prefix()).and_then(|rest| rest.strip_prefix('.')).unwrap_or_default().to_owned()
+    subject
+        .strip_prefix(stream.prefix())
+        .and_then(|rest| rest.strip_prefix('.'))
+        .unwrap_or_default()
+        .to_owned()
 }
 
 fn micros(nanos: i128) -> u64 {
@@ -364,7 +365,8 @@ impl Store for Nats {
     async fn list(&self, bucket: Bucket, partition: Option<u32>, at_least: u64) -> Result<Vec<Entry>, Fault> {
         let name = format!("KV_{}-{}", self.fleet, bucket.name());
         let prefix = format!("$KV.{}-{}.", self.fleet, bucket.name());
-        let filter = partition.map_or_else(|| format!("{prefix}>"), |partition| format!("{prefix}{partition}.*"));
+        let filter =
+            partition.map_or_else(|| format!("{prefix}>"), |partition| format!("{prefix}{partition}.*"));
         let mut found = Vec::new();
         self.read(&name, filter, DeliverPolicy::LastPerSubject, at_least, |message, revision| {
             let is_gone = message.headers.as_ref().is_some_and(|headers| {

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 use futures::stream::BoxStream;
 use metaplan_fleet::partition::{Order, Settings, serve};
@@ -98,7 +99,7 @@ async fn a_crash_between_any_two_operations_neither_loses_nor_repeats() {
         .map(|(robot, mission, scenario)| (robot, scripts::play(mission, scenario, 3, 7)))
         .collect();
     let count = scripts.iter().map(|(_, (events, _))| events.len()).sum();
-    let settings = Settings { save_every: 2, ..Settings::default() };
+    let settings = Settings { save_every: 2, look: Duration::from_millis(1), ..Settings::default() };
     let mut crashes = 0;
     for carries_out in [false, true] {
         for operations in 1.. {
@@ -110,8 +111,7 @@ async fn a_crash_between_any_two_operations_neither_loses_nor_repeats() {
             }
             let left = Arc::new(AtomicU64::new(operations));
             let over = Arc::new(Notify::new());
-            let crashing =
-                Crashing { inner: store.clone(), left, carries_out, over: Arc::clone(&over) };
+            let crashing = Crashing { inner: store.clone(), left, carries_out, over: Arc::clone(&over) };
             let (_orders, heard) = watch::channel(Order::Go);
             let task = tokio::spawn(serve(shared(crashing, "first", settings), 0, heard));
             let crashed = tokio::select! {
@@ -140,7 +140,7 @@ async fn two_owners_of_one_partition_decide_each_event_once() {
         let folder = tempfile::tempdir().expect("a directory");
         let store = open(folder.path(), 1);
         let (events, answers) = scripts::play("ugv", "kinect_comes_and_goes", seed, 30);
-        let settings = Settings { save_every: 3, ..Settings::default() };
+        let settings = Settings { save_every: 3, look: Duration::from_millis(1), ..Settings::default() };
         let own = |name: &str| shared(store.clone(), name, settings);
         let (_orders, heard) = watch::channel(Order::Go);
         let zombie = tokio::spawn(serve(own("zombie"), 0, heard.clone()));
@@ -162,5 +162,34 @@ async fn two_owners_of_one_partition_decide_each_event_once() {
         decided(&store, events.len()).await;
         (zombie.abort(), owner.abort());
         assert_same("r", &decisions(&store).await["r"], &sequences, &answers);
+    }
+}
+
+/// What a former owner has decided is needed until it is gone through, however often progress is written in between.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn owners_that_are_gone_at_any_time_leave_what_is_needed() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let store = open(folder.path(), 1);
+    let scripts: Vec<_> =
+        (0..6).map(|seed| scripts::play("ugv", "kinect_comes_and_goes", seed, 30)).collect();
+    let count = scripts.iter().map(|(events, _)| events.len()).sum();
+    let mut sequences = Vec::new();
+    for (robot, (events, _)) in scripts.iter().enumerate() {
+        sequences.push(tell(&store, &format!("r{robot}"), events).await);
+    }
+    let mut random = fastrand::Rng::with_seed(7);
+    for _ in 0..40 {
+        let save_every = random.usize(1..12);
+        let settings = Settings { save_every, look: Duration::from_millis(1), ..Settings::default() };
+        let (_orders, heard) = watch::channel(Order::Go);
+        let task = tokio::spawn(serve(shared(store.clone(), "gone", settings), 0, heard));
+        tokio::time::sleep(Duration::from_millis(random.u64(1..60))).await;
+        task.abort();
+    }
+    work(&store, "last", Settings::default(), count).await;
+    let made = decisions(&store).await;
+    for (robot, ((_, answers), sequences)) in scripts.iter().zip(&sequences).enumerate() {
+        let robot = format!("r{robot}");
+        assert_same(&robot, &made[&robot], sequences, answers);
     }
 }

@@ -39,7 +39,8 @@ async fn tell<S: Store>(store: &S, robot: &str, events: &[String]) -> Vec<u64> {
     let mut sequences = Vec::new();
     for event in events {
         let message = Message { subject: &subject, id: "", after: None, payload: event.as_bytes() };
-        sequences.push(store.append(Stream::Events, message).await.expect("it is our own directory").sequence);
+        sequences
+            .push(store.append(Stream::Events, message).await.expect("it is our own directory").sequence);
     }
     sequences
 }
@@ -84,7 +85,12 @@ fn assert_same(robot: &str, decided: &[Decided], sequences: &[u64], expected: &[
     let events: Vec<u64> = decided.iter().map(|own| own.event).collect();
     assert_eq!(events, sequences, "{robot}: each event once, in order");
     for (own, expected) in decided.iter().zip(expected) {
-        assert_eq!(scripts::essence(&own.answers), scripts::essence(expected), "{robot}, event {}", own.event);
+        assert_eq!(
+            scripts::essence(&own.answers),
+            scripts::essence(expected),
+            "{robot}, event {}",
+            own.event
+        );
     }
 }
 

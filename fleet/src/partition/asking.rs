@@ -1,0 +1,54 @@
+//! Asking a log until there is an answer.
+
+use std::future::Future;
+use std::time::Duration;
+
+use crate::store::{Bucket, Fault, Store};
+
+/// Writes a value behind a revision, until it is there or somebody else has written another one.
+pub(super) async fn write<S: Store>(
+    store: &S,
+    bucket: Bucket,
+    key: &str,
+    value: &[u8],
+    after: u64,
+) -> Result<u64, Fault> {
+    for attempt in 1.. {
+        match store.put(bucket, key, value, after).await {
+            Ok(revision) => return Ok(revision),
+            Err(Fault::Unreachable(_)) => {}
+            Err(fault) => match store.get(bucket, key).await {
+                Ok(Some(entry)) if entry.value == value => return Ok(entry.revision),
+                Ok(entry) if entry.as_ref().map_or(0, |entry| entry.revision) > after => return Err(fault),
+                _ => {}
+            },
+        }
+        pause(attempt).await;
+    }
+    Err(Fault::Conflict)
+}
+
+/// Asks until there is an answer.
+pub(super) async fn persist<T, F: Future<Output = Result<T, Fault>>>(
+    ask: impl Fn() -> F,
+) -> Result<T, Fault> {
+    for attempt in 1.. {
+        match ask().await {
+            Err(Fault::Unreachable(_)) => pause(attempt).await,
+            other => return other,
+        }
+    }
+    Err(Fault::Conflict)
+}
+
+/// Waits before another attempt: up to 10 ms, and up to twice as long each time, 5 s at most; a random part of that, so that not all come
+/// back at once.
+pub(crate) async fn pause(attempt: u32) {
+    let most = 5_000.min(10_u64 << attempt.min(10));
+    tokio::time::sleep(Duration::from_millis(fastrand::u64(1..=most))).await;
+}
+
+/// A value as it is written.
+pub(super) fn bytes(value: &impl serde::Serialize) -> Vec<u8> {
+    serde_json::to_vec(value).unwrap_or_default()
+}

@@ -1,0 +1,91 @@
+//! What former owners have left.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use futures::stream::FuturesUnordered;
+
+use super::asking::{bytes, pause, persist};
+use super::own::Partition;
+use super::{End, Shared};
+use crate::robot::{Faulted, Robot};
+use crate::store::{Bucket, Store, Stream};
+use crate::wire::{Address, Decided, Progress, Saved};
+
+impl<S: Store> Partition<S> {
+    /// Takes over what former owners have left.
+    pub(super) async fn recover(shared: &Arc<Shared<S>>, number: u32) -> Result<Self, End> {
+        let key = number.to_string();
+        let store = &shared.store;
+        let (progress, revision) = loop {
+            let known = persist(|| store.get(Bucket::Progress, &key)).await.map_err(|_| End::Fenced)?;
+            let (mut progress, revision) = match known {
+                Some(entry) => (serde_json::from_slice(&entry.value).unwrap_or_default(), entry.revision),
+                None => (Progress::default(), 0),
+            };
+            progress.epoch += 1;
+            let value = bytes(&progress);
+            match persist(|| store.put(Bucket::Progress, &key, &value, revision)).await {
+                Ok(revision) => break (progress, revision),
+                // It was written by somebody else, or by ourselves without our knowing.
+                Err(_) => pause(1).await,
+            }
+        };
+        let saved = persist(|| store.list(Bucket::Robots, Some(number), progress.snapshots));
+        let saved = saved.await.map_err(|_| End::Fenced)?;
+        let history = persist(|| store.history(Stream::Decisions, number, progress.decisions));
+        let history = history.await.map_err(|_| End::Fenced)?;
+        shared.counts.partitions.fetch_add(1, Ordering::Relaxed);
+        let mut own = Self {
+            shared: Arc::clone(shared),
+            number,
+            seen: (progress.events, progress.decisions),
+            snapshots: progress.snapshots,
+            progress,
+            revision,
+            slots: BTreeMap::new(),
+            jobs: FuturesUnordered::new(),
+            waiting: 0,
+            is_progressing: false,
+            clock: 0,
+            recent: VecDeque::new(),
+        };
+        for entry in saved {
+            own.snapshots = own.snapshots.max(entry.revision);
+            own.take_saved(&entry.key, &entry.value, entry.revision);
+        }
+        for message in history {
+            own.seen.1 = own.seen.1.max(message.sequence);
+            let Some(address) = Address::parse(&message.subject) else { continue };
+            let slot = own.slot(&address.robot);
+            if slot.chain >= message.sequence {
+                continue;
+            }
+            // Whatever stands there, the next decision stands behind it.
+            slot.chain = message.sequence;
+            match Decided::parse(&message.payload) {
+                Some(decided) => slot.before.push_back((message.sequence, decided)),
+                None => own.refuse(None, "not_a_decision"),
+            }
+        }
+        Ok(own)
+    }
+
+    fn take_saved(&mut self, key: &str, value: &[u8], revision: u64) {
+        let (Some(address), Ok(saved)) = (Address::parse(key), serde_json::from_slice::<Saved>(value)) else {
+            self.refuse(None, "not_a_snapshot");
+            return;
+        };
+        let restored = Robot::restore(&saved, &self.shared.missions);
+        let slot = self.slot(&address.robot);
+        (slot.chain, slot.revision) = (saved.decision, revision);
+        match restored {
+            Ok(robot) => slot.robot = Some(Box::new(robot)),
+            Err(Faulted(why)) => {
+                slot.robot = Some(Box::default());
+                self.fault(&address.robot, saved.event + 1, saved.decision + 1, &why);
+            }
+        }
+    }
+}

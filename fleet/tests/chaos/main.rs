@@ -1,0 +1,232 @@
+//! Three servers, four workers, a thousand robots, and everything that goes wrong at random times: every robot is answered as by one loop.
+//!
+//! Ignored, since it needs `nats-server` (2.11 or newer), whose path is `NATS_SERVER` or which is in the path. Further: `SCHEDULES` (20), `SEED` (1),
+//! `ROBOTS` (1000), `EVENTS` for each robot (100), which it says within `SECONDS` (20). What happens follows from the seed, when from the machine, too.
+
+mod cluster;
+#[path = "../local/scripts.rs"]
+mod scripts;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use metaplan_fleet::robots::{Sender, status};
+use metaplan_fleet::store::nats::{Access, Layout, Nats};
+use metaplan_fleet::store::{Message, Store, Stored, Stream};
+use metaplan_fleet::wire::{Address, Decided, partition_of};
+use serde_json::{Value, json};
+
+use cluster::Cluster;
+
+const PARTITIONS: u32 = 32;
+const LEASE: u64 = 2;
+const WORKERS: usize = 4;
+
+fn number(name: &str, default: u64) -> u64 {
+    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
+}
+
+/// What one robot says, and what it is answered.
+type Script = (Vec<String>, Vec<Vec<Value>>);
+
+/// A script with so many lines: the simulated robot's, and then components that fail and recover.
+fn script(number: usize, lines: usize) -> Script {
+    let (mission, scenario) = scripts::SCENARIOS[number % scripts::SCENARIOS.len()];
+    let (mut events, _) = scripts::play(mission, scenario, number as u64, lines);
+    let component = if mission == "ugv" { "c_kinect" } else { "c_thruster_1" };
+    let mut fails = true;
+    while events.len() < lines {
+        let status = if fails { "FALSE" } else { "OK" };
+        fails = !fails;
+        events
+            .push(json!({"event": "component_status", "component": component, "status": status}).to_string());
+    }
+    let answers = scripts::alone(mission, &events);
+    (events, answers)
+}
+
+async fn open(cluster: &Cluster) -> Nats {
+    let access = Access { url: cluster.url(), ..Access::default() };
+    let lease = Duration::from_secs(LEASE);
+    let layout = Layout { fleet: "fleet".to_owned(), partitions: PARTITIONS, replicas: 3, lease };
+    for _ in 0..60 {
+        match Nats::open(&access, &layout).await {
+            Ok(store) => return store,
+            Err(_) => tokio::time::sleep(Duration::from_millis(500)).await,
+        }
+    }
+    panic!("the servers do not answer: {}", cluster.logs());
+}
+
+/// A stream's messages, read until that works.
+async fn read(store: &Nats, stream: Stream, partition: u32) -> Vec<Stored> {
+    for _ in 0..60 {
+        match store.history(stream, partition, 0).await {
+            Ok(messages) => return messages,
+            Err(_) => tokio::time::sleep(Duration::from_millis(500)).await,
+        }
+    }
+    panic!("partition {partition} cannot be read");
+}
+
+/// Sends what nobody should send, now and then.
+async fn attack(store: Nats, over: Arc<AtomicBool>, seed: u64) -> u64 {
+    let mut random = fastrand::Rng::with_seed(seed);
+    let mut count = 0;
+    while !over.load(Ordering::Relaxed) {
+        let victim = format!("robot-{}", random.u32(0..50));
+        let own = Address::of(&victim, PARTITIONS).to_string();
+        let elsewhere = format!("{}.{victim}", (partition_of(&victim, PARTITIONS) + 1) % PARTITIONS);
+        let long = format!("{{\"event\": \"tick\", \"x\": \"{}\"}}", "a".repeat(900_000));
+        let (subject, id, payload) = match random.u8(0..5) {
+            0 => (elsewhere, format!("{victim}:x{count}"), "{\"event\": \"retire\"}".to_owned()),
+            1 => (own, format!("other:{count}"), "{\"event\": \"retire\"}".to_owned()),
+            2 => ("3.stranger".to_owned(), String::new(), long),
+            3 => ("3.stranger".to_owned(), String::new(), "\u{0}not JSON".to_owned()),
+            _ => {
+                let stranger = Address::of("stranger", PARTITIONS).to_string();
+                (stranger, String::new(), "{\"event\": \"enrol\", \"mission\": \"../ugv\"}".to_owned())
+            }
+        };
+        let message = Message { subject: &subject, id: &id, after: None, payload: payload.as_bytes() };
+        count += u64::from(store.append(Stream::Events, message).await.is_ok());
+        tokio::time::sleep(Duration::from_millis(100)).await;
+    }
+    count
+}
+
+/// One schedule: the robots' events while everything goes wrong, and what has become of them.
+async fn schedule(seed: u64, robots: usize, scripts: &[Script], disturbed: bool) {
+    let cluster = Cluster::begin(seed);
+    let store = open(&cluster).await;
+    for worker in 0..WORKERS {
+        cluster.begin_worker(worker, PARTITIONS, LEASE);
+    }
+    let over = Arc::new(AtomicBool::new(false));
+    let begun = Instant::now();
+    let trouble = disturbed.then(|| {
+        let (cluster, over) = (cluster.clone(), Arc::clone(&over));
+        std::thread::spawn(move || cluster.trouble(seed, &over, PARTITIONS, LEASE))
+    });
+    let attacker = disturbed.then(|| tokio::spawn(attack(store.clone(), Arc::clone(&over), seed)));
+    let sent = Arc::new(AtomicU64::new(0));
+    let mut senders = tokio::task::JoinSet::new();
+    for robot in 0..robots {
+        let mut sender = Sender::new(store.clone(), &format!("robot-{robot}"), "");
+        let events = scripts[robot % scripts.len()].0.clone();
+        let sent = Arc::clone(&sent);
+        let pause = if disturbed { number("SECONDS", 20) * 2000 / events.len() as u64 } else { 0 };
+        senders.spawn(async move {
+            for event in &events {
+                tokio::time::sleep(Duration::from_millis(fastrand::u64(0..=pause))).await;
+                sender.send(event).await.expect("events are short");
+                sent.fetch_add(1, Ordering::Relaxed);
+            }
+        });
+    }
+    while let Some(done) = senders.join_next().await {
+        done.expect("a robot says all that it has to say");
+    }
+    let said = begun.elapsed();
+    let expected = sent.load(Ordering::Relaxed);
+    // Trouble ends, and what is left is done.
+    over.store(true, Ordering::Relaxed);
+    let what = trouble.map(|thread| thread.join().expect("trouble ends")).unwrap_or_default();
+    let attacks = match attacker {
+        Some(task) => task.await.expect("attacks end"),
+        None => 0,
+    };
+    let mut decided = 0;
+    for _ in 0..900 {
+        decided = 0;
+        for partition in 0..PARTITIONS {
+            decided += read(&store, Stream::Decisions, partition).await.len() as u64;
+        }
+        if decided >= expected {
+            break;
+        }
+        tokio::time::sleep(Duration::from_secs(1)).await;
+    }
+    println!(
+        "seed {seed}: {expected} events of {robots} robots said in {:.1} s, decided after {:.1} s; {attacks} attacks; {what}",
+        said.as_secs_f64(),
+        begun.elapsed().as_secs_f64()
+    );
+    if decided < expected {
+        println!(
+            "{}",
+            serde_json::to_string(&status(&store).await.expect("it can be read")).expect("plain data")
+        );
+    }
+    assert_eq!(decided, expected, "seed {seed}: {}", cluster.logs());
+    verify(&store, robots, scripts, seed).await;
+}
+
+/// Every robot has said what it had to say, in order and once, and was answered as by one loop.
+async fn verify(store: &Nats, robots: usize, scripts: &[Script], seed: u64) {
+    let mut said: BTreeMap<String, Vec<Stored>> = BTreeMap::new();
+    let mut made: BTreeMap<String, Vec<Decided>> = BTreeMap::new();
+    for partition in 0..PARTITIONS {
+        for message in read(store, Stream::Events, partition).await {
+            let robot = Address::parse(&message.subject).expect("an address").robot;
+            said.entry(robot).or_default().push(message);
+        }
+        for message in read(store, Stream::Decisions, partition).await {
+            let robot = Address::parse(&message.subject).expect("an address").robot;
+            made.entry(robot).or_default().push(Decided::parse(&message.payload).expect("a decision"));
+        }
+    }
+    assert_eq!(made.len(), robots, "seed {seed}");
+    for robot in 0..robots {
+        let (name, (events, answers)) = (format!("robot-{robot}"), &scripts[robot % scripts.len()]);
+        // What others have said in its name has another id, or none.
+        let prefix = format!("{name}:");
+        let own = |message: &&Stored| {
+            let id = message.id.as_deref().and_then(|id| id.strip_prefix(&prefix));
+            id.is_some_and(|id| id.parse::<u64>().is_ok())
+                && message.subject == Address::of(&name, PARTITIONS).to_string()
+        };
+        let said: Vec<&Stored> = said[&name].iter().filter(own).collect();
+        let texts: Vec<&[u8]> = said.iter().map(|message| message.payload.as_slice()).collect();
+        let wanted: Vec<&[u8]> = events.iter().map(String::as_bytes).collect();
+        assert!(texts == wanted, "seed {seed}: {name} was not heard as it spoke");
+        let made = &made[&name];
+        let sequences: Vec<u64> = made.iter().map(|own| own.event).collect();
+        let wanted: Vec<u64> = said.iter().map(|message| message.sequence).collect();
+        assert_eq!(sequences, wanted, "seed {seed}: {name}: each event once, in order");
+        for (own, expected) in made.iter().zip(answers) {
+            let (own_answers, expected) = (scripts::essence(&own.answers), scripts::essence(expected));
+            assert_eq!(own_answers, expected, "seed {seed}: {name}, event {}", own.event);
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[ignore = "needs nats-server, and minutes"]
+async fn nothing_is_lost_repeated_or_out_of_order() {
+    let Some(()) = cluster::is_there() else {
+        println!("skipped: there is no nats-server (NATS_SERVER, or in the path)");
+        return;
+    };
+    let (robots, lines) = (number("ROBOTS", 1000) as usize, number("EVENTS", 100) as usize);
+    let scripts: Vec<Script> = (0..robots.min(24)).map(|own| script(own, lines)).collect();
+    let first = number("SEED", 1);
+    for seed in first..first + number("SCHEDULES", 20) {
+        println!("seed {seed} begins");
+        schedule(seed, robots, &scripts, true).await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+#[ignore = "needs nats-server, and minutes"]
+async fn without_trouble() {
+    let Some(()) = cluster::is_there() else {
+        println!("skipped: there is no nats-server (NATS_SERVER, or in the path)");
+        return;
+    };
+    let (robots, lines) = (number("ROBOTS", 1000) as usize, number("EVENTS", 100) as usize);
+    let scripts: Vec<Script> = (0..robots.min(24)).map(|own| script(own, lines)).collect();
+    schedule(0, robots, &scripts, false).await;
+}

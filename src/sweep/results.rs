@@ -1,0 +1,204 @@
+//! The lines that runs leave.
+
+use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions};
+use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
+use std::path::{Path, PathBuf};
+
+use fs4::{FileExt, TryLockError};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use super::study::{Shard, Study};
+use crate::message::{Errors, Message};
+
+/// The version of the files.
+const FORMAT: &str = "metaplan-sweep/1";
+
+/// The first line of a file.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+struct Header {
+    format: String,
+    /// The study's checksum.
+    study: String,
+    /// How many runs the study has.
+    runs: usize,
+    shard: String,
+}
+
+/// A run that has ended.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Line {
+    /// Its number in the study, from 0.
+    pub run: usize,
+    /// What is varied, with its values.
+    pub vary: Map<String, Value>,
+    /// Its exit status; none where it was ended by the time limit or by a signal.
+    pub status: Option<i32>,
+    /// Whether the time limit has ended it.
+    pub timed_out: bool,
+    /// How long it took.
+    pub seconds: f64,
+    /// What it has answered; null where that is not JSON.
+    pub answer: Value,
+    /// The end of what it said on standard error, where there is no answer.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub message: String,
+}
+
+/// The file of a shard, which no other process writes.
+#[derive(Debug)]
+pub struct Results {
+    file: File,
+    /// Where the file is.
+    pub path: PathBuf,
+    /// The runs that are done.
+    pub done: BTreeMap<usize, Line>,
+}
+
+impl Results {
+    /// Opens the file of a shard in a directory, which is made if there is none.
+    ///
+    /// # Errors
+    /// There is one already and it is not to be resumed, another process writes it, it belongs to another study, or it is damaged
+    /// elsewhere than at its end.
+    pub fn open(directory: &Path, study: &Study, shard: Shard, resume: bool) -> Result<Self, Message> {
+        let path = directory.join(format!("shard-{:04}-of-{:04}.jsonl", shard.index, shard.of));
+        let failed = |error: io::Error| wrong(&path, &error.to_string());
+        std::fs::create_dir_all(directory).map_err(failed)?;
+        let mut options = OpenOptions::new();
+        let mut file = options.create(true).truncate(false).read(true).write(true).open(&path).map_err(failed)?;
+        match FileExt::try_lock(&file) {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(wrong(&path, "another process writes it")),
+            Err(TryLockError::Error(error)) => return Err(failed(error)),
+        }
+        let mut text = String::new();
+        file.read_to_string(&mut text).map_err(failed)?;
+        let whole = text.rfind('\n').map_or(0, |end| end + 1);
+        let header = Header {
+            format: FORMAT.to_owned(),
+            study: study.digest.clone(),
+            runs: study.len(),
+            shard: shard.to_string(),
+        };
+        let mut done = BTreeMap::new();
+        if whole > 0 {
+            if !resume {
+                return Err(wrong(&path, "it is there already; go on with `--resume`, or take another directory"));
+            }
+            let (found, lines) = parse(&path, &text[..whole])?;
+            if found != header {
+                return Err(wrong(&path, "it belongs to another study, or the study or its files have changed"));
+            }
+            done = lines.into_iter().map(|line| (line.run, line)).collect();
+        }
+        // What a kill has left of a line is cut off; its run is done again.
+        file.set_len(whole as u64).map_err(failed)?;
+        file.seek(SeekFrom::End(0)).map_err(failed)?;
+        let mut results = Self { file, path, done };
+        if whole == 0 {
+            results.write(&header)?;
+        }
+        Ok(results)
+    }
+
+    /// Adds the line of a run; it is on the disk then.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn add(&mut self, line: Line) -> Result<(), Message> {
+        self.write(&line)?;
+        self.done.insert(line.run, line);
+        Ok(())
+    }
+
+    fn write(&mut self, line: &impl Serialize) -> Result<(), Message> {
+        let text = serde_json::to_string(line).unwrap_or_default() + "\n";
+        let written = self.file.write_all(text.as_bytes()).and_then(|()| self.file.sync_data());
+        written.map_err(|error| wrong(&self.path, &error.to_string()))
+    }
+}
+
+fn wrong(path: &Path, text: &str) -> Message {
+    Message::error("M151", format!("{}: {text}", path.display()))
+}
+
+fn parse(path: &Path, text: &str) -> Result<(Header, Vec<Line>), Message> {
+    let mut lines = text.lines();
+    let header: Header = lines
+        .next()
+        .and_then(|line| serde_json::from_str(line).ok())
+        .filter(|header: &Header| header.format == FORMAT)
+        .ok_or_else(|| wrong(path, "it is not a file of `metaplan sweep`"))?;
+    let parsed = lines.enumerate().map(|(number, line)| {
+        serde_json::from_str(line)
+            .map_err(|error| wrong(path, &format!("line {} is damaged: {error}", number + 2)))
+    });
+    Ok((header, parsed.collect::<Result<_, _>>()?))
+}
+
+/// The lines of all shards in a directory, each run once, in their order; and how many runs the study has.
+///
+/// # Errors
+/// A file cannot be read, files are of different studies, or two have done the same run with different answers; all that is wrong.
+pub fn read_lines(directory: &Path) -> Result<(Vec<Line>, usize), Errors> {
+    let failed = |error: io::Error| Errors::from(wrong(directory, &error.to_string()));
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(directory).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        if path.extension().is_some_and(|extension| extension == "jsonl") {
+            files.push(path);
+        }
+    }
+    files.sort();
+    let (mut first, mut all, mut mistakes) = (None, BTreeMap::<usize, Line>::new(), Vec::new());
+    for path in &files {
+        let text = match std::fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(error) => {
+                mistakes.push(wrong(path, &error.to_string()));
+                continue;
+            }
+        };
+        let whole = text.rfind('\n').map_or(0, |end| end + 1);
+        match parse(path, &text[..whole]) {
+            Err(message) => mistakes.push(message),
+            Ok((header, lines)) => {
+                let (study, runs) = first.get_or_insert((header.study.clone(), header.runs));
+                if (&*study, *runs) != (&header.study, header.runs) {
+                    mistakes.push(wrong(path, "it belongs to another study than the files before"));
+                    continue;
+                }
+                for line in lines {
+                    let known = all.entry(line.run).or_insert_with(|| line.clone());
+                    if essence(&known.answer) != essence(&line.answer) {
+                        mistakes.push(wrong(path, &format!("run {} has another answer elsewhere", line.run)));
+                    }
+                }
+            }
+        }
+    }
+    let Some((_, runs)) = first else {
+        mistakes.push(wrong(directory, "there is no file `*.jsonl` of `metaplan sweep` in it"));
+        return Err(mistakes.into());
+    };
+    if mistakes.is_empty() { Ok((all.into_values().collect(), runs)) } else { Err(mistakes.into()) }
+}
+
+/// An answer without what differs from one run of the same to the next: times, memory and the course of a search.
+pub(super) fn essence(answer: &Value) -> Value {
+    match answer {
+        Value::Object(fields) => {
+            let kept = fields.iter().filter(|(name, _)| !is_measured(name));
+            Value::Object(kept.map(|(name, value)| (name.clone(), essence(value))).collect())
+        }
+        Value::Array(values) => values.iter().map(essence).collect(),
+        other => other.clone(),
+    }
+}
+
+/// Whether a field is measured on a machine.
+fn is_measured(name: &str) -> bool {
+    ["statistics", "costs", "milliseconds", "seconds", "elapsed"].contains(&name)
+}

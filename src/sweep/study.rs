@@ -1,0 +1,420 @@
+//! A study's file to its runs.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use schemars::{JsonSchema, Schema, schema_for};
+use serde::Deserialize;
+use serde_json::{Map, Value, json};
+use sha2::{Digest as _, Sha256};
+
+use crate::comparison::Coadaptation;
+use crate::manifest::{self, ManifestPath};
+use crate::message::{Errors, Message};
+use crate::setup::Setup;
+
+/// More runs than that are a mistake.
+const MOST_RUNS: usize = 10_000_000;
+
+/// What is run, and what is varied.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Sections {
+    /// What the study is about.
+    #[serde(default)]
+    description: String,
+    /// A command of `metaplan` with what is the same in all runs. `{KEY}` stands for a varied value, `{dir}` for a directory of the run's own.
+    command: Vec<String>,
+    /// Ends a run after so many seconds.
+    #[serde(default)]
+    time_limit: Option<f64>,
+    /// Where the rows of the table stand in an answer, as a JSON pointer to an object or to a list of objects.
+    #[serde(default)]
+    rows: String,
+    /// Keys whose values are repetitions: tables have means over them.
+    #[serde(default = "seeds")]
+    repetitions: Vec<String>,
+    /// Values by key. A key that `{KEY}` does not name is an option of the command.
+    #[serde(default)]
+    vary: BTreeMap<String, Variation>,
+    /// Pairs of places of a mission, as values of the key `pair`.
+    #[serde(default)]
+    pairs: Option<Pairs>,
+    /// A program that writes the files of a run.
+    #[serde(default)]
+    generate: Option<Generate>,
+}
+
+fn seeds() -> Vec<String> {
+    vec!["seed".to_owned()]
+}
+
+/// The values of a key.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(untagged)]
+enum Variation {
+    /// One after the other. A list is an option that is given several times, a truth value one that is there or not.
+    List(Vec<Scalars>),
+    /// Whole numbers.
+    Range(Range),
+}
+
+/// Whole numbers from one to another, both included.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Range {
+    from: i64,
+    to: i64,
+    #[serde(default = "one")]
+    step: i64,
+}
+
+fn one() -> i64 {
+    1
+}
+
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(untagged)]
+enum Scalars {
+    Several(Vec<Scalar>),
+    One(Scalar),
+}
+
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(untagged)]
+enum Scalar {
+    Truth(bool),
+    Whole(i64),
+    Real(f64),
+    Text(String),
+}
+
+/// All ordered pairs of places, or some of them.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Pairs {
+    /// The manifest of a mission whose problem spells out places.
+    mission: PathBuf,
+    /// So many, spread evenly over all of them.
+    #[serde(default)]
+    most: Option<usize>,
+}
+
+/// A program that writes the files of a run.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Generate {
+    /// The program with its arguments; `{KEY}` and `{dir}` as in `command`.
+    run: Vec<String>,
+}
+
+/// The JSON Schema of a study's file.
+pub fn schema() -> Schema {
+    schema_for!(Sections)
+}
+
+/// A study: a file, and the runs that it comes to.
+#[derive(Debug, Clone)]
+pub struct Study {
+    sections: Sections,
+    /// Where processes run: relative paths are relative to the study's file.
+    pub directory: PathBuf,
+    /// A checksum of the file, of files that its command names, and of the program's version.
+    pub digest: String,
+    /// Keys with their values, the last one varies fastest.
+    keys: Vec<(String, Vec<Value>)>,
+}
+
+/// One run of a study.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Planned {
+    /// From 0.
+    pub number: usize,
+    /// What is varied, with its values.
+    pub vary: Map<String, Value>,
+}
+
+/// Which runs are a process's: each N-th one, from the I-th on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    /// From 1 to `of`.
+    pub index: usize,
+    /// How many shards there are.
+    pub of: usize,
+}
+
+impl Default for Shard {
+    fn default() -> Self {
+        Self { index: 1, of: 1 }
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.of)
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts = text.split_once('/').and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
+        match parts {
+            Some((index, of)) if (1..=of).contains(&index) => Ok(Self { index, of }),
+            _ => Err(format!("`{text}` is not of the form I/N with I from 1 to N")),
+        }
+    }
+}
+
+impl Study {
+    /// Reads a study's file.
+    ///
+    /// # Errors
+    /// It cannot be read, is not a study, varies what cannot be varied, or its pairs have no places.
+    pub fn read(file: &Path) -> Result<Self, Errors> {
+        let (sections, place): (Sections, ManifestPath) = manifest::read(file)?;
+        let wrong = |text: String| Message::at("M150", place.file(), None, text);
+        let mut mistakes = Vec::new();
+        if sections.command.is_empty() {
+            mistakes.push(wrong("`command` is empty; it should begin with a command such as `plan`".to_owned()));
+        }
+        if sections.time_limit.is_some_and(|limit| limit.is_nan() || limit <= 0.0) {
+            mistakes.push(wrong("`time_limit` should be a number of seconds above 0".to_owned()));
+        }
+        if !sections.rows.is_empty() && !sections.rows.starts_with('/') {
+            mistakes.push(wrong(format!("`rows` is `{}`; a JSON pointer begins with `/`", sections.rows)));
+        }
+        let mut keys: Vec<(String, Vec<Value>)> = Vec::new();
+        for (key, variation) in &sections.vary {
+            match values(variation) {
+                Ok(values) => keys.push((key.clone(), values)),
+                Err(text) => mistakes.push(wrong(format!("`vary.{key}` {text}"))),
+            }
+        }
+        if let Some(pairs) = &sections.pairs {
+            match places(&place.path(&pairs.mission), pairs.most) {
+                Ok(values) => keys.push(("pair".to_owned(), values)),
+                Err(errors) => mistakes.extend(errors),
+            }
+        }
+        let known: BTreeSet<&str> = keys.iter().map(|(key, _)| key.as_str()).collect();
+        if sections.pairs.is_some() && sections.vary.contains_key("pair") {
+            mistakes.push(wrong("`vary.pair` and `pairs` are two lists for one key".to_owned()));
+        }
+        let generator = sections.generate.iter().flat_map(|own| &own.run);
+        for word in sections.command.iter().chain(generator) {
+            for name in placeholders(word).filter(|name| *name != "dir" && !known.contains(name)) {
+                mistakes.push(wrong(format!("`{{{name}}}` stands for a key that is not varied")));
+            }
+        }
+        let runs = keys.iter().try_fold(1_usize, |runs, (_, values)| runs.checked_mul(values.len()));
+        if runs.is_none_or(|runs| runs > MOST_RUNS) {
+            mistakes.push(wrong(format!("the study has more than {MOST_RUNS} runs")));
+        }
+        if !mistakes.is_empty() {
+            return Err(place.quote(mistakes).into());
+        }
+        let directory = match file.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        let digest = digest(&sections, &keys, &directory);
+        Ok(Self { sections, directory, digest, keys })
+    }
+
+    /// How many runs it has.
+    pub fn len(&self) -> usize {
+        self.keys.iter().map(|(_, values)| values.len()).product()
+    }
+
+    /// Whether it has none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The runs of a shard, in their order.
+    pub fn runs(&self, shard: Shard) -> impl Iterator<Item = Planned> + '_ {
+        (shard.index - 1..self.len()).step_by(shard.of).map(|number| self.planned(number))
+    }
+
+    fn planned(&self, number: usize) -> Planned {
+        let mut rest = number;
+        let mut vary = Vec::new();
+        for (key, values) in self.keys.iter().rev() {
+            vary.push((key.clone(), values[rest % values.len()].clone()));
+            rest /= values.len();
+        }
+        Planned { number, vary: vary.into_iter().rev().collect() }
+    }
+
+    /// Where the rows of an answer are.
+    pub fn rows(&self) -> &str {
+        &self.sections.rows
+    }
+
+    /// What the study is about.
+    pub fn description(&self) -> &str {
+        &self.sections.description
+    }
+
+    /// Keys, in their order, and which of them are repetitions.
+    pub fn keys(&self) -> Vec<(String, bool)> {
+        let is_repetition = |key: &String| self.sections.repetitions.contains(key);
+        self.keys.iter().map(|(key, _)| (key.clone(), is_repetition(key))).collect()
+    }
+
+    /// The seconds after which a run is ended.
+    pub fn time_limit(&self) -> Option<f64> {
+        self.sections.time_limit
+    }
+
+    /// The words of a run's command, after the program's name.
+    pub fn words(&self, run: &Planned, directory: &Path) -> Vec<String> {
+        let mut words: Vec<String> =
+            self.sections.command.iter().map(|word| filled(word, &run.vary, directory)).collect();
+        let generator = self.sections.generate.iter().flat_map(|own| &own.run);
+        let named: BTreeSet<&str> =
+            self.sections.command.iter().chain(generator).flat_map(|word| placeholders(word)).collect();
+        for (key, value) in run.vary.iter().filter(|(key, _)| !named.contains(key.as_str())) {
+            let several = match value {
+                Value::Array(values) => values.clone(),
+                one => vec![one.clone()],
+            };
+            for value in several {
+                match value {
+                    Value::Bool(true) => words.push(format!("--{key}")),
+                    Value::Bool(false) => {}
+                    value => words.push(format!("--{key}={}", shown(&value))),
+                }
+            }
+        }
+        words.extend(["--format".to_owned(), "json".to_owned(), "--quiet".to_owned()]);
+        words
+    }
+
+    /// The words of the program that writes a run's files, if there is one.
+    pub fn generator(&self, run: &Planned, directory: &Path) -> Option<Vec<String>> {
+        let generate = self.sections.generate.as_ref()?;
+        Some(generate.run.iter().map(|word| filled(word, &run.vary, directory)).collect())
+    }
+}
+
+/// The names in braces.
+fn placeholders(word: &str) -> impl Iterator<Item = &str> {
+    word.split('{').skip(1).filter_map(|rest| rest.split_once('}').map(|(name, _)| name))
+}
+
+fn filled(word: &str, vary: &Map<String, Value>, directory: &Path) -> String {
+    let mut text = word.replace("{dir}", &directory.to_string_lossy());
+    for (key, value) in vary {
+        text = text.replace(&format!("{{{key}}}"), &shown(value));
+    }
+    text
+}
+
+fn shown(value: &Value) -> String {
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
+}
+
+fn values(variation: &Variation) -> Result<Vec<Value>, String> {
+    let scalar = |scalar: &Scalar| match scalar {
+        Scalar::Truth(value) => json!(value),
+        Scalar::Whole(value) => json!(value),
+        Scalar::Real(value) => json!(value),
+        Scalar::Text(value) => json!(value),
+    };
+    let values: Vec<Value> = match variation {
+        Variation::List(list) => list
+            .iter()
+            .map(|value| match value {
+                Scalars::One(one) => scalar(one),
+                Scalars::Several(several) => several.iter().map(scalar).collect(),
+            })
+            .collect(),
+        Variation::Range(Range { step, .. }) if *step <= 0 => {
+            return Err(format!("has a step of {step}; it should be above 0"));
+        }
+        Variation::Range(Range { from, to, step }) => {
+            let count = to.checked_sub(*from).map_or(0, |span| span / step);
+            if count as usize >= MOST_RUNS {
+                return Err(format!("has more than {MOST_RUNS} values"));
+            }
+            (*from..=*to).step_by(*step as usize).map(|value| json!(value)).collect()
+        }
+    };
+    if values.is_empty() { Err("has no value".to_owned()) } else { Ok(values) }
+}
+
+/// Ordered pairs of a mission's places.
+fn places(mission: &Path, most: Option<usize>) -> Result<Vec<Value>, Errors> {
+    let Setup { mission, roles, .. } = Setup::read(mission)?;
+    let (problem, _) = mission.filled()?;
+    let places = Coadaptation::new(&mission, &problem, &roles)?.places;
+    let all: Vec<String> = places
+        .iter()
+        .flat_map(|start| places.iter().filter(move |goal| *goal != start).map(move |goal| format!("{start},{goal}")))
+        .collect();
+    let wanted = most.unwrap_or(all.len()).clamp(1, all.len().max(1)).min(all.len());
+    Ok((0..wanted).map(|number| json!(all[number * all.len() / wanted])).collect())
+}
+
+fn digest(sections: &Sections, keys: &[(String, Vec<Value>)], directory: &Path) -> String {
+    let mut hash = Sha256::new();
+    let mut part = |bytes: &[u8]| {
+        hash.update((bytes.len() as u64).to_le_bytes());
+        hash.update(bytes);
+    };
+    part(env!("CARGO_PKG_VERSION").as_bytes());
+    part(format!("{:?} {:?} {:?}", sections.command, sections.time_limit, sections.generate).as_bytes());
+    part(json!(keys).to_string().as_bytes());
+    for word in &sections.command {
+        if let Ok(bytes) = std::fs::read(directory.join(word)) {
+            part(&bytes);
+        }
+    }
+    hash.finalize().iter().take(16).fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn study(text: &str) -> Result<Study, Errors> {
+        let folder = tempfile::tempdir().expect("a directory");
+        let file = folder.path().join("study.toml");
+        std::fs::write(&file, text).expect("it can be written");
+        Study::read(&file)
+    }
+
+    const TEXT: &str = "command = ['plan', 'm-{n}.toml']\n\
+        [vary]\nfail = [[], ['a', 'b']]\nn = {from = 1, to = 5, step = 2}\nstay-close = [true, false]\nset = ['x=1']\n";
+
+    #[test]
+    fn runs_are_the_product_and_shards_divide_it() {
+        let study = study(TEXT).expect("a study");
+        assert_eq!(study.len(), 12);
+        let all: Vec<Planned> = study.runs(Shard::default()).collect();
+        assert_eq!(all.len(), 12);
+        let mut divided: Vec<Planned> =
+            (1..=5).flat_map(|index| study.runs(Shard { index, of: 5 }).collect::<Vec<_>>()).collect();
+        divided.sort_by_key(|run| run.number);
+        assert_eq!(divided, all);
+        let words = |number: usize| study.words(&all[number], Path::new("d")).join(" ");
+        assert_eq!(words(0), "plan m-1.toml --set=x=1 --stay-close --format json --quiet");
+        assert_eq!(words(11), "plan m-5.toml --fail=a --fail=b --set=x=1 --format json --quiet");
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_all_at_once() {
+        let text = "command = []\nrows = 'x'\ntime_limit = 0\n[vary]\na = []\nb = {from = 1, to = 2, step = 0}\n";
+        let errors = study(text).expect_err("it is wrong");
+        assert_eq!(errors.iter().count(), 5, "{errors}");
+        let errors = study("command = ['plan', '{x}']").expect_err("x is not varied");
+        assert!(errors.to_string().contains("{x}"), "{errors}");
+        assert!("0/3".parse::<Shard>().is_err() && "4/3".parse::<Shard>().is_err() && "x".parse::<Shard>().is_err());
+        assert_eq!("3/3".parse(), Ok(Shard { index: 3, of: 3 }));
+    }
+}

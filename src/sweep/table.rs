@@ -1,0 +1,174 @@
+//! The lines of a study as a table, and means over its repetitions.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::{Map, Value};
+
+use super::results::{Line, essence};
+use crate::simulate::Sample;
+
+/// What stands in a cell; nothing where a row has no such value.
+pub type Cell = Option<Value>;
+
+/// A row: of one run, one object of its answer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// The number of its run.
+    pub run: usize,
+    /// By column.
+    pub cells: Vec<Cell>,
+}
+
+/// All rows, with columns that all of them have.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Table {
+    /// Keys that are varied, and then what answers have; sorted.
+    pub columns: Vec<String>,
+    /// How many of the columns are keys.
+    pub keys: usize,
+    /// By run, and then as in the answer.
+    pub rows: Vec<Row>,
+}
+
+/// Rows that are the same but for repetitions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Group {
+    /// What they have in common: keys and words, with their columns.
+    pub common: Vec<(String, Value)>,
+    /// How many rows.
+    pub count: usize,
+    /// Samples of the columns that have numbers.
+    pub samples: Vec<(String, Sample)>,
+}
+
+impl Table {
+    /// The rows that stand at a JSON pointer in each answer; with what is measured on a machine only if that is wanted.
+    pub fn new(lines: &[Line], rows: &str, measured: bool) -> Self {
+        let mut found: Vec<(usize, Map<String, Value>, Map<String, Value>)> = Vec::new();
+        for line in lines {
+            let answer = if measured { line.answer.clone() } else { essence(&line.answer) };
+            let mut own = Map::new();
+            own.insert("status".to_owned(), line.status.map_or(Value::Null, Into::into));
+            own.insert("timed_out".to_owned(), line.timed_out.into());
+            if measured {
+                own.insert("seconds".to_owned(), line.seconds.into());
+            }
+            let parts = match answer.pointer(rows) {
+                Some(Value::Array(parts)) => parts.clone(),
+                Some(one) => vec![one.clone()],
+                None => vec![Value::Null],
+            };
+            for part in parts {
+                let mut cells = own.clone();
+                flatten("", &part, &mut cells);
+                found.push((line.run, line.vary.clone(), cells));
+            }
+        }
+        let keys: BTreeSet<String> = found.iter().flat_map(|(_, vary, _)| vary.keys().cloned()).collect();
+        let columns: BTreeSet<String> = found
+            .iter()
+            .flat_map(|(_, _, cells)| cells.keys().cloned())
+            .filter(|column| !keys.contains(column))
+            .collect();
+        let rows = found.into_iter().map(|(run, vary, cells)| {
+            let keys = keys.iter().map(|key| vary.get(key).cloned().map(joined));
+            let cells = columns.iter().map(|column| cells.get(column).cloned().filter(|value| !value.is_null()));
+            Row { run, cells: keys.chain(cells).collect() }
+        });
+        let rows = rows.collect();
+        Self { keys: keys.len(), columns: keys.iter().chain(&columns).cloned().collect(), rows }
+    }
+
+    /// Rows in groups: those that have the same values of keys, but for repetitions, and the same words.
+    pub fn groups(&self, repetitions: &[String]) -> Vec<Group> {
+        let is_number = |column: usize| {
+            self.rows.iter().filter_map(|row| row.cells[column].as_ref()).all(Value::is_number)
+        };
+        let counts: Vec<bool> = (0..self.columns.len()).map(|own| own >= self.keys && is_number(own)).collect();
+        let is_common = |column: usize| !counts[column] && !repetitions.contains(&self.columns[column]);
+        let mut groups: Vec<(Vec<(String, Value)>, Vec<&Row>)> = Vec::new();
+        let mut known: BTreeMap<String, usize> = BTreeMap::new();
+        for row in &self.rows {
+            let common: Vec<(String, Value)> = (0..self.columns.len())
+                .filter(|column| is_common(*column))
+                .map(|column| (self.columns[column].clone(), row.cells[column].clone().unwrap_or_default()))
+                .collect();
+            let name = Value::from_iter(common.iter().map(|(_, value)| value.clone())).to_string();
+            let place = *known.entry(name).or_insert_with(|| {
+                groups.push((common, Vec::new()));
+                groups.len() - 1
+            });
+            groups[place].1.push(row);
+        }
+        let group = |(common, rows): (Vec<(String, Value)>, Vec<&Row>)| {
+            let samples = (0..self.columns.len()).filter(|column| counts[*column]).filter_map(|column| {
+                let values = rows.iter().filter_map(|row| row.cells[column].as_ref()?.as_f64());
+                let values: Vec<f64> = values.collect();
+                Some((self.columns[column].clone(), Sample::of(&values)?))
+            });
+            Group { common, count: rows.len(), samples: samples.collect() }
+        };
+        groups.into_iter().map(group).collect()
+    }
+}
+
+/// An option that is given several times, as one value of a table.
+fn joined(value: Value) -> Value {
+    match value {
+        Value::Array(values) => {
+            let words: Vec<String> =
+                values.iter().map(|value| value.as_str().map_or_else(|| value.to_string(), str::to_owned)).collect();
+            Value::String(words.join(" "))
+        }
+        other => other,
+    }
+}
+
+/// The values of an object by their paths; lists have no place in a table.
+fn flatten(path: &str, value: &Value, cells: &mut Map<String, Value>) {
+    match value {
+        Value::Object(fields) => {
+            for (name, value) in fields {
+                let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
+                flatten(&path, value, cells);
+            }
+        }
+        Value::Array(_) => {}
+        _ if path.is_empty() => {}
+        scalar => {
+            cells.insert(path.to_owned(), scalar.clone());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn line(run: usize, seed: u64, fail: &str, answer: Value) -> Line {
+        let vary = json!({"fail": [fail], "seed": seed}).as_object().expect("an object").clone();
+        Line { run, vary, status: Some(0), timed_out: false, seconds: 1.5, answer, message: String::new() }
+    }
+
+    #[test]
+    fn rows_have_all_columns_and_groups_their_means() {
+        let lines = [
+            line(0, 1, "a", json!({"x": {"cost": 2, "kind": "p"}, "statistics": {"n": 9}, "steps": [1]})),
+            line(1, 2, "a", json!({"x": {"cost": 4, "kind": "p"}})),
+            line(2, 1, "b", json!({"x": {"kind": "p"}})),
+        ];
+        let table = Table::new(&lines, "", false);
+        assert_eq!(table.columns, ["fail", "seed", "status", "timed_out", "x.cost", "x.kind"]);
+        assert_eq!(table.rows[2].cells[4], None);
+        let groups = table.groups(&["seed".to_owned()]);
+        assert_eq!(groups.iter().map(|group| group.count).collect::<Vec<_>>(), [2, 1]);
+        let costs = &groups[0].samples.iter().find(|(column, _)| column == "x.cost").expect("costs").1;
+        assert_eq!((costs.count, costs.mean), (2, 3.0));
+        // Student's quantile for one degree of freedom, times the deviation over the root of two.
+        assert!((costs.half_width - 12.706).abs() < 1e-9);
+        assert!(Table::new(&lines, "", true).columns.contains(&"seconds".to_owned()));
+        let parts = Table::new(&[line(0, 1, "a", json!({"l": [{"v": 1}, {"v": 2}]}))], "/l", false);
+        assert_eq!(parts.rows.len(), 2);
+    }
+}
