@@ -29,6 +29,7 @@ pub mod report;
 pub mod schemas;
 pub mod setup;
 pub mod simulate;
+pub mod sweep;
 pub mod templates;
 
 /// The examples of the book are compiled and run with the tests.

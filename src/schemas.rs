@@ -7,18 +7,20 @@ use crate::answers::{
     ChangesAnswer, CheckAnswer, ChecksAnswer, CodeAnswer, CompareAnswer, ConfigureAnswer, DesignAnswer,
     EntailmentAnswer, ErrorAnswer, ImportAnswer, InitAnswer, JournalAnswer, LintAnswer, MissionExport,
     ModelExport, ParetoAnswer, PlanAnswer, ReasonAnswer, ReasonsAnswer, SchemaAnswer, SimulateAnswer,
-    VerdictAnswer, VerificationAnswer,
+    SweepAnswer, VerdictAnswer, VerificationAnswer,
 };
 use crate::mapek::event_schema;
 use crate::recording::answer_schema;
 use crate::setup;
+use crate::sweep;
 
 /// A format, what it is about, and its schemas: one of them describes a document.
 type Entry = (&'static str, &'static str, fn() -> Vec<Schema>);
 
 /// All formats by name. What `metaplan` answers has the name of its `format`, without `metaplan-` and the version.
-pub const FORMATS: [Entry; 23] = [
+pub const FORMATS: [Entry; 25] = [
     ("manifest", "a mission's manifest", || vec![setup::schema()]),
+    ("study", "a study of metaplan sweep", || vec![sweep::schema()]),
     ("event", "a line of events", || vec![event_schema()]),
     ("answer", "an answer of the loop", || vec![answer_schema()]),
     ("check", "metaplan check", || vec![schema_for!(CheckAnswer), schema_for!(ChecksAnswer)]),
@@ -39,6 +41,7 @@ pub const FORMATS: [Entry; 23] = [
     ("reasons", "metaplan reason --why", || vec![schema_for!(ReasonsAnswer)]),
     ("schema", "metaplan reason --schema", || vec![schema_for!(SchemaAnswer)]),
     ("simulate", "metaplan simulate", || vec![schema_for!(SimulateAnswer)]),
+    ("sweep", "metaplan sweep", || vec![schema_for!(SweepAnswer)]),
     ("verdict", "metaplan validate", || vec![schema_for!(VerdictAnswer)]),
     ("verification", "metaplan verify", || vec![schema_for!(VerificationAnswer)]),
 ];

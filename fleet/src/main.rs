@@ -17,6 +17,7 @@ use metaplan_fleet::store::local::Local;
 use metaplan_fleet::store::nats::{Access, Layout, Nats};
 use metaplan_fleet::worker;
 use tokio::sync::watch;
+use tracing::level_filters::LevelFilter;
 
 mod lines;
 
@@ -29,6 +30,9 @@ mod lines;
 struct Arguments {
     #[command(subcommand)]
     command: Command,
+    /// How much is said on standard error: `error`, `warn`, `info`, `debug` or `off`.
+    #[arg(long, global = true, default_value = "warn", value_name = "LEVEL")]
+    log: LevelFilter,
 }
 
 #[derive(Debug, Subcommand)]
@@ -183,7 +187,13 @@ impl Work {
 
 #[tokio::main]
 async fn main() -> ExitCode {
-    match run(Arguments::parse().command).await {
+    let arguments = Arguments::parse();
+    tracing_subscriber::fmt()
+        .with_writer(std::io::stderr)
+        .with_max_level(arguments.log)
+        .with_target(false)
+        .init();
+    match Box::pin(run(arguments.command)).await {
         Ok(()) => ExitCode::SUCCESS,
         Err(messages) => {
             for message in &messages {

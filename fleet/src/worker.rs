@@ -147,12 +147,17 @@ impl<S: Store> Worker<S> {
             match (end, order) {
                 // Somebody has written what only we write, and the lease is ours: it is read again.
                 (Ok(End::Fenced) | Err(_), Order::Go) => {
+                    tracing::warn!(partition, "somebody else has written in it: it is read again");
                     metrics::counter!("metaplan_fleet_fenced_total").increment(1);
                     let own = self.serve(partition, held.revision, held.renewed);
                     self.held.insert(partition, own);
                 }
-                (_, Order::Abandon) => metrics::counter!("metaplan_fleet_lost_total").increment(1),
+                (_, Order::Abandon) => {
+                    tracing::warn!(partition, "the lease is lost");
+                    metrics::counter!("metaplan_fleet_lost_total").increment(1);
+                }
                 _ => {
+                    tracing::info!(partition, "given back");
                     // A lease that is not taken away expires.
                     let key = partition.to_string();
                     let _ = self.shared.store.remove(Bucket::Leases, &key, held.revision).await;
@@ -181,6 +186,7 @@ impl<S: Store> Worker<S> {
             let name = self.shared.worker.as_bytes();
             if let Ok(revision) = self.shared.store.put(Bucket::Leases, &partition.to_string(), name, 0).await
             {
+                tracing::info!(partition, "taken");
                 let held = self.serve(partition, revision, begun);
                 self.held.insert(partition, held);
             }

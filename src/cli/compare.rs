@@ -8,7 +8,7 @@ use metaplan::answers::Pair;
 use metaplan::comparison::{
     Candidate, Coadaptation, Compared, Comparison, Config, Costs, Listener, NoResult, Risk, Roles, Tasked,
 };
-use metaplan::message::Message;
+use metaplan::message::{Message, did_you_mean};
 use metaplan::mission::Mission;
 use metaplan::setup::Setup;
 
@@ -53,6 +53,9 @@ pub struct Arguments {
     /// Compare for pairs of start and goal in place of the mission's: so many, spread evenly over all pairs.
     #[arg(long, value_name = "N")]
     pairs: Option<usize>,
+    /// Compare for one pair of start and goal in place of the mission's.
+    #[arg(long, value_name = "START,GOAL", value_parser = pair, conflicts_with = "pairs")]
+    pair: Option<Pair>,
     /// Write the table as CSV, too.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
@@ -75,6 +78,12 @@ fn loss(text: &str) -> Result<(String, f64), String> {
     let (component, rate) = text.split_once('=').ok_or_else(wrong)?;
     let rate: f64 = rate.parse().map_err(|_| wrong())?;
     if (0.0..=1.0).contains(&rate) { Ok((component.to_owned(), rate)) } else { Err(wrong()) }
+}
+
+fn pair(text: &str) -> Result<Pair, String> {
+    let parts = text.split_once(',').filter(|(start, goal)| start != goal);
+    let parts = parts.ok_or_else(|| format!("`{text}` is not of the form START,GOAL with two places"))?;
+    Ok((parts.0.to_owned(), parts.1.to_owned()))
 }
 
 fn penalty(text: &str) -> Result<f64, String> {
@@ -104,9 +113,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         Some(tasked) => tasked.coadaptation.clone(),
         None => Coadaptation::new(&mission, &problem, &roles)?,
     };
-    if tasked.is_some() && arguments.pairs.is_some() {
-        let text =
-            "`--pairs` is for missions whose problem spells out places (see the book: Compare with PRISM)";
+    if tasked.is_some() && (arguments.pairs.is_some() || arguments.pair.is_some()) {
+        let text = "`--pairs` and `--pair` are for missions whose problem spells out places (see the book: Compare with PRISM)";
         return Err(Failure::usage(Message::error("M129", text)));
     }
     if let Some(loss) = &coadaptation.loss
@@ -151,8 +159,26 @@ fn missions(
     coadaptation: Coadaptation,
     roles: &Roles,
 ) -> Result<Vec<(Option<Pair>, Mission, Coadaptation)>, Failure> {
-    let Some(wanted) = arguments.pairs else { return Ok(vec![(None, mission.clone(), coadaptation)]) };
     let places = coadaptation.places.len();
+    let between = |start: usize, goal: usize| -> Result<_, Failure> {
+        let (start_name, goal_name) = (&coadaptation.places[start], &coadaptation.places[goal]);
+        let mut other = mission.clone();
+        other.set(&roles.location, start_name).map_err(Failure::from)?;
+        other.aim(&roles.location, goal_name);
+        let moved = Coadaptation { start, goal, ..coadaptation.clone() };
+        Ok((Some((start_name.clone(), goal_name.clone())), other, moved))
+    };
+    if let Some((start, goal)) = &arguments.pair {
+        let place = |name: &String| {
+            let found = coadaptation.places.iter().position(|place| place.eq_ignore_ascii_case(name));
+            found.ok_or_else(|| {
+                let meant = did_you_mean(name, coadaptation.places.iter().map(String::as_str));
+                Failure::usage(Message::error("M129", format!("there is no place `{name}`{meant}")))
+            })
+        };
+        return Ok(vec![between(place(start)?, place(goal)?)?]);
+    }
+    let Some(wanted) = arguments.pairs else { return Ok(vec![(None, mission.clone(), coadaptation)]) };
     let all: Vec<(usize, usize)> = (0..places)
         .flat_map(|start| (0..places).filter(move |goal| *goal != start).map(move |goal| (start, goal)))
         .collect();
@@ -160,12 +186,7 @@ fn missions(
     let wanted = wanted.clamp(1, all.len().max(1));
     for number in 0..wanted.min(all.len()) {
         let (start, goal) = all[number * all.len() / wanted];
-        let (start_name, goal_name) = (&coadaptation.places[start], &coadaptation.places[goal]);
-        let mut other = mission.clone();
-        other.set(&roles.location, start_name).map_err(Failure::from)?;
-        other.aim(&roles.location, goal_name);
-        let moved = Coadaptation { start, goal, ..coadaptation.clone() };
-        found.push((Some((start_name.clone(), goal_name.clone())), other, moved));
+        found.push(between(start, goal)?);
     }
     Ok(found)
 }

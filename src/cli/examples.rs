@@ -65,6 +65,12 @@ pub(super) const SIMULATE: &str = "\
 Examples:
   metaplan simulate missions/ugv.toml --scenario kinect_comes_and_goes --runs 3";
 
+pub(super) const SWEEP: &str = "\
+Examples:
+  metaplan sweep missions/studies/kinect.toml --output results
+  metaplan sweep missions/studies/kinect.toml --output results --resume
+  metaplan sweep missions/studies/kinect.toml --output results --merge --csv results.csv";
+
 pub(super) const VALIDATE: &str = "\
 Examples:
   metaplan validate missions/ugv.toml ugv.plan";

@@ -36,6 +36,7 @@ mod run_outlet;
 mod schema;
 mod simulate;
 mod situation;
+mod sweep;
 mod trace;
 mod validate;
 mod values;
@@ -104,6 +105,9 @@ enum Subcommands {
     /// The loop against a simulated robot, beside other ways of control.
     #[command(after_long_help = examples::SIMULATE)]
     Simulate(simulate::Arguments),
+    /// One command with every combination of what is varied, in shards; and a table of all of them.
+    #[command(after_long_help = examples::SWEEP)]
+    Sweep(sweep::Arguments),
     /// Whether a plan is executable, reaches the goal, and what it costs; independent of the planner.
     #[command(after_long_help = examples::VALIDATE)]
     Validate(validate::Arguments),
@@ -182,6 +186,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Subcommands::Run(arguments) => run::run(arguments, &cli.common),
         Subcommands::Journal(arguments) => journal::run(arguments, &cli.common),
         Subcommands::Simulate(arguments) => simulate::run(arguments, &cli.common),
+        Subcommands::Sweep(arguments) => sweep::run(arguments, &cli.common),
         Subcommands::Validate(arguments) => validate::run(arguments, &cli.common),
         Subcommands::Verify(arguments) => verify::run(arguments, &cli.common),
         Subcommands::Schema(arguments) => schema::run(arguments),

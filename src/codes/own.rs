@@ -183,6 +183,24 @@ pub const CODES: &[[&str; 4]] = &[
         "Correct the line.",
     ],
     [
+        "M150",
+        "A study is wrong.",
+        "A key of its file has a value that cannot be varied, a placeholder stands for nothing, or there are too many runs.",
+        "The message names the key; `metaplan schema study` says what stands where.",
+    ],
+    [
+        "M151",
+        "The lines of a study cannot be read or written.",
+        "The directory has lines already, another process writes them, they are of another study, or a line is damaged.",
+        "Give `--resume` to go on, or another directory; a study that has changed begins anew.",
+    ],
+    [
+        "M152",
+        "A run of a study cannot be performed.",
+        "The program that writes its files fails or is not there.",
+        "Run that program by hand with the arguments of the message.",
+    ],
+    [
         "M301",
         "A line is not an event.",
         "It is too long, or is not a JSON object.",

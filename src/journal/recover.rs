@@ -6,7 +6,6 @@ use std::io::{self, Seek as _, Write as _};
 use std::path::Path;
 use std::time::Duration;
 
-
 use super::directory::{End, JournalFiles, OLD_FORMAT, Segment, broken, closing, open_private, path};
 use super::record::{Link, Record};
 use super::recovery::Recovery;

@@ -15,6 +15,9 @@ use crate::message::{Errors, Message};
 /// The version of the files.
 const FORMAT: &str = "metaplan-sweep/1";
 
+/// Why a file is not one of a study.
+const OTHER: &str = "it belongs to another study, or the study or its files have changed";
+
 /// The first line of a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Header {
@@ -67,7 +70,8 @@ impl Results {
         let failed = |error: io::Error| wrong(&path, &error.to_string());
         std::fs::create_dir_all(directory).map_err(failed)?;
         let mut options = OpenOptions::new();
-        let mut file = options.create(true).truncate(false).read(true).write(true).open(&path).map_err(failed)?;
+        let mut file =
+            options.create(true).truncate(false).read(true).write(true).open(&path).map_err(failed)?;
         match FileExt::try_lock(&file) {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => return Err(wrong(&path, "another process writes it")),
@@ -85,11 +89,14 @@ impl Results {
         let mut done = BTreeMap::new();
         if whole > 0 {
             if !resume {
-                return Err(wrong(&path, "it is there already; go on with `--resume`, or take another directory"));
+                return Err(wrong(
+                    &path,
+                    "it is there already; go on with `--resume`, or take another directory",
+                ));
             }
             let (found, lines) = parse(&path, &text[..whole])?;
             if found != header {
-                return Err(wrong(&path, "it belongs to another study, or the study or its files have changed"));
+                return Err(wrong(&path, OTHER));
             }
             done = lines.into_iter().map(|line| (line.run, line)).collect();
         }
@@ -138,11 +145,11 @@ fn parse(path: &Path, text: &str) -> Result<(Header, Vec<Line>), Message> {
     Ok((header, parsed.collect::<Result<_, _>>()?))
 }
 
-/// The lines of all shards in a directory, each run once, in their order; and how many runs the study has.
+/// The lines of all shards in a directory, each run once, in their order.
 ///
 /// # Errors
-/// A file cannot be read, files are of different studies, or two have done the same run with different answers; all that is wrong.
-pub fn read_lines(directory: &Path) -> Result<(Vec<Line>, usize), Errors> {
+/// A file cannot be read or is of another study, or two have done the same run with different answers; all that is wrong.
+pub fn read_lines(directory: &Path, study: &Study) -> Result<Vec<Line>, Errors> {
     let failed = |error: io::Error| Errors::from(wrong(directory, &error.to_string()));
     let mut files = Vec::new();
     for entry in std::fs::read_dir(directory).map_err(failed)? {
@@ -152,7 +159,7 @@ pub fn read_lines(directory: &Path) -> Result<(Vec<Line>, usize), Errors> {
         }
     }
     files.sort();
-    let (mut first, mut all, mut mistakes) = (None, BTreeMap::<usize, Line>::new(), Vec::new());
+    let (mut all, mut mistakes) = (BTreeMap::<usize, Line>::new(), Vec::new());
     for path in &files {
         let text = match std::fs::read_to_string(path) {
             Ok(text) => text,
@@ -165,9 +172,8 @@ pub fn read_lines(directory: &Path) -> Result<(Vec<Line>, usize), Errors> {
         match parse(path, &text[..whole]) {
             Err(message) => mistakes.push(message),
             Ok((header, lines)) => {
-                let (study, runs) = first.get_or_insert((header.study.clone(), header.runs));
-                if (&*study, *runs) != (&header.study, header.runs) {
-                    mistakes.push(wrong(path, "it belongs to another study than the files before"));
+                if header.study != study.digest {
+                    mistakes.push(wrong(path, OTHER));
                     continue;
                 }
                 for line in lines {
@@ -179,11 +185,10 @@ pub fn read_lines(directory: &Path) -> Result<(Vec<Line>, usize), Errors> {
             }
         }
     }
-    let Some((_, runs)) = first else {
+    if files.is_empty() {
         mistakes.push(wrong(directory, "there is no file `*.jsonl` of `metaplan sweep` in it"));
-        return Err(mistakes.into());
-    };
-    if mistakes.is_empty() { Ok((all.into_values().collect(), runs)) } else { Err(mistakes.into()) }
+    }
+    if mistakes.is_empty() { Ok(all.into_values().collect()) } else { Err(mistakes.into()) }
 }
 
 /// An answer without what differs from one run of the same to the next: times, memory and the course of a search.

@@ -161,7 +161,8 @@ impl FromStr for Shard {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let parts = text.split_once('/').and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
+        let parts =
+            text.split_once('/').and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
         match parts {
             Some((index, of)) if (1..=of).contains(&index) => Ok(Self { index, of }),
             _ => Err(format!("`{text}` is not of the form I/N with I from 1 to N")),
@@ -179,7 +180,8 @@ impl Study {
         let wrong = |text: String| Message::at("M150", place.file(), None, text);
         let mut mistakes = Vec::new();
         if sections.command.is_empty() {
-            mistakes.push(wrong("`command` is empty; it should begin with a command such as `plan`".to_owned()));
+            mistakes
+                .push(wrong("`command` is empty; it should begin with a command such as `plan`".to_owned()));
         }
         if sections.time_limit.is_some_and(|limit| limit.is_nan() || limit <= 0.0) {
             mistakes.push(wrong("`time_limit` should be a number of seconds above 0".to_owned()));
@@ -355,7 +357,9 @@ fn places(mission: &Path, most: Option<usize>) -> Result<Vec<Value>, Errors> {
     let places = Coadaptation::new(&mission, &problem, &roles)?.places;
     let all: Vec<String> = places
         .iter()
-        .flat_map(|start| places.iter().filter(move |goal| *goal != start).map(move |goal| format!("{start},{goal}")))
+        .flat_map(|start| {
+            places.iter().filter(move |goal| *goal != start).map(move |goal| format!("{start},{goal}"))
+        })
         .collect();
     let wanted = most.unwrap_or(all.len()).clamp(1, all.len().max(1)).min(all.len());
     Ok((0..wanted).map(|number| json!(all[number * all.len() / wanted])).collect())
@@ -409,12 +413,17 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_told_all_at_once() {
-        let text = "command = []\nrows = 'x'\ntime_limit = 0\n[vary]\na = []\nb = {from = 1, to = 2, step = 0}\n";
+        let text =
+            "command = []\nrows = 'x'\ntime_limit = 0\n[vary]\na = []\nb = {from = 1, to = 2, step = 0}\n";
         let errors = study(text).expect_err("it is wrong");
         assert_eq!(errors.iter().count(), 5, "{errors}");
         let errors = study("command = ['plan', '{x}']").expect_err("x is not varied");
         assert!(errors.to_string().contains("{x}"), "{errors}");
-        assert!("0/3".parse::<Shard>().is_err() && "4/3".parse::<Shard>().is_err() && "x".parse::<Shard>().is_err());
+        assert!(
+            "0/3".parse::<Shard>().is_err()
+                && "4/3".parse::<Shard>().is_err()
+                && "x".parse::<Shard>().is_err()
+        );
         assert_eq!("3/3".parse(), Ok(Shard { index: 3, of: 3 }));
     }
 }

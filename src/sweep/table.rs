@@ -30,11 +30,14 @@ pub struct Table {
     pub rows: Vec<Row>,
 }
 
+/// Columns with the values that rows have in common there.
+type Common = Vec<(String, Value)>;
+
 /// Rows that are the same but for repetitions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Group {
     /// What they have in common: keys and words, with their columns.
-    pub common: Vec<(String, Value)>,
+    pub common: Common,
     /// How many rows.
     pub count: usize,
     /// Samples of the columns that have numbers.
@@ -44,7 +47,7 @@ pub struct Group {
 impl Table {
     /// The rows that stand at a JSON pointer in each answer; with what is measured on a machine only if that is wanted.
     pub fn new(lines: &[Line], rows: &str, measured: bool) -> Self {
-        let mut found: Vec<(usize, Map<String, Value>, Map<String, Value>)> = Vec::new();
+        let mut found: Vec<(&Line, Map<String, Value>)> = Vec::new();
         for line in lines {
             let answer = if measured { line.answer.clone() } else { essence(&line.answer) };
             let mut own = Map::new();
@@ -61,19 +64,20 @@ impl Table {
             for part in parts {
                 let mut cells = own.clone();
                 flatten("", &part, &mut cells);
-                found.push((line.run, line.vary.clone(), cells));
+                found.push((line, cells));
             }
         }
-        let keys: BTreeSet<String> = found.iter().flat_map(|(_, vary, _)| vary.keys().cloned()).collect();
+        let keys: BTreeSet<String> = found.iter().flat_map(|(line, _)| line.vary.keys().cloned()).collect();
         let columns: BTreeSet<String> = found
             .iter()
-            .flat_map(|(_, _, cells)| cells.keys().cloned())
+            .flat_map(|(_, cells)| cells.keys().cloned())
             .filter(|column| !keys.contains(column))
             .collect();
-        let rows = found.into_iter().map(|(run, vary, cells)| {
-            let keys = keys.iter().map(|key| vary.get(key).cloned().map(joined));
-            let cells = columns.iter().map(|column| cells.get(column).cloned().filter(|value| !value.is_null()));
-            Row { run, cells: keys.chain(cells).collect() }
+        let rows = found.into_iter().map(|(line, cells)| {
+            let keys = keys.iter().map(|key| line.vary.get(key).cloned().map(joined));
+            let cells =
+                columns.iter().map(|column| cells.get(column).cloned().filter(|value| !value.is_null()));
+            Row { run: line.run, cells: keys.chain(cells).collect() }
         });
         let rows = rows.collect();
         Self { keys: keys.len(), columns: keys.iter().chain(&columns).cloned().collect(), rows }
@@ -84,23 +88,24 @@ impl Table {
         let is_number = |column: usize| {
             self.rows.iter().filter_map(|row| row.cells[column].as_ref()).all(Value::is_number)
         };
-        let counts: Vec<bool> = (0..self.columns.len()).map(|own| own >= self.keys && is_number(own)).collect();
+        let counts: Vec<bool> =
+            (0..self.columns.len()).map(|own| own >= self.keys && is_number(own)).collect();
         let is_common = |column: usize| !counts[column] && !repetitions.contains(&self.columns[column]);
-        let mut groups: Vec<(Vec<(String, Value)>, Vec<&Row>)> = Vec::new();
+        let mut groups: Vec<(Common, Vec<&Row>)> = Vec::new();
         let mut known: BTreeMap<String, usize> = BTreeMap::new();
         for row in &self.rows {
-            let common: Vec<(String, Value)> = (0..self.columns.len())
+            let common: Common = (0..self.columns.len())
                 .filter(|column| is_common(*column))
                 .map(|column| (self.columns[column].clone(), row.cells[column].clone().unwrap_or_default()))
                 .collect();
-            let name = Value::from_iter(common.iter().map(|(_, value)| value.clone())).to_string();
+            let name = common.iter().map(|(_, value)| value.clone()).collect::<Value>().to_string();
             let place = *known.entry(name).or_insert_with(|| {
                 groups.push((common, Vec::new()));
                 groups.len() - 1
             });
             groups[place].1.push(row);
         }
-        let group = |(common, rows): (Vec<(String, Value)>, Vec<&Row>)| {
+        let group = |(common, rows): (Common, Vec<&Row>)| {
             let samples = (0..self.columns.len()).filter(|column| counts[*column]).filter_map(|column| {
                 let values = rows.iter().filter_map(|row| row.cells[column].as_ref()?.as_f64());
                 let values: Vec<f64> = values.collect();
@@ -116,8 +121,10 @@ impl Table {
 fn joined(value: Value) -> Value {
     match value {
         Value::Array(values) => {
-            let words: Vec<String> =
-                values.iter().map(|value| value.as_str().map_or_else(|| value.to_string(), str::to_owned)).collect();
+            let words: Vec<String> = values
+                .iter()
+                .map(|value| value.as_str().map_or_else(|| value.to_string(), str::to_owned))
+                .collect();
             Value::String(words.join(" "))
         }
         other => other,

@@ -37,6 +37,7 @@ mod run;
 mod schemas;
 mod shell;
 mod simulate;
+mod sweep;
 mod trace;
 mod ugv;
 mod uuv;

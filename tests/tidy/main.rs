@@ -55,7 +55,8 @@ fn files() -> Vec<(String, String)> {
     let mut found = Vec::new();
     let folders =
         ["src", "errors", "ontology", "rules", "pddl", "mission", "certificate", "verify", "encodings"];
-    for folder in folders.into_iter().chain(["probabilistic", "picture", "python", "ros", "fleet", "tests", "benches"])
+    for folder in
+        folders.into_iter().chain(["probabilistic", "picture", "python", "ros", "fleet", "tests", "benches"])
     {
         rust_files(&root.join(folder), &mut found);
     }

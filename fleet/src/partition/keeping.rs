@@ -15,8 +15,8 @@ impl<S: Store> Partition<S> {
         let is_due = |slot: &Slot| all || slot.since.is_some_and(|since| since.elapsed() >= within);
         let due = self.slots.iter().filter(|(_, slot)| is_due(slot)).map(|(name, _)| name.clone());
         let due: Vec<String> = due.collect();
-        // Each of them, not up to the first.
-        due.iter().fold(false, |any, name| self.save_robot(name) || any)
+        let begun = due.iter().filter(|name| self.save_robot(name)).count();
+        begun > 0
     }
 
     /// Begins to save a robot, if that can be done and is worth it.

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use futures::future::BoxFuture;
 use futures::stream::{BoxStream, FuturesUnordered, StreamExt as _};
@@ -62,12 +62,11 @@ impl<S: Store> Partition<S> {
                 return End::Ordered;
             }
             if events.is_none() && !is_draining {
-                match self.shared.store.follow(Stream::Events, self.number, self.seen.0).await {
-                    Ok(stream) => events = Some(stream),
-                    Err(_) => {
-                        backoff += 1;
-                        pause(backoff).await;
-                    }
+                if let Ok(stream) = self.shared.store.follow(Stream::Events, self.number, self.seen.0).await {
+                    events = Some(stream);
+                } else {
+                    backoff += 1;
+                    pause(backoff).await;
                 }
             }
             let may_read = self.waiting < self.shared.settings.ahead && !is_draining;
@@ -83,17 +82,16 @@ impl<S: Store> Partition<S> {
                     self.save(false);
                     self.advance(false);
                 }
-                message = next(&mut events), if may_read && events.is_some() => match message {
-                    Some(Ok(event)) => {
+                message = next(&mut events), if may_read && events.is_some() => {
+                    if let Some(Ok(event)) = message {
                         backoff = 0;
                         self.read(event);
-                    }
-                    Some(Err(_)) | None => {
+                    } else {
                         events = None;
                         backoff += 1;
                         pause(backoff).await;
                     }
-                },
+                }
             }
         }
     }
@@ -161,7 +159,8 @@ impl<S: Store> Partition<S> {
         while slot.before.front().is_some_and(|(_, decided)| decided.event < event.sequence) {
             slot.before.pop_front();
         }
-        let before = slot.before.pop_front_if(|(_, decided)| decided.event == event.sequence);
+        let is_next = slot.before.front().is_some_and(|(_, decided)| decided.event == event.sequence);
+        let before = if is_next { slot.before.pop_front() } else { None };
         // A former owner's decision is needed until it is counted among what is not saved.
         let known = before.as_ref().map_or(known, |(decision, _)| known.min(decision - 1));
         slot.at = Some((event.sequence, known));
@@ -276,6 +275,7 @@ impl<S: Store> Partition<S> {
     /// A robot cannot go on. Its events stay where they are, for a worker that can.
     pub(super) fn fault(&mut self, robot: &str, event: u64, decision: u64, why: &str) {
         metrics::counter!("metaplan_fleet_faulted_total").increment(1);
+        tracing::error!(partition = self.number, robot, "does not go on: {why}");
         let subject = Address { partition: self.number, robot: robot.to_owned() }.to_string();
         let slot = self.slot(robot);
         slot.faulted = true;

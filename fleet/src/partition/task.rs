@@ -37,19 +37,11 @@ impl<S: Store> Task<S> {
             metrics::histogram!("metaplan_fleet_decision_seconds").record(begun.elapsed());
             (robot, event, decided)
         });
-        let (own, event, decided) = match work.await {
-            Ok(done) => done,
+        let Ok((own, event, decided)) = work.await else {
             // A loop that panics takes its robot with it; whoever recovers the partition begins with what was saved.
-            Err(_) => {
-                let event =
-                    Stored { sequence: 0, subject: String::new(), id: None, time: 0, payload: Vec::new() };
-                return Done::Taken {
-                    robot: self.name,
-                    own: Box::default(),
-                    event,
-                    outcome: Outcome::Fenced,
-                };
-            }
+            let event =
+                Stored { sequence: 0, subject: String::new(), id: None, time: 0, payload: Vec::new() };
+            return Done::Taken { robot: self.name, own: Box::default(), event, outcome: Outcome::Fenced };
         };
         drop(permit);
         let outcome = match decided {
@@ -59,13 +51,14 @@ impl<S: Store> Task<S> {
                 "event {} was refused by a former owner, and would not be now",
                 event.sequence
             )),
-            Ok(Ok(mut decided)) => match &self.before {
-                Some((sequence, _)) => Outcome::Decided(*sequence),
-                None => {
+            Ok(Ok(mut decided)) => {
+                if let Some((sequence, _)) = &self.before {
+                    Outcome::Decided(*sequence)
+                } else {
                     (decided.worker, decided.epoch) = (self.shared.worker.clone(), self.epoch);
                     self.publish(&event, &decided).await
                 }
-            },
+            }
         };
         Done::Taken { robot: self.name, own, event, outcome }
     }

@@ -28,8 +28,8 @@ const PAGE: usize = 512;
 const CACHE: usize = 64 << 20;
 
 /// (stream, sequence) to (subject, id, time, payload).
-type Messages = TableDefinition<'static, (u8, u64), (&'static str, &'static str, u64, &'static [u8])>;
-const MESSAGES: Messages = TableDefinition::new("messages");
+type Parts = (&'static str, &'static str, u64, &'static [u8]);
+const MESSAGES: TableDefinition<'static, (u8, u64), Parts> = TableDefinition::new("messages");
 /// (stream, partition, sequence): what a partition has.
 const OF_PARTITION: TableDefinition<'static, (u8, u32, u64), ()> = TableDefinition::new("of_partition");
 /// (stream, subject) to the sequence of its last message.
@@ -132,7 +132,7 @@ impl Local {
 }
 
 fn message(
-    messages: &impl redb::ReadableTable<(u8, u64), (&'static str, &'static str, u64, &'static [u8])>,
+    messages: &impl redb::ReadableTable<(u8, u64), Parts>,
     stream: u8,
     sequence: u64,
 ) -> Result<Option<Stored>, Fault> {
@@ -262,7 +262,7 @@ impl Writer {
 }
 
 struct Tables<'t> {
-    messages: Table<'t, (u8, u64), (&'static str, &'static str, u64, &'static [u8])>,
+    messages: Table<'t, (u8, u64), Parts>,
     of_partition: Table<'t, (u8, u32, u64), ()>,
     last: Table<'t, (u8, &'static str), u64>,
     ids: Table<'t, (u8, &'static str), u64>,

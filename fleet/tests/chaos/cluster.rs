@@ -245,7 +245,7 @@ impl Cluster {
                 let log = fs::read_to_string(entry.path()).unwrap_or_default();
                 let lines: Vec<&str> = log.lines().collect();
                 let last = lines[lines.len().saturating_sub(6)..].join("\n");
-                text += &format!("\n--- {}\n{last}", entry.path().display());
+                text.extend(["\n--- ", &entry.path().to_string_lossy(), "\n", &last]);
             }
         }
         text

@@ -3,6 +3,8 @@
 //! Ignored, since it needs `nats-server` (2.11 or newer), whose path is `NATS_SERVER` or which is in the path. Further: `SCHEDULES` (20), `SEED` (1),
 //! `ROBOTS` (1000), `EVENTS` for each robot (100), which it says within `SECONDS` (20). What happens follows from the seed, when from the machine, too.
 
+#![expect(clippy::print_stdout, reason = "what was done to whom is said while it is done")]
+
 mod cluster;
 #[path = "../local/scripts.rs"]
 mod scripts;
@@ -100,7 +102,7 @@ async fn attack(store: Nats, over: Arc<AtomicBool>, seed: u64) -> u64 {
 /// One schedule: the robots' events while everything goes wrong, and what has become of them.
 async fn schedule(seed: u64, robots: usize, scripts: &[Script], disturbed: bool) {
     let cluster = Cluster::begin(seed);
-    let store = open(&cluster).await;
+    let store = Box::pin(open(&cluster)).await;
     for worker in 0..WORKERS {
         cluster.begin_worker(worker, PARTITIONS, LEASE);
     }
@@ -215,7 +217,7 @@ async fn nothing_is_lost_repeated_or_out_of_order() {
     let first = number("SEED", 1);
     for seed in first..first + number("SCHEDULES", 20) {
         println!("seed {seed} begins");
-        schedule(seed, robots, &scripts, true).await;
+        Box::pin(schedule(seed, robots, &scripts, true)).await;
     }
 }
 
@@ -228,5 +230,5 @@ async fn without_trouble() {
     };
     let (robots, lines) = (number("ROBOTS", 1000) as usize, number("EVENTS", 100) as usize);
     let scripts: Vec<Script> = (0..robots.min(24)).map(|own| script(own, lines)).collect();
-    schedule(0, robots, &scripts, false).await;
+    Box::pin(schedule(0, robots, &scripts, false)).await;
 }

@@ -157,10 +157,11 @@ async fn two_owners_of_one_partition_decide_each_event_once() {
         });
         for event in &events[10..] {
             sequences.extend(tell(&store, "r", std::slice::from_ref(event)).await);
-            tokio::time::sleep(std::time::Duration::from_millis(fastrand::u64(0..20))).await;
+            tokio::time::sleep(Duration::from_millis(fastrand::u64(0..20))).await;
         }
         decided(&store, events.len()).await;
-        (zombie.abort(), owner.abort());
+        zombie.abort();
+        owner.abort();
         assert_same("r", &decisions(&store).await["r"], &sequences, &answers);
     }
 }

@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 
 use metaplan_fleet::partition::{Order, Settings, serve};
 use metaplan_fleet::robots::Sender;
-use metaplan_fleet::store::{Fault, Message, Store, Stream};
+use metaplan_fleet::store::{Bucket, Fault, Message, Store, Stream};
 use metaplan_fleet::wire::Address;
 use tokio::sync::watch;
 
@@ -113,10 +113,9 @@ async fn an_old_epoch_is_refused() {
     assert_eq!(store.append(Stream::Decisions, message("c", first)).await, Err(Fault::Conflict));
     let again = store.append(Stream::Decisions, message("b", first)).await.expect("it is there");
     assert!(again.is_known);
-    use metaplan_fleet::store::Bucket::Progress;
-    let old = store.put(Progress, "0", b"1", 0).await.expect("there is none");
-    store.put(Progress, "0", b"2", old).await.expect("it is the last");
-    assert_eq!(store.put(Progress, "0", b"3", old).await, Err(Fault::Conflict));
-    assert_eq!(store.put(Progress, "0", b"3", 0).await, Err(Fault::Conflict));
-    assert_eq!(store.remove(Progress, "0", old).await, Err(Fault::Conflict));
+    let old = store.put(Bucket::Progress, "0", b"1", 0).await.expect("there is none");
+    store.put(Bucket::Progress, "0", b"2", old).await.expect("it is the last");
+    assert_eq!(store.put(Bucket::Progress, "0", b"3", old).await, Err(Fault::Conflict));
+    assert_eq!(store.put(Bucket::Progress, "0", b"3", 0).await, Err(Fault::Conflict));
+    assert_eq!(store.remove(Bucket::Progress, "0", old).await, Err(Fault::Conflict));
 }

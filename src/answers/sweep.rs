@@ -1,0 +1,108 @@
+//! What `metaplan sweep` answers.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+use crate::sweep::{Group, Line, Table};
+
+/// How far a shard, or a study, has come; and means over repetitions where shards were merged.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+pub struct SweepAnswer {
+    format: &'static str,
+    /// How many runs there are: of the shard, or of the study.
+    runs: usize,
+    /// How many of them are done.
+    done: usize,
+    /// How many of these have no answer.
+    failed: usize,
+    /// How many of these were ended by the time limit.
+    timed_out: usize,
+    /// Runs that are not done, the first hundred of them.
+    missing: Vec<usize>,
+    groups: Vec<GroupPart>,
+}
+
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+struct GroupPart {
+    /// Keys and words that its rows have in common.
+    common: Map<String, Value>,
+    /// How many rows.
+    rows: usize,
+    /// By column.
+    means: Map<String, Value>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct MeanPart {
+    count: usize,
+    mean: f64,
+    deviation: f64,
+    half_width_95: f64,
+}
+
+impl GroupPart {
+    fn of(group: &Group) -> Self {
+        let mean = |(column, sample): &(String, crate::simulate::Sample)| {
+            let part = MeanPart {
+                count: sample.count,
+                mean: sample.mean,
+                deviation: sample.deviation,
+                half_width_95: sample.half_width,
+            };
+            (column.clone(), serde_json::to_value(part).unwrap_or_default())
+        };
+        Self {
+            common: group.common.iter().cloned().collect(),
+            rows: group.count,
+            means: group.samples.iter().map(mean).collect(),
+        }
+    }
+}
+
+impl SweepAnswer {
+    /// Runs that are done, of those with the given numbers.
+    pub fn new(lines: &[Line], wanted: impl Iterator<Item = usize>, groups: &[Group]) -> Self {
+        let done: std::collections::BTreeSet<usize> = lines.iter().map(|line| line.run).collect();
+        let wanted: Vec<usize> = wanted.collect();
+        let missing = wanted.iter().filter(|run| !done.contains(run)).copied();
+        Self {
+            format: "metaplan-sweep/1",
+            runs: wanted.len(),
+            done: lines.len(),
+            failed: lines.iter().filter(|line| line.answer.is_null()).count(),
+            timed_out: lines.iter().filter(|line| line.timed_out).count(),
+            missing: missing.take(100).collect(),
+            groups: groups.iter().map(GroupPart::of).collect(),
+        }
+    }
+
+    /// Whether all runs are done, each with an answer.
+    pub fn is_complete(&self) -> bool {
+        self.done == self.runs && self.failed == 0
+    }
+
+    /// A sentence.
+    pub fn sentence(&self) -> String {
+        let done = format!("{} of {} runs done", self.done, self.runs);
+        match (self.failed, self.timed_out) {
+            (0, _) => done,
+            (failed, 0) => format!("{done}, {failed} without an answer"),
+            (failed, late) => format!("{done}, {failed} without an answer ({late} by the time limit)"),
+        }
+    }
+}
+
+/// A table as CSV: one line a row, all of them with the same columns; what is missing is empty.
+pub fn sweep_csv(table: &Table) -> String {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+    let header = std::iter::once("run".to_owned()).chain(table.columns.iter().cloned());
+    // Writing into memory does not fail.
+    let _ = writer.write_record(header);
+    for row in &table.rows {
+        let cells = row.cells.iter().map(|cell| cell.as_ref().map(text).unwrap_or_default());
+        let _ = writer.write_record(std::iter::once(row.run.to_string()).chain(cells));
+    }
+    String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default()
+}
