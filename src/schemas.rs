@@ -7,12 +7,12 @@ use crate::answers::{
     ChangesAnswer, CheckAnswer, ChecksAnswer, CodeAnswer, CompareAnswer, ConfigureAnswer, DesignAnswer,
     EntailmentAnswer, ErrorAnswer, ImportAnswer, InitAnswer, JournalAnswer, LintAnswer, MissionExport,
     ModelExport, ParetoAnswer, PlanAnswer, ReasonAnswer, ReasonsAnswer, SchemaAnswer, SimulateAnswer,
-    SweepAnswer, VerdictAnswer, VerificationAnswer,
+    VerdictAnswer, VerificationAnswer,
 };
 use crate::mapek::event_schema;
 use crate::recording::answer_schema;
 use crate::setup;
-use crate::sweep;
+use crate::sweep::{self, SweepAnswer};
 
 /// A format, what it is about, and its schemas: one of them describes a document.
 type Entry = (&'static str, &'static str, fn() -> Vec<Schema>);

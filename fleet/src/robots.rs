@@ -1,17 +1,12 @@
 //! What robots and people do with a fleet: say what happens, hear what is to be done, and look at it.
 
 use std::collections::BTreeMap;
-use std::time::Duration;
 
-use futures::StreamExt as _;
 use serde::Serialize;
 
 use crate::partition::pause;
 use crate::store::{Bucket, Entry, Fault, Message, Store, Stream};
 use crate::wire::{Address, Presence, Progress};
-
-/// So long a message is looked for that should be there.
-const LOOK: Duration = Duration::from_secs(2);
 
 /// Says what happens to one robot, one event after the other: each is stored before the next one is sent, so that order is kept and none is
 /// lost or there twice.
@@ -60,25 +55,14 @@ impl<S: Store> Sender<S> {
 
     /// Whether the message of a sequence, which has our id, says what we say, in our place.
     async fn is_own(&self, subject: &str, sequence: u64, event: &str) -> bool {
-        let partition = self.address.partition;
         for attempt in 1.. {
-            let Ok(mut messages) = self.store.follow(Stream::Events, partition, sequence - 1).await else {
-                pause(attempt).await;
-                continue;
-            };
-            // In another partition it is not found, however long one waits.
-            return match tokio::time::timeout(LOOK, messages.next()).await {
-                Ok(Some(Ok(found))) => {
-                    found.sequence == sequence
-                        && found.subject == subject
-                        && found.payload == event.as_bytes()
+            match self.store.at(Stream::Events, sequence).await {
+                Ok(found) => {
+                    return found
+                        .is_some_and(|own| own.subject == subject && own.payload == event.as_bytes());
                 }
-                Ok(_) => {
-                    pause(attempt).await;
-                    continue;
-                }
-                Err(_) => false,
-            };
+                Err(_) => pause(attempt).await,
+            }
         }
         false
     }

@@ -16,7 +16,6 @@ mod plan;
 mod reason;
 mod run;
 mod simulate;
-mod sweep;
 mod validate;
 
 pub use ::mission::message::ErrorAnswer;
@@ -34,5 +33,4 @@ pub use plan::{Objective, ParetoAnswer, PlanAnswer, Preparation, milliseconds};
 pub use reason::{AssertionAnswer, EntailmentAnswer, ReasonAnswer, ReasonsAnswer, SchemaAnswer, statuses};
 pub use run::{HandledLine, LogLine, NumberedAnswer, PlanningLine, ReadyLine};
 pub use simulate::{SimulateAnswer, accomplished_cost, beside_joint, runs_of, sample};
-pub use sweep::{SweepAnswer, sweep_csv};
 pub use validate::VerdictAnswer;

@@ -3,9 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use metaplan::answers::{SweepAnswer, sweep_csv};
 use metaplan::message::Message;
-use metaplan::sweep::{Group, Line, Results, Shard, Study, Table, perform, read_lines};
+use metaplan::sweep::{Group, Line, Results, Shard, Study, SweepAnswer, Table, perform, read_lines};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::output;
@@ -65,7 +64,7 @@ fn merge(arguments: &Arguments, study: &Study, common: &Common) -> Result<Exit, 
     let lines = read_lines(&arguments.output, study)?;
     let table = Table::new(&lines, study.rows(), arguments.measured);
     if let Some(file) = &arguments.csv {
-        output::write_file(file, &sweep_csv(&table))?;
+        output::write_file(file, &table.to_csv())?;
     }
     let repetitions = study.keys().into_iter().filter(|(_, repeats)| *repeats).map(|(key, _)| key);
     let groups = table.groups(&repetitions.collect::<Vec<_>>());

@@ -4,11 +4,13 @@
 //! its own, so that one that fails takes nothing with it, and leaves one line in the shard's file. A line is whole or it is not there: who
 //! goes on after a kill does again what has none. [`Table`] puts the lines of all shards together.
 
+mod answer;
 mod process;
 mod results;
 mod study;
 mod table;
 
+pub use answer::SweepAnswer;
 pub use process::perform;
 pub use results::{Line, Results, read_lines};
 pub use study::{Planned, Shard, Study, schema};

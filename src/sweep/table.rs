@@ -7,6 +7,9 @@ use serde_json::{Map, Value};
 use super::results::{Line, essence};
 use crate::simulate::Sample;
 
+/// The column of exit statuses, over which there is no mean.
+const STATUS: &str = "status";
+
 /// What stands in a cell; nothing where a row has no such value.
 pub type Cell = Option<Value>;
 
@@ -51,7 +54,7 @@ impl Table {
         for line in lines {
             let answer = if measured { line.answer.clone() } else { essence(&line.answer) };
             let mut own = Map::new();
-            own.insert("status".to_owned(), line.status.map_or(Value::Null, Into::into));
+            own.insert(STATUS.to_owned(), line.status.map_or(Value::Null, Into::into));
             own.insert("timed_out".to_owned(), line.timed_out.into());
             if measured {
                 own.insert("seconds".to_owned(), line.seconds.into());
@@ -83,14 +86,32 @@ impl Table {
         Self { keys: keys.len(), columns: keys.iter().chain(&columns).cloned().collect(), rows }
     }
 
-    /// Rows in groups: those that have the same values of keys, but for repetitions, and the same words.
+    /// It as CSV: one line a row, all of them with the same columns; what is missing is empty.
+    pub fn to_csv(&self) -> String {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        let header = std::iter::once("run".to_owned()).chain(self.columns.iter().cloned());
+        // Writing into memory does not fail.
+        let _ = writer.write_record(header);
+        for row in &self.rows {
+            let cells = row.cells.iter().map(|cell| cell.as_ref().map(text).unwrap_or_default());
+            let _ = writer.write_record(std::iter::once(row.run.to_string()).chain(cells));
+        }
+        String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default()
+    }
+
+    /// Rows in groups: those that have the same values of keys, but for repetitions, and the same words. Of truth values the mean is the
+    /// share of those that are true.
     pub fn groups(&self, repetitions: &[String]) -> Vec<Group> {
         let is_number = |column: usize| {
-            self.rows.iter().filter_map(|row| row.cells[column].as_ref()).all(Value::is_number)
+            self.rows.iter().filter_map(|row| row.cells[column].as_ref()).all(|value| figure(value).is_some())
         };
         let counts: Vec<bool> =
             (0..self.columns.len()).map(|own| own >= self.keys && is_number(own)).collect();
-        let is_common = |column: usize| !counts[column] && !repetitions.contains(&self.columns[column]);
+        let is_status = |column: usize| self.columns[column] == STATUS;
+        let is_common = |column: usize| {
+            !counts[column] && !is_status(column) && !repetitions.contains(&self.columns[column])
+        };
         let mut groups: Vec<(Common, Vec<&Row>)> = Vec::new();
         let mut known: BTreeMap<String, usize> = BTreeMap::new();
         for row in &self.rows {
@@ -106,8 +127,9 @@ impl Table {
             groups[place].1.push(row);
         }
         let group = |(common, rows): (Common, Vec<&Row>)| {
-            let samples = (0..self.columns.len()).filter(|column| counts[*column]).filter_map(|column| {
-                let values = rows.iter().filter_map(|row| row.cells[column].as_ref()?.as_f64());
+            let samples = (0..self.columns.len()).filter(|column| counts[*column] && !is_status(*column));
+            let samples = samples.filter_map(|column| {
+                let values = rows.iter().filter_map(|row| figure(row.cells[column].as_ref()?));
                 let values: Vec<f64> = values.collect();
                 Some((self.columns[column].clone(), Sample::of(&values)?))
             });
@@ -115,6 +137,11 @@ impl Table {
         };
         groups.into_iter().map(group).collect()
     }
+}
+
+/// A number, or a truth value as one.
+fn figure(value: &Value) -> Option<f64> {
+    value.as_bool().map(|truth| f64::from(u8::from(truth))).or_else(|| value.as_f64())
 }
 
 /// An option that is given several times, as one value of a table.

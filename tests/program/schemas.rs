@@ -33,7 +33,7 @@ fn answers_fit_their_schemas() {
     let here = directory.path();
     let json = ["--format", "json"];
     let mission = "m/mission.toml";
-    let commands: [&[&str]; 20] = [
+    let commands: [&[&str]; 21] = [
         &["init", "m", "--from", "warehouse"],
         &["plan", mission],
         &["plan", mission, "--fail", "c_arm"],
@@ -54,9 +54,11 @@ fn answers_fit_their_schemas() {
         &["validate", mission, "plan"],
         &["verify", "proof"],
         &["journal", "check", "none"],
+        &["sweep", "study.toml", "--output", "results"],
     ];
     std::fs::write(here.join("m.prism"), "mdp\nmodule m\n s : [0..1];\n [] s=0 -> (s'=1);\nendmodule\n")
         .expect("written");
+    std::fs::write(here.join("study.toml"), "command = ['plan', 'm/mission.toml']\n").expect("written");
     std::fs::write(here.join("plan"), "(pick box near_rack fd_suction)\n").expect("written");
     let mut seen = std::collections::BTreeSet::new();
     for command in commands {
@@ -82,7 +84,7 @@ fn answers_fit_their_schemas() {
     // What reads and what needs files of others is tested elsewhere, or described by hand.
     let silent: Vec<&str> =
         FORMATS.iter().map(|(format, ..)| *format).filter(|format| !seen.contains(*format)).collect();
-    assert_eq!(silent, ["manifest", "event", "answer", "compare", "import"]);
+    assert_eq!(silent, ["manifest", "study", "event", "answer", "compare", "import"]);
 }
 
 #[test]

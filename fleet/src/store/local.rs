@@ -382,6 +382,11 @@ impl Store for Local {
         message(&transaction.open_table(MESSAGES).map_err(failed)?, stream as u8, sequence.value())
     }
 
+    async fn at(&self, stream: Stream, sequence: u64) -> Result<Option<Stored>, Fault> {
+        let transaction = self.0.database.begin_read().map_err(failed)?;
+        message(&transaction.open_table(MESSAGES).map_err(failed)?, stream as u8, sequence)
+    }
+
     async fn get(&self, bucket: Bucket, key: &str) -> Result<Option<Entry>, Fault> {
         let transaction = self.0.database.begin_read().map_err(failed)?;
         let values = transaction.open_table(VALUES).map_err(failed)?;

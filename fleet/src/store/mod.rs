@@ -166,6 +166,10 @@ pub trait Store: Clone + Send + Sync + 'static {
         subject: &str,
     ) -> impl Future<Output = Result<Option<Stored>, Fault>> + Send;
 
+    /// The message of a sequence, of whatever subject.
+    fn at(&self, stream: Stream, sequence: u64)
+    -> impl Future<Output = Result<Option<Stored>, Fault>> + Send;
+
     /// A value.
     fn get(&self, bucket: Bucket, key: &str) -> impl Future<Output = Result<Option<Entry>, Fault>> + Send;
 

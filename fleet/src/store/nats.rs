@@ -9,7 +9,7 @@ use std::time::Duration;
 use async_nats::jetstream::consumer::{AckPolicy, DeliverPolicy, pull};
 use async_nats::jetstream::context::{Context, PublishError, PublishErrorKind};
 use async_nats::jetstream::kv::{self, CreateErrorKind, Operation, UpdateErrorKind};
-use async_nats::jetstream::message::PublishMessage;
+use async_nats::jetstream::message::{PublishMessage, StreamMessage};
 use async_nats::jetstream::stream::{self, LastRawMessageErrorKind};
 use async_nats::jetstream::{self};
 use async_nats::{Client, ConnectOptions};
@@ -150,6 +150,14 @@ impl Nats {
         Ok(Self { client, context, partitions, fleet: layout.fleet.clone(), streams, buckets })
     }
 
+    /// How many messages a stream has.
+    ///
+    /// # Errors
+    /// The server cannot be reached.
+    pub async fn count(&self, stream: Stream) -> Result<u64, Fault> {
+        Ok(self.stream(stream).get_info().await.map_err(failed)?.state.messages)
+    }
+
     /// Refusals as they come: subjects behind `err.`, and sentences.
     ///
     /// # Errors
@@ -241,6 +249,17 @@ fn stored(stream: Stream, message: &jetstream::Message) -> Result<Stored, Fault>
     })
 }
 
+/// A message that a stream's leader has read.
+fn raw(stream: Stream, message: StreamMessage) -> Stored {
+    Stored {
+        sequence: message.sequence,
+        subject: tail(stream, &message.subject),
+        id: message.headers.get("Nats-Msg-Id").map(|id| id.as_str().to_owned()),
+        time: micros(message.time.unix_timestamp_nanos()),
+        payload: message.payload.to_vec(),
+    }
+}
+
 fn tail(stream: Stream, subject: &str) -> String {
     subject
         .strip_prefix(stream.prefix())
@@ -323,13 +342,15 @@ impl Store for Nats {
     async fn last(&self, kind: Stream, subject: &str) -> Result<Option<Stored>, Fault> {
         let name = format!("{}.{subject}", kind.prefix());
         match self.stream(kind).get_last_raw_message_by_subject(&name).await {
-            Ok(message) => Ok(Some(Stored {
-                sequence: message.sequence,
-                subject: subject.to_owned(),
-                id: message.headers.get("Nats-Msg-Id").map(|id| id.as_str().to_owned()),
-                time: micros(message.time.unix_timestamp_nanos()),
-                payload: message.payload.to_vec(),
-            })),
+            Ok(message) => Ok(Some(raw(kind, message))),
+            Err(error) if matches!(error.kind(), LastRawMessageErrorKind::NoMessageFound) => Ok(None),
+            Err(error) => Err(failed(error)),
+        }
+    }
+
+    async fn at(&self, kind: Stream, sequence: u64) -> Result<Option<Stored>, Fault> {
+        match self.stream(kind).get_raw_message(sequence).await {
+            Ok(message) => Ok(Some(raw(kind, message))),
             Err(error) if matches!(error.kind(), LastRawMessageErrorKind::NoMessageFound) => Ok(None),
             Err(error) => Err(failed(error)),
         }

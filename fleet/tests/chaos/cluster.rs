@@ -237,6 +237,14 @@ impl Cluster {
         counts.iter().map(|(what, count)| format!("{count} {what}")).collect::<Vec<_>>().join(", ")
     }
 
+    /// The memory of a process, in megabytes.
+    pub(super) fn memory(&self, name: &str) -> u64 {
+        let pid = self.processes().get(name).map(Child::id).unwrap_or_default();
+        let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
+        let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap_or_default();
+        line.split_whitespace().next().and_then(|text| text.parse::<u64>().ok()).unwrap_or_default() / 1024
+    }
+
     /// The ends of all logs.
     pub(super) fn logs(&self) -> String {
         let mut text = String::new();

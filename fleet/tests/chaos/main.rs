@@ -100,7 +100,7 @@ async fn attack(store: Nats, over: Arc<AtomicBool>, seed: u64) -> u64 {
 }
 
 /// One schedule: the robots' events while everything goes wrong, and what has become of them.
-async fn schedule(seed: u64, robots: usize, scripts: &[Script], disturbed: bool) {
+async fn schedule(seed: u64, robots: usize, scripts: &[Script]) {
     let cluster = Cluster::begin(seed);
     let store = Box::pin(open(&cluster)).await;
     for worker in 0..WORKERS {
@@ -108,18 +108,18 @@ async fn schedule(seed: u64, robots: usize, scripts: &[Script], disturbed: bool)
     }
     let over = Arc::new(AtomicBool::new(false));
     let begun = Instant::now();
-    let trouble = disturbed.then(|| {
+    let trouble = {
         let (cluster, over) = (cluster.clone(), Arc::clone(&over));
         std::thread::spawn(move || cluster.trouble(seed, &over, PARTITIONS, LEASE))
-    });
-    let attacker = disturbed.then(|| tokio::spawn(attack(store.clone(), Arc::clone(&over), seed)));
+    };
+    let attacker = tokio::spawn(attack(store.clone(), Arc::clone(&over), seed));
     let sent = Arc::new(AtomicU64::new(0));
     let mut senders = tokio::task::JoinSet::new();
     for robot in 0..robots {
         let mut sender = Sender::new(store.clone(), &format!("robot-{robot}"), "");
         let events = scripts[robot % scripts.len()].0.clone();
         let sent = Arc::clone(&sent);
-        let pause = if disturbed { number("SECONDS", 20) * 2000 / events.len() as u64 } else { 0 };
+        let pause = number("SECONDS", 20) * 2000 / events.len() as u64;
         senders.spawn(async move {
             for event in &events {
                 tokio::time::sleep(Duration::from_millis(fastrand::u64(0..=pause))).await;
@@ -135,11 +135,8 @@ async fn schedule(seed: u64, robots: usize, scripts: &[Script], disturbed: bool)
     let expected = sent.load(Ordering::Relaxed);
     // Trouble ends, and what is left is done.
     over.store(true, Ordering::Relaxed);
-    let what = trouble.map(|thread| thread.join().expect("trouble ends")).unwrap_or_default();
-    let attacks = match attacker {
-        Some(task) => task.await.expect("attacks end"),
-        None => 0,
-    };
+    let what = trouble.join().expect("trouble ends");
+    let attacks = attacker.await.expect("attacks end");
     let mut decided = 0;
     for _ in 0..900 {
         decided = 0;
@@ -217,18 +214,96 @@ async fn nothing_is_lost_repeated_or_out_of_order() {
     let first = number("SEED", 1);
     for seed in first..first + number("SCHEDULES", 20) {
         println!("seed {seed} begins");
-        Box::pin(schedule(seed, robots, &scripts, true)).await;
+        Box::pin(schedule(seed, robots, &scripts)).await;
     }
 }
 
+/// Events a second and latencies for 1, 2 and 4 workers, beside loops in this process; and the memory of a worker.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
-#[ignore = "needs nats-server, and minutes"]
-async fn without_trouble() {
+#[ignore = "needs nats-server and an idle machine; figures mean something in a release build only"]
+async fn figures() {
     let Some(()) = cluster::is_there() else {
         println!("skipped: there is no nats-server (NATS_SERVER, or in the path)");
         return;
     };
-    let (robots, lines) = (number("ROBOTS", 1000) as usize, number("EVENTS", 100) as usize);
+    let (robots, lines) = (number("ROBOTS", 1000) as usize, number("EVENTS", 20) as usize);
     let scripts: Vec<Script> = (0..robots.min(24)).map(|own| script(own, lines)).collect();
-    Box::pin(schedule(0, robots, &scripts, false)).await;
+    let begun = Instant::now();
+    let alone = scripts.iter().enumerate().map(|(own, (events, _))| {
+        let (mission, _) = scripts::SCENARIOS[own % scripts::SCENARIOS.len()];
+        scripts::alone(mission, events).len()
+    });
+    let count: usize = alone.sum();
+    println!(
+        "one thread of one process: {:.0} events/s, reading missions included",
+        rate(count, begun.elapsed())
+    );
+    for workers in [1, 2, 4] {
+        let cluster = Cluster::begin(0);
+        let store = Box::pin(open(&cluster)).await;
+        for worker in 0..workers {
+            cluster.begin_worker(worker, PARTITIONS, 10);
+        }
+        tokio::time::sleep(Duration::from_secs(8)).await;
+        let (said, decided) = say_all(&store, robots, &scripts).await;
+        let events = robots * lines;
+        let late = latencies(&store).await;
+        println!(
+            "{workers} workers: {events} events of {robots} robots said at {:.0}/s, decided at {:.0}/s; flat out latency median {:.1} ms, 99 percent {:.1} ms; memory {} MB each, servers {} MB",
+            rate(events, said),
+            rate(events, decided),
+            late[late.len() / 2],
+            late[late.len() * 99 / 100],
+            (0..workers).map(|own| cluster.memory(&format!("w{own}"))).max().unwrap_or_default(),
+            (0..3).map(|own| cluster.memory(&format!("s{own}"))).max().unwrap_or_default(),
+        );
+        verify(&store, robots, &scripts, 0).await;
+    }
+}
+
+fn rate(count: usize, time: Duration) -> f64 {
+    count as f64 / time.as_secs_f64()
+}
+
+/// Has all robots say all they have to say; the time until it was said, and until it was decided.
+async fn say_all(store: &Nats, robots: usize, scripts: &[Script]) -> (Duration, Duration) {
+    let begun = Instant::now();
+    let mut senders = tokio::task::JoinSet::new();
+    for robot in 0..robots {
+        let mut sender = Sender::new(store.clone(), &format!("robot-{robot}"), "");
+        let events = scripts[robot % scripts.len()].0.clone();
+        senders.spawn(async move {
+            for event in &events {
+                sender.send(event).await.expect("events are short");
+            }
+            events.len()
+        });
+    }
+    let mut expected = 0;
+    while let Some(done) = senders.join_next().await {
+        expected += done.expect("a robot says all that it has to say");
+    }
+    let said = begun.elapsed();
+    loop {
+        let count = store.count(Stream::Decisions).await.expect("it can be read");
+        if count >= expected as u64 {
+            return (said, begun.elapsed());
+        }
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+}
+
+/// Milliseconds from an event to its decision, both as they were stored; sorted.
+async fn latencies(store: &Nats) -> Vec<f64> {
+    let mut late = Vec::new();
+    for partition in 0..PARTITIONS {
+        let events: BTreeMap<u64, u64> =
+            read(store, Stream::Events, partition).await.iter().map(|own| (own.sequence, own.time)).collect();
+        for message in read(store, Stream::Decisions, partition).await {
+            let decided = Decided::parse(&message.payload).expect("a decision");
+            late.push((message.time - events[&decided.event]) as f64 / 1000.0);
+        }
+    }
+    late.sort_by(f64::total_cmp);
+    late
 }

@@ -71,6 +71,10 @@ impl Store for Crashing {
         self.through(self.inner.last(stream, subject)).await
     }
 
+    async fn at(&self, stream: Stream, sequence: u64) -> Result<Option<Stored>, Fault> {
+        self.through(self.inner.at(stream, sequence)).await
+    }
+
     async fn get(&self, bucket: Bucket, key: &str) -> Result<Option<Entry>, Fault> {
         self.through(self.inner.get(bucket, key)).await
     }

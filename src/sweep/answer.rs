@@ -1,10 +1,12 @@
-//! What `metaplan sweep` answers.
+//! What `metaplan sweep` answers. It stands here, and not among the other answers, since studies read missions, which know of answers.
 
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use crate::sweep::{Group, Line, Table};
+use super::results::Line;
+use super::table::Group;
+use crate::simulate::Sample;
 
 /// How far a shard, or a study, has come; and means over repetitions where shards were merged.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
@@ -43,7 +45,7 @@ struct MeanPart {
 
 impl GroupPart {
     fn of(group: &Group) -> Self {
-        let mean = |(column, sample): &(String, crate::simulate::Sample)| {
+        let mean = |(column, sample): &(String, Sample)| {
             let part = MeanPart {
                 count: sample.count,
                 mean: sample.mean,
@@ -91,18 +93,4 @@ impl SweepAnswer {
             (failed, late) => format!("{done}, {failed} without an answer ({late} by the time limit)"),
         }
     }
-}
-
-/// A table as CSV: one line a row, all of them with the same columns; what is missing is empty.
-pub fn sweep_csv(table: &Table) -> String {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-    let header = std::iter::once("run".to_owned()).chain(table.columns.iter().cloned());
-    // Writing into memory does not fail.
-    let _ = writer.write_record(header);
-    for row in &table.rows {
-        let cells = row.cells.iter().map(|cell| cell.as_ref().map(text).unwrap_or_default());
-        let _ = writer.write_record(std::iter::once(row.run.to_string()).chain(cells));
-    }
-    String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default()
 }
