@@ -19,11 +19,11 @@
 //! # async fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let folder = tempfile::tempdir()?;
 //! # let directory = folder.path();
-//! let (lease, store) = (Duration::from_secs(2), Local::open(directory, 4, Duration::from_secs(2))?);
+//! let store = Local::open(directory, 4, Duration::from_secs(2))?;
 //! let missions = Missions::read(Path::new("../missions"))?;
 //! let shared = Arc::new(Shared::new(store.clone(), missions, "worker-1".to_owned(), Settings::default()));
 //! let (stop, stopped) = tokio::sync::watch::channel(false);
-//! let worker = tokio::spawn(worker::run(shared, lease, stopped));
+//! let worker = tokio::spawn(worker::run(shared, stopped));
 //!
 //! let mut robot = Sender::new(store.clone(), "ugv-1", "");
 //! let event = robot.send(r#"{"event": "enrol", "mission": "ugv"}"#).await?;

@@ -186,7 +186,6 @@ async fn write_decisions<S: Store>(
 /// A fleet in a directory, from standard input to standard output.
 pub(crate) async fn up(
     shared: Arc<Shared<Local>>,
-    lease: Duration,
     after: Option<u64>,
     mut stop: watch::Receiver<bool>,
 ) -> Result<(), Message> {
@@ -201,7 +200,7 @@ pub(crate) async fn up(
         }
     });
     let (order, orders) = watch::channel(false);
-    let working = tokio::spawn(worker::run(Arc::clone(&shared), lease, orders));
+    let working = tokio::spawn(worker::run(Arc::clone(&shared), orders));
     let (reader, own) = (store.clone(), Arc::clone(&written));
     let writing = tokio::spawn(async move { write_decisions(&reader, None, &own).await });
     let session = format!("{:016x}.", fastrand::u64(..));

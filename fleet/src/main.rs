@@ -137,7 +137,7 @@ struct Server {
     /// On how many servers a fleet that is made is kept: 1, 3 or 5.
     #[arg(long, value_name = "N", default_value_t = 1)]
     replicas: usize,
-    /// Seconds after which a worker that is not heard of has lost its partitions.
+    /// Seconds after which a worker that is not heard of has lost its partitions, in a fleet that is made.
     #[arg(long, value_name = "S", default_value_t = 10, value_parser = clap::value_parser!(u64).range(2..=3600))]
     lease: u64,
 }
@@ -210,13 +210,13 @@ async fn run(command: Command) -> Result<(), Errors> {
             let store = server.open().await.map_err(|message| vec![message])?;
             let name = name.unwrap_or_else(own_name);
             let shared = work.shared(store, name)?;
-            worker::run(shared, Duration::from_secs(server.lease), signals()?).await;
+            worker::run(shared, signals()?).await;
         }
         Command::Up { local, after, work, partitions } => {
             let lease = Duration::from_secs(10);
             let store = Local::open(&local, partitions, lease).map_err(|message| vec![message])?;
             let shared = work.shared(store, own_name())?;
-            lines::up(shared, lease, after, signals()?).await.map_err(|message| vec![message])?;
+            lines::up(shared, after, signals()?).await.map_err(|message| vec![message])?;
         }
         Command::Send { server, session } => {
             let store = server.open().await.map_err(|message| vec![message])?;

@@ -36,9 +36,9 @@ struct Worker<S> {
     looked: (Instant, u64),
 }
 
-/// Runs a worker until `stop` is true; partitions are then given back, saved and in order. Leases last as long as `lease` says unless they are
-/// renewed.
-pub async fn run<S: Store>(shared: Arc<Shared<S>>, lease: Duration, mut stop: watch::Receiver<bool>) {
+/// Runs a worker until `stop` is true; partitions are then given back, saved and in order.
+pub async fn run<S: Store>(shared: Arc<Shared<S>>, mut stop: watch::Receiver<bool>) {
+    let lease = shared.store.lease();
     let mut worker =
         Worker { shared, lease, held: BTreeMap::new(), presence: 0, looked: (Instant::now(), 0) };
     let mut tick = tokio::time::interval(lease / 4);

@@ -49,6 +49,7 @@ pub struct Local(Arc<Inner>);
 struct Inner {
     database: Arc<Database>,
     partitions: u32,
+    lease: Duration,
     requests: mpsc::UnboundedSender<Request>,
     /// Grows whenever something is appended.
     appended: watch::Receiver<u64>,
@@ -102,7 +103,7 @@ impl Local {
             .name("fleet-writer".to_owned())
             .spawn(move || writer.run(waiting, &appending))
             .map_err(|error| wrong(&error))?;
-        Ok(Self(Arc::new(Inner { database, partitions: known, requests, appended, notices })))
+        Ok(Self(Arc::new(Inner { database, partitions: known, lease, requests, appended, notices })))
     }
 
     /// What is refused, as it comes: subjects and sentences.
@@ -343,6 +344,10 @@ impl Reader {
 impl Store for Local {
     fn partitions(&self) -> u32 {
         self.0.partitions
+    }
+
+    fn lease(&self) -> Duration {
+        self.0.lease
     }
 
     async fn follow(

@@ -7,6 +7,7 @@ pub mod local;
 pub mod nats;
 
 use std::future::Future;
+use std::time::Duration;
 
 use futures::stream::BoxStream;
 
@@ -132,6 +133,9 @@ pub enum Fault {
 pub trait Store: Clone + Send + Sync + 'static {
     /// How many partitions there are. It never changes.
     fn partitions(&self) -> u32;
+
+    /// After this time leases and signs of life are gone unless they are renewed. It never changes.
+    fn lease(&self) -> Duration;
 
     /// The messages of a partition after a sequence, as they come, without an end. Sequences grow.
     fn follow(

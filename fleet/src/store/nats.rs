@@ -62,6 +62,7 @@ pub struct Nats {
     client: Client,
     context: Context,
     partitions: u32,
+    lease: Duration,
     fleet: String,
     streams: [stream::Stream<()>; 2],
     buckets: [kv::Store; 4],
@@ -146,8 +147,11 @@ impl Nats {
             context.get_stream_no_info(events).await.map_err(failed)?,
             context.get_stream_no_info(decisions).await.map_err(failed)?,
         ];
+        // As it was made, whatever is asked for now.
+        let leases: &kv::Store = &buckets[Bucket::Leases as usize];
+        let lease = leases.status().await.map_err(failed)?.max_age();
         let buckets = buckets.try_into().map_err(|_| failed("a bucket is missing"))?;
-        Ok(Self { client, context, partitions, fleet: layout.fleet.clone(), streams, buckets })
+        Ok(Self { client, context, partitions, lease, fleet: layout.fleet.clone(), streams, buckets })
     }
 
     /// How many messages a stream has.
@@ -250,7 +254,7 @@ fn stored(stream: Stream, message: &jetstream::Message) -> Result<Stored, Fault>
 }
 
 /// A message that a stream's leader has read.
-fn raw(stream: Stream, message: StreamMessage) -> Stored {
+fn raw(stream: Stream, message: &StreamMessage) -> Stored {
     Stored {
         sequence: message.sequence,
         subject: tail(stream, &message.subject),
@@ -283,6 +287,10 @@ fn published(error: &PublishError, bytes: usize) -> Fault {
 impl Store for Nats {
     fn partitions(&self) -> u32 {
         self.partitions
+    }
+
+    fn lease(&self) -> Duration {
+        self.lease
     }
 
     async fn follow(
@@ -342,7 +350,7 @@ impl Store for Nats {
     async fn last(&self, kind: Stream, subject: &str) -> Result<Option<Stored>, Fault> {
         let name = format!("{}.{subject}", kind.prefix());
         match self.stream(kind).get_last_raw_message_by_subject(&name).await {
-            Ok(message) => Ok(Some(raw(kind, message))),
+            Ok(message) => Ok(Some(raw(kind, &message))),
             Err(error) if matches!(error.kind(), LastRawMessageErrorKind::NoMessageFound) => Ok(None),
             Err(error) => Err(failed(error)),
         }
@@ -350,7 +358,7 @@ impl Store for Nats {
 
     async fn at(&self, kind: Stream, sequence: u64) -> Result<Option<Stored>, Fault> {
         match self.stream(kind).get_raw_message(sequence).await {
-            Ok(message) => Ok(Some(raw(kind, message))),
+            Ok(message) => Ok(Some(raw(kind, &message))),
             Err(error) if matches!(error.kind(), LastRawMessageErrorKind::NoMessageFound) => Ok(None),
             Err(error) => Err(failed(error)),
         }

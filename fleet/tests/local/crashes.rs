@@ -46,6 +46,10 @@ impl Store for Crashing {
         self.inner.partitions()
     }
 
+    fn lease(&self) -> Duration {
+        self.inner.lease()
+    }
+
     async fn follow(
         &self,
         stream: Stream,

@@ -26,7 +26,8 @@ fn missions() -> Missions {
 }
 
 fn open(directory: &Path, partitions: u32) -> Local {
-    Local::open(directory, partitions, Duration::from_secs(2)).unwrap_or_else(|message| panic!("{message}"))
+    Local::open(directory, partitions, Duration::from_millis(400))
+        .unwrap_or_else(|message| panic!("{message}"))
 }
 
 fn shared<S: Store>(store: S, name: &str, settings: Settings) -> Arc<Shared<S>> {
@@ -74,7 +75,7 @@ async fn decided<S: Store>(store: &S, count: usize) {
 async fn work<S: Store>(store: &S, name: &str, settings: Settings, count: usize) {
     let (stop, heard) = watch::channel(false);
     let shared = shared(store.clone(), name, settings);
-    let task = tokio::spawn(worker::run(shared, Duration::from_millis(400), heard));
+    let task = tokio::spawn(worker::run(shared, heard));
     decided(store, count).await;
     stop.send_replace(true);
     task.await.expect("a worker ends in order");

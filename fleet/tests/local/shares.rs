@@ -38,7 +38,7 @@ async fn partitions_are_shared_and_taken_over() {
     let begin = |name: &str| {
         let (stop, heard) = watch::channel(false);
         let shared = shared(store.clone(), name, Settings::default());
-        (stop, tokio::spawn(worker::run(shared, LEASE, heard)))
+        (stop, tokio::spawn(worker::run(shared, heard)))
     };
     let (events, answers) = scripts::play("ugv", "kinect_comes_and_goes", 5, 30);
     let mut sequences = tell(&store, "r", &events[..10]).await;
