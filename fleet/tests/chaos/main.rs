@@ -306,7 +306,7 @@ async fn calm(store: &Nats, robots: usize) -> Vec<f64> {
         let subject = sender.address().to_string();
         let known = store.last(Stream::Decisions, &subject).await.expect("it can be read");
         let known = known.map_or(0, |last| last.sequence);
-        let status = if number / robots % 2 == 0 { "FALSE" } else { "OK" };
+        let status = if (number / robots).is_multiple_of(2) { "FALSE" } else { "OK" };
         let event =
             json!({"event": "component_status", "component": "c_kinect", "status": status}).to_string();
         let begun = Instant::now();
