@@ -23,7 +23,7 @@ pub struct ManifestPath {
 /// Reads a manifest; `-` is standard input, and paths are relative to the current directory then.
 ///
 /// # Errors
-/// The file cannot be read, is no manifest, or has other sections or keys: all that is wrong with them.
+/// The file cannot be read, is not a manifest, or has other sections or keys: all that is wrong with them.
 pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, ManifestPath), Errors> {
     let source = source(file)?;
     parse(source.name(), source.text(), &file.parent().map(Path::to_owned).unwrap_or_default())
@@ -32,7 +32,7 @@ pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, ManifestPath), Error
 /// A manifest from its text, whose paths are relative to a directory; `name` stands for the file in messages.
 ///
 /// # Errors
-/// It is no manifest, or has other sections or keys: all that is wrong with them.
+/// It is not a manifest, or has other sections or keys: all that is wrong with them.
 pub fn parse<S: DeserializeOwned>(
     name: &str,
     text: &str,

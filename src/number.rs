@@ -41,7 +41,7 @@ pub(crate) fn from_json(value: &Value) -> Option<BigRational> {
     }
 }
 
-/// As decimal text; a fraction that is no decimal is rounded.
+/// As decimal text; a fraction that is not a decimal is rounded.
 pub(crate) fn decimal(value: &BigRational) -> String {
     rules::Decimal::from_rational(value).to_string()
 }
@@ -51,7 +51,7 @@ pub(crate) fn to_json(value: &BigRational) -> Value {
     decimal(value).parse::<serde_json::Number>().map_or(Value::Null, Value::Number)
 }
 
-/// An exact number of the planner as a number of JSON; a fraction that is no decimal, rounded to a double.
+/// An exact number of the planner as a number of JSON; a fraction that is not a decimal, rounded to a double.
 pub(crate) fn exact_to_json(value: &encodings::Exact) -> Value {
     value.to_string().parse::<serde_json::Number>().map_or_else(|_| value.to_f64().into(), Value::Number)
 }

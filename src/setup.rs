@@ -22,19 +22,28 @@ use crate::simulate::Simulation;
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Sections {
+    /// The mission's name.
     name: String,
+    /// A sentence about it.
     #[serde(default)]
     description: String,
+    /// The knowledge base.
     knowledge: KnowledgeSection,
+    /// The PDDL files.
     planning: PlanningSection,
+    /// PDDL symbol to query, where it is not the default; `names` has individuals.
     #[serde(default)]
     bindings: BindingsSection,
+    /// How eager the loop is.
     #[serde(default)]
     adaptation: AdaptationSection,
+    /// The symbols of the probabilistic process, for `compare` and for `export` to PRISM and JANI.
     #[serde(default)]
     probabilistic: Roles,
+    /// What pictures need.
     #[serde(default)]
     report: ReportSection,
+    /// Situations by name.
     #[serde(default)]
     scenarios: BTreeMap<String, Scenario<Simulation>>,
 }

@@ -45,7 +45,7 @@ pub enum Fault {
     #[error("no plan of the task can cost {0}")]
     Cost(String),
     /// A table of lower bounds is wrong.
-    #[error("{table} {position} is no lower bound: {reason}")]
+    #[error("{table} {position} is not a lower bound: {reason}")]
     Bound {
         /// `potential` or `need`.
         table: &'static str,

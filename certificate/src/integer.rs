@@ -208,7 +208,7 @@ impl<'de> Deserialize<'de> for Integer {
         }
         let is_integer = digits.bytes().all(|byte| byte.is_ascii_digit() || byte == b'-');
         let big = if is_integer { digits.parse::<BigInt>().ok() } else { None };
-        big.map(Self::from).ok_or_else(|| D::Error::custom(format!("{digits} is no integer")))
+        big.map(Self::from).ok_or_else(|| D::Error::custom(format!("{digits} is not an integer")))
     }
 }
 

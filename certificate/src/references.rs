@@ -79,7 +79,7 @@ pub(super) fn argument(model: &Model, argument: &Argument) -> Found {
         let fits = label.0.len() == model.basic
             && label.1.len() == numbers
             && label.0.iter().zip(sizes).all(|(value, size)| (*value as usize) < size);
-        require(fits, || format!("label {position} is no state"))?;
+        require(fits, || format!("label {position} is not a state"))?;
     }
     Ok(())
 }

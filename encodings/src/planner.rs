@@ -111,7 +111,7 @@ impl<'a> Planner<'a> {
     ///
     /// # Errors
     /// Every construct that the planner does not handle, with its place; or that a limit was reached before the task was ground. A
-    /// plan that is not proved optimal, or none, is no error: see [`Solution::status`].
+    /// plan that is not proved optimal, or none, is not an error: see [`Solution::status`].
     pub fn plan(mut self) -> Result<Solution, Errors> {
         match ground(self.domain, self.problem, &self.grounding) {
             Ok(task) => {

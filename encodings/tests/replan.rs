@@ -313,7 +313,7 @@ fn the_old_plan_serves_when_time_is_up() {
     let found = ask(&mut replanner, &problem, Some(&old));
     let Replanned::Feasible { first: None, steps, metric } = found else { panic!("{found:?}") };
     assert_eq!((named(&steps), metric), (old.clone(), BigRational::from_integer(14.into())));
-    // Where it is no plan any more, it does not serve.
+    // Where it is not a plan any more, it does not serve.
     problem.init.push(InitialElement::Fact(atom("on s3")));
     assert_eq!(ask(&mut replanner, &problem, Some(&old)), Replanned::Unknown);
     assert!(

@@ -216,7 +216,7 @@ fn parse_query(symbol: &str, query: &str) -> Result<Query, String> {
         ("solves", "") => Ok(Query::Solves),
         ("available", "") => Ok(Query::Available),
         _ => Err(format!(
-            "`{symbol}` is bound to `{query}`, which is no query; queries are `class:NAME`, `solves`, `available`, \
+            "`{symbol}` is bound to `{query}`, which is not a query; queries are `class:NAME`, `solves`, `available`, \
              `requires`, `requires:ACTION`, `estimation:ATTRIBUTE`, `measured:ATTRIBUTE`, and in plain domains `action:NAME`, `chosen:ATTRIBUTE` and \
              `reconfigured:ATTRIBUTE`"
         )),
@@ -287,7 +287,7 @@ impl Fill<'_> {
         for Individual { iri, name } in &*members {
             let spelled = Name::new(name);
             if !is_pddl_name(name) {
-                let text = format!("<{iri}> is left out: `{name}` is no PDDL name");
+                let text = format!("<{iri}> is left out: `{name}` is not a PDDL name");
                 self.warnings.push(Message::warning("M201", text));
             } else if known.insert(spelled.clone()) {
                 let alternatives = vec![identifier(r#type)];

@@ -26,7 +26,7 @@ pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
         return Err(io::Error::other("is a directory"));
     }
     if !found.is_file() {
-        return Err(io::Error::other("it is no regular file"));
+        return Err(io::Error::other("it is not a regular file"));
     }
     let mut bytes = Vec::new();
     std::fs::File::open(path)?.take(LARGEST + 1).read_to_end(&mut bytes)?;
@@ -217,7 +217,7 @@ pub(crate) fn quoted(messages: Vec<Message>) -> Vec<Message> {
     messages.into_iter().map(quoted).collect()
 }
 
-/// Whether a file begins like a knowledge base. What is no file, or cannot be read, was given otherwise.
+/// Whether a file begins like a knowledge base. What is not a file, or cannot be read, was given otherwise.
 fn is_knowledge(path: &Path) -> bool {
     let Ok(file) = std::fs::File::open(path) else { return true };
     let mut bytes = Vec::new();

@@ -64,7 +64,7 @@ impl Mission {
         for (kind, source) in [(Kind::Domain, &domain_source), (Kind::Problem, &problem_source)] {
             errors.extend(file::expect(kind, source.name(), source.text()).err());
         }
-        // Of what is no PDDL nothing is shown.
+        // Of what is not PDDL nothing is shown.
         if errors.iter().any(|error| error.code == file::CODE) {
             return Err(errors.into());
         }

@@ -237,7 +237,9 @@ impl std::error::Error for Message {}
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ErrorAnswer<'a> {
+    /// Name and version of this format.
     format: &'static str,
+    /// All that is wrong.
     messages: &'a [Message],
 }
 

@@ -73,7 +73,7 @@ impl Mission {
         let Some(number) = decimal(value) else {
             return Err(Message::error(
                 "M102",
-                format!("the value `{value}` of {function} is no decimal number"),
+                format!("the value `{value}` of {function} is not a decimal number"),
             ));
         };
         let target = atom(function, arguments);

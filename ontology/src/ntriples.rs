@@ -34,7 +34,7 @@ struct Terms<'a> {
     symbols: &'a Symbols,
     /// What each is written as, with a blank behind it, so that lines are in the order of their terms.
     texts: Vec<String>,
-    /// By symbol; `None` for what is no term.
+    /// By symbol; `None` for what is not a term.
     numbers: FxHashMap<Symbol, Option<u32>>,
 }
 
@@ -59,7 +59,7 @@ impl<'a> Terms<'a> {
         }
     }
 
-    /// The number of what is no literal.
+    /// The number of what is not a literal.
     fn node(&mut self, symbol: Symbol) -> Option<u32> {
         self.symbols.value(symbol).as_name()?;
         self.term(symbol)

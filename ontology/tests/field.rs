@@ -63,7 +63,7 @@ const FILES: [(&str, Verdict); 62] = [
     ("metaclass.ttl", Follows(&["Eagle a Taxon"])),
     ("nan.ttl", Inconsistent),
     ("negprop.ttl", Inconsistent),
-    // "a  b" is no token: the lexical form would be collapsed, the string is another value.
+    // "a  b" is not a token: the lexical form would be collapsed, the string is another value.
     ("normalized.ttl", Inconsistent),
     ("nothing-rule.ttl", Inconsistent),
     ("nothing.ttl", Inconsistent),

@@ -47,7 +47,7 @@ fn texts_cut_off_anywhere() {
     }
 }
 
-/// What reading a text of one line that is no document in any syntax says.
+/// What reading a text of one line that is not a document in any syntax says.
 fn garbage(length: usize) -> String {
     let text = "x".repeat(length);
     let errors = read_text(&text, "garbage", &ReadOptions::default()).expect_err("no document");

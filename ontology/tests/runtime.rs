@@ -86,7 +86,7 @@ fn candidates_say_which_requirements_they_miss() {
         assert_eq!(missed(&runtime), [Vec::<String>::new(), vec![]]);
         let mut runtime = robot_with(mode, LESS_IS_AN_ERROR);
         runtime.add_objective(&objective).expect("known");
-        // Both are estimated to perform worse; what is compared with the surroundings is no requirement of this kind.
+        // Both are estimated to perform worse; what is compared with the surroundings is not a requirement of this kind.
         assert_eq!(missed(&runtime), [["performance IN_ERROR_FR"], ["performance IN_ERROR_FR"]]);
         runtime.measure("performance", decimal("0.1")).expect("known");
         // What was measured of a design before says nothing about the next one.

@@ -112,7 +112,7 @@ impl Replay {
         same("state", &self.state(), &step["state"])
     }
 
-    /// A diagnostic message: an unknown name or a value that is no number changes nothing.
+    /// A diagnostic message: an unknown name or a value that is not a number changes nothing.
     fn report(&mut self, step: &Value) -> Result<(), String> {
         let text = |key: &str| step[key].as_str().unwrap_or_default().to_owned();
         let accepted = match step["message"].as_str().expect("message") {

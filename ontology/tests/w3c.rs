@@ -167,6 +167,6 @@ fn cases_of_the_working_group() {
         println!("{profile}, {kind}, {verdict}: {count}");
     }
     assert_eq!(wrong, [""; 0]);
-    // What is decided as the W3C has it is no exception any more.
+    // What is decided as the W3C has it is not an exception any more.
     assert_eq!(open, BTreeSet::new());
 }

@@ -49,7 +49,7 @@ impl<'a> Validator<'a> {
         self.options(Options { concurrent: true, tolerance: separation })
     }
 
-    /// Executes a plan. A plan that is not valid is no error: see [`Verdict::violation`].
+    /// Executes a plan. A plan that is not valid is not an error: see [`Verdict::violation`].
     ///
     /// # Errors
     /// All lines that are not steps of a plan.

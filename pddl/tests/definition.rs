@@ -339,7 +339,7 @@ fn the_tolerance_is_for_rounded_plans() {
     };
     // What begins too early by a rounding begins when the step before has ended, and the event has taken place by then.
     assert_eq!(verdict(&Options::default(), "0: (a) [5]\n4.9995: (b) [1]"), Some("at_start"));
-    // A separation is no tolerance of durations.
+    // A separation is not a tolerance of durations.
     let separation = BigRational::from_integer(BigInt::from(1));
     let wide = Options { concurrent: true, tolerance: separation };
     assert_eq!(verdict(&wide, "0: (a) [4.5]"), Some("duration"));

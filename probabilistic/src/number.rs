@@ -158,7 +158,7 @@ pub(crate) fn rounded<N: Number>(value: &BigRational) -> Option<N> {
     (N::EXACT || Zero::is_zero(value) || (1e-250..=1e250).contains(&magnitude)).then_some(number)
 }
 
-/// A decimal as it is written, `1.25e-3`, exactly; none where the text is no number.
+/// A decimal as it is written, `1.25e-3`, exactly; none where the text is not a number.
 pub fn parse_decimal(text: &str) -> Option<BigRational> {
     let (mantissa, exponent) = match text.split_once(['e', 'E']) {
         Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().ok()?),

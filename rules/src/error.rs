@@ -77,7 +77,7 @@ pub enum Error {
     },
     /// An atom that no class and no property can have, and that no rule concludes.
     #[error(
-        "{file}:{line}:{column}: R104 <{name}> with {count} arguments is no class, no property and nothing that a rule \
+        "{file}:{line}:{column}: R104 <{name}> with {count} arguments is not a class, a property or anything that a rule \
          concludes, and a built-in of this name is not known"
     )]
     UnknownRelation {

@@ -189,7 +189,7 @@ fn temporal_relations() {
         ("finishes", format!("{later}, {early}, {later}"), true),
         ("intersects", format!("{late}, {early}, {later}"), true),
         ("notIntersects", format!("{early}, {late}, {later}"), true),
-        // A period that ends before it begins is none, and neither is what is no moment: not even its negation holds.
+        // A period that ends before it begins is none, and neither is what is not a moment: not even its negation holds.
         ("during", format!("{late}, {later}, {early}"), false),
         ("notDuring", format!("{late}, {later}, {early}"), false),
         ("notBefore", format!("{late}, \"soon\""), false),
@@ -214,7 +214,7 @@ fn unknown_built_ins_are_errors() {
     };
     let unknown = |at: &str, name: &str, count: usize| {
         format!(
-            "test:{at}: R104 <{name}> with {count} arguments is no class, no property and nothing that a rule concludes, \
+            "test:{at}: R104 <{name}> with {count} arguments is not a class, a property or anything that a rule concludes, \
              and a built-in of this name is not known"
         )
     };

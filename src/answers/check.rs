@@ -9,7 +9,9 @@ use serde::Serialize;
 /// A value of a property, its policy's size, and what it took.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct CheckAnswer<'a> {
+    /// Name and version of this format.
     format: &'static str,
+    /// As it was asked.
     property: &'a str,
     /// Its name in a file of properties.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -19,13 +21,16 @@ pub struct CheckAnswer<'a> {
     constants: Option<BTreeMap<&'a str, &'a str>>,
     #[serde(flatten)]
     found: Found,
+    /// The size of the model, and what it took.
     statistics: SizePart,
 }
 
 /// What several properties, or several values of constants, are answered with.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ChecksAnswer<'a> {
+    /// Name and version of this format.
     format: &'static str,
+    /// An answer for each property and each value of the constants.
     answers: Vec<CheckAnswer<'a>>,
     /// Properties without an answer.
     refused: Vec<RefusedPart<'a>>,
@@ -34,8 +39,11 @@ pub struct ChecksAnswer<'a> {
 /// A property that has no answer.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct RefusedPart<'a> {
+    /// As it was asked.
     property: &'a str,
+    /// Its name in the file of properties; null where it has none.
     name: Option<&'a str>,
+    /// Why it has no answer.
     messages: Vec<String>,
 }
 
@@ -51,19 +59,25 @@ enum Found {
         holds: Option<bool>,
     },
     Range {
+        /// The least value over the states.
         least: ValuePart,
+        /// The greatest value over the states.
         greatest: ValuePart,
     },
     States {
+        /// Each state of the set.
         states: Vec<StatePart>,
     },
     Front {
+        /// The vertices of a Pareto front: a value for each of the two properties.
         vertices: Vec<[ValuePart; 2]>,
     },
     Constrained {
         #[serde(flatten)]
         value: ValuePart,
+        /// The value of the best policy, which may draw lots.
         randomised: ValuePart,
+        /// The value of the best policy that does not.
         deterministic: ProvedPart,
     },
 }
@@ -72,17 +86,24 @@ enum Found {
 /// `inf`, or null.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ValuePart {
+    /// `finite`, `infinite`, or `undefined` (no policy keeps the bound of `multi`).
     status: &'static str,
+    /// The value; null where it is infinite or undefined.
     value: Option<f64>,
+    /// It is at least this; null where it is infinite or undefined.
     lower: Option<f64>,
+    /// It is at most this; null where it is infinite, undefined, or not bounded.
     upper: Option<f64>,
+    /// The value as a fraction, `inf` where it is infinite, null where it was not computed exactly.
     exact: Option<String>,
 }
 
 /// A state, by the values of its variables, with its value or whether the property holds in it.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct StatePart {
+    /// Variable to value.
     state: BTreeMap<String, i64>,
+    /// Whether the property holds in it.
     #[serde(skip_serializing_if = "Option::is_none")]
     holds: Option<bool>,
     #[serde(flatten)]
@@ -94,21 +115,29 @@ struct StatePart {
 struct ProvedPart {
     #[serde(flatten)]
     value: ValuePart,
+    /// Whether no policy without lots is better.
     proved: bool,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct SizePart {
+    /// Reachable states.
     states: usize,
+    /// Choices, over all states.
     choices: usize,
+    /// Transitions, over all choices.
     transitions: usize,
+    /// States without a choice, which got a loop.
     deadlocks: usize,
+    /// What took how long.
     milliseconds: DurationPart,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct DurationPart {
+    /// Exploring the model.
     build: f64,
+    /// Computing the value.
     solve: f64,
 }
 

@@ -8,10 +8,15 @@ use crate::codes::Code;
 /// What a code of a message means.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct CodeAnswer {
+    /// Name and version of this format.
     format: &'static str,
+    /// The code.
     code: &'static str,
+    /// What a message with this code says.
     meaning: &'static str,
+    /// Why there is such a message.
     cause: &'static str,
+    /// What to do.
     remedy: &'static str,
 }
 

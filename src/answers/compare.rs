@@ -100,11 +100,16 @@ pub fn rows(pair: Option<&Pair>, comparison: &Comparison) -> Vec<Row> {
 /// All comparisons, or as many as there were when time was up.
 #[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 pub struct CompareAnswer<'a> {
+    /// Name and version of this format.
     format: &'static str,
+    /// Whether all of it was computed; false where the time limit came first.
     complete: bool,
+    /// One comparison for each pair.
     comparisons: Vec<ComparisonAnswer>,
+    /// Rows that `--published` adds, in the form of candidates.
     #[schemars(with = "Vec<std::collections::BTreeMap<String, serde_json::Value>>")]
     published: &'a [Row],
+    /// Why it is not complete (M130).
     messages: &'a [Message],
 }
 
@@ -119,67 +124,105 @@ impl<'a> CompareAnswer<'a> {
 /// One comparison.
 #[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 pub struct ComparisonAnswer {
+    /// Where the mission starts; null for a single comparison.
     start: Option<String>,
+    /// Where it goes; null for a single comparison.
     goal: Option<String>,
+    /// Ways to decide, each with `kind` (`a` to `f`), `name` and the measures; a measure is null where it is infinite or not defined.
     #[schemars(with = "Vec<std::collections::BTreeMap<String, serde_json::Value>>")]
     candidates: Vec<Row>,
     #[serde(flatten)]
     figures: Option<Figures>,
+    /// Whether all candidates were computed.
     complete: bool,
+    /// What both sides took.
     costs: CostsPart,
 }
 
 /// What a comparison has that is done.
 #[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 struct Figures {
+    /// The vertices of the front of expected time and probability of success without collision.
     front: Vec<[f64; 2]>,
+    /// The time that a failed mission counts.
     penalty: f64,
+    /// The penalised time that the plan with replanning takes above the best policy.
     price_of_determinism: Option<f64>,
+    /// Why that price is zero, where it is known without computing it; else null.
     price_provably_zero: Option<&'static str>,
+    /// The penalised time that the plan without replanning takes above the best policy.
     price_of_open_loop: Option<f64>,
+    /// The penalised time that replanning saves.
     value_of_replanning: Option<f64>,
+    /// What the loss of a component does; null where none may be lost.
     loss: Option<LossPart>,
 }
 
 #[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 struct LossPart {
+    /// The component.
     component: String,
+    /// The probability of losing it at each move.
     rate: f64,
+    /// By the move after which it is lost.
     steps: Vec<LossStep>,
 }
 
 #[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 struct LossStep {
+    /// Moves before the loss.
     moves: usize,
+    /// The penalised time of the plan that goes on as it is.
     open_loop: Option<f64>,
+    /// The penalised time with a new plan.
     replanned: Option<f64>,
+    /// The penalised time of a policy that is computed then.
     solved_again: Option<f64>,
+    /// The penalised time of the policy that has known of losses from the start.
     anticipated: Option<f64>,
 }
 
 #[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 struct CostsPart {
+    /// States of the process.
     states: usize,
+    /// Its transitions.
     transitions: usize,
+    /// Plans that were looked for.
     plans: usize,
+    /// Variables of the formulas, in sum.
     variables: u64,
+    /// Clauses of the formulas, in sum.
     clauses: u64,
+    /// Decisions of the policy that are reachable.
     decisions: usize,
+    /// What took how long.
     milliseconds: Milliseconds,
+    /// The greatest memory, in MB; null where the system does not tell.
     peak_memory_mb: Option<u64>,
+    /// The greatest memory while the process was solved.
     process_memory_mb: Option<u64>,
+    /// The greatest memory while the first plan was made.
     first_plan_memory_mb: Option<u64>,
 }
 
 #[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 struct Milliseconds {
+    /// Exploring the process.
     build: f64,
+    /// Solving it.
     solve: f64,
+    /// Reading the policy from the solution.
     extract: f64,
+    /// The first plan, in all.
     first_plan: f64,
+    /// Grounding and encoding for it.
     first_plan_build: f64,
+    /// Searching and solving for it.
     first_plan_solve: f64,
+    /// Reading it from the solution.
     first_plan_extract: f64,
+    /// All further plans.
     more_plans: f64,
 }
 

@@ -12,36 +12,49 @@ use crate::number::to_json;
 /// A design for every function in need.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ConfigureAnswer<'a> {
+    /// Name and version of this format.
     format: &'static str,
     /// Whether each function in need has a design.
     served: bool,
     /// Whether it is proved that no choice is better.
     optimal: bool,
+    /// What the chosen designs are worth in sum.
     #[schemars(with = "f64")]
     utility: Value,
+    /// Each objective in need, with what was chosen for it.
     choices: Vec<ChoicePart<'a>>,
+    /// What is questionable about the files.
     warnings: &'a [Message],
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ChoicePart<'a> {
+    /// The objective.
     objective: &'a str,
+    /// The function that it is of; null where the knowledge base does not say.
     function: Option<&'a str>,
+    /// Why it needs a design: its statuses.
     need: &'a [String],
+    /// The design that it had; null where there is none.
     before: Option<&'a str>,
+    /// The design that it gets; null where there is none for it.
     design: Option<&'a str>,
+    /// All designs of the function.
     considered: Vec<ConsideredPart<'a>>,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ConsideredPart<'a> {
+    /// The design.
     design: &'a str,
+    /// What it is worth.
     #[schemars(with = "f64")]
     utility: Value,
     /// Requirements of the objective that it is estimated to miss.
     missed: &'a [String],
     /// `chosen`, `ruled out`, `less` or `not together`.
     verdict: &'static str,
+    /// Why it is ruled out, or not chosen together with the others.
     because: Vec<&'a str>,
 }
 
@@ -93,8 +106,11 @@ impl<'a> ConsideredPart<'a> {
 /// The first line of the loop of `run --configure`.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct KeeperReadyLine {
+    /// `ready`.
     answer: &'static str,
+    /// Name and version of this format.
     format: &'static str,
+    /// The objectives that are there.
     objectives: Vec<String>,
 }
 

@@ -12,44 +12,67 @@ use crate::number::to_json;
 /// What would change the plan.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ChangesAnswer<'a> {
+    /// Name and version of this format.
     format: &'static str,
+    /// The mission's name.
     mission: &'a str,
+    /// The best plan as things are.
     best: BestPart<'a>,
+    /// The smallest changes that lead to another plan.
     changes: Vec<ChangePart<'a>>,
 }
 
 /// All about one design.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct DesignAnswer<'a> {
+    /// Name and version of this format.
     format: &'static str,
+    /// The mission's name.
     mission: &'a str,
+    /// The best plan as things are.
     best: BestPart<'a>,
+    /// The design.
     design: &'a str,
+    /// The functions that it solves.
     functions: &'a [String],
+    /// Whether it is available.
     available: bool,
+    /// Why, or why not.
     because: &'a [String],
+    /// Steps of the best plan that use it, from 1.
     used: &'a [usize],
+    /// The best plan that uses it wherever its functions are needed.
     alone: BestPart<'a>,
+    /// The best plan that does not use it.
     without: BestPart<'a>,
+    /// The smallest changes after which the best plan uses it, or does not.
     changes: Vec<ChangePart<'a>>,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct BestPart<'a> {
+    /// Its metric; null without a plan.
     #[schemars(with = "Option<f64>")]
     cost: Option<Value>,
+    /// Whether it is proved to be the best, or that there is none.
     proved: bool,
+    /// Its steps.
     steps: &'a [PlannedStep],
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ChangePart<'a> {
+    /// What changes: an attribute, a function of the problem, or a component.
     name: &'a str,
+    /// Its value now; null for components.
     #[schemars(with = "Option<f64>")]
     from: Option<Value>,
+    /// `at_least`, `at_most`, `above` or `below` the bound; `failed` or `recovered`.
     relation: &'static str,
+    /// The value from which on the plan is another one; null for components.
     #[schemars(with = "Option<f64>")]
     bound: Option<Value>,
+    /// The best plan in that case.
     then: BestPart<'a>,
 }
 

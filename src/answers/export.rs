@@ -6,22 +6,29 @@ use serde::Serialize;
 /// A mission as PDDL for other planners.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct MissionExport {
+    /// Name and version of this format.
     format: &'static str,
+    /// The text of the domain.
     domain: String,
+    /// The text of the problem.
     problem: String,
 }
 
 /// A mission's process as a model for model checkers.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ModelExport {
+    /// Name and version of this format.
     format: &'static str,
+    /// The text of the model.
     model: String,
 }
 
 /// Where the mission is that was made of another tool's files.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ImportAnswer {
+    /// Name and version of this format.
     format: &'static str,
+    /// The path of the manifest that was written.
     mission: String,
 }
 

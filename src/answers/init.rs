@@ -6,9 +6,13 @@ use serde::Serialize;
 /// Where a new mission lies, and what it consists of.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct InitAnswer<'a> {
+    /// Name and version of this format.
     format: &'static str,
+    /// The directory that was made.
     directory: &'a str,
+    /// The template that it was made from.
     template: &'static str,
+    /// What was written into it.
     files: Vec<&'static str>,
 }
 

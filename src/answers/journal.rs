@@ -10,19 +10,28 @@ use crate::message::Message;
 /// What is in a journal, and what is wrong with it.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct JournalAnswer<'a> {
+    /// Name and version of this format.
     format: &'static str,
+    /// Whether it can be used.
     sound: bool,
+    /// A sentence for each file.
     parts: &'a [String],
+    /// What is wrong with it.
     messages: &'a [Message],
+    /// With `show`: what is in it.
     #[serde(skip_serializing_if = "Option::is_none")]
     records: Option<Vec<RecordPart<'a>>>,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct RecordPart<'a> {
+    /// Its number, from 1.
     record: u64,
+    /// The number of the file that it is in.
     segment: u64,
+    /// `event`, `decision` or `end`.
     kind: &'a str,
+    /// When it was written, from the start of the mission.
     #[serde(skip_serializing_if = "Option::is_none")]
     microseconds: Option<u64>,
     /// Of a decision.

@@ -8,9 +8,13 @@ use crate::message::Message;
 /// All that is wrong or questionable about a mission.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct LintAnswer<'a> {
+    /// Name and version of this format.
     format: &'static str,
+    /// How many errors.
     errors: usize,
+    /// How many warnings.
     warnings: usize,
+    /// All of them, in the order of the files.
     messages: &'a [Message],
 }
 

@@ -15,25 +15,40 @@ use crate::number::exact_to_json;
 /// A plan with its proof and its figures.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct PlanAnswer {
+    /// Name and version of this format.
     format: &'static str,
+    /// The mission's name; empty for a domain and a problem.
     mission: String,
+    /// `optimal`, `feasible`, `unsolvable`, `unsolvable_within_horizon` or `unknown`.
     status: &'static str,
+    /// The value of the metric, in its unit; null without a plan.
     #[schemars(with = "Option<f64>")]
     cost: Option<Value>,
+    /// No plan has a better metric; null where nothing is known.
     #[schemars(with = "Option<f64>")]
     lower_bound: Option<Value>,
+    /// Steps up to which all plans were considered.
     horizon: usize,
+    /// What proves the status; null where nothing does.
     proof: Option<ProofPart>,
+    /// For a metric without a best value `proved` or `suspected`; else null.
     unbounded: Option<&'static str>,
+    /// The plan; empty where there is none.
     steps: Vec<StepPart>,
+    /// What was done.
     statistics: StatisticsPart,
+    /// With `--minimize`: the values by objective.
     #[serde(skip_serializing_if = "Option::is_none")]
     objectives: Option<Vec<Objective>>,
+    /// With `--alternatives`, for an optimal plan: others that are as good.
     #[serde(skip_serializing_if = "Option::is_none")]
     alternatives: Option<AlternativesPart>,
+    /// With `--concurrent`: when the last action ends; the metric counts it, and no step's `cost` does.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<f64>")]
     makespan: Option<Value>,
+    /// Where no plan exists, and every design together would give one: a minimal list of designs without which there is none, whatever
+    /// others are available.
     #[serde(skip_serializing_if = "Option::is_none")]
     blocking: Option<Vec<String>>,
 }
@@ -41,17 +56,24 @@ pub struct PlanAnswer {
 /// The front of several objectives.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ParetoAnswer {
+    /// Name and version of this format.
     format: &'static str,
+    /// The mission's name.
     mission: String,
+    /// `complete` where it is proved that no point is missing, else `incomplete`.
     status: &'static str,
+    /// What is minimized, as it was asked for.
     objectives: Vec<String>,
+    /// The plans that none is better than in all objectives, from the best in the first objective on.
     points: Vec<PlanAnswer>,
 }
 
 /// An objective, and the value that a plan has by it.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct Objective {
+    /// The objective, as it was asked for.
     minimize: String,
+    /// Its value for this plan.
     #[schemars(with = "f64")]
     value: Value,
 }
@@ -60,6 +82,7 @@ pub struct Objective {
 #[serde(tag = "by", rename_all = "snake_case")]
 enum ProofPart {
     Sat {
+        /// Steps up to which the formula was solved: no plan that is longer can be better.
         step_bound: usize,
         /// The program by whose word alone the formula has no model.
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -68,60 +91,85 @@ enum ProofPart {
     Bound,
     Search,
     Relaxation {
+        /// Why the relaxation has no plan.
         reason: String,
     },
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct StepPart {
+    /// The name of the action.
     action: String,
+    /// All its arguments, in the order of the action's parameters.
     arguments: Vec<String>,
     /// Function to design.
     #[schemars(with = "std::collections::BTreeMap<String, String>")]
     configuration: Map<String, Value>,
+    /// When it starts, in the domain's time unit.
     #[schemars(with = "f64")]
     start: Value,
+    /// How long it takes; 0 for actions without duration.
     #[schemars(with = "f64")]
     duration: Value,
+    /// What it adds to the metric.
     #[schemars(with = "f64")]
     cost: Value,
+    /// Functions whose design differs from the one that the last step with this function used.
     reconfigured: Vec<String>,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct StatisticsPart {
+    /// Ground operators.
     operators: usize,
+    /// Variables of the largest formula.
     variables: usize,
+    /// Clauses of the largest formula.
     clauses: usize,
     /// Clauses by family.
     #[schemars(with = "std::collections::BTreeMap<String, usize>")]
     families: Map<String, Value>,
+    /// Conflicts of the solvers, over all formulas.
     conflicts: u64,
+    /// Calls of solvers, over all formulas.
     solver_calls: usize,
     /// What found the plan: `search`, `satisficing` or `sat`.
     found_by: Option<&'static str>,
+    /// States whose successors were looked at, over all searches.
     expanded: u64,
+    /// These successors.
     generated: u64,
+    /// Those of them that were estimated.
     evaluated: u64,
+    /// How often the search for a plan soon has begun anew, for a better one.
     restarts: usize,
+    /// Better plans, and bounds that have risen by a hundredth, in their order.
     history: Vec<MomentPart>,
+    /// What took how long.
     milliseconds: MillisecondsPart,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct MomentPart {
+    /// The metric of the best plan then; null without a plan.
     #[schemars(with = "Option<f64>")]
     cost: Option<Value>,
+    /// The bound then.
     #[schemars(with = "f64")]
     lower_bound: Value,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct MillisecondsPart {
+    /// Reading files, reasoning, and filling the problem.
     read: f64,
+    /// Grounding.
     ground: f64,
+    /// Bounds and searches.
     search: f64,
+    /// Making formulas.
     encode: f64,
+    /// Solving them.
     solve: f64,
     /// The times of the history.
     history: Vec<f64>,
@@ -129,14 +177,19 @@ struct MillisecondsPart {
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct AlternativesPart {
+    /// The steps of each.
     plans: Vec<Vec<StepPart>>,
+    /// Whether it is proved that there are no others.
     complete: bool,
+    /// For each step, what every such plan has in common; null where that is not known.
     forced: Option<Vec<ForcedPart>>,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ForcedPart {
+    /// Whether the action of the step is the same in every such plan.
     action: bool,
+    /// Functions whose design in this step is the same in every such plan.
     functions: Vec<String>,
 }
 

@@ -13,51 +13,73 @@ use crate::message::Message;
 /// What follows from documents and rules.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ReasonAnswer<'a> {
+    /// Name and version of this format.
     format: &'static str,
+    /// Whether nothing is contradicted.
     consistent: bool,
+    /// How many rules there are, of documents and rule files; axioms do not count.
     rules: usize,
     /// As N-Triples, each with its full stop.
     inferred: Vec<String>,
+    /// The function designs.
     designs: Vec<DesignPart>,
+    /// The objectives with a status.
     objectives: Vec<ObjectivePart>,
+    /// What is contradicted.
     contradictions: &'a [Contradiction],
+    /// What is not read or not used in full, summed up in `O304`, and likely mistakes (`O4xx`).
     warnings: &'a [Message],
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct DesignPart {
+    /// Its local name.
     name: String,
+    /// Its IRI.
     iri: String,
+    /// The functions that it solves.
     solves: Vec<String>,
+    /// The components that it needs.
     components: Vec<String>,
+    /// Whether it is available.
     available: bool,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ObjectivePart {
+    /// Its local name.
     objective: String,
+    /// Its status, as `o_status` has it.
     status: String,
 }
 
 /// Whether the statements of documents follow.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct EntailmentAnswer<'a> {
+    /// Name and version of this format.
     format: &'static str,
+    /// Whether all statements follow.
     entailed: bool,
+    /// Each statement.
     statements: Vec<StatementPart<'a>>,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct StatementPart<'a> {
+    /// The statement.
     statement: &'a str,
+    /// Whether it follows.
     follows: bool,
+    /// Why, or why not.
     reason: &'a str,
 }
 
 /// Why assertions hold, or do not.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ReasonsAnswer {
+    /// Name and version of this format.
     format: &'static str,
+    /// An answer for each assertion.
     answers: Vec<AssertionAnswer>,
 }
 
@@ -75,17 +97,25 @@ pub struct AssertionAnswer {
 /// What follows about classes and properties.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct SchemaAnswer<'a> {
+    /// Name and version of this format.
     format: &'static str,
+    /// The named classes.
     classes: Vec<EntityPart<'a>>,
+    /// The object properties.
     object_properties: Vec<EntityPart<'a>>,
+    /// The data properties.
     data_properties: Vec<EntityPart<'a>>,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct EntityPart<'a> {
+    /// Its IRI.
     iri: &'a str,
+    /// What it is directly below.
     direct: &'a [String],
+    /// All that it is below.
     above: &'a [String],
+    /// Why nothing can be in it; null where something can.
     empty: Option<&'a str>,
 }
 

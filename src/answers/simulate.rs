@@ -8,49 +8,81 @@ use crate::simulate::{Run, Sample, Strategy};
 /// The figures of all ways of control, and all missions.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct SimulateAnswer<'a> {
+    /// Name and version of this format.
     format: &'static str,
+    /// The mission's name.
     mission: &'a str,
+    /// The scenario.
     scenario: &'a str,
+    /// The figures of each way of control, over all its missions.
     strategies: Vec<StrategyPart>,
+    /// Each mission.
     runs: Vec<RunPart>,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct StrategyPart {
+    /// The way of control.
     strategy: &'static str,
+    /// How many missions.
     runs: usize,
+    /// How many of them reached the goal.
     accomplished: usize,
+    /// The metric of accomplished missions; null where there is none.
     cost: Option<SamplePart>,
+    /// Seconds from an event that the action under way cannot go on after, to what is done about it; null without such an event.
     reaction: Option<SamplePart>,
+    /// How often a function got another design.
     reconfigurations: Option<SamplePart>,
+    /// How many different configurations actions were requested with.
     configurations: Option<SamplePart>,
+    /// Missions in which it did better than the loop; null where the loop was not run.
     better_than_joint: Option<usize>,
+    /// Missions in which it did worse.
     worse_than_joint: Option<usize>,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct SamplePart {
+    /// The mean.
     mean: f64,
+    /// The standard deviation of the sample.
     deviation: f64,
+    /// Half of the 95 % confidence interval's width, by Student's distribution.
     half_width_95: f64,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct RunPart {
+    /// The way of control.
     strategy: &'static str,
+    /// What all that is random was drawn from.
     seed: u64,
+    /// Whether the goal was reached.
     accomplished: bool,
+    /// Whether the robot came to its end.
     lost: bool,
+    /// The mission's metric at the end.
     cost: f64,
+    /// How many seconds it took.
     time: f64,
+    /// Actions that succeeded.
     actions: usize,
+    /// Actions that failed.
     failed: usize,
+    /// Actions that were cancelled.
     cancelled: usize,
+    /// Plans that were looked for.
     plans: usize,
+    /// How often a function got another design.
     reconfigurations: usize,
+    /// How many different configurations actions were requested with.
     configurations: usize,
+    /// The mean reaction in seconds; null without an event.
     reaction: Option<f64>,
+    /// When the pipeline was found, in seconds; null where it was not, or the mission has none.
     found: Option<f64>,
+    /// How much of it was inspected; null where the mission does not inspect.
     distance: Option<f64>,
 }
 

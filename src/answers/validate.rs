@@ -11,31 +11,44 @@ use crate::number::to_json;
 /// Whether a plan is valid, and what it costs; or what is wrong with it.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct VerdictAnswer<'a> {
+    /// Name and version of this format.
     format: &'static str,
+    /// Whether the plan can be executed, and the goal holds in the end.
     valid: bool,
+    /// Its value after a valid plan; null without `:metric`, or where it is undefined.
     #[schemars(with = "Option<f64>")]
     metric: Option<Value>,
+    /// The sum of the durations, in the domain's time unit.
     #[schemars(with = "f64")]
     total_time: Value,
     /// By function with arguments.
     #[schemars(with = "std::collections::BTreeMap<String, Option<f64>>")]
     values: Map<String, Value>,
+    /// The first thing that is wrong; null for a valid plan.
     violation: Option<ViolationPart<'a>>,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct ViolationPart<'a> {
+    /// The step, from 1; null for the goal.
     step: Option<usize>,
+    /// Its action; null for the goal.
     action: Option<&'a str>,
+    /// When, in the domain's time unit.
     #[schemars(with = "f64")]
     time: Value,
+    /// `unknown_action`, `unknown_object`, `arguments`, `duration`, `at_start`, `over_all`, `at_end`, `undefined`, `conflict`, `overlap`,
+    /// `interference` or `goal`.
     kind: &'static str,
+    /// One sentence.
     message: &'a str,
+    /// What does not hold.
     unmet: Vec<UnmetPart<'a>>,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 struct UnmetPart<'a> {
+    /// The condition, as PDDL.
     condition: &'a str,
     /// By function with arguments; null where it is undefined.
     #[schemars(with = "std::collections::BTreeMap<String, Option<f64>>")]

@@ -59,7 +59,7 @@ fn values(name: &str, text: &str) -> Result<Vec<String>, String> {
         [_] => return Ok(vec![text.to_owned()]),
         [first, last] => (first, "1", last),
         [first, step, last] => (first, step, last),
-        _ => return Err(format!("`{name}={text}` is no series; write `first:last` or `first:step:last`")),
+        _ => return Err(format!("`{name}={text}` is not a series; write `first:last` or `first:step:last`")),
     };
     let read = |part: &str| {
         let (negative, digits) = part.strip_prefix('-').map_or((false, part), |digits| (true, digits));

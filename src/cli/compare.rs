@@ -88,7 +88,7 @@ fn pair(text: &str) -> Result<Pair, String> {
 
 fn penalty(text: &str) -> Result<f64, String> {
     let value = text.parse::<f64>().ok().filter(|value| *value >= 0.0 && value.is_finite());
-    value.ok_or_else(|| format!("`{text}` is no time that is at least 0"))
+    value.ok_or_else(|| format!("`{text}` is not a time that is at least 0"))
 }
 
 /// Runs the command.

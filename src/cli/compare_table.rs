@@ -30,7 +30,7 @@ pub fn published_rows(path: &std::path::Path) -> Result<Vec<Row>, Failure> {
         let unknown = fields.keys().find(|key| *key != "name" && !MEASURES.contains(&key.as_str()));
         if let Some(unknown) = unknown {
             let text = format!(
-                "entry {}: `{unknown}` is no measure; these are: {}",
+                "entry {}: `{unknown}` is not a measure; these are: {}",
                 number + 1,
                 MEASURES.join(", ")
             );

@@ -30,7 +30,7 @@ pub fn answer(text: &str) {
     document(&visible(text));
 }
 
-/// Writes a document as it is to standard output; a reader that has gone away is no fault, a full disk is.
+/// Writes a document as it is to standard output; a reader that has gone away is not a fault, a full disk is.
 pub fn document(text: &str) {
     let mut stdout = std::io::stdout().lock();
     if let Err(error) = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush())
@@ -123,7 +123,7 @@ pub fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> St
     })
 }
 
-/// An exact number as decimal text; a fraction that is no decimal is rounded.
+/// An exact number as decimal text; a fraction that is not a decimal is rounded.
 pub fn decimal(value: &num_rational::BigRational) -> String {
     rules::Decimal::from_rational(value).to_string()
 }

@@ -18,7 +18,7 @@ pub(super) struct Line {
     pub(super) now: Option<Duration>,
 }
 
-/// Lines without those that are blank. Of a line that is far too long only the beginning is kept, which is no event.
+/// Lines without those that are blank. Of a line that is far too long only the beginning is kept, which is not an event.
 pub(super) struct Lines {
     name: String,
     source: Source,
@@ -31,14 +31,14 @@ enum Source {
     Recorded(Box<Replay<Box<dyn BufRead>>>),
 }
 
-/// Opens a file; a pipe is read as it comes, and anything else that is no file is not.
+/// Opens a file; a pipe is read as it comes, and any other thing that is not a file is refused.
 fn regular(path: &Path) -> io::Result<File> {
     let kind = std::fs::metadata(path)?.file_type();
     #[cfg(unix)]
     let is_pipe = std::os::unix::fs::FileTypeExt::is_fifo(&kind);
     #[cfg(not(unix))]
     let is_pipe = false;
-    if kind.is_file() || is_pipe { File::open(path) } else { Err(io::Error::other("it is no file")) }
+    if kind.is_file() || is_pipe { File::open(path) } else { Err(io::Error::other("it is not a file")) }
 }
 
 impl Lines {

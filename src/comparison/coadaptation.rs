@@ -19,21 +19,31 @@ use crate::mission::Mission;
 #[serde(deny_unknown_fields, default)]
 #[allow(missing_docs, reason = "the names are those of the roles")]
 pub struct Roles {
+    /// The predicate `(robot_at PLACE)`.
     pub location: String,
+    /// The predicate `(configured DESIGN)`.
     pub configured: String,
+    /// The predicate `(fd_available DESIGN)`.
     pub available: String,
     /// `(suits DESIGN FROM TO)`.
     pub suits: String,
     /// `(time FROM TO DESIGN)`, and so on.
     pub time: String,
+    /// The function `(energy FROM TO DESIGN)`.
     pub energy: String,
+    /// The function `(success FROM TO DESIGN)`, a probability.
     pub success: String,
+    /// The function `(hit FROM TO DESIGN)`, the probability of a collision.
     pub hit: String,
     /// `(switch_time OLD NEW)`, and so on.
     pub switch_time: String,
+    /// The function `(switch_energy OLD NEW)`.
     pub switch_energy: String,
+    /// The function `(switch_success OLD NEW)`, a probability.
     pub switch_success: String,
+    /// The function `(battery)`.
     pub battery: String,
+    /// The function `(reserve)`.
     pub reserve: String,
     /// How much battery one level of the process stands for, in the unit of the problem.
     pub battery_unit: u32,

@@ -84,7 +84,7 @@ impl<'t> Map<'t> {
     /// Reads a map.
     ///
     /// # Errors
-    /// It is no JSON of that form, or places are there twice, or lead where there is no place.
+    /// It is not JSON of that form, or places are there twice, or lead where there is no place.
     pub(super) fn read(file: &str, text: &'t str) -> Result<Self, Errors> {
         let map: Self = serde_json::from_str(text).map_err(|error| {
             let older = if error.to_string().contains("missing field `coords`") {
@@ -141,7 +141,7 @@ impl<'t> Map<'t> {
             for next in &node.neighbours {
                 if !known.contains(next.text.as_str()) {
                     let meant = did_you_mean(&next.text, known.iter().copied());
-                    wrong(next.raw, format!("`{own}` leads to `{}`, which is no place{meant}", next.text));
+                    wrong(next.raw, format!("`{own}` leads to `{}`, which is not a place{meant}", next.text));
                 } else if next.text == own {
                     wrong(next.raw, format!("`{own}` leads to itself"));
                 }

@@ -207,7 +207,7 @@ pub(super) const OLD_FORMAT: &str = "is of the format `metaplan-journal/1`, whic
                                      wrote it bring its mission to an end, or begin the mission anew with a journal in another \
                                      directory";
 
-/// Why a file whose first line is no header is none of ours.
+/// Why a file whose first line is not a header is none of ours.
 fn no_journal(first: &[u8]) -> String {
     let text = String::from_utf8_lossy(first);
     let old = text.contains("metaplan-journal/1");
@@ -215,7 +215,7 @@ fn no_journal(first: &[u8]) -> String {
     match (old, damaged) {
         (true, _) => OLD_FORMAT.to_owned(),
         (false, true) => "is damaged in its first line".to_owned(),
-        (false, false) => "is no journal; it was left as it is".to_owned(),
+        (false, false) => "is not a journal; it was left as it is".to_owned(),
     }
 }
 
@@ -238,10 +238,10 @@ fn read_private(path: &Path) -> io::Result<Vec<u8>> {
 }
 
 /// # Errors
-/// There is something with that name that is no file.
+/// There is something with that name that is not a file.
 pub(super) fn require_file(path: &Path) -> io::Result<()> {
     match std::fs::symlink_metadata(path) {
-        Ok(found) if !found.is_file() => Err(io::Error::other("is no regular file")),
+        Ok(found) if !found.is_file() => Err(io::Error::other("is not a regular file")),
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
         _ => Ok(()),
     }

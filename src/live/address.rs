@@ -49,7 +49,7 @@ impl Address {
 fn wrong(text: &str, why: &str) -> Message {
     Message::error(
         "M332",
-        format!("`{text}` is no address to serve at: {why}; it should be PORT, HOST or HOST:PORT"),
+        format!("`{text}` is not an address to serve at: {why}; it should be PORT, HOST or HOST:PORT"),
     )
 }
 

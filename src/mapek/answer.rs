@@ -221,7 +221,7 @@ impl Answer {
         }
     }
 
-    /// Writes what stands behind the kind of an answer that is no effect.
+    /// Writes what stands behind the kind of an answer that is not an effect.
     fn fields<M: SerializeMap>(&self, object: &mut M) -> Result<(), M::Error> {
         match self {
             Self::Inferred { designs, objectives } => {

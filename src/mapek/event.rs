@@ -230,7 +230,7 @@ impl Observation {
             return Err(Refusal::new("M301", format!("a line of {} bytes is too long", text.len())));
         }
         let value: Value = serde_json::from_str(text)
-            .map_err(|error| Refusal::new("M301", format!("this is no JSON: {error}")))?;
+            .map_err(|error| Refusal::new("M301", format!("this is not JSON: {error}")))?;
         if let Some(key) = doubled_key(text) {
             return Err(Refusal::new("M302", format!("the field `{key}` is there twice")));
         }
@@ -400,7 +400,7 @@ fn diagnostics(fields: &Map<String, Value>) -> Result<Vec<Result<Event, Refusal>
 }
 
 fn measured(attribute: &str, value: &str) -> Result<Event, Refusal> {
-    let wrong = || Refusal::new("M304", format!("the value `{value}` of {attribute} is no decimal number"));
+    let wrong = || Refusal::new("M304", format!("the value `{value}` of {attribute} is not a decimal number"));
     Ok(Event::Measured { attribute: attribute.to_owned(), value: number::exact(value).ok_or_else(wrong)? })
 }
 

@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 
 use crate::number;
 
-/// Why a line, or a part of it, is no event.
+/// Why a line, or a part of it, is not an event.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refusal {
     /// A stable code.

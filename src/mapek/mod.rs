@@ -7,7 +7,7 @@
 //! A plan is looked for when the plan at hand cannot be kept: it uses a design that is not available any more, an
 //! objective is in error, an action has failed, the goal has changed, or the validator rejects the plan for the state as it
 //! is (Algorithm 1 of the paper). It is also looked for when a design comes back, and adopted then if it is better by
-//! the mission's minimum benefit. A design that is lost and that the plan does not use is no reason: of fewer choices none is
+//! the mission's minimum benefit. A design that is lost and that the plan does not use is not a reason: of fewer choices none is
 //! better.
 //!
 //! - \[1\] J. Kephart, D. Chess: The vision of autonomic computing, Computer 36, 2003.

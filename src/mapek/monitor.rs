@@ -372,7 +372,7 @@ impl Taking<'_> {
             self.changes.facts = true;
             return Ok(());
         }
-        let wrong = || Refusal::new("M302", format!("the value `{value}` of {name} is no decimal number"));
+        let wrong = || Refusal::new("M302", format!("the value `{value}` of {name} is not a decimal number"));
         let value = number::rounded(&number::exact(value).ok_or_else(wrong)?);
         if self.beliefs.mission.value(&name).as_ref() != Some(&value) {
             self.set(&name, &number::decimal(&value))?;

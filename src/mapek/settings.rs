@@ -15,15 +15,21 @@ use crate::number;
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AdaptationSection {
+    /// A plan that could be kept is replaced only by one whose metric is better by this much; 0 is any benefit.
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     minimum_benefit: Option<Spanned<toml::Value>>,
+    /// For so many seconds must a design be back before a better plan is looked for.
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     settle: Option<Spanned<toml::Value>>,
+    /// So many seconds may one plan take (10 if nothing is said); then the best so far is used if there is one, and planning goes on when
+    /// something changes.
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     time_limit: Option<Spanned<toml::Value>>,
+    /// Of plans that are as good and as long, one is chosen that has most steps of the plan at hand; otherwise the choice depends on the
+    /// situation alone.
     #[serde(default)]
     stay_close: bool,
 }

@@ -20,11 +20,15 @@ use crate::message::{Errors, Message};
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct KnowledgeSection {
+    /// OWL documents.
     files: Vec<PathBuf>,
+    /// Rule files, or `coadaptation`, `tomasys`.
     #[serde(default = "shipped_rules")]
     rules: Vec<String>,
+    /// Catalogs of IRIs, where imports are looked for first.
     #[serde(default)]
     catalogs: Vec<PathBuf>,
+    /// Directories in which imports are looked for.
     #[serde(default)]
     directories: Vec<PathBuf>,
 }

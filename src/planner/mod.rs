@@ -136,7 +136,7 @@ impl<'m, 'r> Planner<'m, 'r> {
     /// # Errors
     /// Every construct that the planner does not handle, with its place; what is wrong with an objective; M107, what is wanted does not go
     /// together; that a limit was reached before the task was ground; or M170, a fault of the planner. A plan that is not proved
-    /// optimal, or none, is no error: see [`Solution::status`].
+    /// optimal, or none, is not an error: see [`Solution::status`].
     pub fn plan(self) -> Result<Planned<'m>, Errors> {
         let objectives = Objectives::read(self.mission, &self.problem, &self.minimize)?;
         let several = objectives.metrics.len() > 1;

@@ -86,7 +86,7 @@ impl<R: Read> Replay<R> {
     /// The next line; none at the end.
     ///
     /// # Errors
-    /// The source cannot be read, it is no MCAP file, or damaged, or nothing in it is for a loop.
+    /// The source cannot be read, it is not an MCAP file, or damaged, or nothing in it is for a loop.
     pub fn next_line(&mut self) -> io::Result<Option<Replayed>> {
         loop {
             if let Some(line) = self.lines.pop_front() {
@@ -136,7 +136,7 @@ impl<R: Read> Replay<R> {
         Ok(())
     }
 
-    /// Takes a record that is no chunk.
+    /// Takes a record that is not a chunk.
     fn take(&mut self, record: Record<'static>) -> io::Result<()> {
         match record {
             Record::Schema { header, .. } => {
@@ -161,7 +161,7 @@ impl<R: Read> Replay<R> {
     fn message(&mut self, header: &MessageHeader, data: &[u8]) -> io::Result<()> {
         let wrong = |what: &str, why: String| {
             let text =
-                format!("message {} of channel {} is no {what}: {why}", header.sequence, header.channel_id);
+                format!("message {} of channel {} is not a {what}: {why}", header.sequence, header.channel_id);
             io::Error::other(text)
         };
         let heard = |json: &str| -> io::Result<Replayed> {
@@ -203,7 +203,7 @@ impl<R: Read> Replay<R> {
 fn damaged(error: McapError) -> io::Error {
     match error {
         McapError::Io(error) => error,
-        McapError::BadMagic => io::Error::other("it is no MCAP file"),
+        McapError::BadMagic => io::Error::other("it is not an MCAP file"),
         other => io::Error::other(format!("it is damaged: {other}")),
     }
 }

@@ -57,7 +57,7 @@ pub(super) fn event() -> Value {
                     "time": {"type": "number", "description": "seconds since the start of the mission, as the sender counts"}
                 }
             },
-            "text": {"type": "string", "description": "the line as it was, where it is no JSON object"}
+            "text": {"type": "string", "description": "the line as it was, where it is not a JSON object"}
         },
         "required": ["line", "nanoseconds"]
     })

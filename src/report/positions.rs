@@ -16,6 +16,7 @@ use crate::message::{Errors, Message};
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ReportSection {
+    /// Where places lie: a CSV file of lines `place,x,y`, or two functions of places, `["x", "y"]`; y is upwards.
     positions: Option<Written>,
 }
 

@@ -11,6 +11,7 @@ use crate::simulate::Sample;
 /// How far a shard, or a study, has come; and means over repetitions where shards were merged.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct SweepAnswer {
+    /// Name and version of this format.
     format: &'static str,
     /// How many runs there are: of the shard, or of the study.
     runs: usize,
@@ -22,6 +23,7 @@ pub struct SweepAnswer {
     timed_out: usize,
     /// Runs that are not done, the first hundred of them.
     missing: Vec<usize>,
+    /// With `--merge`: rows that differ in numbers and seeds only.
     groups: Vec<GroupPart>,
 }
 

@@ -65,8 +65,11 @@ enum Variation {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Range {
+    /// The first value.
     from: i64,
+    /// No value is beyond this one.
     to: i64,
+    /// From each value to the next.
     #[serde(default = "one")]
     step: i64,
 }

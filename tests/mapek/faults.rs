@@ -263,7 +263,7 @@ fn what_is_no_journal_is_left_as_it_is() {
     let file = directory.path().join("journal-000000");
     for text in ["my diary", "my diary\n", ""] {
         std::fs::write(&file, text).expect("a file");
-        refused(directory.path(), &pristine, "is no journal");
+        refused(directory.path(), &pristine, "is not a journal");
         assert_eq!(std::fs::read_to_string(&file).expect("a file"), text);
     }
     // As the version before began one; nothing in it is damaged, so that nothing is to be restored.
@@ -274,7 +274,7 @@ fn what_is_no_journal_is_left_as_it_is() {
     assert_eq!(std::fs::read_to_string(&file).expect("a file"), first);
     std::fs::remove_file(&file).expect("removed");
     std::fs::create_dir(&file).expect("a directory");
-    refused(directory.path(), &pristine, "is no regular file");
+    refused(directory.path(), &pristine, "is not a regular file");
 }
 
 #[cfg(unix)]
@@ -287,10 +287,10 @@ fn links_and_pipes_are_refused_at_once_and_files_are_private() {
         let place = directory.path().join(name);
         let status = std::process::Command::new("mkfifo").arg(&place).status().expect("mkfifo");
         assert!(status.success());
-        refused(directory.path(), &pristine, "is no regular file");
+        refused(directory.path(), &pristine, "is not a regular file");
         std::fs::remove_file(&place).expect("removed");
         std::os::unix::fs::symlink("/etc/hostname", &place).expect("a link");
-        refused(directory.path(), &pristine, "is no regular file");
+        refused(directory.path(), &pristine, "is not a regular file");
     }
     let directory = tempfile::tempdir().expect("a directory");
     let below = directory.path().join("below");

@@ -330,7 +330,7 @@ fn judge_caught(case: &Case, tally: &mut Tally) {
     tally.planning += started.elapsed();
     match answer {
         Answer::Refused(codes) => {
-            // A limit while grounding is no refusal.
+            // A limit while grounding is not a refusal.
             tally.count(if limits.reached() {
                 "limit while grounding".into()
             } else {

@@ -167,7 +167,7 @@ fn inputs_and_the_converters_files_have_plans_of_one_length() {
         let path = |file: &str| folder.join(file).display().to_string();
         let (status, stdout, _) =
             metaplan(&["plan", &path(domain), &path(problem), "--quiet", "--format", "json"]);
-        // What the converter makes of its test features is no PDDL: types or a goal are missing.
+        // What the converter makes of its test features is not PDDL: types or a goal are missing.
         if name.starts_with("testFeatures") {
             assert_eq!(status, 3, "{name}: {stdout}");
             continue;

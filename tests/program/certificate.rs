@@ -193,7 +193,7 @@ fn what_is_changed_is_rejected_with_the_first_thing_that_is_wrong() {
             |text| text + "@prefix a: <urn:a> .\na:b a:c a:d .\n",
             "derivations failed: not well-formed Turtle",
         ),
-        ("proof.drat", |_| "a".repeat(10_000_000), "proof       failed: line 1 of the proof is no clause"),
+        ("proof.drat", |_| "a".repeat(10_000_000), "proof       failed: line 1 of the proof is not a clause"),
     ];
     for (file, edit, expected) in cases {
         let directory = tempfile::tempdir().expect("a directory");
@@ -296,7 +296,7 @@ fn certificates_that_are_none_are_rejected() {
             let made = std::process::Command::new("mkfifo").arg(file).status().expect("mkfifo runs");
             assert!(made.success());
         };
-        check(&pipe, &format!("{name}: is no plain file"));
+        check(&pipe, &format!("{name}: is not a plain file"));
     }
     #[cfg(unix)]
     check(
@@ -305,7 +305,7 @@ fn certificates_that_are_none_are_rejected() {
             std::fs::rename(&plan, directory.join("moved")).expect("a file");
             std::os::unix::fs::symlink(directory.join("moved"), plan).expect("a link");
         },
-        "plan.txt: is no plain file",
+        "plan.txt: is not a plain file",
     );
 }
 

@@ -118,7 +118,7 @@ fn malformed_maps_have_a_place() {
         "[\"h1\", \"h3\"]",
         "[\"h1\", \"hh3\"]",
         "3:76",
-        "`h2` leads to `hh3`, which is no place; did you mean",
+        "`h2` leads to `hh3`, which is not a place; did you mean",
     );
     check("[\"h1\", \"h3\"]", "[\"h1\", \"h2\"]", "3:76", "`h2` leads to itself");
     check("],\n", "],,\n", "8:3", "this is not a map");

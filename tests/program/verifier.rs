@@ -3,7 +3,7 @@
 use crate::certificate::certificate;
 use crate::common::{root, verify_in};
 
-/// What is no certificate at all, what cannot be written, and what takes too long.
+/// What is not a certificate at all, what cannot be written, and what takes too long.
 #[test]
 fn both_programs_refuse_alike() {
     let directory = tempfile::tempdir().expect("a directory");

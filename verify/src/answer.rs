@@ -11,17 +11,25 @@ use crate::manifest::{Claim, Verification, VerifiedPart};
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct VerificationAnswer<'a> {
+    /// Name and version of this format.
     format: &'static str,
+    /// Whether every part is verified.
     verified: bool,
+    /// What the certificate claims: `{"optimal": {"metric": "408"}}`, `"unsolvable"`, or null.
     claim: Option<&'a Claim>,
+    /// What was checked, up to the first part that failed.
     parts: Vec<PartAnswer<'a>>,
 }
 
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 struct PartAnswer<'a> {
+    /// `files`, `derivations`, `knowledge`, `task`, `plan`, `argument`, `formula`, `proof`, `steps`, `mission`; or `limits`, where time or
+    /// memory was up.
     part: &'static str,
+    /// Whether it holds.
     verified: bool,
+    /// What was found, or why it does not hold.
     message: &'a str,
 }
 

@@ -102,7 +102,7 @@ fn plain_file(directory: &Path, name: &str, most: u64) -> Result<PathBuf, String
     let kind =
         fs::symlink_metadata(&path).map_err(|error| wrong(format!("cannot be read: {}", error.kind())))?;
     if !kind.is_file() {
-        return Err(wrong("is no plain file".to_owned()));
+        return Err(wrong("is not a plain file".to_owned()));
     }
     if kind.len() > most {
         return Err(wrong(format!("has {} bytes, more than {most}", kind.len())));

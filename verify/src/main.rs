@@ -98,7 +98,7 @@ fn fail(messages: &[Message], format: Format) {
     }
 }
 
-/// Writes to standard output; false if that is not possible. A reader that has gone away is no fault, a full disk is.
+/// Writes to standard output; false if that is not possible. A reader that has gone away is not a fault, a full disk is.
 fn document(text: &str) -> bool {
     let mut stdout = std::io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {

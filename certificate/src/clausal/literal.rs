@@ -46,7 +46,7 @@ impl Literal {
 impl Neg for Literal {
     type Output = Self;
 
-    #[expect(clippy::arithmetic_side_effects, reason = "the least number is no literal")]
+    #[expect(clippy::arithmetic_side_effects, reason = "the least number is not a literal")]
     fn neg(self) -> Self {
         Self(-self.0)
     }

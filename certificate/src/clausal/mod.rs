@@ -4,7 +4,7 @@
 //! [`encoding`] is plain: one operator at each step, all states written out, sums in binary. It knows no windows, no reduced
 //! costs and no symmetries, and shares nothing with the planner's encoding. It is this formula that a SAT solver refutes for the
 //! certificate, not the one that the plan was found with. [`proof`] checks the refutation, clause by clause, by going through notes
-//! of what each follows from; it is no solver. [`steps`] bounds the number of steps by arithmetic on a potential.
+//! of what each follows from; it is not a solver. [`steps`] bounds the number of steps by arithmetic on a potential.
 //!
 //! The formula of a task is made again to check it, and compared with the written one.
 

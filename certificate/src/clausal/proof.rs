@@ -38,7 +38,7 @@ pub(super) fn check<'c>(
         let text = lines::read(proof, &mut line).map_err(unreadable)?;
         let text = text.ok_or("the proof ends before the empty clause")?;
         lines::literals(text, variables, &mut clause)
-            .ok_or_else(|| wrong("is no clause of the formula's variables"))?;
+            .ok_or_else(|| wrong("is not a clause of the formula's variables"))?;
         let text = lines::read(hints, &mut line).map_err(unreadable)?.unwrap_or_default();
         lines::places(text, checker.places.len(), &mut named)
             .ok_or_else(|| wrong("has hints that name no clauses before it"))?;

@@ -66,7 +66,7 @@ impl Invariant {
             let read = |text: String| {
                 let is_fraction = text.bytes().all(|byte| byte.is_ascii_digit() || b"-/".contains(&byte));
                 let parsed = if is_fraction { text.parse::<BigRational>().ok() } else { None };
-                parsed.ok_or_else(|| form(format!("{text} is no fraction")))
+                parsed.ok_or_else(|| form(format!("{text} is not a fraction")))
             };
             text.map(read).transpose()
         };

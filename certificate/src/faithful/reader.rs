@@ -211,7 +211,7 @@ impl<'r> Reader<'r> {
     pub(super) fn unfold(&mut self, key: &Key) -> Result<Formula, Cause> {
         if self.unfolding.contains(key) {
             return Err(Cause::unsupported(format!(
-                "{}, which depends on itself and is no variable of the task, or on what the same action changes",
+                "{}, which depends on itself and is not a variable of the task, or on what the same action changes",
                 self.world.show(key)
             )));
         }

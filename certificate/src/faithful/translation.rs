@@ -63,7 +63,7 @@ impl Names {
                 let key = world.written(text);
                 let is_derived = |key: &Key| world.rules(key.0).is_some();
                 if is_basic && key.as_ref().is_none_or(is_derived) {
-                    return form(format!("{text} is no atom of the files that actions can change"));
+                    return form(format!("{text} is not an atom of the files that actions can change"));
                 }
                 let key = key.filter(|key| is_basic || is_derived(key));
                 if let Some(key) = &key {
@@ -84,7 +84,7 @@ impl Names {
         let scale = model.number_scale.to_rational();
         for (number, text) in (0..).zip(&model.fluents) {
             let Some(key) = world.written(text) else {
-                return form(format!("{text} is no fluent of the files"));
+                return form(format!("{text} is not a fluent of the files"));
             };
             names.structure.integers.insert(key.clone(), scale.clone());
             if names.numbers.insert(key.clone(), number).is_some() {

@@ -25,7 +25,7 @@ pub enum Faithful {
 #[non_exhaustive]
 pub enum Difference {
     /// The task does not have its form.
-    #[error("it is no task: {reason}")]
+    #[error("it is not a task: {reason}")]
     Form {
         /// What is wrong with it.
         reason: String,
@@ -80,7 +80,7 @@ pub enum Difference {
         what: String,
     },
     /// The witness cannot be read.
-    #[error("it is no witness: {reason}")]
+    #[error("it is not a witness: {reason}")]
     WitnessForm {
         /// What is wrong with it.
         reason: String,

@@ -122,7 +122,7 @@ impl Run<'_> {
         }
         let steps = self.encoding.decode(self.solver.as_ref());
         let is_plan = replay(self.task, &steps).is_some();
-        debug_assert!(is_plan, "the encoding admits a sequence that is no plan");
+        debug_assert!(is_plan, "the encoding admits a sequence that is not a plan");
         (answer, is_plan.then_some(steps))
     }
 

@@ -23,7 +23,7 @@ const NONE: u32 = u32::MAX;
 /// Writes proof and hints, line by line.
 ///
 /// # Errors
-/// The draft is no proof, a limit, or a file that cannot be written.
+/// The draft is not a proof, a limit, or a file that cannot be written.
 #[expect(clippy::arithmetic_side_effects, reason = "places of clauses that are held in memory")]
 pub(super) fn trim<'c>(
     clauses: impl Iterator<Item = &'c [Literal]>,

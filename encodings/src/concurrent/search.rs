@@ -61,7 +61,7 @@ impl<'a> Search<'a> {
         estimate: &'a Estimate,
         bounds: Option<&'a Bounds>,
     ) -> Self {
-        // A duration is no resource.
+        // A duration is not a resource.
         let monotone =
             is_monotone(&concurrent.task) && concurrent.instances.iter().all(|own| own.timer.is_none());
         let mut search = Self {

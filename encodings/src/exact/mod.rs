@@ -57,7 +57,7 @@ impl ExactTask {
 
 /// Finds a cheapest plan by search. Of the configuration it heeds the horizon and the limits.
 ///
-/// With a horizon, a cheapest plan that is longer is no answer: then a best plan within it is looked for, which is not called
+/// With a horizon, a cheapest plan that is longer is not an answer: then a best plan within it is looked for, which is not called
 /// optimal. Where actions improve the metric, plans with fewest steps count, and of those the best by the metric.
 pub fn optimize_exact(task: &ExactTask, config: &Config) -> Solution {
     let started = Instant::now();

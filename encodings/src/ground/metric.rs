@@ -30,7 +30,7 @@ pub(crate) fn attach_costs(task: &mut GroundTask<'_>, generality: &Generality) -
     if lifted.metrics.is_empty() {
         let temporal = task.operators.iter().any(|operator| !operator.duration.is_zero());
         for operator in &mut task.operators {
-            // A wait is no action of the plan.
+            // A wait is not an action of the plan.
             let unit = Quantity::constant(Rational::from_integer(i128::from(operator.wait.is_none())));
             operator.costs = vec![if temporal { operator.duration.clone() } else { unit }];
         }

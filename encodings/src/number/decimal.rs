@@ -70,7 +70,7 @@ impl Decimal {
         (places <= PLACES && fits(mantissa)).then_some(Self { mantissa, places })
     }
 
-    /// None if it is no decimal, or has too many digits.
+    /// None if it is not a decimal, or has too many digits.
     pub(super) fn from_small(small: &Ratio<i128>) -> Option<Self> {
         if *small.denom() == 1 {
             return Some(Self { mantissa: I256::from(*small.numer()), places: 0 });
@@ -86,7 +86,7 @@ impl Decimal {
         Self::new(mantissa, places)
     }
 
-    /// None if it is no decimal, or has too many digits.
+    /// None if it is not a decimal, or has too many digits.
     pub(super) fn from_big(big: &BigRational) -> Option<Self> {
         let bits = |integer: &BigInt| integer.bits();
         if bits(big.numer()) > BITS.into() || bits(big.denom()) > U256::BITS.into() {

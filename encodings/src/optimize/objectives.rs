@@ -100,7 +100,7 @@ pub fn pareto(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement))
             (Status::Optimal, Some(plan)) => {
                 let by_second = cost_by(task, 1, plan).and_then(|cost| cost.checked_sub(1));
                 points.push(point);
-                // A sum that does not fit is no budget: there may be other points.
+                // A sum that does not fit is not a budget: there may be other points.
                 let Some(budget) = by_second else { return Front { points, status: Status::Feasible } };
                 budgets = vec![(1, budget)];
             }
@@ -146,7 +146,7 @@ fn in_order(
         };
         let spent = cost_by(task, *objective, plan);
         budgets.extend(spent.map(|spent| (*objective, spent)));
-        // A sum that does not fit is no budget for what comes next.
+        // A sum that does not fit is not a budget for what comes next.
         let proved = solution.status == Status::Optimal && spent.is_some();
         best = Some(match best {
             None => solution,

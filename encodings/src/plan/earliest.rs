@@ -48,7 +48,7 @@ fn same_action<N: TaskNumber>(task: &Task<N>, id: OperatorId) -> impl Iterator<I
     all.filter(move |(other, other_id)| *other_id != id && same(other)).map(|(_, id)| id)
 }
 
-/// The plan with another operator at a position, and waits where they are needed; none if that is no plan, or a dearer one.
+/// The plan with another operator at a position, and waits where they are needed; none if that is not a plan, or a dearer one.
 fn with<N: TaskNumber>(
     task: &Task<N>,
     plan: &GroundPlan<N>,

@@ -244,7 +244,7 @@ fn frame(problem: &Problem) -> String {
         }
         text.push(' ');
     }
-    // Places belong to it: a text that stands elsewhere counts as another one, which costs time and is no mistake.
+    // Places belong to it: a text that stands elsewhere counts as another one, which costs time and is not a mistake.
     let _ = write!(text, "{:?} {:?}", problem.goal, problem.metric);
     text
 }

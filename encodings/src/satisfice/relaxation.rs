@@ -19,7 +19,7 @@ use crate::task::{Condition, Fact, Literal, Operator, OperatorId, State, Task, V
 /// Something that may hold: by number.
 pub(super) type Proposition = u32;
 
-/// A node that is no operator's.
+/// A node that is not an operator's.
 pub(super) const NO_OPERATOR: u32 = u32::MAX;
 
 /// A sum of numeric variables, and what it has to come to.
@@ -348,7 +348,7 @@ impl<'a, N: TaskNumber> Builder<'a, N> {
     }
 }
 
-/// What an operator adds to a sum at its best; none if it adds nothing, infinite if that is no constant or does not fit. Whether it is
+/// What an operator adds to a sum at its best; none if it adds nothing, infinite if that is not a constant or does not fit. Whether it is
 /// above 0 is decided exactly: what nothing adds to is out of reach.
 fn gain<N: TaskNumber>(operator: &Operator<N>, sum: &[(NumericId, N)]) -> Option<f64> {
     let mut gain = N::zero();

@@ -271,7 +271,7 @@ impl<N: TaskNumber> Store<N> {
         self.width.saturating_sub(self.exact.len())
     }
 
-    /// The nodes of a front that is no tree.
+    /// The nodes of a front that is not a tree.
     fn chain(&self, first: u32) -> impl Iterator<Item = u32> {
         let some = |node: u32| (node != NONE).then_some(node);
         std::iter::successors(some(first), move |node| some(self.nodes[*node as usize].next))

@@ -144,7 +144,7 @@ pub(crate) struct Operator<N = Int> {
     pub(crate) others: Vec<Quantity<N>>,
     /// In the task's time unit.
     pub(crate) duration: Quantity<N>,
-    /// Set if this is no action but a wait until that time, in the task's time unit from the start of the plan.
+    /// Set if this is not an action but a wait until that time, in the task's time unit from the start of the plan.
     pub(crate) wait: Option<N>,
     /// In the task's time unit from the start of the plan.
     pub(crate) timing: Timing<N>,

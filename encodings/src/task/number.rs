@@ -21,7 +21,7 @@ pub(crate) trait TaskNumber: Number + std::fmt::Debug + std::hash::Hash + Defaul
     /// Whether fractions become integers by a common factor; otherwise that factor is 1.
     const SCALED: bool;
 
-    /// A rational times a factor; none if that is no number of this kind.
+    /// A rational times a factor; none if that is not a number of this kind.
     fn from_rational(number: &Rational, scale: Int) -> Option<Self>;
 
     /// About the number, for estimates.

@@ -153,7 +153,7 @@ pub fn check(task: &Task, (domain, problem): &(Domain, Problem)) -> Option<usize
                 }
             }
         }
-        assert!(transitions.is_empty(), "{:?} is no instance\n{}", transitions.keys(), context());
+        assert!(transitions.is_empty(), "{:?} is not an instance\n{}", transitions.keys(), context());
     }
     Some(next)
 }

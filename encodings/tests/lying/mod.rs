@@ -29,7 +29,7 @@ fn files(example: &Example) -> (Domain, Problem) {
 }
 
 fn fraction(text: &str) -> BigRational {
-    text.parse().unwrap_or_else(|_| panic!("{text} is no fraction"))
+    text.parse().unwrap_or_else(|_| panic!("{text} is not a fraction"))
 }
 
 /// The certificate of an example, with its witness.

@@ -279,13 +279,13 @@ impl Knowledge {
     /// and what no more.
     ///
     /// # Errors
-    /// There is no such attribute, or the value is no number.
+    /// There is no such attribute, or the value is not a number.
     pub fn measure(&mut self, attribute: &str, value: &str) -> Result<Delta, Message> {
         let literal = Literal::parse(value, Some("http://www.w3.org/2001/XMLSchema#decimal"), None);
         if literal.as_rational().is_none() {
             return Err(Message::error(
                 "M102",
-                format!("the value `{value}` of {attribute} is no decimal number"),
+                format!("the value `{value}` of {attribute} is not a decimal number"),
             ));
         }
         let outcome = self.runtime.measure(attribute, literal);

@@ -116,7 +116,7 @@ pub fn rule_text(file: &str) -> Result<String, Message> {
         TOMASYS => Ok(rules::TOMASYS_RULES.to_owned()),
         "-" => std::io::read_to_string(std::io::stdin()),
         path => file::read(Path::new(path)).and_then(|bytes| {
-            String::from_utf8(bytes).map_err(|_| std::io::Error::other("it is no UTF-8 text"))
+            String::from_utf8(bytes).map_err(|_| std::io::Error::other("it is not UTF-8 text"))
         }),
     };
     text.map_err(|error| Message::at("M101", file, None, format!("the file cannot be read: {error}")))

@@ -115,7 +115,7 @@ impl CoAdaptation {
         }
         for (name, needs) in &self.actions {
             for needed in needs.functions.iter().filter(|needed| !is_pddl_name(&needed.name)) {
-                let text = format!("`{name}` requires `{}`, which is no PDDL name", needed.name);
+                let text = format!("`{name}` requires `{}`, which is not a PDDL name", needed.name);
                 errors.push(Message::error("M117", text));
             }
             let action = domain.actions.iter().find(|action| action.identifier.name == *name);
@@ -136,7 +136,7 @@ impl CoAdaptation {
                 });
                 if !fits {
                     let text = format!(
-                        "<{}> counts for `{name}` in the context `{context}`, which is no predicate of the domain \
+                        "<{}> counts for `{name}` in the context `{context}`, which is not a predicate of the domain \
                          whose parameters have names of the action's parameters",
                         quality.individual.iri
                     );

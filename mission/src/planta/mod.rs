@@ -176,7 +176,7 @@ impl Planta {
     }
 
     /// Says anew in a filled problem which designs are available: of the others it holds that they cannot be realised. The domain
-    /// that is returned concludes nothing about that. That a function is not grounded is no design that somebody could do without.
+    /// that is returned concludes nothing about that. That a function is not grounded is not a design that somebody could do without.
     pub(crate) fn allow<'d>(
         &self,
         domain: &Domain,

@@ -1,6 +1,6 @@
 //! Which derived predicates of a knowledge base no action and no event can change, and the clauses that decide them.
 //!
-//! A predicate is *open* if an action or an event changes it, if it has an axiom that is no clause, or if a clause for it asks for
+//! A predicate is *open* if an action or an event changes it, if it has an axiom that is not a clause, or if a clause for it asks for
 //! an open one. Taken as they stand, the axioms about domains and ranges open nearly everything: what
 //! `(functionGrounding ?f ?fd)` relates is concluded to be a function and a function design. Such a conclusion says nothing new
 //! where each action that adds the fact asks first whether its arguments are stated to be of that class (a *guard*), and where

@@ -150,7 +150,7 @@ pub(super) fn is_annotation(iri: &str) -> bool {
     iri.starts_with(annotation::NS)
 }
 
-/// Whether an IRI is that of the class of everything, which is no condition, or of nothing.
+/// Whether an IRI is that of the class of everything, which is not a condition, or of nothing.
 pub(super) fn is_top(iri: &str) -> bool {
     [owl::THING, owl::NOTHING].contains(&iri)
 }

@@ -11,7 +11,7 @@ const LARGEST: u64 = 1 << 30;
 pub(super) fn regular_file(path: &Path) -> std::io::Result<Vec<u8>> {
     let metadata = std::fs::metadata(path)?;
     if !metadata.is_file() {
-        return Err(std::io::Error::other("it is no regular file"));
+        return Err(std::io::Error::other("it is not a regular file"));
     }
     let mut bytes = Vec::with_capacity(metadata.len().min(LARGEST) as usize + 1);
     std::fs::File::open(path)?.take(LARGEST + 1).read_to_end(&mut bytes)?;

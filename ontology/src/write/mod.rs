@@ -77,7 +77,7 @@ pub fn convert_files<P: AsRef<Path>>(
 /// Writes an N-Triples document (of this crate's making) as Turtle with the prefixes of the vocabularies in it.
 ///
 /// # Errors
-/// [`Error::Unwritable`] where it is no N-Triples.
+/// [`Error::Unwritable`] where it is not N-Triples.
 pub fn turtle(ntriples: &str) -> Result<String, Error> {
     let unwritable = |reason| Error::Unwritable { syntax: "Turtle", reason };
     let parsed: Result<Vec<Triple>, _> =

@@ -219,7 +219,7 @@ impl<'a> Checker<'a> {
         let is_value = index + 1 == atom.arguments.len() && self.symbols.object_fluents.contains(name);
         let what = if is_value { "the value".to_owned() } else { format!("argument {}", index + 1) };
         let message = format!("{what} of `{name}` is {wanted}, but `{shown}` is {given}");
-        // An object that is no value of its type would be a second one that no quantifier finds.
+        // An object that is not a value of its type would be a second one that no quantifier finds.
         if is_untyped && !is_value {
             self.sink.warning("P126", span, message).help("give it a type in `:objects` or `:constants`");
         } else {

@@ -60,7 +60,7 @@ pub struct NumberBound {
 /// Follows the numbers through a plan. A step without a start begins when the one before it ends.
 ///
 /// # Errors
-/// A step is no action of the domain, or an effect is undefined.
+/// A step is not an action of the domain, or an effect is undefined.
 pub fn course(domain: &Domain, problem: &Problem, plan: &PlanText) -> Result<Course, Box<Violation>> {
     let world = World::new(domain, problem);
     let texts = plan.steps.iter().zip(1..);

@@ -55,7 +55,7 @@ impl<'p> Bindings<'p> {
     }
 }
 
-/// The most bits of a number: a plan that multiplies a value with itself a hundred times is no plan.
+/// The most bits of a number: a plan that multiplies a value with itself a hundred times is not a plan.
 const BITS_LIMIT: u64 = 100_000;
 
 /// Evaluates in one state.

@@ -138,7 +138,7 @@ impl<N: Number> Query<'_, N> {
         Ok((code, sets))
     }
 
-    /// The same with names of sets of states in the place of what is no expression of the model.
+    /// The same with names of sets of states in the place of what is not an expression of the model.
     fn with_sets(&self, expression: &Expr, sets: &mut Vec<FixedBitSet>, stopped: &mut Option<Stop>) -> Expr {
         expression.rewrite(&mut |part| {
             let set = match &part.kind {

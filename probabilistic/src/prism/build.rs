@@ -63,7 +63,7 @@ pub fn compile_command<N: Number>(
         for (number, (name, value, place)) in update.assignments.iter().enumerate() {
             let known = names.find_variable(name);
             let problem = match known {
-                None => Some(("Q201", format!("`{name}` is no variable of the model"))),
+                None => Some(("Q201", format!("`{name}` is not a variable of the model"))),
                 Some(_) if !writable(name) => {
                     Some(("Q208", format!("this command cannot change `{name}`, which is not of its module")))
                 }

@@ -272,7 +272,7 @@ impl Names {
                 self.nested(name, &inner, place)
             }
             None => {
-                let text = format!("`{name}` is no constant, formula or variable of the model");
+                let text = format!("`{name}` is not a constant, formula or variable of the model");
                 Err(Diagnostic::new("Q201", place, text))
             }
         }
@@ -426,7 +426,7 @@ fn fold(code: &Code, kind: Type) -> Result<Code, Fault> {
 
 /// A value from outside: a number, a fraction, a truth value, or an expression of these.
 fn setting_code(text: &str, kind: Type, name: &str) -> Result<Code, Error> {
-    let wrong = || Error::Constant(format!("`{text}` is no value of type `{}` for `{name}`", kind.name()));
+    let wrong = || Error::Constant(format!("`{text}` is not a value of type `{}` for `{name}`", kind.name()));
     if kind == Type::Double
         && let Some(exact) = parse_decimal(text)
     {

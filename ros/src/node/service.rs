@@ -75,7 +75,7 @@ pub enum CallError {
         /// The value of `--rmw` for the other mapping.
         other: &'static str,
     },
-    /// The answer is no message of its type, or the request could not be written.
+    /// The answer is not a message of its type, or the request could not be written.
     #[error("{service}: {because}")]
     Broken {
         /// Its full name.

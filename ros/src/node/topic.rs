@@ -105,7 +105,7 @@ impl Node {
                     Ok((message, _)) => take(message),
                     Err(error) => {
                         if wrong % RUBBISH == 0 {
-                            let text = format!("what was heard on {full} is no {}: {error}", M::TYPE);
+                            let text = format!("what was heard on {full} is not a {}: {error}", M::TYPE);
                             node.log(Severity::Warn, &text);
                         }
                         wrong += 1;

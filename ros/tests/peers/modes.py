@@ -49,7 +49,7 @@ class Faults:
     refuses: set[str] = field(default_factory=set)  # modes that are answered with false
     delay: float = 0.0  # s before an answer
     silent: bool = False  # no answer at all
-    rubbish: bool = False  # an answer that is no CDR of the type
+    rubbish: bool = False  # an answer that is not CDR of the type
     skips: set[str] = field(default_factory=set)  # modes that are granted, and not entered
 
 

@@ -77,7 +77,7 @@ def steps(plan: Any) -> list[str]:
 
 @scenario()
 def planner_node(setting: Setting) -> str:
-    """get_plan honours the metric; what has no plan, and what is no PDDL, is refused with a reason."""
+    """get_plan honours the metric; what has no plan, and what is not PDDL, is refused with a reason."""
     with planner(setting) as (node, _):
         get_plan = node.client("/planner/get_plan", "plansys2_msgs/srv/GetPlan")
         began = time.monotonic()

@@ -8,7 +8,7 @@ use super::signature::BuiltIn;
 use super::text::as_text;
 use crate::literal::Literal;
 
-/// The value of a URI function; `None` for other functions and for what is no URI.
+/// The value of a URI function; `None` for other functions and for what is not a URI.
 pub(super) fn compute(built_in: BuiltIn, arguments: &[&Literal]) -> Option<Literal> {
     let text = match (built_in, arguments) {
         (BuiltIn::ResolveUri, [reference, base]) => {

@@ -11,7 +11,7 @@ const XML_LITERAL: &str = "http://www.w3.org/1999/02/22-rdf-syntax-ns#XMLLiteral
 enum Kind {
     /// The value itself.
     Known,
-    /// A rational number that is no decimal.
+    /// A rational number that is not a decimal.
     Rational,
     /// That it is a piece of XML; two spellings can be one.
     Xml,

@@ -42,7 +42,7 @@ pub enum Literal {
     Base64(Box<[u8]>),
     /// `xsd:anyURI`.
     Uri(Box<str>),
-    /// A datatype that has no meaning here, a rational number that is no decimal (in lowest terms), or an XML literal.
+    /// A datatype that has no meaning here, a rational number that is not a decimal (in lowest terms), or an XML literal.
     Opaque {
         /// As written.
         lexical: Box<str>,

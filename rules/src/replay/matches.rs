@@ -148,7 +148,7 @@ impl Matcher<'_> {
         all
     }
 
-    /// The values with what an atom that is no relation adds to them; none where it does not hold.
+    /// The values with what an atom that is not a relation adds to them; none where it does not hold.
     fn filter(&mut self, body: &[Atom], at: usize, mut values: Values) -> Option<Values> {
         let bound = match &body[at] {
             Atom::Same(left, right) => match (value(*left, &values), value(*right, &values)) {
@@ -173,7 +173,7 @@ impl Matcher<'_> {
         Some(values)
     }
 
-    /// Whether an atom of a rule's body that is no relation holds; `names` are those that are known to be one.
+    /// Whether an atom of a rule's body that is not a relation holds; `names` are those that are known to be one.
     pub fn holds(&mut self, atom: &Atom, rule: &Rule, values: &Values, names: &Names) -> bool {
         let at = rule.body.iter().position(|other| std::ptr::eq(other, atom));
         at.is_some_and(|at| self.holds_at(&rule.body, at, values, names))
@@ -237,7 +237,7 @@ fn column(aggregate: Aggregate) -> Aggregate {
     aggregate.map(&|_| Term::Variable(Variable(0)))
 }
 
-/// Whether an atom that is no relation has values enough.
+/// Whether an atom that is not a relation has values enough.
 fn is_ready(body: &[Atom], at: usize, values: &Values) -> bool {
     let known = |term: &Term| value(*term, values).is_some();
     match &body[at] {

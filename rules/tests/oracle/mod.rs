@@ -219,7 +219,7 @@ pub fn aggregate(
     facts: &BTreeSet<Fact>,
     outside: &BTreeSet<Term>,
 ) -> Option<Literal> {
-    let Atom::Aggregate { aggregate, body, .. } = atom else { panic!("{atom:?} is no aggregate") };
+    let Atom::Aggregate { aggregate, body, .. } = atom else { panic!("{atom:?} is not an aggregate") };
     let mut group = binding.clone();
     group.retain(|variable, _| outside.contains(&Term::Variable(*variable)));
     let found = extensions(body, group, symbols, facts);

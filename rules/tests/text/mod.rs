@@ -20,7 +20,7 @@ pub fn facts(symbols: &mut Symbols, text: &str) -> Vec<Fact> {
         Atom::Relation { predicate, arguments } => Fact::new(predicate, arguments.into_iter().map(ground)),
         Atom::Same(left, right) => Fact::new(same, [ground(left), ground(right)]),
         Atom::Different(left, right) => Fact::new(different, [ground(left), ground(right)]),
-        other => panic!("{other:?} is no fact"),
+        other => panic!("{other:?} is not a fact"),
     };
     program.rules.into_iter().flat_map(|rule| rule.head).map(fact).collect()
 }

@@ -104,7 +104,7 @@ fn every_listing_is_a_part_of_its_file() {
             let Kind::File(file) = &block.kind else { continue };
             let whole = std::fs::read_to_string(root().join(file)).unwrap_or_default();
             if !(format!("\n{whole}")).contains(&format!("\n{}", block.text)) {
-                wrong.push(format!("{page}:{}: this is no part of {file}", block.line));
+                wrong.push(format!("{page}:{}: this is not part of {file}", block.line));
             }
         }
     }

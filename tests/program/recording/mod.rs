@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::common::{Outcome, metaplan_in, root};
 
-/// A mission as it may go: measurements, a failure, what is no event, and what ROS 2 says.
+/// A mission as it may go: measurements, a failure, what is not an event, and what ROS 2 says.
 const EVENTS: [&str; 9] = [
     r#"{"event":"measured","attribute":"ambient_light","value":0.50,"time":1.5}"#,
     r#"{"event":"action_succeeded","action":1}"#,
@@ -277,7 +277,7 @@ fn nothing_is_overwritten_and_what_is_no_recording_is_refused() {
         assert_eq!(outcome.status, 3, "{outcome:#?}");
         assert!(outcome.stderr.contains("M101") && outcome.stderr.contains(said), "{said}: {outcome:#?}");
     };
-    replay(b"\x89PNG\r\n\x1a\n and more that is a picture", "it is no MCAP file");
+    replay(b"\x89PNG\r\n\x1a\n and more that is a picture", "it is not an MCAP file");
     let mut empty = std::io::Cursor::new(Vec::new());
     mcap::Writer::new(&mut empty).expect("a writer").finish().expect("a file");
     replay(empty.get_ref(), "neither /metaplan/events nor diagnostic_msgs/msg/DiagnosticArray");

@@ -92,7 +92,7 @@ impl Middle<'_> {
 }
 
 /// The cases of an instance: one, unless its start is conditional or its numbers are. A case that contradicts itself, or in which
-/// a value is missing, is none; the others stay (PDDL 2.1, section 8: an effect whose condition does not hold is no effect).
+/// a value is missing, is none; the others stay (PDDL 2.1, section 8: an effect whose condition does not hold is not an effect).
 pub(super) fn cases(
     schema: &Schema,
     before: &[Residual],

@@ -81,7 +81,7 @@ impl<'a> Frame<'a> {
         let function = |slot: &SlotParameter| arguments(&[slot.function], core).first().copied();
         let slots = outline.parameters.iter().zip(&designs.designs);
         let slots: Option<_> = slots.map(|(slot, own)| Some((function(slot)?, own.clone()))).collect();
-        let slots = slots.expect("invariant: the function of a slot is no slot");
+        let slots = slots.expect("invariant: the function of a slot is not a slot");
         let forbidden = forbidden.into();
         Ok(Some(Self {
             designs,

@@ -11,7 +11,7 @@
 //!
 //! Events change the state at their time. A start or an end that *interferes* with an event (one changes what the other
 //! reads, or they set an atom to different values) is not at its time [1, section 8.4; 2, section 2]; one that does not may be, and
-//! then their order does not matter. An event at the time of an end is no part of the interval over which a condition holds.
+//! then their order does not matter. An event at the time of an end is not part of the interval over which a condition holds.
 //!
 //! [1] M. Fox, D. Long: PDDL2.1: an extension to PDDL for expressing temporal planning domains, JAIR 20, 2003.
 //! [2] S. Edelkamp, J. Hoffmann: PDDL2.2: the language for the classical part of IPC-4, technical report 195, 2004.

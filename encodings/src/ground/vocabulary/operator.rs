@@ -31,7 +31,7 @@ pub(crate) struct GroundOperator {
     /// By objective.
     pub(crate) costs: Vec<Quantity<Rational>>,
     pub(crate) duration: Quantity<Rational>,
-    /// Set if this is no action but a wait until that time.
+    /// Set if this is not an action but a wait until that time.
     pub(crate) wait: Option<Rational>,
     /// Each time with whether a moment later is meant, until all durations are known.
     pub(crate) timing: Timing<(Rational, bool)>,

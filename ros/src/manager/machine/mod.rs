@@ -261,7 +261,7 @@ impl Machine {
                 Answer::PlanRequested { .. } => self.through = vec![State::Plan],
                 Answer::PlanFound { .. } => {
                     self.without_plan = false;
-                    // What is left of an action is no plan for a task that has ended.
+                    // What is left of an action is not a plan for a task that has ended.
                     if self.task.is_some() || self.control.beliefs().goal().is_none() {
                         self.outputs.push(Output::Plan(answer.to_json()));
                     }

@@ -56,7 +56,7 @@ impl Robot {
 
     /// A change is answered.
     fn answer(&mut self, output: &Output, outcome: Outcome) -> Vec<Output> {
-        let Output::Change(change) = output else { panic!("{output:?} is no change") };
+        let Output::Change(change) = output else { panic!("{output:?} is not a change") };
         self.hear(Input::Changed(change.clone(), outcome))
     }
 
@@ -220,7 +220,7 @@ fn what_somebody_else_has_changed_is_adopted_or_taken_back() {
     let mut robot = Robot::new(None);
     let outputs = robot.request("search_pipeline");
     robot.obey(outputs);
-    // What we have asked for is no news.
+    // What we have asked for is not news.
     assert_eq!(robot.hear(Input::Mode(PATH.to_owned(), "fd_spiral_high".to_owned())), []);
     let outputs = robot.hear(Input::Mode(PATH.to_owned(), "fd_spiral_low".to_owned()));
     assert_eq!(

@@ -212,7 +212,7 @@ impl<A: Action + 'static> Connection<A> {
     }
 
     fn poll(&self) {
-        // What is no answer is left out; a goal whose result is none is never heard of again, as with any client.
+        // What is not an answer is left out; a goal whose result is none is never heard of again, as with any client.
         while let Ok(Some((message, _))) = self.client.feedback_subscription().take() {
             if let Some(followed) = self.goals().get(&message.goal_id) {
                 let _ = followed.events.try_send(Accepted::Feedback(message.feedback));

@@ -4,7 +4,7 @@
 //! the minute or the second on (`1998-12-02T12`): what is missing is the first possible. Moments are compared by *granules*
 //! (years, months, days, hours, minutes, seconds or milliseconds since the beginning of year 1), so that the difference
 //! of 1999-12-31 and 2000-01-01 is one year at the granularity of years. With a time zone they are taken in UTC; one with
-//! and one without do not compare. `now` is no moment, because what has been concluded would have to be concluded again.
+//! and one without do not compare. `now` is not a moment, because what has been concluded would have to be concluded again.
 //! An operation on a period takes the two instants that bound it as second and third argument.
 
 use std::cmp::Ordering;
