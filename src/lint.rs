@@ -1,9 +1,17 @@
 //! All that is wrong or questionable about a mission, found without planning.
 
+use std::time::Duration;
+
+use encodings::Limits;
+use pddl::ast::Problem;
+
 use crate::message::Message;
-use crate::mission::Mission;
+use crate::mission::{Mission, Planning as _};
 use crate::setup::Setup;
 use crate::simulate::Simulation;
+
+/// How long it may take to find what the planner does not handle.
+const PATIENCE: Duration = Duration::from_secs(20);
 
 /// What there is to say of a mission that could be read, errors first.
 ///
@@ -20,7 +28,10 @@ pub fn lint(setup: &Setup) -> Vec<Message> {
     let mission = &setup.mission;
     let mut messages: Vec<Message> = mission.warnings().cloned().collect();
     match mission.filled() {
-        Ok((_, more)) => messages.extend(more),
+        Ok((problem, more)) => {
+            messages.extend(more);
+            messages.extend(refused(mission, &problem));
+        }
         Err(errors) => messages.extend(errors),
     }
     messages.extend(setup.positions().err().into_iter().flatten());
@@ -32,6 +43,13 @@ pub fn lint(setup: &Setup) -> Vec<Message> {
         messages.extend(wrong.iter().map(|message| setup.in_scenario(name, message)));
     }
     in_order(messages)
+}
+
+/// What the planner does not handle. That numbers are too large, and that it takes long to find out, is not a fault of a mission.
+fn refused(mission: &Mission, problem: &Problem) -> impl Iterator<Item = Message> {
+    let limits = Limits::none().with_time(PATIENCE);
+    let refused = mission.ground(problem, &[], &limits).err().into_iter().flatten();
+    refused.filter(|message| !["E304", "E306"].contains(&message.code.as_str()))
 }
 
 /// Messages, each once: errors first, then as they stand in files.

@@ -65,7 +65,8 @@ fn plans_one_after_another_have_the_metric_of_their_end() {
     ] {
         let (domain, problem) = market(metric);
         let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
-        let solution = optimize(&task, &Config::default(), &mut |_| panic!("it is not a bound of the metric"));
+        let solution =
+            optimize(&task, &Config::default(), &mut |_| panic!("it is not a bound of the metric"));
         let plan = solution.plan.as_ref().expect("a plan");
         // 1 at first, 12 for g, 2 for the way, and 7.5 for h.
         assert_eq!(plan.cost.to_string(), expected, "{metric}");

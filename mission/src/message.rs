@@ -233,11 +233,14 @@ impl fmt::Display for Message {
 
 impl std::error::Error for Message {}
 
+const ERROR_FORMAT: &str = "metaplan-error/1";
+
 /// What every command answers that has failed.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct ErrorAnswer<'a> {
     /// Name and version of this format.
+    #[cfg_attr(feature = "schema", schemars(extend("const" = ERROR_FORMAT)))]
     format: &'static str,
     /// All that is wrong.
     messages: &'a [Message],
@@ -246,7 +249,7 @@ pub struct ErrorAnswer<'a> {
 impl<'a> ErrorAnswer<'a> {
     /// With all messages.
     pub fn new(messages: &'a [Message]) -> Self {
-        Self { format: "metaplan-error/1", messages }
+        Self { format: ERROR_FORMAT, messages }
     }
 }
 

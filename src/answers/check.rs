@@ -6,10 +6,15 @@ use probabilistic::check::{Answer, Listed, Outcome, Report};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+const CHECK: &str = "metaplan-check/1";
+
+const CHECKS: &str = "metaplan-checks/1";
+
 /// A value of a property, its policy's size, and what it took.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct CheckAnswer<'a> {
     /// Name and version of this format.
+    #[schemars(extend("const" = CHECK))]
     format: &'static str,
     /// As it was asked.
     property: &'a str,
@@ -29,6 +34,7 @@ pub struct CheckAnswer<'a> {
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ChecksAnswer<'a> {
     /// Name and version of this format.
+    #[schemars(extend("const" = CHECKS))]
     format: &'static str,
     /// An answer for each property and each value of the constants.
     answers: Vec<CheckAnswer<'a>>,
@@ -200,7 +206,7 @@ impl<'a> CheckAnswer<'a> {
             milliseconds,
         };
         let (name, constants) = (None, None);
-        Self { format: "metaplan-check/1", property, name, constants, found, statistics }
+        Self { format: CHECK, property, name, constants, found, statistics }
     }
 
     /// The same with the name of the property, and with the values of constants that have several.
@@ -220,7 +226,7 @@ impl<'a> CheckAnswer<'a> {
 impl<'a> ChecksAnswer<'a> {
     /// The answers that there are, in their order.
     pub fn new(answers: Vec<CheckAnswer<'a>>) -> Self {
-        Self { format: "metaplan-checks/1", answers, refused: Vec::new() }
+        Self { format: CHECKS, answers, refused: Vec::new() }
     }
 
     /// Adds a property without an answer.

@@ -5,10 +5,13 @@ use serde::Serialize;
 
 use crate::codes::Code;
 
+const FORMAT: &str = "metaplan-code/1";
+
 /// What a code of a message means.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct CodeAnswer {
     /// Name and version of this format.
+    #[schemars(extend("const" = FORMAT))]
     format: &'static str,
     /// The code.
     code: &'static str,
@@ -23,6 +26,6 @@ pub struct CodeAnswer {
 impl From<Code> for CodeAnswer {
     fn from(code: Code) -> Self {
         let Code { code, meaning, cause, remedy } = code;
-        Self { format: "metaplan-code/1", code, meaning, cause, remedy }
+        Self { format: FORMAT, code, meaning, cause, remedy }
     }
 }

@@ -8,6 +8,8 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 use crate::comparison::{Candidate, Comparison, Costs, LossAt, LossReport, Measures};
 use crate::message::Message;
 
+const FORMAT: &str = "metaplan-compare/1";
+
 /// Start and goal, where a comparison is one of many.
 pub type Pair = (String, String);
 
@@ -101,6 +103,7 @@ pub fn rows(pair: Option<&Pair>, comparison: &Comparison) -> Vec<Row> {
 #[derive(Debug, Clone, serde::Serialize, JsonSchema)]
 pub struct CompareAnswer<'a> {
     /// Name and version of this format.
+    #[schemars(extend("const" = FORMAT))]
     format: &'static str,
     /// Whether all of it was computed; false where the time limit came first.
     complete: bool,
@@ -117,7 +120,7 @@ impl<'a> CompareAnswer<'a> {
     /// With rows that the user adds; not complete if there is a message.
     pub fn new(comparisons: Vec<ComparisonAnswer>, published: &'a [Row], messages: &'a [Message]) -> Self {
         let complete = messages.is_empty();
-        Self { format: "metaplan-compare/1", complete, comparisons, published, messages }
+        Self { format: FORMAT, complete, comparisons, published, messages }
     }
 }
 
@@ -172,13 +175,13 @@ struct LossPart {
 struct LossStep {
     /// Moves before the loss.
     moves: usize,
-    /// The penalised time of the plan that goes on as it is.
+    /// The time of the plan if it can be carried on as it is; null where it cannot.
     open_loop: Option<f64>,
-    /// The penalised time with a new plan.
+    /// The time with a new plan from there.
     replanned: Option<f64>,
-    /// The penalised time of a policy that is computed then.
+    /// The time when the process is solved again from there.
     solved_again: Option<f64>,
-    /// The penalised time of the policy that has known of losses from the start.
+    /// The time of the policy that reckons with the loss, which may have gone another way from the start.
     anticipated: Option<f64>,
 }
 
@@ -190,11 +193,11 @@ struct CostsPart {
     transitions: usize,
     /// Plans that were looked for.
     plans: usize,
-    /// Variables of the formulas, in sum.
+    /// Variables of the largest formula.
     variables: u64,
-    /// Clauses of the formulas, in sum.
+    /// Clauses of the largest formula.
     clauses: u64,
-    /// Decisions of the policy that are reachable.
+    /// What the policies of single objectives decide, in all states that they get to.
     decisions: usize,
     /// What took how long.
     milliseconds: Milliseconds,

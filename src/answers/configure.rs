@@ -9,10 +9,13 @@ use crate::mapek::FORMAT;
 use crate::message::Message;
 use crate::number::to_json;
 
+const CONFIGURE: &str = "metaplan-configure/1";
+
 /// A design for every function in need.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ConfigureAnswer<'a> {
     /// Name and version of this format.
+    #[schemars(extend("const" = CONFIGURE))]
     format: &'static str,
     /// Whether each function in need has a design.
     served: bool,
@@ -33,13 +36,13 @@ struct ChoicePart<'a> {
     objective: &'a str,
     /// The function that it is of; null where the knowledge base does not say.
     function: Option<&'a str>,
-    /// Why it needs a design: its statuses.
+    /// Why it is in need: its statuses, `updatable`, `always improve`, or `ungrounded`.
     need: &'a [String],
     /// The design that it had; null where there is none.
     before: Option<&'a str>,
     /// The design that it gets; null where there is none for it.
     design: Option<&'a str>,
-    /// All designs of the function.
+    /// All designs of the function, in the order of preference.
     considered: Vec<ConsideredPart<'a>>,
 }
 
@@ -47,7 +50,7 @@ struct ChoicePart<'a> {
 struct ConsideredPart<'a> {
     /// The design.
     design: &'a str,
-    /// What it is worth.
+    /// What it is worth; larger is better.
     #[schemars(with = "f64")]
     utility: Value,
     /// Requirements of the objective that it is estimated to miss.
@@ -62,7 +65,7 @@ impl<'a> ConfigureAnswer<'a> {
     /// All of it.
     pub fn new(configuration: &'a Configuration, warnings: &'a [Message]) -> Self {
         Self {
-            format: "metaplan-configure/1",
+            format: CONFIGURE,
             served: configuration.choices.iter().all(|choice| choice.design.is_some()),
             optimal: configuration.optimal,
             utility: to_json(&configuration.utility),

@@ -9,10 +9,13 @@ use crate::explain::{BestPlan, Change, DesignExplanation, Target};
 use crate::mapek::PlannedStep;
 use crate::number::to_json;
 
+const FORMAT: &str = "metaplan-explain/1";
+
 /// What would change the plan.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ChangesAnswer<'a> {
     /// Name and version of this format.
+    #[schemars(extend("const" = FORMAT))]
     format: &'static str,
     /// The mission's name.
     mission: &'a str,
@@ -26,6 +29,7 @@ pub struct ChangesAnswer<'a> {
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct DesignAnswer<'a> {
     /// Name and version of this format.
+    #[schemars(extend("const" = FORMAT))]
     format: &'static str,
     /// The mission's name.
     mission: &'a str,
@@ -37,15 +41,15 @@ pub struct DesignAnswer<'a> {
     functions: &'a [String],
     /// Whether it is available.
     available: bool,
-    /// Why, or why not.
+    /// The rules and facts that rule it out.
     because: &'a [String],
     /// Steps of the best plan that use it, from 1.
     used: &'a [usize],
-    /// The best plan that uses it wherever its functions are needed.
+    /// The best plan in which no other design solves its functions; as if it were available if it is not.
     alone: BestPart<'a>,
     /// The best plan that does not use it.
     without: BestPart<'a>,
-    /// The smallest changes after which the best plan uses it, or does not.
+    /// What would have to change for it to be available, or to be so no more.
     changes: Vec<ChangePart<'a>>,
 }
 
@@ -75,8 +79,6 @@ struct ChangePart<'a> {
     /// The best plan in that case.
     then: BestPart<'a>,
 }
-
-const FORMAT: &str = "metaplan-explain/1";
 
 impl<'a> ChangesAnswer<'a> {
     /// The smallest changes that lead to another plan than the best.

@@ -3,10 +3,15 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+const EXPORT: &str = "metaplan-export/1";
+
+const IMPORT: &str = "metaplan-import/1";
+
 /// A mission as PDDL for other planners.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct MissionExport {
     /// Name and version of this format.
+    #[schemars(extend("const" = EXPORT))]
     format: &'static str,
     /// The text of the domain.
     domain: String,
@@ -18,6 +23,7 @@ pub struct MissionExport {
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ModelExport {
     /// Name and version of this format.
+    #[schemars(extend("const" = EXPORT))]
     format: &'static str,
     /// The text of the model.
     model: String,
@@ -27,12 +33,11 @@ pub struct ModelExport {
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ImportAnswer {
     /// Name and version of this format.
+    #[schemars(extend("const" = IMPORT))]
     format: &'static str,
     /// The path of the manifest that was written.
     mission: String,
 }
-
-const EXPORT: &str = "metaplan-export/1";
 
 impl MissionExport {
     /// The texts of domain and problem.
@@ -51,6 +56,6 @@ impl ModelExport {
 impl ImportAnswer {
     /// The path of the manifest.
     pub fn new(mission: String) -> Self {
-        Self { format: "metaplan-import/1", mission }
+        Self { format: IMPORT, mission }
     }
 }

@@ -3,10 +3,13 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
+const FORMAT: &str = "metaplan-init/1";
+
 /// Where a new mission lies, and what it consists of.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct InitAnswer<'a> {
     /// Name and version of this format.
+    #[schemars(extend("const" = FORMAT))]
     format: &'static str,
     /// The directory that was made.
     directory: &'a str,
@@ -19,6 +22,6 @@ pub struct InitAnswer<'a> {
 impl<'a> InitAnswer<'a> {
     /// The files of a template in a directory.
     pub fn new(directory: &'a str, template: &'static str, files: Vec<&'static str>) -> Self {
-        Self { format: "metaplan-init/1", directory, template, files }
+        Self { format: FORMAT, directory, template, files }
     }
 }

@@ -7,10 +7,13 @@ use serde_json::Value;
 use crate::journal::{Entry, JournalReport};
 use crate::message::Message;
 
+const FORMAT: &str = "metaplan-journal-report/1";
+
 /// What is in a journal, and what is wrong with it.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct JournalAnswer<'a> {
     /// Name and version of this format.
+    #[schemars(extend("const" = FORMAT))]
     format: &'static str,
     /// Whether it can be used.
     sound: bool,
@@ -31,7 +34,7 @@ struct RecordPart<'a> {
     segment: u64,
     /// `event`, `decision` or `end`.
     kind: &'a str,
-    /// When it was written, from the start of the mission.
+    /// Of an event: its time since the start of the mission.
     #[serde(skip_serializing_if = "Option::is_none")]
     microseconds: Option<u64>,
     /// Of a decision.
@@ -46,7 +49,7 @@ impl<'a> JournalAnswer<'a> {
     /// The report, with the records if `shows`.
     pub fn new(report: &'a JournalReport, shows: bool) -> Self {
         Self {
-            format: "metaplan-journal-report/1",
+            format: FORMAT,
             sound: report.is_sound(),
             parts: &report.parts,
             messages: &report.messages,

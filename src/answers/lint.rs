@@ -5,10 +5,13 @@ use serde::Serialize;
 
 use crate::message::Message;
 
+const FORMAT: &str = "metaplan-lint/1";
+
 /// All that is wrong or questionable about a mission.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct LintAnswer<'a> {
     /// Name and version of this format.
+    #[schemars(extend("const" = FORMAT))]
     format: &'static str,
     /// How many errors.
     errors: usize,
@@ -22,7 +25,7 @@ impl<'a> LintAnswer<'a> {
     /// With all messages.
     pub fn new(messages: &'a [Message]) -> Self {
         let errors = messages.iter().filter(|message| message.is_error()).count();
-        Self { format: "metaplan-lint/1", errors, warnings: messages.len() - errors, messages }
+        Self { format: FORMAT, errors, warnings: messages.len() - errors, messages }
     }
 
     /// How many errors and how many warnings.

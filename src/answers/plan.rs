@@ -12,10 +12,15 @@ use serde_json::{Map, Value};
 use crate::mission::Blocking;
 use crate::number::exact_to_json;
 
+const PARETO: &str = "metaplan-pareto/1";
+
+const PLAN: &str = "metaplan-plan/1";
+
 /// A plan with its proof and its figures.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct PlanAnswer {
     /// Name and version of this format.
+    #[schemars(extend("const" = PLAN))]
     format: &'static str,
     /// The mission's name; empty for a domain and a problem.
     mission: String,
@@ -57,10 +62,11 @@ pub struct PlanAnswer {
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ParetoAnswer {
     /// Name and version of this format.
+    #[schemars(extend("const" = PARETO))]
     format: &'static str,
     /// The mission's name.
     mission: String,
-    /// `complete` where it is proved that no point is missing, else `incomplete`.
+    /// `optimal` where it is proved that there are no other points, `unsolvable` where there is no plan at all; else as for one plan.
     status: &'static str,
     /// What is minimized, as it was asked for.
     objectives: Vec<String>,
@@ -81,6 +87,7 @@ pub struct Objective {
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 #[serde(tag = "by", rename_all = "snake_case")]
 enum ProofPart {
+    /// No formula up to the step bound has a better plan.
     Sat {
         /// Steps up to which the formula was solved: no plan that is longer can be better.
         step_bound: usize,
@@ -88,8 +95,11 @@ enum ProofPart {
         #[serde(skip_serializing_if = "Option::is_none")]
         unchecked: Option<String>,
     },
+    /// A lower bound is reached.
     Bound,
+    /// Every state from which a better plan could go on was searched.
     Search,
+    /// Not even a relaxation of the task has a plan.
     Relaxation {
         /// Why the relaxation has no plan.
         reason: String,
@@ -212,7 +222,7 @@ impl PlanAnswer {
     pub fn new(mission: &str, solution: &Solution, preparation: &Preparation) -> Self {
         let statistics = &solution.statistics;
         Self {
-            format: "metaplan-plan/1",
+            format: PLAN,
             mission: mission.to_owned(),
             status: solution.status.as_str(),
             cost: solution.plan.as_ref().map(|plan| exact_to_json(&plan.cost)),
@@ -270,7 +280,7 @@ impl ParetoAnswer {
                 .with_objectives(Objective::all(objectives, &point.values))
         };
         Self {
-            format: "metaplan-pareto/1",
+            format: PARETO,
             mission: mission.to_owned(),
             status: front.status.as_str(),
             objectives: objectives.to_vec(),

@@ -10,10 +10,19 @@ use serde::Serialize;
 use crate::knowledge::{Contradiction, Knowledge};
 use crate::message::Message;
 
+const ENTAILS: &str = "metaplan-entails/1";
+
+const REASON: &str = "metaplan-reason/1";
+
+const REASONS: &str = "metaplan-reasons/1";
+
+const SCHEMA: &str = "metaplan-schema/1";
+
 /// What follows from documents and rules.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ReasonAnswer<'a> {
     /// Name and version of this format.
+    #[schemars(extend("const" = REASON))]
     format: &'static str,
     /// Whether nothing is contradicted.
     consistent: bool,
@@ -57,6 +66,7 @@ struct ObjectivePart {
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct EntailmentAnswer<'a> {
     /// Name and version of this format.
+    #[schemars(extend("const" = ENTAILS))]
     format: &'static str,
     /// Whether all statements follow.
     entailed: bool,
@@ -78,6 +88,7 @@ struct StatementPart<'a> {
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct ReasonsAnswer {
     /// Name and version of this format.
+    #[schemars(extend("const" = REASONS))]
     format: &'static str,
     /// An answer for each assertion.
     answers: Vec<AssertionAnswer>,
@@ -98,6 +109,7 @@ pub struct AssertionAnswer {
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct SchemaAnswer<'a> {
     /// Name and version of this format.
+    #[schemars(extend("const" = SCHEMA))]
     format: &'static str,
     /// The named classes.
     classes: Vec<EntityPart<'a>>,
@@ -125,7 +137,7 @@ impl<'a> ReasonAnswer<'a> {
         let triples = ontology::ntriples(knowledge.engine().symbols(), &knowledge.inferred());
         let objectives = statuses(knowledge).into_iter();
         Self {
-            format: "metaplan-reason/1",
+            format: REASON,
             consistent: contradictions.is_empty(),
             rules: knowledge.rule_count(),
             inferred: triples.lines().map(ToOwned::to_owned).collect(),
@@ -185,14 +197,14 @@ impl<'a> EntailmentAnswer<'a> {
         };
         let statements: Vec<StatementPart<'a>> = found.iter().map(statement).collect();
         let entailed = statements.iter().all(|one| one.follows);
-        Self { format: "metaplan-entails/1", entailed, statements }
+        Self { format: ENTAILS, entailed, statements }
     }
 }
 
 impl ReasonsAnswer {
     /// The answers about all assertions.
     pub fn new(answers: Vec<AssertionAnswer>) -> Self {
-        Self { format: "metaplan-reasons/1", answers }
+        Self { format: REASONS, answers }
     }
 }
 
@@ -201,7 +213,7 @@ impl<'a> SchemaAnswer<'a> {
     pub fn new(schema: &'a Schema) -> Self {
         let all = |entities: &'a [SchemaEntity]| entities.iter().map(EntityPart::of).collect();
         Self {
-            format: "metaplan-schema/1",
+            format: SCHEMA,
             classes: all(&schema.classes),
             object_properties: all(&schema.object_properties),
             data_properties: all(&schema.data_properties),

@@ -5,10 +5,13 @@ use serde::Serialize;
 
 use crate::simulate::{Run, Sample, Strategy};
 
+const FORMAT: &str = "metaplan-simulate/1";
+
 /// The figures of all ways of control, and all missions.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct SimulateAnswer<'a> {
     /// Name and version of this format.
+    #[schemars(extend("const" = FORMAT))]
     format: &'static str,
     /// The mission's name.
     mission: &'a str,
@@ -90,7 +93,7 @@ impl<'a> SimulateAnswer<'a> {
     /// All runs of these ways of control in a scenario.
     pub fn new(mission: &'a str, scenario: &'a str, strategies: &[Strategy], runs: &[Run]) -> Self {
         Self {
-            format: "metaplan-simulate/1",
+            format: FORMAT,
             mission,
             scenario,
             strategies: strategies.iter().map(|&strategy| StrategyPart::of(strategy, runs)).collect(),

@@ -8,10 +8,13 @@ use serde_json::{Map, Value};
 
 use crate::number::to_json;
 
+const FORMAT: &str = "metaplan-verdict/1";
+
 /// Whether a plan is valid, and what it costs; or what is wrong with it.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct VerdictAnswer<'a> {
     /// Name and version of this format.
+    #[schemars(extend("const" = FORMAT))]
     format: &'static str,
     /// Whether the plan can be executed, and the goal holds in the end.
     valid: bool,
@@ -60,7 +63,7 @@ impl<'a> VerdictAnswer<'a> {
     pub fn new(verdict: &'a Verdict) -> Self {
         let value = |(name, value): (&String, &BigRational)| (name.clone(), to_json(value));
         Self {
-            format: "metaplan-verdict/1",
+            format: FORMAT,
             valid: verdict.valid,
             metric: verdict.metric.as_ref().map(to_json),
             total_time: to_json(&verdict.total_time),

@@ -97,7 +97,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if let Some(time) = arguments.time_limit {
         so_far.show_after(time, common);
     }
-    let Setup { mission, mut roles, .. } = arguments.situation.setup(&arguments.inputs)?;
+    let Setup { mission, mut roles, .. } = arguments.situation.setup(&arguments.inputs, common)?;
     if let Some((component, rate)) = &arguments.loss {
         roles.loss_component = Some(component.clone());
         roles.loss_rate = *rate;

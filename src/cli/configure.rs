@@ -14,6 +14,7 @@ use num_rational::BigRational;
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::limits::Guard;
 use crate::cli::output;
+use crate::cli::progress::during;
 use crate::cli::situation::{Imports, consistent, knowledge};
 use crate::cli::values::{amount, seconds, setting};
 
@@ -130,11 +131,11 @@ impl Wanted {
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let Arguments { documents, rules, imports, set, fail, time_limit, wanted } = arguments;
     let guard = Guard::new(*time_limit, None, common)?;
-    let knowledge = knowledge(documents, rules, imports, fail, set)?;
+    let knowledge = during("reading", common, || knowledge(documents, rules, imports, fail, set))?;
     output::warnings(common, knowledge.warnings());
     let configurator = wanted.configurator(knowledge)?;
     consistent(Some(configurator.knowledge()))?;
-    let configuration = configurator.choose(&guard.plan())?;
+    let configuration = during("choosing", common, || configurator.choose(&guard.plan()))?;
     match common.format {
         Format::Json => {
             output::json_answer(&ConfigureAnswer::new(&configuration, configurator.knowledge().warnings()));

@@ -12,6 +12,7 @@ use metaplan::message::{Message, did_you_mean};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::output::{self, decimal};
+use crate::cli::progress::during;
 use crate::cli::situation::Situation;
 
 /// Arguments of `explain`.
@@ -34,13 +35,13 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     {
         return code(name, common);
     }
-    let mission = arguments.situation.mission(std::slice::from_ref(&arguments.mission))?;
+    let mission = arguments.situation.mission(std::slice::from_ref(&arguments.mission), common)?;
     output::warnings(common, mission.warnings());
     let limits = Limits::none();
-    let answer = best(&mission, &limits)?;
+    let answer = during("planning", common, || best(&mission, &limits))?;
     let name = mission.name.as_str();
     if let Some(query) = &arguments.query {
-        let found = design(&mission, query, &limits).map_err(|messages| {
+        let found = during("planning", common, || design(&mission, query, &limits)).map_err(|messages| {
             let exit = if messages.iter().any(|m| m.code == "M112") { Exit::Usage } else { Exit::BadInput };
             Failure { exit, messages }
         })?;
@@ -49,7 +50,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             _ => output::answer(&design_text(&answer, &found)),
         }
     } else {
-        let changes = smallest_changes(&mission, &limits)?;
+        let changes = during("planning", common, || smallest_changes(&mission, &limits))?;
         match common.format {
             Format::Json => output::json_answer(&ChangesAnswer::new(name, &answer, &changes)),
             _ => output::answer(&changes_text(&answer, &changes)),

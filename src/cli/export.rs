@@ -13,6 +13,7 @@ use pddl::{portable, print_domain, print_problem};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::output;
+use crate::cli::progress::during;
 use crate::cli::situation::Situation;
 
 /// Arguments of `export`.
@@ -59,7 +60,7 @@ enum Setting {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
-    let Setup { mission, roles, .. } = arguments.situation.setup(&arguments.inputs)?;
+    let Setup { mission, roles, .. } = arguments.situation.setup(&arguments.inputs, common)?;
     if !matches!(arguments.target, Language::Pddl) {
         let (problem, warnings) = mission.filled()?;
         output::warnings(common, mission.warnings().chain(&warnings));
@@ -94,11 +95,13 @@ fn process(
     problem: &Problem,
     roles: &Roles,
 ) -> Result<Exit, Failure> {
-    let coadaptation = if Coadaptation::is_spelt_out(problem, roles) {
-        Coadaptation::new(mission, problem, roles)?
-    } else {
-        Tasked::new(mission, problem, roles)?.coadaptation
-    };
+    let coadaptation = during("exploring", common, || {
+        if Coadaptation::is_spelt_out(problem, roles) {
+            Coadaptation::new(mission, problem, roles)
+        } else {
+            Tasked::new(mission, problem, roles).map(|tasked| tasked.coadaptation)
+        }
+    })?;
     let model = match arguments.setting {
         Setting::Corrected => program(&coadaptation, Risk::all(&coadaptation)),
         Setting::Published => published_program(&coadaptation),

@@ -10,6 +10,7 @@ use serde_json::Value;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::output;
+use crate::cli::progress::during;
 
 /// Arguments of `journal`.
 #[derive(Debug, Args)]
@@ -37,7 +38,7 @@ enum Operation {
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let (Operation::Check { directory } | Operation::Show { directory }) = &arguments.what;
-    let report = JournalReport::read(directory)?;
+    let report = during("reading", common, || JournalReport::read(directory))?;
     let shows = matches!(arguments.what, Operation::Show { .. });
     if common.format == Format::Json {
         output::json_answer(&JournalAnswer::new(&report, shows));

@@ -8,6 +8,7 @@ use metaplan::lint::{in_order, lint};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::output;
+use crate::cli::progress::during;
 use crate::cli::situation::Situation;
 
 /// Arguments of `lint`.
@@ -22,8 +23,8 @@ pub struct Arguments {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
-    let messages = match arguments.situation.setup(&arguments.inputs) {
-        Ok(setup) => lint(&setup),
+    let messages = match arguments.situation.setup(&arguments.inputs, common) {
+        Ok(setup) => during("looking", common, || lint(&setup)),
         Err(failure) if failure.exit == Exit::Usage => return Err(failure),
         Err(failure) => in_order(failure.messages.into_vec()),
     };

@@ -191,7 +191,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let guard = Guard::new(arguments.time_limit, arguments.memory_limit, common)?;
     arguments.check()?;
 
-    let setup = arguments.situation.setup(&arguments.inputs)?;
+    let setup = arguments.situation.setup(&arguments.inputs, common)?;
     let is_drawn = arguments.report.is_some() || arguments.drawing.is_file_wanted();
     let positions = if is_drawn { setup.positions()? } else { Positions::Unknown };
     let mission = setup.mission;

@@ -55,6 +55,12 @@ impl Progress {
     }
 }
 
+/// Does something, and shows what as long as it takes.
+pub(super) fn during<T>(what: &'static str, common: &Common, work: impl FnOnce() -> T) -> T {
+    let _progress = Progress::new(what, common);
+    work()
+}
+
 impl Drop for Progress {
     fn drop(&mut self) {
         self.bar.finish_and_clear();

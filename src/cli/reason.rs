@@ -12,6 +12,7 @@ use rules::{DEFAULT_STEP_BUDGET, Delta, Limits};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::output;
+use crate::cli::progress::during;
 use crate::cli::reason_ask::Questions;
 use crate::cli::situation::{Imports, consistent};
 use crate::cli::values::setting;
@@ -51,7 +52,7 @@ pub struct Arguments {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
-    let mut knowledge = read(arguments)?;
+    let mut knowledge = during("reasoning", common, || read(arguments))?;
     output::warnings(common, knowledge.warnings());
     let mut delta = Delta::default();
     for file in &arguments.assert {
@@ -60,7 +61,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     for file in &arguments.retract {
         delta.delete.extend(knowledge.assertions(file)?);
     }
-    knowledge.apply(delta)?;
+    during("reasoning", common, || knowledge.apply(delta))?;
     for component in &arguments.fail {
         knowledge.fail(component).map_err(Failure::usage)?;
     }

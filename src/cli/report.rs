@@ -22,6 +22,7 @@ use crate::cli::drawn::write_pictures;
 use crate::cli::limits::Guard;
 use crate::cli::output;
 use crate::cli::plan::exit;
+use crate::cli::progress::during;
 use crate::cli::situation::Situation;
 use crate::cli::values::seconds;
 
@@ -62,26 +63,31 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         return Err(Failure::usage(Message::error("M107", text)));
     }
     if let Some(directory) = &arguments.journal {
-        return journal(arguments, directory);
+        return during("reading", common, || JournalReport::read(directory))
+            .map_err(Failure::from)
+            .and_then(|report| journal(arguments, directory, &report));
     }
     let guard = Guard::new(arguments.time_limit, arguments.memory_limit, common)?;
-    let setup = arguments.situation.setup(&arguments.inputs)?;
+    let setup = arguments.situation.setup(&arguments.inputs, common)?;
     let before = arguments.situation.before();
-    let before = before.map(|situation| situation.setup(&arguments.inputs)).transpose()?;
+    let before = before.map(|situation| situation.setup(&arguments.inputs, common)).transpose()?;
     let positions = setup.positions()?;
     output::warnings(common, setup.mission.warnings());
     let limits = guard.plan();
     let separation = arguments.overlap.separation();
-    let answer = Answer::of(&setup.mission, &positions, separation, &limits)?;
+    let answer = during("planning", common, || Answer::of(&setup.mission, &positions, separation, &limits))?;
     let before = match &before {
-        Some(before) => Some((before, Answer::of(&before.mission, &positions, separation, &limits)?)),
+        Some(before) => {
+            let work = || Answer::of(&before.mission, &positions, separation, &limits);
+            Some((before, during("planning", common, work)?))
+        }
         None => None,
     };
     let checked = arguments
         .certificate
         .as_deref()
         .map(|directory| Verifier::new(directory).mission(&setup.mission).stop(|| limits.reached()))
-        .map(|verifier| checked(&verifier.verify()));
+        .map(|verifier| checked(&during("verifying", common, || verifier.verify())));
     let (status, said) = (answer.solution.status, answer.solution.verdict());
     let report = page(arguments, &setup, before, answer, checked);
     if let Some(directory) = &arguments.svg {
@@ -92,9 +98,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
 }
 
 /// The page of a journal.
-fn journal(arguments: &Arguments, directory: &Path) -> Result<Exit, Failure> {
-    let report = JournalReport::read(directory)?;
-    let log = log_picture(&directory.display().to_string(), &report);
+fn journal(arguments: &Arguments, directory: &Path, report: &JournalReport) -> Result<Exit, Failure> {
+    let log = log_picture(&directory.display().to_string(), report);
     if let Some(directory) = &arguments.svg {
         write_pictures(directory, &[("log.svg".to_owned(), log.svg())])?;
     }

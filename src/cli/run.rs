@@ -70,7 +70,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         let text = "`--objective`, `--require`, `--budget`, `--exclusive`, `--most` and `--least` go with `--configure`";
         return Err(Failure::usage(Message::error("M107", text)));
     }
-    let setup = arguments.situation.setup(&arguments.inputs)?;
+    let setup = arguments.situation.setup(&arguments.inputs, common)?;
     let painter = arguments.outlets.painter(&setup)?;
     let Setup { mission, settings, .. } = setup;
     output::warnings(common, mission.warnings());
@@ -160,7 +160,7 @@ fn drive(
 
 /// The loop without a task plan.
 fn keep(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
-    let knowledge = arguments.situation.knowledge(&arguments.inputs)?;
+    let knowledge = arguments.situation.knowledge(&arguments.inputs, common)?;
     output::warnings(common, knowledge.warnings());
     let configurator = arguments.wanted.configurator(knowledge)?;
     consistent(Some(configurator.knowledge()))?;

@@ -11,7 +11,8 @@ use metaplan::planner;
 use metaplan::setup::Setup;
 use ontology::ReadOptions;
 
-use crate::cli::common::{Exit, Failure};
+use crate::cli::common::{Common, Exit, Failure};
+use crate::cli::progress::during;
 use crate::cli::values::{existing_directory, setting};
 
 /// A mission, or a domain and a problem, and the situation to plan for.
@@ -94,21 +95,25 @@ impl Situation {
     }
 
     /// The knowledge of documents in this situation, without a mission.
-    pub(super) fn knowledge(&self, documents: &[PathBuf]) -> Result<Knowledge, Failure> {
+    pub(super) fn knowledge(&self, documents: &[PathBuf], common: &Common) -> Result<Knowledge, Failure> {
         if !self.knowledge.is_empty() || !self.names.is_empty() || self.scenario.is_some() {
             let text = "with `--configure` the knowledge bases are the arguments, and there is no `--kb`, `--name` or `--scenario`";
             return Err(Failure::usage(Message::error("M107", text)));
         }
-        knowledge(documents, &self.rules, &self.imports, &self.fail, &self.set)
+        during("reading", common, || knowledge(documents, &self.rules, &self.imports, &self.fail, &self.set))
     }
 
     /// The mission in this situation, from one input (a manifest) or two (domain and problem).
-    pub(super) fn mission(&self, inputs: &[PathBuf]) -> Result<Mission, Failure> {
-        self.setup(inputs).map(|setup| setup.mission)
+    pub(super) fn mission(&self, inputs: &[PathBuf], common: &Common) -> Result<Mission, Failure> {
+        self.setup(inputs, common).map(|setup| setup.mission)
     }
 
     /// As [`Situation::mission`], with what goes with the mission.
-    pub(super) fn setup(&self, inputs: &[PathBuf]) -> Result<Setup, Failure> {
+    pub(super) fn setup(&self, inputs: &[PathBuf], common: &Common) -> Result<Setup, Failure> {
+        during("reading", common, || self.read(inputs))
+    }
+
+    fn read(&self, inputs: &[PathBuf]) -> Result<Setup, Failure> {
         let mut setup = match inputs {
             [manifest] => {
                 let imports = &self.imports;

@@ -13,6 +13,7 @@ use pddl::validate::{Options, Verdict, validate};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::output;
+use crate::cli::progress::during;
 use crate::cli::situation::Situation;
 use crate::cli::values::time;
 
@@ -44,12 +45,12 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             )));
         }
     };
-    let mission = arguments.situation.mission(mission)?;
+    let mission = arguments.situation.mission(mission, common)?;
     let (problem, warnings) = mission.filled()?;
     output::warnings(common, mission.warnings().chain(&warnings));
     let plan = read_plan(&source(plan)?, &mission)?;
     let options = Options { concurrent: arguments.concurrent, tolerance: arguments.tolerance.clone() };
-    let verdict = validate(mission.domain(), &problem, &plan, &options);
+    let verdict = during("validating", common, || validate(mission.domain(), &problem, &plan, &options));
     match common.format {
         Format::Json => output::json_answer(&VerdictAnswer::new(&verdict)),
         _ => output::answer(&text(&mission, &verdict)),

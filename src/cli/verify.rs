@@ -10,6 +10,7 @@ use ::verify::{Watch, json};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::output;
+use crate::cli::progress::during;
 use crate::cli::situation::Situation;
 use crate::cli::values::{seconds, setting};
 
@@ -54,11 +55,12 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
                 arguments.set.clone(),
                 arguments.fail.clone(),
             );
-            Some(situation.mission(std::slice::from_ref(manifest))?)
+            Some(situation.mission(std::slice::from_ref(manifest), common)?)
         }
         None => None,
     };
-    Ok(show(&watch.end(verifier.mission(mission.as_ref()).verify()), format))
+    let report = during("verifying", common, || verifier.mission(mission.as_ref()).verify());
+    Ok(show(&watch.end(report), format))
 }
 
 fn show(report: &Verification, format: Format) -> Exit {

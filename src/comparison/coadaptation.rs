@@ -25,9 +25,9 @@ pub struct Roles {
     pub configured: String,
     /// The predicate `(fd_available DESIGN)`.
     pub available: String,
-    /// `(suits DESIGN FROM TO)`.
+    /// The predicate `(suits DESIGN FROM TO)`.
     pub suits: String,
-    /// `(time FROM TO DESIGN)`, and so on.
+    /// The function `(time FROM TO DESIGN)`.
     pub time: String,
     /// The function `(energy FROM TO DESIGN)`.
     pub energy: String,
@@ -35,7 +35,7 @@ pub struct Roles {
     pub success: String,
     /// The function `(hit FROM TO DESIGN)`, the probability of a collision.
     pub hit: String,
-    /// `(switch_time OLD NEW)`, and so on.
+    /// The function `(switch_time OLD NEW)`.
     pub switch_time: String,
     /// The function `(switch_energy OLD NEW)`.
     pub switch_energy: String,

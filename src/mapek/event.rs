@@ -400,7 +400,8 @@ fn diagnostics(fields: &Map<String, Value>) -> Result<Vec<Result<Event, Refusal>
 }
 
 fn measured(attribute: &str, value: &str) -> Result<Event, Refusal> {
-    let wrong = || Refusal::new("M304", format!("the value `{value}` of {attribute} is not a decimal number"));
+    let wrong =
+        || Refusal::new("M304", format!("the value `{value}` of {attribute} is not a decimal number"));
     Ok(Event::Measured { attribute: attribute.to_owned(), value: number::exact(value).ok_or_else(wrong)? })
 }
 

@@ -1,7 +1,6 @@
 //! Steps of a plan as the loop keeps them: with exact numbers, and so that they can be written to the journal.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 
 use num_rational::BigRational;
 use pddl::ast::Name;
@@ -45,17 +44,23 @@ impl JsonSchema for PlannedStep {
         "PlannedStep".into()
     }
 
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let names = generator.subschema_for::<Vec<String>>();
-        let configuration = generator.subschema_for::<BTreeMap<String, String>>();
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
         json_schema!({
             "type": "object",
             "properties": {
-                "action": { "type": "string" },
-                "arguments": names,
-                "configuration": configuration,
-                "duration": { "type": "number" },
-                "cost": { "type": "number" }
+                "action": { "type": "string", "description": "The name of the action." },
+                "arguments": {
+                    "type": "array",
+                    "items": { "type": "string" },
+                    "description": "All its arguments in the order of the parameters, designs among them."
+                },
+                "configuration": {
+                    "type": "object",
+                    "additionalProperties": { "type": "string" },
+                    "description": "Function to design."
+                },
+                "duration": { "type": "number", "description": "How long it takes, in the domain's time unit." },
+                "cost": { "type": "number", "description": "What it adds to the metric." }
             },
             "required": ["action", "arguments", "configuration", "duration", "cost"]
         })

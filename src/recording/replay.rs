@@ -160,8 +160,10 @@ impl<R: Read> Replay<R> {
 
     fn message(&mut self, header: &MessageHeader, data: &[u8]) -> io::Result<()> {
         let wrong = |what: &str, why: String| {
-            let text =
-                format!("message {} of channel {} is not a {what}: {why}", header.sequence, header.channel_id);
+            let text = format!(
+                "message {} of channel {} is not a {what}: {why}",
+                header.sequence, header.channel_id
+            );
             io::Error::other(text)
         };
         let heard = |json: &str| -> io::Result<Replayed> {

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use super::results::Line;
+use super::results::{FORMAT, Line};
 use super::table::Group;
 use crate::simulate::Sample;
 
@@ -12,6 +12,7 @@ use crate::simulate::Sample;
 #[derive(Debug, Clone, Serialize, JsonSchema)]
 pub struct SweepAnswer {
     /// Name and version of this format.
+    #[schemars(extend("const" = FORMAT))]
     format: &'static str,
     /// How many runs there are: of the shard, or of the study.
     runs: usize,
@@ -71,7 +72,7 @@ impl SweepAnswer {
         let wanted: Vec<usize> = wanted.collect();
         let missing = wanted.iter().filter(|run| !done.contains(run)).copied();
         Self {
-            format: "metaplan-sweep/1",
+            format: FORMAT,
             runs: wanted.len(),
             done: lines.len(),
             failed: lines.iter().filter(|line| line.answer.is_null()).count(),

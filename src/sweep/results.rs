@@ -13,7 +13,7 @@ use super::study::{Shard, Study};
 use crate::message::{Errors, Message};
 
 /// The version of the files.
-const FORMAT: &str = "metaplan-sweep/1";
+pub(super) const FORMAT: &str = "metaplan-sweep/1";
 
 /// Why a file is not one of a study.
 const OTHER: &str = "it belongs to another study, or the study or its files have changed";

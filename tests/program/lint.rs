@@ -118,6 +118,18 @@ fn all_errors_of_all_files_are_told_at_once() {
 }
 
 #[test]
+fn what_cannot_be_planned_with_is_told_without_planning() {
+    check(
+        &[
+            ("domain.pddl", "(= ?duration (grasp_time))", "(= ?duration (battery))"),
+            ("domain.pddl", "(= ?duration 3)", "(= ?duration (+ 3 (battery)))"),
+        ],
+        3,
+        &["E301", "depends on the state", "2 errors, 0 warnings"],
+    );
+}
+
+#[test]
 fn a_contradiction_is_an_error() {
     let outcome = check(
         &[("robot.ttl", ":c_lamp a t:Component .", ":c_lamp a t:Component , t:Function .")],

@@ -18,7 +18,7 @@ const PLACES: [(&str, f64, f64, &str); 6] = [
 ];
 
 /// A map in the form of 2017.
-fn map() -> String {
+pub fn map() -> String {
     let mut text = "{\"map\": [\n".to_owned();
     for (number, (id, x, y, next)) in (1..).zip(PLACES) {
         let end = if number == PLACES.len() { "" } else { "," };

@@ -7,11 +7,14 @@ use serde::Serialize;
 
 use crate::manifest::{Claim, Verification, VerifiedPart};
 
+const FORMAT: &str = "metaplan-verification/1";
+
 /// What a certificate claims, and whether each part of it holds.
 #[derive(Debug, Clone, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct VerificationAnswer<'a> {
     /// Name and version of this format.
+    #[cfg_attr(feature = "schema", schemars(extend("const" = FORMAT)))]
     format: &'static str,
     /// Whether every part is verified.
     verified: bool,
@@ -42,7 +45,7 @@ impl<'a> VerificationAnswer<'a> {
             message: part.result.as_ref().unwrap_or_else(|reason| reason),
         };
         Self {
-            format: "metaplan-verification/1",
+            format: FORMAT,
             verified: report.verified(),
             claim: report.claim.as_ref(),
             parts: report.parts.iter().map(part).collect(),

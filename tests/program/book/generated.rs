@@ -5,15 +5,18 @@ use std::fmt::Write as _;
 
 use metaplan::codes;
 
-use super::help;
+use super::{formats, help};
 use crate::common::{metaplan, root};
 
 /// A page, the name of a part of it, and what makes that.
 type Part = (&'static str, &'static str, fn() -> String);
 
-const PARTS: [Part; 5] = [
+const PARTS: [Part; 8] = [
     ("docs/reference/codes.md", "codes", codes),
     ("docs/reference/commands.md", "commands", help::commands),
+    ("docs/reference/json.md", "formats", formats::answers),
+    ("docs/reference/manifest.md", "keys", formats::manifest),
+    ("docs/how-to/study.md", "keys", formats::study),
     ("docs/reference/tomasys.md", "classes", || terms("owl:Class")),
     ("docs/reference/tomasys.md", "relations", || terms("owl:ObjectProperty")),
     ("docs/reference/tomasys.md", "values", || terms("owl:DatatypeProperty")),

@@ -15,6 +15,7 @@
 #![allow(clippy::print_stdout)] // what is skipped says so
 
 mod console;
+mod formats;
 mod generated;
 mod help;
 mod page;
