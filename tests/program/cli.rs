@@ -171,7 +171,7 @@ fn arguments_that_fit_nothing_are_a_usage_error() {
     check(
         &metaplan(&["plan", "missions/ugv.toml", "--set", "ambient_light=bright"]),
         2,
-        &["no decimal number"],
+        &["not a decimal number"],
     );
     check(&metaplan(&["plan", "missions/ugv.toml", "--scenario", "none"]), 2, &["kinect_failure"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--time-limit", "-1"]), 2, &["negative"]);
@@ -180,7 +180,7 @@ fn arguments_that_fit_nothing_are_a_usage_error() {
     check(&metaplan(&["plan", "missions/ugv.toml", "--directory", "."]), 2, &["manifest names its own"]);
     check(&metaplan(&["reason", "ontology/kb/ugv.ttl", "--directory", "nowhere"]), 2, &["no directory"]);
     check(&metaplan(&["validate", "missions/ugv.toml"]), 2, &["and a plan"]);
-    check(&metaplan(&["plan", "missions/ugv.toml", "--time-limit", "soon"]), 2, &["no number of seconds"]);
+    check(&metaplan(&["plan", "missions/ugv.toml", "--time-limit", "soon"]), 2, &["not a number of seconds"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--format", "ntriples"]), 2, &[]);
 }
 

@@ -55,7 +55,7 @@ fn all_wrong_names_are_told() {
         (&["--budget", "safety=many"], "decimal number"),
         (&["--require", "safety=1"], "FUNCTION.ATTRIBUTE=BOUND"),
         (&["--most", "safety", "--least", "safety"], "cannot be used with"),
-        (&["--set", "safety=x"], "no decimal number"),
+        (&["--set", "safety=x"], "not a decimal number"),
         (&["--fail", "c_none"], "c_none"),
     ] {
         let outcome = metaplan(&[&base[..], further].concat());

@@ -56,7 +56,7 @@ impl PolicyTable {
     /// What is not as it should be.
     pub fn from_json(text: &str) -> Result<Self, Error> {
         let wrong = |what: String| Error::Policy(what);
-        let json: Value = serde_json::from_str(text).map_err(|error| wrong(format!("no JSON: {error}")))?;
+        let json: Value = serde_json::from_str(text).map_err(|error| wrong(format!("not JSON: {error}")))?;
         if json["format"] != FORMAT {
             return Err(wrong(format!("`format` must be `{FORMAT}`")));
         }
