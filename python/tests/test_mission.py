@@ -190,7 +190,9 @@ plan = metaplan.Mission.from_files(open(sys.argv[1]).read(), open(sys.argv[2]).r
 print(plan.status, len(plan.steps))
 """
     command = [sys.executable, "-c", program, tmp_path / "d.pddl", tmp_path / "p.pddl"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    # A background job of a shell ignores the signal, and so would what it starts.
+    heeds = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, preexec_fn=heeds) as process:
         assert process.stdout.readline() == "begun\n"
         process.send_signal(signal.SIGINT)
         status, steps = process.stdout.readline().split()
