@@ -35,6 +35,18 @@ pub fn headlines(stderr: &str) -> String {
     lines.iter().fold(String::new(), |all, line| all + line + "\n")
 }
 
+/// A text without the lines that say every few seconds what is being done, as `planning, 3 s: cost 4`: when they come depends on what else the
+/// machine has to do.
+pub fn without_progress(text: &str) -> String {
+    let is_progress = |line: &&str| {
+        let Some((word, rest)) = line.trim_end().split_once(", ") else { return false };
+        let digits = rest.trim_start_matches(|own: char| own.is_ascii_digit());
+        let is_word = !word.is_empty() && word.chars().all(|own| own.is_ascii_lowercase());
+        is_word && digits.len() < rest.len() && (digits == " s" || digits.starts_with(" s: "))
+    };
+    text.split_inclusive('\n').filter(|line| !is_progress(line)).collect()
+}
+
 /// The root of the project.
 pub fn root() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -94,7 +106,7 @@ fn outcome(program: &Path, directory: &Path, arguments: &[&str], input: &str) ->
     Outcome {
         status: output.status.code().unwrap_or(-1),
         stdout: text(output.stdout),
-        stderr: text(output.stderr),
+        stderr: without_progress(&text(output.stderr)),
     }
 }
 

@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use snapbox::{Assert, IntoData as _};
 use tempfile::TempDir;
 
-use crate::common::{copy_folder, root, verifier};
+use crate::common::{copy_folder, root, verifier, without_progress};
 
 /// What a session finds in its directory, which is not the project's, so that commands may write.
 pub const FILES: [&str; 7] = [
@@ -102,7 +102,7 @@ impl Session {
         shell.env("LC_ALL", "C").env("GIT_CEILING_DIRECTORIES", std::env::temp_dir());
         let output = shell.stdin(Stdio::null()).output().expect("the shell runs");
         self.status = output.status.code().unwrap_or(-1);
-        Some(String::from_utf8(output.stdout).expect("UTF-8"))
+        Some(without_progress(&String::from_utf8(output.stdout).expect("UTF-8")))
     }
 }
 
