@@ -9,6 +9,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
+use super::wires::{Wire, routes};
+
+/// The servers that two servers are, by the number of the third one.
+const PAIRS: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
+
 /// The disk of the third server has so much room, where it can have a disk of its own.
 const DISK: &str = "64m";
 
@@ -29,6 +34,9 @@ pub(super) struct Cluster(Arc<Inner>);
 struct Inner {
     directory: tempfile::TempDir,
     clients: [u16; 3],
+    monitors: [u16; 3],
+    /// Between two servers, by the number of the third one.
+    wires: [Wire; 3],
     own_disk: bool,
     processes: Mutex<BTreeMap<String, Child>>,
 }
@@ -62,15 +70,23 @@ impl Cluster {
             tempfile::Builder::new().prefix(&format!("chaos-{seed}-")).tempdir().expect("a directory");
         let clients: [u16; 3] = std::array::from_fn(|_| free_port());
         let routes: [u16; 3] = std::array::from_fn(|_| free_port());
-        let list: Vec<String> = routes.iter().map(|port| format!("nats://127.0.0.1:{port}")).collect();
+        let monitors: [u16; 3] = std::array::from_fn(|_| free_port());
+        let wires: [Wire; 3] = std::array::from_fn(|_| Wire::default());
+        // Servers tell each other of further ones, which lets them go round a wire that is cut: nobody listens there.
+        let nobody = free_port();
         for own in 0..3 {
+            let others = (0..3).filter(|other| *other != own);
+            let list: Vec<String> = others
+                .map(|other| format!("nats://127.0.0.1:{}", wires[3 - own - other].lead(routes[other])))
+                .collect();
             let folder = directory.path().join(format!("s{own}"));
             fs::create_dir_all(&folder).expect("it can be made");
             let text = format!(
-                "server_name: s{own}\nlisten: \"127.0.0.1:{}\"\n\
+                "server_name: s{own}\nlisten: \"127.0.0.1:{}\"\nhttp: \"127.0.0.1:{}\"\n\
                  jetstream {{ store_dir: \"{}\", sync_interval: always, max_file_store: 4GB }}\n\
-                 cluster {{ name: chaos, listen: \"127.0.0.1:{}\", routes: [{}] }}\n",
+                 cluster {{ name: chaos, listen: \"127.0.0.1:{}\", advertise: \"127.0.0.1:{nobody}\", routes: [{}] }}\n",
                 clients[own],
+                monitors[own],
                 folder.display(),
                 routes[own],
                 list.join(", ")
@@ -78,7 +94,8 @@ impl Cluster {
             fs::write(directory.path().join(format!("s{own}.conf")), text).expect("it can be written");
         }
         let own_disk = can_mount();
-        let cluster = Self(Arc::new(Inner { directory, clients, own_disk, processes: Mutex::default() }));
+        let processes = Mutex::default();
+        let cluster = Self(Arc::new(Inner { directory, clients, monitors, wires, own_disk, processes }));
         if own_disk {
             cluster.begin_disk();
         }
@@ -186,6 +203,23 @@ impl Cluster {
         }
     }
 
+    /// Cuts two servers off from each other for a time; both still hear the third one.
+    fn part(&self, third: usize, millis: u64) {
+        let [one, other] = PAIRS[third];
+        self.0.wires[third].cut();
+        std::thread::sleep(Duration::from_millis(millis));
+        for (own, lost) in [(one, other), (other, one)] {
+            // A server that is busy answers nothing.
+            if let Some(routes) = routes(self.0.monitors[own]) {
+                assert!(
+                    !routes.contains(&format!("\"remote_name\": \"s{lost}\"")),
+                    "s{own} still hears s{lost}: {routes}"
+                );
+            }
+        }
+        self.0.wires[third].mend();
+    }
+
     /// Everything that goes wrong, until it is over; then all run again. One server at a time is away.
     pub(super) fn trouble(&self, seed: u64, over: &AtomicBool, partitions: u32, lease: u64) -> String {
         let mut random = fastrand::Rng::with_seed(seed);
@@ -195,7 +229,7 @@ impl Cluster {
             wait(random.u64(200..2500));
             let worker = random.usize(0..super::WORKERS);
             let server = random.usize(0..3);
-            let what = match random.u8(0..if self.0.own_disk { 11 } else { 10 }) {
+            let what = match random.u8(0..if self.0.own_disk { 13 } else { 12 }) {
                 0..=3 => {
                     self.kill(&format!("w{worker}"));
                     wait(random.u64(0..3000));
@@ -221,6 +255,11 @@ impl Cluster {
                     self.signal(&format!("s{server}"), "-CONT");
                     wait(1000);
                     "servers cut off"
+                }
+                10..=11 => {
+                    self.part(server, random.u64(1000..5000));
+                    wait(1000);
+                    "connections between two servers cut"
                 }
                 _ => {
                     self.fill(true);

@@ -8,6 +8,7 @@
 mod cluster;
 #[path = "../local/scripts.rs"]
 mod scripts;
+mod wires;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -18,10 +18,18 @@ struct Crashing {
     inner: Local,
     left: Arc<AtomicU64>,
     carries_out: bool,
+    /// Whether decisions are compared with what they should come after.
+    fences: bool,
     over: Arc<Notify>,
 }
 
 impl Crashing {
+    /// A log that stays.
+    fn never(inner: Local, fences: bool) -> Self {
+        let left = Arc::new(AtomicU64::new(u64::MAX));
+        Self { inner, left, carries_out: false, fences, over: Arc::default() }
+    }
+
     /// Whether there is an operation left; the last one counts as `carries_out` says.
     async fn through<T>(&self, operation: impl Future<Output = Result<T, Fault>>) -> Result<T, Fault> {
         let left = self.left.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |left| left.checked_sub(1));
@@ -67,7 +75,10 @@ impl Store for Crashing {
         self.through(self.inner.end(stream, partition)).await
     }
 
-    async fn append(&self, stream: Stream, message: Message<'_>) -> Result<Receipt, Fault> {
+    async fn append(&self, stream: Stream, mut message: Message<'_>) -> Result<Receipt, Fault> {
+        if !self.fences {
+            message.after = None;
+        }
         self.through(self.inner.append(stream, message)).await
     }
 
@@ -119,7 +130,8 @@ async fn a_crash_between_any_two_operations_neither_loses_nor_repeats() {
             }
             let left = Arc::new(AtomicU64::new(operations));
             let over = Arc::new(Notify::new());
-            let crashing = Crashing { inner: store.clone(), left, carries_out, over: Arc::clone(&over) };
+            let (inner, over_now) = (store.clone(), Arc::clone(&over));
+            let crashing = Crashing { inner, left, carries_out, fences: true, over: over_now };
             let (_orders, heard) = watch::channel(Order::Go);
             let task = tokio::spawn(serve(shared(crashing, "first", settings), 0, heard));
             let crashed = tokio::select! {
@@ -171,6 +183,42 @@ async fn two_owners_of_one_partition_decide_each_event_once() {
         zombie.abort();
         owner.abort();
         assert_same("r", &decisions(&store).await["r"], &sequences, &answers);
+    }
+}
+
+/// What keeps two owners from deciding an event twice is the comparison with the decision before, and nothing else: without it they do.
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn without_the_comparison_events_are_decided_twice() {
+    let (events, answers) = scripts::play("ugv", "kinect_comes_and_goes", 1, 30);
+    // Progress, which is compared, too, is not written.
+    let settings = Settings { save_every: 1_000, look: Duration::from_secs(3_600), ..Settings::default() };
+    for fences in [true, false] {
+        let folder = tempfile::tempdir().expect("a directory");
+        let store = open(folder.path(), 1);
+        let (_orders, heard) = watch::channel(Order::Go);
+        let owners = ["one", "two"].map(|name| {
+            let own = shared(Crashing::never(store.clone(), fences), name, settings);
+            let heard = heard.clone();
+            tokio::spawn(async move {
+                loop {
+                    serve(Arc::clone(&own), 0, heard.clone()).await;
+                }
+            })
+        });
+        let mut sequences = Vec::new();
+        for event in &events {
+            sequences.extend(tell(&store, "r", std::slice::from_ref(event)).await);
+            tokio::time::sleep(Duration::from_millis(10)).await;
+        }
+        decided(&store, events.len()).await;
+        tokio::time::sleep(Duration::from_millis(300)).await;
+        owners.iter().for_each(tokio::task::JoinHandle::abort);
+        let decided = &decisions(&store).await["r"];
+        if fences {
+            assert_same("r", decided, &sequences, &answers);
+        } else {
+            assert!(decided.len() > events.len(), "{} decisions", decided.len());
+        }
     }
 }
 
