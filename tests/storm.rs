@@ -227,6 +227,32 @@ fn file(folder: &Path, name: &str, text: &str) -> String {
     path.display().to_string()
 }
 
+/// A property that is decided in some states is not followed beyond them; where a policy is wanted, all states are explored.
+#[test]
+fn what_comes_later_does_not_count() {
+    let mut random = Random(7);
+    let mut fewer = 0;
+    for _ in 0..300 {
+        let model = random_model(&mut random);
+        let more = ["P=? [ G \"good\" ]", "P=? [ G<=3 !\"goal\" ]", "P>=0.5 [ \"good\" U<=4 \"goal\" ]"];
+        let more = more.map(|question| match model.kind {
+            ModelKind::Mdp => question.replace("P=?", "Pmin=?"),
+            ModelKind::Dtmc => question.to_owned(),
+        });
+        for question in questions(model.kind).iter().copied().chain(more.iter().map(String::as_str)) {
+            let property = property::parse(question).expect("a property");
+            let [all, some] = [true, false].map(|policy| {
+                let options = Options { exactness: Exactness::Always, policy, ..Options::default() };
+                check(&model, &property, &options).expect("an answer")
+            });
+            assert_eq!(some.outcome, all.outcome, "{question}\n{}", prism::write(&model));
+            assert!(some.states <= all.states);
+            fewer += usize::from(some.states < all.states);
+        }
+    }
+    assert!(fewer > 100, "{fewer} have fewer states");
+}
+
 #[test]
 #[ignore = "needs Storm"]
 fn random_models() {
