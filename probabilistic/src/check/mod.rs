@@ -150,9 +150,7 @@ fn end_of(property: &Property, names: &Names, options: &Options<'_>) -> Option<E
     if options.policy || options.evaluate.is_some() || options.secondary.is_some() {
         return None;
     }
-    let lasts = |steps: &Option<Box<Steps>>| {
-        steps.as_ref().is_none_or(|steps| steps.least.is_none() && steps.reward.is_none())
-    };
+    let lasts = |steps: &Option<Box<Steps>>| steps.as_ref().is_none_or(|steps| steps.least.is_none());
     let not = |inner: &Expr| Expr { kind: ExprKind::Not(Box::new(inner.clone())), place: inner.place };
     let end = match property {
         Property::Probability(_, Path::Until(left, right, steps)) if lasts(steps) => {

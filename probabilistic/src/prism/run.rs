@@ -16,7 +16,7 @@ use crate::prism::ast::ModelKind;
 use crate::prism::code::{Code, Fault, rounded};
 use crate::prism::command::{Command, RewardItem, Variable};
 use crate::prism::model::{Group, Program, UNNAMED};
-use crate::prism::state::{Packed, Valuation, above_least};
+use crate::prism::state::{Packed, above_least};
 
 /// The values of the variables, of one state at a time.
 type Values = SmallVec<[i64; 16]>;
@@ -128,7 +128,8 @@ impl<N: Number> Program<N> {
                 to(next, probability);
             }
             // The updates of the last module change first.
-            let Some(changes) = (0..chosen.len()).rev().find(|own| at[*own].saturating_add(1) < chosen[*own].updates.len())
+            let Some(changes) =
+                (0..chosen.len()).rev().find(|own| at[*own].saturating_add(1) < chosen[*own].updates.len())
             else {
                 return;
             };
@@ -157,7 +158,8 @@ impl<N> Meeting<N> {
             let chosen: SmallVec<[&Effects<N>; 8]> = at.iter().map(|own| &self.effects[*own]).collect();
             way(&chosen)?;
             // The command of the first module changes first.
-            let Some(changes) = (0..at.len()).find(|own| at[*own].saturating_add(1) < self.of(*own).end) else {
+            let Some(changes) = (0..at.len()).find(|own| at[*own].saturating_add(1) < self.of(*own).end)
+            else {
                 return Ok(());
             };
             at[changes] = at[changes].saturating_add(1);
