@@ -441,7 +441,8 @@ fn what_is_exported_is_the_process_itself() {
     let native = coadaptation(&setup);
     let risk = Risk::all(&native);
     let native = explore(&Process::<f64>::new(&native, risk, &[]), &Bounds::default()).expect("explored");
-    let checked = metaplan(&["check", file, "Pmax=? [ F \"safe_goal\" ]", "--format", "json"]);
+    let all = "filter(max, Pmax=? [ F \"safe_goal\" ], \"init\")";
+    let checked = metaplan(&["check", file, all, "--format", "json"]);
     let statistics = &checked.json()["statistics"];
     let sizes = [native.mdp.states(), native.mdp.choice_count(), native.mdp.transition_count()];
     let found = ["states", "choices", "transitions"].map(|key| statistics[key].as_u64().expect("number"));
