@@ -23,6 +23,7 @@ const FINENESS: i64 = 1000;
 
 /// The best plan for a mission under some condition.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct BestPlan {
     /// The metric of the best plan, in its unit; none where there is no plan.
     pub cost: Option<BigRational>,
@@ -34,6 +35,7 @@ pub struct BestPlan {
 
 /// All about one design.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct DesignExplanation {
     /// Its local name.
     pub design: String,
@@ -55,6 +57,7 @@ pub struct DesignExplanation {
 
 /// A change that leads to another answer.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Change {
     /// The attribute, function or component.
     pub name: String,

@@ -145,6 +145,19 @@ fn endless(model: &Model, formula: &Named) -> Option<Diagnostic> {
     None
 }
 
+/// What has to hold together for a condition to hold.
+fn parts(condition: &Expr) -> Vec<&Expr> {
+    let (mut open, mut found) = (vec![condition], Vec::new());
+    while let Some(part) = open.pop() {
+        match &part.kind {
+            // The left one comes first.
+            ExprKind::Binary(BinaryOp::And, left, right) => open.extend([&**right, &**left]),
+            _ => found.push(part),
+        }
+    }
+    found
+}
+
 struct Writer<'a> {
     formulas: &'a [Named],
 }
@@ -159,7 +172,7 @@ impl Writer<'_> {
             }
             for rewards in &model.rewards {
                 let of_states = rewards.items.iter().filter(|item| item.action.is_none());
-                if let Some(value) = self.sum(of_states) {
+                if let Some(value) = self.sum(of_states, &[]) {
                     transient.push(json!({ "ref": reward_name(model, &rewards.name), "value": value }));
                 }
             }
@@ -186,9 +199,10 @@ impl Writer<'_> {
             action.is_some() && model.modules.iter().find(shares).is_some_and(|m| m.name == module.name);
         let mut assignments = Vec::new();
         if carries {
+            let fixed = self.fixed(&command.guard);
             for Rewards { name, items, .. } in &model.rewards {
                 let own = items.iter().filter(|item| item.action == Some(command.action.clone()));
-                if let Some(value) = self.sum(own) {
+                if let Some(value) = self.sum(own, &fixed) {
                     assignments.push(json!({ "ref": reward_name(model, name), "value": value }));
                 }
             }
@@ -222,19 +236,49 @@ impl Writer<'_> {
         edge
     }
 
-    /// The sum of rewards, each where its guard holds.
-    fn sum<'a>(&self, items: impl Iterator<Item = &'a RewardItem>) -> Option<Value> {
+    /// The sum of rewards, each where its guard holds; variables that are known to have some value are not asked for again.
+    fn sum<'a>(&self, items: impl Iterator<Item = &'a RewardItem>, fixed: &[(&str, i64)]) -> Option<Value> {
         items
-            .map(|item| match item.guard.kind {
-                ExprKind::Bool(true) => self.expression(&item.reward),
-                _ => json!({
-                    "op": "ite",
-                    "if": self.expression(&item.guard),
-                    "then": self.expression(&item.reward),
-                    "else": 0,
-                }),
+            .filter_map(|item| {
+                let mut left: Option<Expr> = None;
+                for part in parts(&item.guard) {
+                    let known = self.fixes(part).and_then(|(name, value)| {
+                        fixed.iter().find(|(known, _)| *known == name).map(|(_, known)| *known == value)
+                    });
+                    match known {
+                        Some(true) => {}
+                        Some(false) => return None,
+                        None if part.kind == ExprKind::Bool(true) => {}
+                        None => {
+                            left = Some(match left {
+                                Some(before) => before.op(BinaryOp::And, part.clone()),
+                                None => part.clone(),
+                            });
+                        }
+                    }
+                }
+                let reward = self.expression(&item.reward);
+                Some(match left {
+                    None => reward,
+                    Some(guard) => {
+                        json!({ "op": "ite", "if": self.expression(&guard), "then": reward, "else": 0 })
+                    }
+                })
             })
             .reduce(|left, right| json!({ "op": "+", "left": left, "right": right }))
+    }
+
+    /// The variables that have one value where a condition holds.
+    fn fixed<'a>(&self, condition: &'a Expr) -> Vec<(&'a str, i64)> {
+        parts(condition).into_iter().filter_map(|part| self.fixes(part)).collect()
+    }
+
+    /// The variable and the value of `variable = value`.
+    fn fixes<'a>(&self, part: &'a Expr) -> Option<(&'a str, i64)> {
+        let ExprKind::Binary(BinaryOp::Equal, left, right) = &part.kind else { return None };
+        let (ExprKind::Name(name), ExprKind::Int(value)) = (&left.kind, &right.kind) else { return None };
+        let is_formula = self.formulas.iter().any(|formula| formula.name == *name);
+        (!is_formula).then_some((name.as_str(), *value))
     }
 
     fn variable(&self, variable: &Variable) -> Value {

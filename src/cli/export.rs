@@ -108,7 +108,8 @@ fn process(
     };
     let text = match arguments.target {
         Language::Jani => match probabilistic::jani::write(&mission.name, &model) {
-            Ok(json) => output::pretty(&json),
+            // Indented it is three times as long, and nobody reads it.
+            Ok(json) => format!("{json}\n"),
             Err(error) => {
                 let message =
                     |problem: &probabilistic::Diagnostic| Message::error(problem.code, &problem.message);

@@ -47,6 +47,7 @@ pub struct Candidate {
 
 /// The table.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Comparison {
     /// The rows.
     pub candidates: Vec<Candidate>,

@@ -13,6 +13,7 @@ use crate::comparison::referee::Referee;
 
 /// What happens when the component is lost after some move of the nominal run.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct LossAt {
     /// After how many moves.
     pub moves: usize,
@@ -28,6 +29,7 @@ pub struct LossAt {
 
 /// The loss of a component on the nominal run.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct LossReport {
     /// The component.
     pub component: String,
@@ -152,6 +154,7 @@ impl Spent {
 
 /// Bounds that nobody gets below.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Hindsight {
     /// The least that a mission can take which gets to its goal.
     pub least: Option<f64>,

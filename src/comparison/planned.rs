@@ -49,6 +49,7 @@ pub type PlanFinder<'a> = dyn FnMut(&Valuation) -> Result<Planned, Errors> + 'a;
 
 /// What both sides take.
 #[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct Costs {
     /// Of the process.
     pub states: usize,

@@ -53,6 +53,7 @@ impl<N: Number> Generator<N> for Played<'_, '_, N> {
 
 /// What comes of a way to decide. Sums are over the whole mission, until the goal or a failure.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Measures {
     /// The probability of getting to the goal.
     pub goal: f64,

@@ -37,6 +37,7 @@ pub struct Wishes {
 
 /// What has been chosen for all objectives in need.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Configuration {
     /// For each objective in need, sorted by name.
     pub choices: Vec<Choice>,
@@ -48,6 +49,7 @@ pub struct Configuration {
 
 /// What has been chosen for an objective.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Choice {
     /// The objective, by local name.
     pub objective: String,
@@ -65,6 +67,7 @@ pub struct Choice {
 
 /// A design of an objective's function.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Considered {
     /// Its local name.
     pub design: String,

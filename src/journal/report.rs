@@ -10,6 +10,7 @@ use crate::message::Message;
 
 /// What is in a journal.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct JournalReport {
     /// One sentence for each segment and snapshot.
     pub parts: Vec<String>,
@@ -21,6 +22,7 @@ pub struct JournalReport {
 
 /// A record.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Entry {
     /// Its number.
     pub record: u64,

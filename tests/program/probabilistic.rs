@@ -441,11 +441,18 @@ fn what_is_exported_is_the_process_itself() {
     let native = coadaptation(&setup);
     let risk = Risk::all(&native);
     let native = explore(&Process::<f64>::new(&native, risk, &[]), &Bounds::default()).expect("explored");
-    let checked = metaplan(&["check", file, "Pmax=? [ F \"safe_goal\" ]", "--format", "json"]);
+    let all = "filter(max, Pmax=? [ F \"safe_goal\" ], \"init\")";
+    let checked = metaplan(&["check", file, all, "--format", "json"]);
     let statistics = &checked.json()["statistics"];
     let sizes = [native.mdp.states(), native.mdp.choice_count(), native.mdp.transition_count()];
     let found = ["states", "choices", "transitions"].map(|key| statistics[key].as_u64().expect("number"));
     assert_eq!(found, sizes.map(|size| size as u64));
+    for mission in ["camara_like", "ugv", "uuv"] {
+        let mission = format!("missions/{mission}.toml");
+        let [prism, jani] =
+            ["prism", "jani"].map(|form| metaplan(&["export", &mission, "--to", form]).stdout.len());
+        assert!(jani <= 10 * prism, "{mission}: {jani} bytes of JANI, {prism} of PRISM");
+    }
     let jani = metaplan(&["export", "missions/camara_like.toml", "--to", "jani"]);
     assert_eq!(jani.json()["jani-version"], 1);
 }

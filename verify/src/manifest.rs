@@ -95,6 +95,7 @@ pub struct VerifiedPart {
 
 /// What came of a verification.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Verification {
     /// The claim; none if the manifest does not say.
     pub claim: Option<Claim>,

@@ -4,6 +4,7 @@ use num_rational::BigRational;
 
 /// Whether a plan is right, what it costs, and otherwise the first thing that is wrong with it.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Verdict {
     /// Executable, and the goal holds in the end.
     pub valid: bool,
@@ -22,6 +23,7 @@ pub struct Verdict {
 
 /// A condition that does not hold, or a step that cannot be executed.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Violation {
     /// The step, from 1 in the order of the plan's text; nothing for the goal.
     pub step: Option<usize>,
@@ -39,6 +41,7 @@ pub struct Violation {
 
 /// A condition that does not hold.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Unmet {
     /// The condition with its objects.
     pub condition: String,

@@ -11,10 +11,11 @@ use crate::check::ask::{Asked, property_error, refusal, worked};
 use crate::check::paths::Valued;
 use crate::check::query::Query;
 use crate::check::vector::{Span, Vector};
+use crate::graph::visit_components;
 use crate::mdp::{Mdp, dense};
-use crate::number::Number;
+use crate::number::{Number, count};
 use crate::prism::ast::Steps;
-use crate::solve::{Problem, solve_within};
+use crate::solve::{Direction, Problem, Work, solve_within};
 
 /// Budgets that are kept at most.
 const BUDGETS: usize = 100_000;
@@ -54,7 +55,16 @@ impl<N: Number> Query<'_, N> {
         let mut known: Vec<Vec<N>> = Vec::new();
         let mut vector = Vector::exactly(vec![N::zero(); n], Span::Probability);
         let mut error = 0.0_f64;
+        let sweep = Sweep::new(&layers, problem, &earned);
         for budget in 0..=budgets {
+            // One is left over from a budget that no choice reaches back to.
+            let mut values = if known.len() > greatest { known.remove(0) } else { vec![N::zero(); n] };
+            if let Some(sweep) = &sweep {
+                worked(sweep.layer(&mut values, &known, budget, &mut self.work.borrow_mut()))?;
+                error += sweep.error;
+                known.push(values);
+                continue;
+            }
             let mut worth = vec![N::zero(); layers.mdp.states()];
             for state in problem.terminal.ones() {
                 worth[state] = N::one();
@@ -81,14 +91,11 @@ impl<N: Number> Query<'_, N> {
             let own = solution.errors.iter().fold(0.0_f64, |most, error| most.max(*error));
             // The sums over the targets round, too.
             error += own + 256.0 * f64::EPSILON;
-            let mut values = solution.values;
+            values = solution.values;
             values.truncate(n);
-            if known.len() > greatest {
-                known.remove(0);
-            }
-            known.push(values.clone());
-            vector.values = values;
+            known.push(values);
         }
+        vector.values = known.pop().unwrap_or_default();
         vector.errors.fill(error);
         Ok(vector.into())
     }
@@ -112,6 +119,90 @@ struct Layers<N> {
     paid: Vec<usize>,
     ends: FixedBitSet,
     blocked: FixedBitSet,
+}
+
+/// The equations of a budget where what earns nothing goes round nowhere: each state after all that it depends on.
+struct Sweep<'a, N> {
+    problem: Problem<'a, N>,
+    earned: &'a [usize],
+    /// The states at which the problem does not end; what they lead to without earning comes first.
+    order: Vec<u32>,
+    /// How far values of a budget can be from the truth because of rounding in it.
+    error: f64,
+}
+
+impl<'a, N: Number> Sweep<'a, N> {
+    /// None where something that earns nothing goes round.
+    fn new(layers: &Layers<N>, problem: Problem<'a, N>, earned: &'a [usize]) -> Option<Self> {
+        let mdp = problem.mdp;
+        let n = mdp.states();
+        let ends = |state: u32| state as usize >= n || problem.is_sink(state as usize);
+        let successors = |state: u32| if ends(state) { &[] } else { layers.mdp.successors(state as usize) };
+        let mut order = Vec::new();
+        let mut depths = vec![0_u32; layers.mdp.states()];
+        let (mut deepest, mut widest) = (0_u32, 0_usize);
+        let visited = visit_components(layers.mdp.states(), successors, |component| {
+            let [state] = *component else { return Err(()) };
+            if ends(state) {
+                return Ok(());
+            }
+            let mut depth = 0;
+            for choice in problem.choices(state as usize) {
+                let targets = mdp.targets(choice);
+                widest = widest.max(targets.len());
+                if earned[choice] == 0
+                    && targets.contains(&state)
+                    && targets.iter().any(|target| *target != state)
+                {
+                    return Err(());
+                }
+            }
+            for target in successors(state).iter().filter(|target| **target != state) {
+                depth = depth.max(depths[*target as usize]);
+            }
+            depths[state as usize] = depth.saturating_add(1);
+            deepest = deepest.max(depth.saturating_add(1));
+            order.push(state);
+            Ok(())
+        });
+        visited.ok()?;
+        // Each sum rounds its products, its probabilities and itself, and adds to what its parts are wrong by.
+        let error = if N::EXACT { 0.0 } else { f64::from(deepest) * (count(widest) + 4.0) * f64::EPSILON };
+        Some(Self { problem, earned, order, error })
+    }
+
+    /// The values of a budget, from those of the budgets before; none where exact arithmetic takes too long.
+    fn layer(&self, values: &mut [N], known: &[Vec<N>], budget: usize, work: &mut Work) -> Option<()> {
+        let mdp = self.problem.mdp;
+        for (state, value) in values.iter_mut().enumerate() {
+            *value = if self.problem.terminal.contains(state) { N::one() } else { N::zero() };
+        }
+        for state in &self.order {
+            let mut best: Option<N> = None;
+            for choice in self.problem.choices(*state as usize) {
+                let from: Option<&[N]> = match self.earned[choice] {
+                    0 if mdp.targets(choice) == [*state] => None,
+                    0 => Some(&*values),
+                    earned if earned > budget => None,
+                    earned => Some(&known[known.len().saturating_sub(earned)]),
+                };
+                let value = from.map_or_else(N::zero, |from| {
+                    mdp.transitions(choice)
+                        .fold(N::zero(), |sum, (target, p)| sum.plus(&p.times(&from[target])))
+                });
+                work.spend(&value, mdp.targets(choice).len())?;
+                let is_better = best.as_ref().is_none_or(|best| match self.problem.direction {
+                    Direction::Min => value < *best,
+                    Direction::Max => value > *best,
+                });
+                if is_better {
+                    best = Some(value);
+                }
+            }
+            values[*state as usize] = best.unwrap_or_else(N::zero);
+        }
+        Some(())
+    }
 }
 
 impl<N: Number> Layers<N> {

@@ -24,12 +24,13 @@ use num_rational::BigRational;
 use crate::error::Error;
 use crate::explore::{Exploration, Explored, explore};
 use crate::number::Number;
-use crate::prism::ast::Model;
-use crate::prism::{Packed, Program, Settings};
-use crate::property::{Declarations, Property};
+use crate::prism::ast::{BinaryOp, Expr, ExprKind, Model};
+use crate::prism::{Names, Packed, Program, Settings};
+use crate::property::{Declarations, Path, Property, RewardPath, Steps};
 use crate::solve::NONE;
 use crate::solve::work::MOST;
 use query::Query;
+use state::is_of_states;
 use validate::{expressions_of, properties_in, steps_of, validate};
 
 pub use answer::{Answer, Listed, Outcome, Precision, Quantity};
@@ -47,6 +48,7 @@ fn budget(transitions: usize) -> u64 {
 
 /// What came out.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Report {
     /// The answer.
     pub outcome: Outcome,
@@ -115,10 +117,17 @@ pub fn check_all(
     }
     wanted.sort_unstable();
     wanted.dedup();
-    let program = program.with_rewards(&wanted);
+    let end = match properties {
+        [only] => end_of(only, &program.names, options),
+        _ => None,
+    };
+    let program = program.with_rewards(&wanted).stopping(end.as_ref());
     let exact = match options.exactness {
         Exactness::Never => None,
-        _ => Some(Program::<BigRational>::new(&joined, &options.settings)?.with_rewards(&wanted)),
+        _ => {
+            let exact = Program::<BigRational>::new(&joined, &options.settings)?;
+            Some(exact.with_rewards(&wanted).stopping(end.as_ref()))
+        }
     };
     let mut found = Processes::explore(&program, exact.as_ref(), options)?;
     let build = start.elapsed();
@@ -133,6 +142,25 @@ pub fn check_all(
         reports.push(report.map(|report| Report { build, solve: start.elapsed(), ..report }));
     }
     Ok(reports)
+}
+
+/// Where a property is decided, so that nothing that happens later counts; none where that depends on more than the state, or where policies
+/// are asked for or given, which go on.
+fn end_of(property: &Property, names: &Names, options: &Options<'_>) -> Option<Expr> {
+    if options.policy || options.evaluate.is_some() || options.secondary.is_some() {
+        return None;
+    }
+    let lasts = |steps: &Option<Box<Steps>>| steps.as_ref().is_none_or(|steps| steps.least.is_none());
+    let not = |inner: &Expr| Expr { kind: ExprKind::Not(Box::new(inner.clone())), place: inner.place };
+    let end = match property {
+        Property::Probability(_, Path::Until(left, right, steps)) if lasts(steps) => {
+            right.clone().op(BinaryOp::Or, not(left))
+        }
+        Property::Probability(_, Path::Globally(goal, steps)) if lasts(steps) => not(goal),
+        Property::Reward(_, _, RewardPath::Reach(goal)) => goal.clone(),
+        _ => return None,
+    };
+    is_of_states(&end, names).then_some(end)
 }
 
 /// A model with the constants and labels of a file of properties.

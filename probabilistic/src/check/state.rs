@@ -73,6 +73,23 @@ pub fn with_placeholders(expression: &Expr, names: &Names) -> Expr {
     })
 }
 
+/// Whether it depends on nothing but the values of variables, whatever is explored.
+pub fn is_of_states(expression: &Expr, names: &Names) -> bool {
+    let mut found = true;
+    let _ = expression.rewrite(&mut |part| {
+        match &part.kind {
+            ExprKind::Property(_) | ExprKind::Temporal(_) => found = false,
+            ExprKind::Label(label) if is_built_in(label, names) => found = false,
+            ExprKind::Label(label) => {
+                found &= names.label(label).is_some_and(|inner| is_of_states(inner, names));
+            }
+            _ => {}
+        }
+        None
+    });
+    found
+}
+
 fn mentions_built_in(expression: &Expr, names: &Names) -> bool {
     let mut found = false;
     let _ = expression.rewrite(&mut |part| {

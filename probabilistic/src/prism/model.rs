@@ -10,8 +10,9 @@ use rustc_hash::FxHashMap;
 use crate::error::{Diagnostic, Error};
 use crate::mdp::dense;
 use crate::number::Number;
-use crate::prism::ast::{self, Model, ModelKind, Type};
+use crate::prism::ast::{self, Expr, Model, ModelKind, Type};
 use crate::prism::build::{compile_command, declare, reward_item};
+use crate::prism::code::Code;
 use crate::prism::command::{Command, RewardItem, Variable};
 use crate::prism::compile::{Names, Settings};
 use crate::prism::starts::starts;
@@ -70,6 +71,8 @@ pub struct Program<N> {
     pub(super) wanted: Vec<usize>,
     /// Where it can start.
     pub(super) starts: Vec<Packed>,
+    /// Where nothing that happens later is asked for.
+    pub(super) stop: Option<Code>,
 }
 
 impl<N: Number> Program<N> {
@@ -93,6 +96,7 @@ impl<N: Number> Program<N> {
             rewards: Vec::new(),
             wanted: Vec::new(),
             starts: Vec::new(),
+            stop: None,
         };
         let modules = model.modules.iter().map(|module| &module.variables);
         for variable in std::iter::once(&model.globals).chain(modules).flatten() {
@@ -177,6 +181,14 @@ impl<N: Number> Program<N> {
     #[must_use]
     pub fn with_rewards(mut self, wanted: &[usize]) -> Self {
         self.wanted = wanted.to_vec();
+        self
+    }
+
+    /// Lets states in which a condition holds keep where they are: what happens later is not asked for. A condition that does not fit the
+    /// model is left out.
+    #[must_use]
+    pub(crate) fn stopping(mut self, condition: Option<&Expr>) -> Self {
+        self.stop = condition.and_then(|condition| self.names.clone().typed(condition, Type::Bool).ok());
         self
     }
 

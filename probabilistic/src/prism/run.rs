@@ -16,69 +16,79 @@ use crate::prism::ast::ModelKind;
 use crate::prism::code::{Code, Fault, rounded};
 use crate::prism::command::{Command, RewardItem, Variable};
 use crate::prism::model::{Group, Program, UNNAMED};
-use crate::prism::state::{Packed, Valuation, above_least};
+use crate::prism::state::{Packed, above_least};
 
 /// The values of the variables, of one state at a time.
 type Values = SmallVec<[i64; 16]>;
 /// The rewards of a choice.
 type Sums<N> = SmallVec<[N; 4]>;
 
-type Outcome<N> = Vec<(Valuation, N)>;
-
 /// Ends of the combined commands of an action in one state, at most.
 const COMBINED: usize = 1_000_000;
 
+/// What an enabled command does in a state.
+struct Effects<N> {
+    /// The probability of each update that is possible, and where its changes end.
+    updates: SmallVec<[(N, u32); 4]>,
+    /// Variables with their new values.
+    changes: SmallVec<[(u32, i64); 6]>,
+}
+
+/// The enabled commands of one action, which move together: one of each module.
+struct Meeting<N> {
+    action: u32,
+    /// Of all modules, one after the other.
+    effects: SmallVec<[Effects<N>; 2]>,
+    /// Where those of each module begin.
+    begins: SmallVec<[u32; 4]>,
+}
+
 impl<N: Number> Program<N> {
-    /// All combinations of what the enabled commands of some groups do together.
-    fn combine(
-        &self,
-        groups: &[Group<N>],
-        values: &Valuation,
-        found: &mut Vec<Outcome<N>>,
-    ) -> Result<(), Error> {
-        let Some((first, others)) = groups.split_first() else { return Ok(()) };
-        let mut combined: Vec<Outcome<N>> = Vec::new();
-        for command in enabled(first, values) {
-            let effects = self.effects(command?, values)?;
-            let outcome =
-                effects.into_iter().map(|(probability, changes)| (changed(values, &changes), probability));
-            combined.push(outcome.collect());
-        }
-        for group in others {
-            if combined.is_empty() {
-                return Ok(());
-            }
-            let mut next = Vec::new();
-            let (outcomes, mut ends) = (combined.iter().map(Vec::len).sum::<usize>(), 0_usize);
+    /// What modules can do together in a state; none if one of them has no enabled command.
+    fn meet(&self, action: u32, groups: &[Group<N>], values: &[i64]) -> Result<Option<Meeting<N>>, Error> {
+        let mut commands: SmallVec<[&Command<N>; 8]> = SmallVec::new();
+        let mut begins: SmallVec<[u32; 4]> = SmallVec::new();
+        for group in groups {
+            let begin = commands.len();
+            begins.push(dense(begin));
             for command in enabled(group, values) {
-                let command = command?;
-                let effects = self.effects(command, values)?;
-                ends = ends.saturating_add(outcomes.saturating_mul(effects.len()));
-                if ends > COMBINED {
-                    let text = format!("more than {COMBINED} ways in which modules move together in a state");
-                    return Err(Diagnostic::new("Q306", command.place, text).into());
-                }
-                next.extend(combined.iter().map(|outcome| join(outcome, &effects)));
+                commands.push(command?);
             }
-            combined = next;
+            if commands.len() == begin {
+                return Ok(None);
+            }
         }
-        found.append(&mut combined);
-        Ok(())
+        let mut effects: SmallVec<[Effects<N>; 2]> = SmallVec::new();
+        for command in &commands {
+            effects.push(self.effects(command, values)?);
+        }
+        let meeting = Meeting { action, effects, begins };
+        let mut outcomes = 1_usize;
+        for module in 0..groups.len() {
+            let mut ends = 0_usize;
+            for at in meeting.of(module) {
+                ends = ends.saturating_add(outcomes.saturating_mul(meeting.effects[at].updates.len()));
+                if ends > COMBINED && module > 0 {
+                    let text = format!("more than {COMBINED} ways in which modules move together in a state");
+                    return Err(Diagnostic::new("Q306", commands[at].place, text).into());
+                }
+            }
+            outcomes = ends;
+        }
+        Ok(Some(meeting))
     }
 
-    /// The updates of a command in a state: probability, and the new values.
-    fn effects(&self, command: &Command<N>, values: &[i64]) -> Result<Vec<Effect<N>>, Error> {
-        let mut effects = Vec::with_capacity(command.updates.len());
+    /// The updates of a command in a state.
+    fn effects(&self, command: &Command<N>, values: &[i64]) -> Result<Effects<N>, Error> {
+        let mut effects = Effects { updates: SmallVec::new(), changes: SmallVec::new() };
         for (update, probability) in command.updates.iter().zip(&*command.probabilities(values)?) {
             if probability.is_zero() {
                 continue;
             }
-            let mut changes = Vec::with_capacity(update.assignments.len());
             for (variable, code, place) in &update.assignments {
-                let value = self.assigned(*variable, code, *place, values)?;
-                changes.push((*variable, value));
+                effects.changes.push((*variable, self.assigned(*variable, code, *place, values)?));
             }
-            effects.push((probability.clone(), changes));
+            effects.updates.push((probability.clone(), dense(effects.changes.len())));
         }
         Ok(effects)
     }
@@ -94,39 +104,70 @@ impl<N: Number> Program<N> {
         Err(Diagnostic::new("Q305", place, text).into())
     }
 
-    fn all_outcomes(&self, values: &Valuation) -> Result<Vec<(u32, Outcome<N>)>, Error> {
-        let mut all = Vec::new();
-        let mut found = Vec::new();
-        for group in &self.free {
-            self.combine(std::slice::from_ref(group), values, &mut found)?;
+    /// The states that a choice of one command of each module leads to.
+    fn lead(&self, state: &Packed, chosen: &[&Effects<N>], mut to: impl FnMut(Packed, N)) {
+        let mut at: SmallVec<[usize; 8]> = SmallVec::from_elem(0, chosen.len());
+        if chosen.iter().any(|effects| effects.updates.is_empty()) {
+            return;
         }
-        all.extend(found.drain(..).map(|outcome| (UNNAMED, outcome)));
-        for (action, groups) in self.synchronised.iter().enumerate() {
-            self.combine(groups, values, &mut found)?;
-            all.extend(found.drain(..).map(|outcome| (dense(action), outcome)));
+        loop {
+            let mut next = state.clone();
+            let mut together: Option<N> = None;
+            for (effects, at) in chosen.iter().zip(&at) {
+                let (probability, end) = &effects.updates[*at];
+                let begin = at.checked_sub(1).map_or(0, |before| effects.updates[before].1);
+                for (variable, value) in &effects.changes[begin as usize..*end as usize] {
+                    self.layout.set(&mut next, *variable, *value);
+                }
+                together = Some(match together {
+                    Some(before) => before.times(probability),
+                    None => probability.clone(),
+                });
+            }
+            if let Some(probability) = together {
+                to(next, probability);
+            }
+            // The updates of the last module change first.
+            let Some(changes) =
+                (0..chosen.len()).rev().find(|own| at[*own].saturating_add(1) < chosen[*own].updates.len())
+            else {
+                return;
+            };
+            at[changes] = at[changes].saturating_add(1);
+            at[changes.saturating_add(1)..].fill(0);
         }
-        Ok(all)
     }
 }
 
-type Effect<N> = (N, Vec<(u32, i64)>);
+impl<N> Meeting<N> {
+    /// The commands of a module, by position.
+    fn of(&self, module: usize) -> std::ops::Range<usize> {
+        let end = self.begins.get(module.saturating_add(1)).map_or(self.effects.len(), |end| *end as usize);
+        self.begins[module] as usize..end
+    }
 
-fn join<N: Number>(outcome: &Outcome<N>, effects: &[Effect<N>]) -> Outcome<N> {
-    let mut joined = Vec::with_capacity(outcome.len().saturating_mul(effects.len()));
-    for (values, before) in outcome {
-        for (probability, changes) in effects {
-            joined.push((changed(values, changes), before.times(probability)));
+    /// In how many ways one command of each module can be chosen.
+    fn ways(&self) -> usize {
+        (0..self.begins.len()).map(|module| self.of(module).len()).product()
+    }
+
+    /// Each way to choose one command of each module.
+    fn each<E>(&self, mut way: impl FnMut(&[&Effects<N>]) -> Result<(), E>) -> Result<(), E> {
+        let mut at: SmallVec<[usize; 8]> = self.begins.iter().map(|begin| *begin as usize).collect();
+        loop {
+            let chosen: SmallVec<[&Effects<N>; 8]> = at.iter().map(|own| &self.effects[*own]).collect();
+            way(&chosen)?;
+            // The command of the first module changes first.
+            let Some(changes) = (0..at.len()).find(|own| at[*own].saturating_add(1) < self.of(*own).end)
+            else {
+                return Ok(());
+            };
+            at[changes] = at[changes].saturating_add(1);
+            for (own, begin) in at.iter_mut().zip(&self.begins).take(changes) {
+                *own = *begin as usize;
+            }
         }
     }
-    joined
-}
-
-fn changed(values: &Valuation, changes: &[(u32, i64)]) -> Valuation {
-    let mut values = values.clone();
-    for (variable, value) in changes {
-        values[*variable as usize] = *value;
-    }
-    values
 }
 
 /// The enabled commands of a group.
@@ -227,7 +268,6 @@ impl<N: Number> Program<N> {
                 choices.end(UNNAMED, rewards(&self.action_rewards(UNNAMED, values)?));
             }
         }
-        let mut found = Vec::new();
         for action in self.possible(values) {
             let number = dense(action);
             match &self.synchronised[action][..] {
@@ -238,13 +278,13 @@ impl<N: Number> Program<N> {
                     }
                 }
                 groups => {
-                    self.combine(groups, &values.to_vec(), &mut found)?;
-                    for outcome in found.drain(..) {
-                        for (values, probability) in outcome {
-                            choices.to(self.layout.pack(&values), probability);
-                        }
-                        choices.end(number, rewards(&self.action_rewards(number, values)?));
-                    }
+                    let Some(meeting) = self.meet(number, groups, values)? else { continue };
+                    let sums = rewards(&self.action_rewards(number, values)?);
+                    meeting.each(|chosen| {
+                        self.lead(state, chosen, |next, probability| choices.to(next, probability));
+                        choices.end(number, sums.iter().cloned());
+                        Ok::<(), Error>(())
+                    })?;
                 }
             }
         }
@@ -252,23 +292,32 @@ impl<N: Number> Program<N> {
     }
 
     /// The one choice of a state of a Markov chain: each of the commands with the same probability.
-    fn step(&self, values: &Values, choices: &mut Choices<Packed, N>) -> Result<(), Error> {
-        let all = self.all_outcomes(&values.to_vec())?;
-        if all.is_empty() {
+    fn step(&self, state: &Packed, values: &Values, choices: &mut Choices<Packed, N>) -> Result<(), Error> {
+        let mut meetings: SmallVec<[Meeting<N>; 1]> = SmallVec::new();
+        for group in &self.free {
+            meetings.extend(self.meet(UNNAMED, std::slice::from_ref(group), values)?);
+        }
+        for action in self.possible(values) {
+            meetings.extend(self.meet(dense(action), &self.synchronised[action], values)?);
+        }
+        let ways = meetings.iter().map(Meeting::ways).fold(0, usize::saturating_add);
+        if ways == 0 {
             return Ok(());
         }
-        let count = N::from_rational(&BigRational::from(BigInt::from(all.len())));
+        let count = (ways > 1).then(|| N::from_rational(&BigRational::from(BigInt::from(ways))));
+        let share = |number: &N| count.as_ref().map_or_else(|| number.clone(), |count| number.over(count));
         let mut total = self.state_rewards(values)?;
-        for (action, outcome) in &all {
-            for (sum, more) in total.iter_mut().zip(self.action_rewards(*action, values)?) {
-                *sum = sum.plus(&more.over(&count));
-            }
-            for (values, probability) in outcome {
-                choices.to(self.layout.pack(values), probability.over(&count));
-            }
+        for meeting in &meetings {
+            let rewards = self.action_rewards(meeting.action, values)?;
+            meeting.each(|chosen| {
+                for (sum, more) in total.iter_mut().zip(&rewards) {
+                    *sum = sum.plus(&share(more));
+                }
+                self.lead(state, chosen, |next, probability| choices.to(next, share(&probability)));
+                Ok::<(), Error>(())
+            })?;
         }
-        let single = if let [(action, _)] = all[..] { action } else { UNNAMED };
-        choices.end(single, total);
+        choices.end(if ways == 1 { meetings[0].action } else { UNNAMED }, total);
         Ok(())
     }
 }
@@ -298,9 +347,14 @@ impl<N: Number> Generator<N> for Program<N> {
 
     fn successors(&self, state: &Packed, choices: &mut Choices<Packed, N>) -> Result<(), Error> {
         let values: Values = self.layout.values(state).collect();
+        if self.stop.as_ref().is_some_and(|stop| stop.holds(&values).unwrap_or(false)) {
+            choices.to(state.clone(), N::one());
+            choices.end(UNNAMED, self.wanted.iter().map(|_| N::zero()));
+            return Ok(());
+        }
         match self.kind {
             ModelKind::Mdp => self.choices(state, &values, choices),
-            ModelKind::Dtmc => self.step(&values, choices),
+            ModelKind::Dtmc => self.step(state, &values, choices),
         }
     }
 }
