@@ -122,12 +122,11 @@ pub fn check_all(
         _ => None,
     };
     let program = program.with_rewards(&wanted).stopping(end.as_ref());
-    let exact = match options.exactness {
-        Exactness::Never => None,
-        _ => {
-            let exact = Program::<BigRational>::new(&joined, &options.settings)?;
-            Some(exact.with_rewards(&wanted).stopping(end.as_ref()))
-        }
+    let exact = if options.exactness == Exactness::Never {
+        None
+    } else {
+        let exact = Program::<BigRational>::new(&joined, &options.settings)?;
+        Some(exact.with_rewards(&wanted).stopping(end.as_ref()))
     };
     let mut found = Processes::explore(&program, exact.as_ref(), options)?;
     let build = start.elapsed();

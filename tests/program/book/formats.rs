@@ -140,7 +140,7 @@ impl<'a> Table<'a> {
                 }
             };
             if let Some(elsewhere) = elsewhere {
-                means = format!("{means} {elsewhere}").trim().to_owned();
+                means.extend([if means.is_empty() { "" } else { " " }, &elsewhere]);
                 inner = None;
             }
         }
@@ -172,7 +172,7 @@ impl<'a> Table<'a> {
         let (mut name, mut schema) = (String::new(), field.clone());
         loop {
             if let Some(target) = schema["$ref"].as_str() {
-                name = target.rsplit('/').next().unwrap_or_default().to_owned();
+                target.rsplit('/').next().unwrap_or_default().clone_into(&mut name);
                 schema = self.resolved(&schema).clone();
             } else if schema["items"].is_object() {
                 path.push_str("[]");
