@@ -298,10 +298,13 @@ fn bounds_on_rewards_are_those_of_the_unfolded_process() {
     let mut between = 0;
     for _ in 0..200 {
         let model = random_model(&mut random);
+        // Rewards of a chain are shared among the commands of a state, and no whole numbers then.
+        if model.kind == ModelKind::Dtmc {
+            continue;
+        }
         for budget in [0, 1, 3, 8] {
             for direction in ["min", "max"] {
-                let named = if model.kind == ModelKind::Mdp { direction } else { "" };
-                let question = format!("P{named}=? [ F^{{rew{{\"cost\"}}<={budget}}} \"goal\" ]");
+                let question = format!("P{direction}=? [ F^{{rew{{\"cost\"}}<={budget}}} \"goal\" ]");
                 let expected = unfolded(&model, budget, direction == "max");
                 between += usize::from(expected > 0.0 && expected < 1.0);
                 for exactness in [Exactness::Always, Exactness::Never] {
