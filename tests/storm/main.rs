@@ -6,6 +6,9 @@
 
 #![allow(clippy::print_stdout)]
 
+mod decided;
+mod random;
+
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
@@ -15,14 +18,12 @@ use metaplan::comparison::{Battery, Coadaptation, Process, Risk, program};
 use metaplan::setup::Setup;
 use probabilistic::check::{Answer, Exactness, Options, Outcome, check};
 use probabilistic::explore::{Bounds, explore};
-use probabilistic::prism::ast::{
-    BinaryOp, Command as Guarded, Expr, ExprKind, Model, ModelKind, Module, Named, RewardItem, Rewards,
-    Update, Variable,
-};
-use probabilistic::prism::{Program, Settings};
+use probabilistic::prism::ast::Model;
 use probabilistic::solve::solve;
-use probabilistic::{Direction, Place, Problem, jani, prism, property};
+use probabilistic::{Direction, Problem, jani, prism, property};
 use serde_json::{Value, json};
+
+use random::{Random, questions, random_model};
 
 /// Reads lines of JSON with `file`, `property` and `exact`, and answers each with the value or why there is none.
 const SCRIPT: &str = r#"
@@ -86,114 +87,6 @@ fn storm(questions: &[Value]) -> Option<Vec<Value>> {
     )
 }
 
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, bound: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) as usize % bound
-    }
-}
-
-fn place() -> Place {
-    Place::default()
-}
-
-fn equals(name: &str, value: usize) -> Expr {
-    Expr::name(name).op(BinaryOp::Equal, Expr::int(value as i64))
-}
-
-/// A module over `variable` with random commands; actions are shared with the other module.
-fn module(random: &mut Random, name: &str, variable: &str, size: usize, actions: &[&str]) -> Module {
-    let mut commands = Vec::new();
-    for state in 0..size {
-        for _ in 0..random.below(4) {
-            let action = random.below(actions.len() + 1);
-            let ends = 1 + random.below(3);
-            let mut left = 100;
-            let mut updates = Vec::new();
-            for end in 0..ends {
-                let share = if end + 1 == ends { left } else { random.below(left + 1) };
-                left -= share;
-                let probability = Expr::int(share as i64).op(BinaryOp::Divide, Expr::int(100));
-                let target = Expr::int(random.below(size) as i64);
-                updates.push(Update {
-                    probability: Some(probability),
-                    assignments: vec![(variable.to_owned(), target, place())],
-                });
-            }
-            commands.push(Guarded {
-                action: actions.get(action).map(|action| (*action).to_owned()),
-                guard: equals(variable, state),
-                updates,
-                place: place(),
-            });
-        }
-    }
-    let range = Some((Expr::int(0), Expr::int(size as i64 - 1)));
-    let variable = Variable { name: variable.to_owned(), range, initial: Some(Expr::int(0)), place: place() };
-    Module { name: name.to_owned(), variables: vec![variable], commands, place: place() }
-}
-
-fn random_model(random: &mut Random) -> Model {
-    let (m, n) = (2 + random.below(8), 1 + random.below(4));
-    let modules = vec![
-        module(random, "first", "s", m, &["a", "b"]),
-        module(random, "second", "t", n.max(2), &["b", "c"]),
-    ];
-    let used: Vec<String> =
-        modules.iter().flat_map(|m| &m.commands).filter_map(|c| c.action.clone()).collect();
-    let mut items = Vec::new();
-    for action in ["a", "b", "c"] {
-        if used.iter().any(|known| known == action) && random.below(3) > 0 {
-            items.push(RewardItem {
-                action: Some(Some(action.to_owned())),
-                guard: Expr::bool(true),
-                reward: Expr::int(random.below(5) as i64),
-                place: place(),
-            });
-        }
-    }
-    items.push(RewardItem {
-        action: None,
-        guard: equals("s", random.below(m)),
-        reward: Expr::int(random.below(3) as i64),
-        place: place(),
-    });
-    Model {
-        kind: if random.below(5) == 0 { ModelKind::Dtmc } else { ModelKind::Mdp },
-        remark: String::new(),
-        constants: Vec::new(),
-        formulas: Vec::new(),
-        globals: Vec::new(),
-        modules,
-        rewards: vec![Rewards { name: "cost".to_owned(), items, place: place() }],
-        labels: vec![
-            Named { name: "goal".to_owned(), expression: equals("s", m - 1), place: place() },
-            Named {
-                name: "good".to_owned(),
-                expression: Expr::new(ExprKind::Not(Box::new(equals("t", 1)))),
-                place: place(),
-            },
-        ],
-        initial: None,
-    }
-}
-
-fn questions(kind: ModelKind) -> &'static [&'static str] {
-    match kind {
-        ModelKind::Mdp => &[
-            "Pmax=? [ F \"goal\" ]",
-            "Pmin=? [ F \"goal\" ]",
-            "R{\"cost\"}min=? [ F \"goal\" ]",
-            "R{\"cost\"}max=? [ F \"goal\" ]",
-            "Pmax=? [ \"good\" U \"goal\" ]",
-            "Pmax=? [ F<=5 \"goal\" ]",
-        ],
-        ModelKind::Dtmc => &["P=? [ F \"goal\" ]", "R{\"cost\"}=? [ F \"goal\" ]"],
-    }
-}
-
 /// Our value, with bounds; infinite as none.
 fn ours(model: &Model, text: &str, exactness: Exactness) -> Option<(f64, f64, f64)> {
     let options = Options { exactness, ..Options::default() };
@@ -226,97 +119,6 @@ fn file(folder: &Path, name: &str, text: &str) -> String {
     let path = folder.join(name);
     std::fs::write(&path, text).expect("written");
     path.display().to_string()
-}
-
-/// A property that is decided in some states is not followed beyond them; where a policy is wanted, all states are explored.
-#[test]
-fn what_comes_later_does_not_count() {
-    let mut random = Random(7);
-    let mut fewer = 0;
-    for _ in 0..300 {
-        let model = random_model(&mut random);
-        let more = ["P=? [ G \"good\" ]", "P=? [ G<=3 !\"goal\" ]", "P>=0.5 [ \"good\" U<=4 \"goal\" ]"];
-        let more = more.map(|question| match model.kind {
-            ModelKind::Mdp => question.replace("P=?", "Pmin=?"),
-            ModelKind::Dtmc => question.to_owned(),
-        });
-        for question in questions(model.kind).iter().copied().chain(more.iter().map(String::as_str)) {
-            let property = property::parse(question).expect("a property");
-            let [all, some] = [true, false].map(|policy| {
-                let options = Options { exactness: Exactness::Always, policy, ..Options::default() };
-                check(&model, &property, &options).expect("an answer")
-            });
-            assert_eq!(some.outcome, all.outcome, "{question}\n{}", prism::write(&model));
-            assert!(some.states <= all.states);
-            fewer += usize::from(some.states < all.states);
-        }
-    }
-    assert!(fewer > 100, "{fewer} have fewer states");
-}
-
-/// The value of reaching `s=m-1` within a budget, by iteration over states and what is left of it.
-fn unfolded(model: &Model, budget: usize, greatest: bool) -> f64 {
-    let program = Program::<f64>::new(model, &Settings::default()).expect("a program").with_rewards(&[0]);
-    let explored = explore(&program, &Bounds::default()).expect("explored");
-    let (mdp, rewards) = (&explored.mdp, &explored.rewards[0]);
-    let mut values = Vec::new();
-    let mut is_goal = Vec::new();
-    for state in &explored.states {
-        program.unpack(state, &mut values);
-        is_goal.push(values[0] == program.variables[0].greatest);
-    }
-    let mut known = vec![vec![0.0_f64; mdp.states()]; budget + 1];
-    for _ in 0..20_000 {
-        let mut change = 0.0_f64;
-        for left in 0..=budget {
-            for state in 0..mdp.states() {
-                let worth = |choice: usize| {
-                    let Some(left) = left.checked_sub(rewards[choice] as usize) else { return 0.0 };
-                    mdp.transitions(choice).map(|(target, p)| p * known[left][target]).sum::<f64>()
-                };
-                let all = mdp.choices(state).map(worth);
-                let best = match (is_goal[state], greatest) {
-                    (true, _) => 1.0,
-                    (false, true) => all.fold(0.0, f64::max),
-                    (false, false) => all.fold(1.0, f64::min),
-                };
-                change = change.max((best - known[left][state]).abs());
-                known[left][state] = best;
-            }
-        }
-        if change < 1e-13 {
-            break;
-        }
-    }
-    known[budget][0]
-}
-
-/// Whether what earns nothing goes round or not.
-#[test]
-fn bounds_on_rewards_are_those_of_the_unfolded_process() {
-    let mut random = Random(11);
-    let mut between = 0;
-    for _ in 0..200 {
-        let model = random_model(&mut random);
-        // Rewards of a chain are shared among the commands of a state, and no whole numbers then.
-        if model.kind == ModelKind::Dtmc {
-            continue;
-        }
-        for budget in [0, 1, 3, 8] {
-            for direction in ["min", "max"] {
-                let question = format!("P{direction}=? [ F^{{rew{{\"cost\"}}<={budget}}} \"goal\" ]");
-                let expected = unfolded(&model, budget, direction == "max");
-                between += usize::from(expected > 0.0 && expected < 1.0);
-                for exactness in [Exactness::Always, Exactness::Never] {
-                    let (value, lower, upper) = ours(&model, &question, exactness).expect("a probability");
-                    let text = prism::write(&model);
-                    assert!((value - expected).abs() < 1e-9, "{question}: {value}, {expected}\n{text}");
-                    assert!(lower - 1e-9 <= expected && expected <= upper + 1e-9, "{question}\n{text}");
-                }
-            }
-        }
-    }
-    assert!(between > 100, "{between} values between 0 and 1");
 }
 
 #[test]

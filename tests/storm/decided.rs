@@ -1,0 +1,101 @@
+//! What does not count once a property is decided, and what is left of a reward: without Storm.
+
+use probabilistic::check::{Exactness, Options, check};
+use probabilistic::explore::{Bounds, explore};
+use probabilistic::prism::ast::{Model, ModelKind};
+use probabilistic::prism::{self, Program, Settings};
+use probabilistic::property;
+
+use super::ours;
+use super::random::{Random, questions, random_model};
+
+/// A property that is decided in some states is not followed beyond them; where a policy is wanted, all states are explored.
+#[test]
+fn what_comes_later_does_not_count() {
+    let mut random = Random(7);
+    let mut fewer = 0;
+    for _ in 0..300 {
+        let model = random_model(&mut random);
+        let more = ["P=? [ G \"good\" ]", "P=? [ G<=3 !\"goal\" ]", "P>=0.5 [ \"good\" U<=4 \"goal\" ]"];
+        let more = more.map(|question| match model.kind {
+            ModelKind::Mdp => question.replace("P=?", "Pmin=?"),
+            ModelKind::Dtmc => question.to_owned(),
+        });
+        for question in questions(model.kind).iter().copied().chain(more.iter().map(String::as_str)) {
+            let property = property::parse(question).expect("a property");
+            let [all, some] = [true, false].map(|policy| {
+                let options = Options { exactness: Exactness::Always, policy, ..Options::default() };
+                check(&model, &property, &options).expect("an answer")
+            });
+            assert_eq!(some.outcome, all.outcome, "{question}\n{}", prism::write(&model));
+            assert!(some.states <= all.states);
+            fewer += usize::from(some.states < all.states);
+        }
+    }
+    assert!(fewer > 100, "{fewer} have fewer states");
+}
+
+/// The value of reaching `s=m-1` within a budget, by iteration over states and what is left of it.
+fn unfolded(model: &Model, budget: usize, greatest: bool) -> f64 {
+    let program = Program::<f64>::new(model, &Settings::default()).expect("a program").with_rewards(&[0]);
+    let explored = explore(&program, &Bounds::default()).expect("explored");
+    let (mdp, rewards) = (&explored.mdp, &explored.rewards[0]);
+    let mut values = Vec::new();
+    let mut is_goal = Vec::new();
+    for state in &explored.states {
+        program.unpack(state, &mut values);
+        is_goal.push(values[0] == program.variables[0].greatest);
+    }
+    let mut known = vec![vec![0.0_f64; mdp.states()]; budget + 1];
+    for _ in 0..20_000 {
+        let mut change = 0.0_f64;
+        for left in 0..=budget {
+            for state in 0..mdp.states() {
+                let worth = |choice: usize| {
+                    let Some(left) = left.checked_sub(rewards[choice] as usize) else { return 0.0 };
+                    mdp.transitions(choice).map(|(target, p)| p * known[left][target]).sum::<f64>()
+                };
+                let all = mdp.choices(state).map(worth);
+                let best = match (is_goal[state], greatest) {
+                    (true, _) => 1.0,
+                    (false, true) => all.fold(0.0, f64::max),
+                    (false, false) => all.fold(1.0, f64::min),
+                };
+                change = change.max((best - known[left][state]).abs());
+                known[left][state] = best;
+            }
+        }
+        if change < 1e-13 {
+            break;
+        }
+    }
+    known[budget][0]
+}
+
+/// Whether what earns nothing goes round or not.
+#[test]
+fn bounds_on_rewards_are_those_of_the_unfolded_process() {
+    let mut random = Random(11);
+    let mut between = 0;
+    for _ in 0..200 {
+        let model = random_model(&mut random);
+        // Rewards of a chain are shared among the commands of a state, and no whole numbers then.
+        if model.kind == ModelKind::Dtmc {
+            continue;
+        }
+        for budget in [0, 1, 3, 8] {
+            for direction in ["min", "max"] {
+                let question = format!("P{direction}=? [ F^{{rew{{\"cost\"}}<={budget}}} \"goal\" ]");
+                let expected = unfolded(&model, budget, direction == "max");
+                between += usize::from(expected > 0.0 && expected < 1.0);
+                for exactness in [Exactness::Always, Exactness::Never] {
+                    let (value, lower, upper) = ours(&model, &question, exactness).expect("a probability");
+                    let text = prism::write(&model);
+                    assert!((value - expected).abs() < 1e-9, "{question}: {value}, {expected}\n{text}");
+                    assert!(lower - 1e-9 <= expected && expected <= upper + 1e-9, "{question}\n{text}");
+                }
+            }
+        }
+    }
+    assert!(between > 100, "{between} values between 0 and 1");
+}
