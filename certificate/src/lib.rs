@@ -57,6 +57,7 @@ pub use check::{Checked, Fault, check};
 pub use clausal::{Formula, Inputs, Literal, StepBound, check_refutation, formula, lines};
 pub use faithful::{Cause, Difference, Faithful, faithful, witness};
 pub use smt::verification_conditions;
+pub use {num_rational::BigRational, pddl};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -67,7 +67,7 @@ pub use configuration::{Chosen, DesignChoice, configure};
 pub use encode::Semantics;
 pub use error::{Error, Errors, File, Place};
 pub use exact::{ExactTask, ground_exact, optimize_exact};
-pub use ground::{Config as GroundConfig, ground};
+pub use ground::{GroundConfig, ground};
 pub use limits::Limits;
 pub use optimize::{Config, Engine, Front, Point, Strategy, lexicographic, optimize, pareto};
 pub use plan::solution::{Improvement, Moment, Part, Proof, Solution, Statistics, Status, Unbounded};

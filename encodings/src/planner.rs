@@ -11,7 +11,7 @@ use pddl::ast::{Domain, Metric, Problem};
 use crate::concurrent::{ground_concurrent, optimize_concurrent};
 use crate::error::{Error, Errors};
 use crate::exact::{ground_exact, optimize_exact};
-use crate::ground::{Config as GroundConfig, ground};
+use crate::ground::{GroundConfig, ground};
 use crate::limits::Limits;
 use crate::optimize::{Config, Front, lexicographic, pareto};
 use crate::plan::solution::{Improvement, Solution};

@@ -17,7 +17,7 @@ use rustc_hash::FxHashMap;
 use crate::bounds::Bounds;
 use crate::context::Context;
 use crate::encode::{CostLimit, Counting, Encoding, Plans, Semantics};
-use crate::ground::{Config, ground};
+use crate::ground::{GroundConfig, ground};
 use crate::limits::Limits;
 use crate::number::Int;
 use crate::plan::ground::replay;
@@ -73,7 +73,7 @@ fn check(seed: u64, backend: &Backend) {
     let mission = Mission::random(seed);
     let (domain, problem) = (Source::new("d", mission.domain()), Source::new("p", mission.problem()));
     let (domain, problem, _) = read(&domain, &problem).expect("PDDL");
-    let task = ground(&domain, &problem, &Config::default()).expect("a task");
+    let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
     let optimum = mission.oracle().map(Int::from);
     if task.unreachable.is_some() {
         assert!(optimum.is_none(), "seed {seed}");
@@ -285,7 +285,7 @@ pub(crate) fn depot(seed: u64) -> (String, String) {
 
 pub(crate) fn ground_text((domain, problem): (String, String)) -> Task {
     let (domain, problem, _) = read(&Source::new("d", domain), &Source::new("p", problem)).expect("PDDL");
-    let config = Config { solves: vec![pddl::ast::Name::new("solves")], ..Config::default() };
+    let config = GroundConfig { solves: vec![pddl::ast::Name::new("solves")], ..GroundConfig::default() };
     ground(&domain, &problem, &config).expect("a task")
 }
 

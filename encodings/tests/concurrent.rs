@@ -48,7 +48,7 @@ fn metric(
 ) -> Result<BigRational, String> {
     let plan =
         PlanText::parse(&Source::new("plan", text)).unwrap_or_else(|errors| panic!("{errors:?}\n{text}"));
-    let options = Options { concurrent: true, tolerance: separation.clone() };
+    let options = Options::default().with_concurrent(true).with_tolerance(separation.clone());
     let verdict = validate(domain, problem, &plan, &options);
     match verdict.violation {
         None => Ok(verdict.metric.unwrap_or(verdict.total_time)),

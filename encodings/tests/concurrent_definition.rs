@@ -31,7 +31,12 @@ fn proved(domain: &str, problem: &str) -> String {
     });
     let text: String = lines.collect();
     let parsed = PlanText::parse(&Source::new("plan", text.clone())).expect("a plan");
-    let verdict = validate(&domain, &problem, &parsed, &Options { concurrent: true, tolerance: separation });
+    let verdict = validate(
+        &domain,
+        &problem,
+        &parsed,
+        &Options::default().with_concurrent(true).with_tolerance(separation),
+    );
     assert!(verdict.valid, "{text}{:?}", verdict.violation);
     let value = verdict.metric.unwrap_or(verdict.total_time);
     assert_eq!(value, plan.cost.to_rational(), "{text}");

@@ -29,7 +29,7 @@ fn check(actions: &str, init: &str, goal: &str, expected: (Status, Option<&str>)
     });
     let text: String = lines.collect();
     let parsed = PlanText::parse(&Source::new("plan", text.clone())).expect("a plan");
-    let options = Options { concurrent: true, tolerance: separation };
+    let options = Options::default().with_concurrent(true).with_tolerance(separation);
     let verdict = validate(&domain_read, &problem_read, &parsed, &options);
     assert!(verdict.valid, "{text}{:?}", verdict.violation);
     assert_eq!(verdict.metric, Some(plan.cost.to_rational()), "{text}");

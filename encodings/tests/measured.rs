@@ -26,7 +26,7 @@ fn judge((domain, problem): (&Domain, &Problem), concurrent: bool, solution: &So
     let plan = solution.plan.as_ref().expect("a plan");
     let text = text(plan);
     let parsed = PlanText::parse(&Source::new("plan", text.clone())).expect("a plan");
-    let options = Options { concurrent, tolerance: BigRational::new(BigInt::from(1), BigInt::from(1000)) };
+    let options = Options::default().with_concurrent(concurrent);
     let verdict = validate(domain, problem, &parsed, &options);
     assert!(verdict.valid, "{text}{:?}", verdict.violation);
     assert_eq!(verdict.metric, Some(plan.cost.to_rational()), "{text}");

@@ -159,7 +159,8 @@ fn verdicts_on_real_files_are_those_of_the_unified_planning_framework() {
         let answer = String::from_utf8_lossy(&output.stdout);
         let verdicts: Vec<bool> = answer.lines().map(|line| line == "valid").collect();
         assert_eq!(verdicts.len(), plans.len(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
-        let options = Options { concurrent: true, tolerance: num_rational::BigRational::default() };
+        let options =
+            Options::default().with_concurrent(true).with_tolerance(num_rational::BigRational::default());
         for (plan, peer) in plans.iter().zip(verdicts) {
             let parsed = PlanText::parse(&Source::new("plan", text(plan))).expect("a plan is read");
             let ours = validate(&domain, &problem, &parsed, &options);

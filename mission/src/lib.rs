@@ -26,3 +26,4 @@ pub use codes::CODES;
 pub use joined::Mission;
 pub use message::{Errors, Message};
 pub use native::CoAdaptation;
+pub use {num_rational::BigRational, ontology, pddl, rules};

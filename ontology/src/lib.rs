@@ -36,6 +36,7 @@ pub use ntriples::ntriples;
 pub use owl::*;
 pub use read::{ReadOptions, Syntax, read_files, read_text};
 pub use write::{OutputSyntax, convert_files, turtle};
+pub use {num_rational::BigRational, rules};
 
 /// The example of the README is compiled and run with the tests.
 #[cfg(doctest)]

@@ -30,6 +30,7 @@ mod types;
 pub mod validate;
 mod validator;
 
+pub use ::num_rational::BigRational;
 pub use check::{check, check_domain};
 pub use codes::CODES;
 pub use diagnostic::{Diagnostic, Errors, Severity, has_errors, render};

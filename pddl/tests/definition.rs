@@ -51,7 +51,12 @@ impl Task {
         let plan = PlanText::parse(&Source::new("plan", plan)).expect("the plan can be read");
         let thousandth = BigRational::new(BigInt::from(1), BigInt::from(1000));
         let tolerance = if concurrent { thousandth } else { BigRational::default() };
-        let verdict = validate(&domain, &problem, &plan, &Options { concurrent, tolerance });
+        let verdict = validate(
+            &domain,
+            &problem,
+            &plan,
+            &Options::default().with_concurrent(concurrent).with_tolerance(tolerance),
+        );
         verdict.violation.map_or("valid".to_owned(), |violation| violation.kind.as_str().to_owned())
     }
 
@@ -341,7 +346,7 @@ fn the_tolerance_is_for_rounded_plans() {
     assert_eq!(verdict(&Options::default(), "0: (a) [5]\n4.9995: (b) [1]"), Some("at_start"));
     // A separation is not a tolerance of durations.
     let separation = BigRational::from_integer(BigInt::from(1));
-    let wide = Options { concurrent: true, tolerance: separation };
+    let wide = Options::default().with_concurrent(true).with_tolerance(separation);
     assert_eq!(verdict(&wide, "0: (a) [4.5]"), Some("duration"));
     assert_eq!(verdict(&wide, "0: (a) [4.9995]"), Some("goal"));
 }

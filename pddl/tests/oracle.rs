@@ -319,7 +319,7 @@ fn check(task: &Task) {
     // With a time between them, the actions do the same when they may overlap.
     let timed: Vec<_> = plan.lines().enumerate().map(|(index, step)| format!("{index}: {step}\n")).collect();
     let timed = PlanText::parse(&Source::new("timed plan", timed.concat())).expect("the plan can be read");
-    let options = Options { concurrent: true, ..Options::default() };
+    let options = Options::default().with_concurrent(true);
     let concurrent = validate(&domain_tree, &problem_tree, &timed, &options);
     let what = |verdict: &Verdict| verdict.violation.as_ref().map(|found| (found.step, found.kind));
     assert_eq!((what(&concurrent), &concurrent.values), (what(&verdict), &verdict.values));

@@ -26,7 +26,8 @@ fn check(domain: &str, problem: &str, plan: &str, concurrent: bool, expected: &s
         Err(found) => panic!("{}", render(&found, &[&domain, &problem], false)),
     };
     let plan = PlanText::parse(&Source::new("plan", plan)).expect("the plan can be read");
-    let verdict = validate(&domain_tree, &problem_tree, &plan, &Options { concurrent, ..Options::default() });
+    let verdict =
+        validate(&domain_tree, &problem_tree, &plan, &Options::default().with_concurrent(concurrent));
     let metric = verdict.metric.map_or("-".to_owned(), |metric| metric.to_string());
     let found = verdict.violation.as_ref().map_or(format!("{} {metric}", verdict.total_time), |violation| {
         format!("{} {}", violation.step.unwrap_or(0), violation.kind.as_str())

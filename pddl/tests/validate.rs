@@ -44,7 +44,7 @@ fn check(task: &(ast::Domain, ast::Problem), cases: &[(&str, &str)]) {
 }
 
 fn check_concurrent(task: &(ast::Domain, ast::Problem), cases: &[(&str, &str)]) {
-    let options = Options { concurrent: true, ..Options::default() };
+    let options = Options::default().with_concurrent(true);
     for (plan, expected) in cases {
         assert_eq!(summary(&run(task, plan, &options)), *expected, "{plan}");
     }

@@ -98,12 +98,28 @@ impl<S: Clone, N: Number> Choices<S, N> {
     }
 }
 
-/// When exploration has to stop.
+/// When exploration has to stop. Each `with_` changes one thing.
+#[derive(Clone, Copy)]
+#[non_exhaustive]
 pub struct Bounds<'a> {
     /// More states than this are an error.
     pub states: usize,
     /// Told the number of states from time to time; false stops.
     pub progress: &'a dyn Fn(usize) -> bool,
+}
+
+impl<'a> Bounds<'a> {
+    /// More states than this are an error; 50 million unless said otherwise.
+    #[must_use]
+    pub fn with_states(self, states: usize) -> Self {
+        Self { states, ..self }
+    }
+
+    /// Told the number of states from time to time; false stops.
+    #[must_use]
+    pub fn with_progress(self, progress: &'a dyn Fn(usize) -> bool) -> Self {
+        Self { progress, ..self }
+    }
 }
 
 impl Default for Bounds<'_> {

@@ -45,6 +45,7 @@ pub use error::{Diagnostic, Error, Place};
 pub use mdp::Mdp;
 pub use number::Number;
 pub use solve::{Direction, Problem, Solution};
+pub use {fixedbitset::FixedBitSet, num_rational::BigRational, smallvec::SmallVec};
 
 /// The README's example is a test.
 #[cfg(doctest)]

@@ -10,7 +10,7 @@ fn outcome(model: &str, question: &str, options: &Options<'_>) -> Result<Outcome
 }
 
 fn value(model: &str, question: &str, exactness: Exactness) -> Quantity {
-    let options = Options { exactness, ..Options::default() };
+    let options = Options::default().with_exactness(exactness);
     match outcome(model, question, &options).expect("an answer") {
         Outcome::Value(Answer::Finite(quantity)) => quantity,
         other => panic!("{question}: {other:?}"),
@@ -33,7 +33,7 @@ fn enclosed(model: &str, question: &str) -> BigRational {
 
 /// The codes of what is wrong with a model.
 fn refused(model: &str, question: &str, exactness: Exactness) -> Vec<&'static str> {
-    match outcome(model, question, &Options { exactness, ..Options::default() }) {
+    match outcome(model, question, &Options::default().with_exactness(exactness)) {
         Err(Error::Model(problems)) => problems.iter().map(|problem| problem.code).collect(),
         other => panic!("{other:?}"),
     }
@@ -144,13 +144,14 @@ fn a_policy_is_evaluated_over_bounded_steps() {
     ];
     for (question, expected) in cases {
         let evaluate = Some(PolicyTable::from_json(policy).expect("a policy"));
-        let found = outcome(model, question, &Options { evaluate, ..Options::default() }).expect("an answer");
+        let found =
+            outcome(model, question, &Options::default().with_evaluation(evaluate)).expect("an answer");
         let Outcome::Value(Answer::Finite(found)) = found else { panic!("{found:?}") };
         assert_eq!(found.exact.map(|exact| exact.to_string()).as_deref(), Some(expected), "{question}");
     }
     let evaluate = Some(PolicyTable::from_json(policy).expect("a policy"));
     let both = "multi(R{\"cost\"}min=? [ F \"goal\" ], Pmax=? [ F \"goal\" ])";
-    assert!(outcome(model, both, &Options { evaluate, ..Options::default() }).is_err());
+    assert!(outcome(model, both, &Options::default().with_evaluation(evaluate)).is_err());
 }
 
 #[test]
@@ -165,9 +166,9 @@ fn ties_of_small_values_are_ties() {
         label \"goal\" = s=40 & h;";
     let model = prism::parse(model).expect("a model");
     let question = property::parse("Pmax=? [ F \"goal\" ]").expect("a property");
-    let options = Options { exactness: Exactness::Never, policy: true, ..Options::default() };
+    let options = Options::default().with_exactness(Exactness::Never).with_policy(true);
     let report = check(&model, &question, &options).expect("an answer");
-    let options = Options { exactness: Exactness::Always, evaluate: report.policy, ..Options::default() };
+    let options = Options::default().with_exactness(Exactness::Always).with_evaluation(report.policy);
     let again = check(&model, &question, &options).expect("an answer").outcome;
     let Outcome::Value(Answer::Finite(found)) = again else { panic!("{again:?}") };
     assert_eq!(found.exact.map(|exact| exact.to_string()).as_deref(), Some("1/100000000"));
@@ -184,7 +185,7 @@ fn two_objectives_in_doubles_have_the_bounds_of_their_policies() {
         label \"end\" = s>0; label \"good\" = s=1;";
     let question = "multi(R{\"cost\"}min=? [ F \"end\" ], Pmax=? [ F \"good\" ])";
     let [exact, rounded] = [Exactness::Always, Exactness::Never].map(|exactness| {
-        let found = outcome(model, question, &Options { exactness, ..Options::default() });
+        let found = outcome(model, question, &Options::default().with_exactness(exactness));
         let Ok(Outcome::Front(front)) = found else { panic!("{found:?}") };
         front
     });
@@ -201,7 +202,7 @@ fn two_objectives_in_doubles_have_the_bounds_of_their_policies() {
         "multi(Pmax=? [ F \"good\" ], R{\"cost\"}<=2 [ F \"end\" ])",
     ] {
         let [exact, rounded] = [Exactness::Always, Exactness::Never].map(|exactness| {
-            match outcome(model, bounded, &Options { exactness, ..Options::default() }) {
+            match outcome(model, bounded, &Options::default().with_exactness(exactness)) {
                 Ok(Outcome::Constrained { randomised, deterministic, proved: true }) => {
                     [randomised, deterministic]
                 }

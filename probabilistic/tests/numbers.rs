@@ -25,8 +25,8 @@ fn asked(model: &str, question: &str, exactness: Exactness) -> String {
         Err(other) => panic!("{other}"),
     };
     // No limit but that of memory, and of the numbers of states.
-    let bounds = Bounds { states: usize::MAX, ..Bounds::default() };
-    match check(&model, &property, &Options { bounds, exactness, ..Options::default() }) {
+    let bounds = Bounds::default().with_states(usize::MAX);
+    match check(&model, &property, &Options::default().with_bounds(bounds).with_exactness(exactness)) {
         Ok(report) => match report.outcome {
             Outcome::Value(answer) => answer.quantity().map_or(f64::NAN, |found| found.value).to_string(),
             other => panic!("{other:?}"),
@@ -135,9 +135,8 @@ fn a_policy_with_numbers_of_any_size_is_refused() {
         };
         let rows = [row(0, "0"), row(1, choice), row(2, "0")].join(", ");
         let json = format!("{{\"format\": \"metaplan-policy/1\", \"states\": [{rows}]}}");
-        let found = PolicyTable::from_json(&json).and_then(|table| {
-            check(&model, &property, &Options { evaluate: Some(table), ..Options::default() })
-        });
+        let found = PolicyTable::from_json(&json)
+            .and_then(|table| check(&model, &property, &Options::default().with_evaluation(table)));
         assert_eq!(found.err().map(|error| error.to_string()).as_deref(), expected, "{choice}");
     }
 }

@@ -39,7 +39,7 @@ const PROCESS: &str = "mdp
 fn outcome(model: &str, question: &str, exactness: Exactness) -> Outcome {
     let model = prism::parse(model).unwrap_or_else(|problems| panic!("{problems:?}"));
     let property = property::parse(question).unwrap_or_else(|error| panic!("{question}: {error:?}"));
-    let options = Options { exactness, ..Options::default() };
+    let options = Options::default().with_exactness(exactness);
     check(&model, &property, &options).unwrap_or_else(|error| panic!("{question}: {error:?}")).outcome
 }
 
@@ -254,8 +254,8 @@ fn a_file_of_properties() {
         ]
     );
     let model = prism::parse(CHAIN).expect("a model");
-    let mut options = Options { declarations: file.declarations, ..Options::default() };
-    let properties: Vec<_> = file.properties.iter().map(|listed| &listed.property).collect();
+    let mut options = Options::default().with_declarations(file.declarations);
+    let properties: Vec<_> = file.properties.into_iter().map(|listed| listed.property).collect();
     let missing = check_all(&model, &properties, &options).expect_err("open constants").to_string();
     assert_eq!(missing, "constants without value: k");
     options.settings.insert("k".to_owned(), "2".to_owned());

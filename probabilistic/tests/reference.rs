@@ -32,7 +32,8 @@ fn settings(text: &str) -> Settings {
 fn run(model: &Path, text: &str, constants: &str, exactness: Exactness) -> Report {
     let source = std::fs::read_to_string(model).expect("readable");
     let model = parse(&source).unwrap_or_else(|problems| panic!("{}: {problems:?}", model.display()));
-    let options = Options { settings: settings(constants), exactness, policy: true, ..Options::default() };
+    let options =
+        Options::default().with_settings(settings(constants)).with_exactness(exactness).with_policy(true);
     let property = property::parse(text).unwrap_or_else(|error| panic!("{text}: {error:?}"));
     check(&model, &property, &options).unwrap_or_else(|error| panic!("{text}: {error:?}"))
 }

@@ -52,7 +52,7 @@ const WORDS: [&str; 24] = [
 fn survive(text: &str) {
     if let Ok(model) = prism::parse(text) {
         let property = property::parse("Pmax=? [ F \"goal\" ]").expect("a property");
-        let options = Options { bounds: Bounds { states: 2000, ..Bounds::default() }, ..Options::default() };
+        let options = Options::default().with_bounds(Bounds::default().with_states(2000));
         let _ = check(&model, &property, &options);
         let _ = jani::write("model", &model);
     }
@@ -102,7 +102,7 @@ fn exact_and_rounded_answers_agree() {
     ] {
         let property = property::parse(question).expect("a property");
         let [exact, rounded] = [Exactness::Always, Exactness::Never].map(|exactness| {
-            let options = Options { exactness, ..Options::default() };
+            let options = Options::default().with_exactness(exactness);
             check(&model, &property, &options).expect("an answer").outcome
         });
         let (Outcome::Value(exact), Outcome::Value(rounded)) = (exact, rounded) else { panic!("{question}") };
@@ -160,7 +160,7 @@ fn a_large_component_gets_bounds() {
     .expect("a model");
     for question in ["R{\"cost\"}min=? [ F \"home\" ]", "R{\"cost\"}max=? [ F \"home\" ]"] {
         let property = property::parse(question).expect("a property");
-        let options = Options { exactness: Exactness::Never, ..Options::default() };
+        let options = Options::default().with_exactness(Exactness::Never);
         let report = check(&model, &property, &options).expect("an answer");
         let Outcome::Value(Answer::Finite(cost)) = report.outcome else { panic!("{:?}", report.outcome) };
         assert!(cost.lower <= cost.value && cost.value <= cost.upper);

@@ -11,7 +11,7 @@ use num_rational::BigRational;
 
 fn value(model: &str, question: &str, exactness: Exactness) -> Quantity {
     let model = prism::parse(model).unwrap_or_else(|problems| panic!("{problems:?}"));
-    let options = Options { exactness, ..Options::default() };
+    let options = Options::default().with_exactness(exactness);
     let start = Instant::now();
     let report = check(&model, &property::parse(question).expect("a property"), &options).expect("an answer");
     // What took minutes takes milliseconds; the rest is for slow machines and for code that is not optimised.

@@ -89,7 +89,7 @@ pub(crate) fn check(
     let answered = || -> Result<String, Error> {
         let read = prism::parse(model)?;
         let asked = property::parse(property)?;
-        let options = Options { settings: constants.into_iter().collect(), exactness, ..Options::default() };
+        let options = Options::default().with_settings(constants).with_exactness(exactness);
         Ok(json(&CheckAnswer::new(property, &checked(&read, &asked, &options)?)))
     };
     py.detach(answered).map_err(|error| {

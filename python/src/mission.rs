@@ -276,7 +276,7 @@ impl Mission {
         let judged = || {
             let (problem, _) = mission.filled()?;
             let plan = read_plan(&Source::new("plan", plan), mission)?;
-            let options = validate::Options { concurrent, tolerance };
+            let options = validate::Options::default().with_concurrent(concurrent).with_tolerance(tolerance);
             let verdict = validate::validate(mission.domain(), &problem, &plan, &options);
             Ok(serde_json::to_string(&VerdictAnswer::new(&verdict)).unwrap_or_default())
         };

@@ -207,22 +207,20 @@ impl Checked<'_> {
             progress.set_message(format!("{states} states"));
             true
         };
-        let options = Options {
-            settings: combination.settings.clone(),
-            bounds: Bounds { states: arguments.state_limit, progress: &told },
-            exactness: match (arguments.exact, arguments.inexact) {
+        let options = Options::default()
+            .with_settings(combination.settings.clone())
+            .with_bounds(Bounds::default().with_states(arguments.state_limit).with_progress(&told))
+            .with_exactness(match (arguments.exact, arguments.inexact) {
                 (true, _) => Exactness::Always,
                 (_, true) => Exactness::Never,
                 _ => Exactness::Auto,
-            },
-            secondary: arguments.secondary.clone(),
-            policy: arguments.policy.is_some(),
-            evaluate: evaluate.clone(),
-            precision: precision(arguments),
-            declarations: (*declarations).clone(),
-        };
-        let properties: Vec<_> = listed.iter().map(|listed| &listed.property).collect();
-        check_all(model, &properties, &options)
+            })
+            .with_secondary(arguments.secondary.clone())
+            .with_policy(arguments.policy.is_some())
+            .with_evaluation(evaluate.clone())
+            .with_precision(precision(arguments))
+            .with_declarations((*declarations).clone());
+        check_all(model, listed.iter().map(|listed| &listed.property), &options)
     }
 }
 

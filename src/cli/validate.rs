@@ -49,7 +49,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let (problem, warnings) = mission.filled()?;
     output::warnings(common, mission.warnings().chain(&warnings));
     let plan = read_plan(&source(plan)?, &mission)?;
-    let options = Options { concurrent: arguments.concurrent, tolerance: arguments.tolerance.clone() };
+    let options =
+        Options::default().with_concurrent(arguments.concurrent).with_tolerance(arguments.tolerance.clone());
     let verdict = during("validating", common, || validate(mission.domain(), &problem, &plan, &options));
     match common.format {
         Format::Json => output::json_answer(&VerdictAnswer::new(&verdict)),

@@ -106,7 +106,7 @@ pub fn compare(
     report(&[], &memo.costs);
     let started = Instant::now();
     let process = Process::<f64>::new(mission, config.risk, &REWARDS);
-    let bounds = Bounds { states: config.states, ..Bounds::default() };
+    let bounds = Bounds::default().with_states(config.states);
     let explored = explore(&process, &bounds)?;
     memo.costs.process.build = started.elapsed();
     memo.costs.states = explored.mdp.states();

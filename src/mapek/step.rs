@@ -80,6 +80,13 @@ impl PlannedStep {
         }
     }
 
+    /// The action with all its arguments, as PDDL writes it: `(move a b)`.
+    pub fn call(&self) -> String {
+        let words: Vec<&str> =
+            std::iter::once(&self.action).chain(&self.arguments).map(String::as_str).collect();
+        format!("({})", words.join(" "))
+    }
+
     /// `move wp1 wp2 (f_localization = fd_amcl_kinect)`: without functions and designs among the arguments.
     pub fn summary(&self) -> String {
         let configured = |word: &str| self.configuration.iter().any(|(f, d)| f == word || d == word);

@@ -23,7 +23,10 @@ impl Reading {
 
     /// Actions overlap; those that interfere lie so far apart.
     pub fn concurrent(separation: &BigRational) -> Self {
-        Self { options: Options { concurrent: true, tolerance: separation.clone() }, timed: true }
+        Self {
+            options: Options::default().with_concurrent(true).with_tolerance(separation.clone()),
+            timed: true,
+        }
     }
 
     /// What the validator says a plan with this reading comes to, by the problem's metric; none of an invalid plan.

@@ -8,6 +8,7 @@ use serde::Deserialize;
 /// How a scenario is simulated. Times are in the domain's time unit.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Simulation {
     /// The time from one report to the next.
     pub step: f64,
@@ -102,6 +103,22 @@ pub struct Suave {
 }
 
 impl Simulation {
+    /// A world in which nothing happens but what is asked for: reports come every `step`, the mission is given up after `time_budget`, and
+    /// an action that cannot go on fails after `patience`.
+    pub fn new(step: f64, time_budget: f64, patience: f64) -> Self {
+        Self {
+            step,
+            time_budget,
+            patience,
+            noise: 0.0,
+            lifeline: None,
+            events: Vec::new(),
+            signals: Vec::new(),
+            failures: Vec::new(),
+            suave: None,
+        }
+    }
+
     /// What is wrong with the numbers, if something is.
     pub fn mistake(&self) -> Option<String> {
         let positive = [("step", self.step), ("time_budget", self.time_budget), ("patience", self.patience)];

@@ -111,17 +111,11 @@ fn once(failing: &[&str], time: (f64, f64), recovery: Option<(f64, f64)>) -> Vec
 }
 
 fn simulation(robot: &Robot, events: Vec<Disturbance>, failures: Vec<RandomFailure>) -> Simulation {
-    Simulation {
-        step: robot.pace.0,
-        time_budget: 200.0 * robot.pace.0,
-        patience: robot.pace.1,
-        noise: 0.02,
-        lifeline: robot.lifeline.map(ToOwned::to_owned),
-        events,
-        signals: Vec::new(),
-        failures,
-        suave: None,
-    }
+    let mut simulation = Simulation::new(robot.pace.0, 200.0 * robot.pace.0, robot.pace.1);
+    simulation.noise = 0.02;
+    simulation.lifeline = robot.lifeline.map(ToOwned::to_owned);
+    (simulation.events, simulation.failures) = (events, failures);
+    simulation
 }
 
 /// What a scenario has come to beside one other way of control.

@@ -165,8 +165,10 @@ pub fn plan_text(steps: &[Step]) -> PlanText {
 /// How the validator reads a plan of a mode. One after another it takes no rounding: the times are exact.
 pub fn options(mode: &Mode) -> Options {
     match mode {
-        Mode::Sequential => Options { concurrent: false, tolerance: BigRational::zero() },
-        Mode::Concurrent(separation) => Options { concurrent: true, tolerance: separation.clone() },
+        Mode::Sequential => Options::default().with_tolerance(BigRational::zero()),
+        Mode::Concurrent(separation) => {
+            Options::default().with_concurrent(true).with_tolerance(separation.clone())
+        }
     }
 }
 

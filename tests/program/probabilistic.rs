@@ -57,7 +57,7 @@ pub fn dark() -> Vec<(String, String)> {
 /// The answer of the PRISM model of a process, as a fraction.
 fn answer(mission: &Coadaptation, risk: Risk, question: &str) -> Outcome {
     let model = program(mission, risk);
-    let options = Options { exactness: Exactness::Always, ..Options::default() };
+    let options = Options::default().with_exactness(Exactness::Always);
     check(&model, &property::parse(question).expect("a property"), &options).expect("an answer").outcome
 }
 

@@ -24,7 +24,7 @@ fn what_comes_later_does_not_count() {
         for question in questions(model.kind).iter().copied().chain(more.iter().map(String::as_str)) {
             let property = property::parse(question).expect("a property");
             let [all, some] = [true, false].map(|policy| {
-                let options = Options { exactness: Exactness::Always, policy, ..Options::default() };
+                let options = Options::default().with_exactness(Exactness::Always).with_policy(policy);
                 check(&model, &property, &options).expect("an answer")
             });
             assert_eq!(some.outcome, all.outcome, "{question}\n{}", prism::write(&model));

@@ -89,7 +89,7 @@ fn storm(questions: &[Value]) -> Option<Vec<Value>> {
 
 /// Our value, with bounds; infinite as none.
 fn ours(model: &Model, text: &str, exactness: Exactness) -> Option<(f64, f64, f64)> {
-    let options = Options { exactness, ..Options::default() };
+    let options = Options::default().with_exactness(exactness);
     let report = check(model, &property::parse(text).expect("a property"), &options).expect("an answer");
     match report.outcome {
         Outcome::Value(Answer::Finite(quantity)) => Some((quantity.value, quantity.lower, quantity.upper)),
@@ -210,7 +210,7 @@ fn native(mission: &Coadaptation, risk: Risk, case: &Case) -> Run {
     let started = processor();
     let names: Vec<&str> = case.reward.into_iter().collect();
     let process = Process::<f64>::new(mission, risk, &names);
-    let bounds = Bounds { states: 100_000_000, ..Bounds::default() };
+    let bounds = Bounds::default().with_states(100_000_000);
     let explored = explore(&process, &bounds).expect("explored");
     let build = processor() - started;
     let mut goal = fixedbitset::FixedBitSet::with_capacity(explored.mdp.states());
@@ -229,8 +229,8 @@ fn native(mission: &Coadaptation, risk: Risk, case: &Case) -> Run {
 /// The model as text, as anybody would check it.
 fn as_text(text: &str, case: &Case) -> Run {
     let model = prism::parse(text).expect("a model");
-    let bounds = Bounds { states: 100_000_000, ..Bounds::default() };
-    let options = Options { exactness: Exactness::Never, bounds, ..Options::default() };
+    let bounds = Bounds::default().with_states(100_000_000);
+    let options = Options::default().with_exactness(Exactness::Never).with_bounds(bounds);
     let property = property::parse(case.property).expect("a property");
     let started = processor();
     let report = check(&model, &property, &options).expect("an answer");

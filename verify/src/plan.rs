@@ -34,7 +34,7 @@ pub fn plan(
         step.duration = step.duration.take().filter(|_| is_chosen(domain, &step.action));
     }
     let tolerance = if is_timed { Options::default().tolerance } else { BigRational::zero() };
-    let options = Options { tolerance, ..Options::default() };
+    let options = Options::default().with_tolerance(tolerance);
     let verdict = validate(domain, problem, &plan, &options);
     if let Some(violation) = verdict.violation {
         return Err(violation.message);

@@ -41,6 +41,6 @@ fuzz_target!(|bytes: &[u8]| {
     }
     let Ok(plan) = PlanText::parse(&Source::new("plan", lines)) else { return };
     for concurrent in [false, true] {
-        validate(&trees.0, &trees.1, &plan, &Options { concurrent, ..Options::default() });
+        validate(&trees.0, &trees.1, &plan, &Options::default().with_concurrent(concurrent));
     }
 });

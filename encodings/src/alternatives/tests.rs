@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::{Forced, alternatives};
 use crate::context::Context;
-use crate::ground::{Config as GroundConfig, ground};
+use crate::ground::{GroundConfig, ground};
 use crate::limits::Limits;
 use crate::number::Int;
 use crate::optimize::{Config, optimize};

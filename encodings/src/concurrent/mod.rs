@@ -38,7 +38,7 @@ use tracing::info_span;
 use crate::bounds::Bounds;
 use crate::context::Context;
 use crate::error::{Error, Errors, File, Place};
-use crate::ground::{Config as GroundConfig, Generality, ground_lifted};
+use crate::ground::{Generality, GroundConfig, ground_lifted};
 use crate::lifted::{Expression, Lifted, Metric, Rational};
 use crate::limits::Limits;
 use crate::normalize::{normalize, partial};

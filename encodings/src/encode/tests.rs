@@ -11,7 +11,7 @@ use crate::encode::builder::Builder;
 use crate::encode::conditional::Fires;
 use crate::encode::formula::{Family, Formula, Meaning};
 use crate::encode::{CostLimit, Counting, Encoding, Plans, Semantics, operators, state};
-use crate::ground::{Config, ground};
+use crate::ground::{GroundConfig, ground};
 use crate::limits::Limits;
 use crate::sat::Lit;
 use crate::task::{Argument, Task};
@@ -34,7 +34,7 @@ const PROBLEM: &str = "(define (problem p) (:domain d)
 fn task() -> Task {
     let (domain, problem, _) =
         read(&Source::new("domain", DOMAIN), &Source::new("problem", PROBLEM)).expect("PDDL");
-    let config = Config { solves: vec![pddl::ast::Name::new("solves")], ..Config::default() };
+    let config = GroundConfig { solves: vec![pddl::ast::Name::new("solves")], ..GroundConfig::default() };
     ground(&domain, &problem, &config).expect("a task")
 }
 
@@ -122,7 +122,7 @@ const LAMPS: (&str, &str) = (
 fn lamps(semantics: Semantics, family: Family) -> String {
     let (domain, problem, _) =
         read(&Source::new("domain", LAMPS.0), &Source::new("problem", LAMPS.1)).expect("PDDL");
-    let task = ground(&domain, &problem, &Config::default()).expect("a task");
+    let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
     let allowed = vec![vec![true; task.operators.len()]; 2];
     let limits = Limits::none();
     let encoding = Encoding::new(

@@ -17,7 +17,7 @@ use crate::bounds::Bounds;
 use crate::context::Context;
 use crate::error::Errors;
 use crate::exact::integral::Integral;
-use crate::ground::{Config as GroundConfig, Generality, ground_for};
+use crate::ground::{Generality, GroundConfig, ground_for};
 use crate::limits::Interrupted;
 use crate::number::{Int, Rational, dense};
 use crate::optimize::{Config, can_repeat_reward};

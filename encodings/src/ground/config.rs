@@ -7,7 +7,7 @@ use pddl::ast::{Metric, Name};
 /// How the domain's symbols are to be read. Each `with_` changes one thing.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
-pub struct Config {
+pub struct GroundConfig {
     /// Predicates `(p DESIGN FUNCTION)` that say which design solves which function.
     pub solves: Vec<Name>,
     /// What plans are measured by, the most important first, in place of the metric of the problem; none for that metric.
@@ -16,7 +16,7 @@ pub struct Config {
     pub limits: Limits,
 }
 
-impl Default for Config {
+impl Default for GroundConfig {
     /// The names of the Metaplan paper and of the files of kas-lab.
     fn default() -> Self {
         Self {
@@ -27,7 +27,7 @@ impl Default for Config {
     }
 }
 
-impl Config {
+impl GroundConfig {
     /// Predicates `(p DESIGN FUNCTION)` that say which design solves which function.
     #[must_use]
     pub fn with_solves(self, solves: Vec<Name>) -> Self {

@@ -41,8 +41,8 @@ use pddl::ast::{Domain, Problem};
 use tracing::field::Empty;
 use tracing::info_span;
 
-pub use config::Config;
 pub(crate) use config::Generality;
+pub use config::GroundConfig;
 use vocabulary::reached::Reached;
 use vocabulary::world::World;
 
@@ -69,7 +69,7 @@ use vocabulary::world::World;
 ///
 /// # Errors
 /// Every construct that the planner does not handle, with its place.
-pub fn ground(domain: &Domain, problem: &Problem, config: &Config) -> Result<Task, Errors> {
+pub fn ground(domain: &Domain, problem: &Problem, config: &GroundConfig) -> Result<Task, Errors> {
     let measures_ends = config.objectives.len() <= 1;
     ground_for(domain, problem, config, &Generality { measures_ends, ..Generality::default() })
 }
@@ -78,7 +78,7 @@ pub fn ground(domain: &Domain, problem: &Problem, config: &Config) -> Result<Tas
 pub(crate) fn ground_for<N: TaskNumber>(
     domain: &Domain,
     problem: &Problem,
-    config: &Config,
+    config: &GroundConfig,
     generality: &Generality,
 ) -> Result<Task<N>, Errors> {
     let plain = info_span!("compile").in_scope(|| compile(domain, problem, &config.objectives))?;
@@ -98,7 +98,7 @@ pub(crate) fn ground_for<N: TaskNumber>(
 /// Grounds a task in which start and end of actions of duration 0 are still apart.
 fn ground_normal<N: TaskNumber>(
     mut lifted: Lifted,
-    config: &Config,
+    config: &GroundConfig,
     generality: &Generality,
 ) -> Result<Task<N>, Errors> {
     zero::split(&mut lifted)?;

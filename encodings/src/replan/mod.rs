@@ -26,7 +26,7 @@ use std::fmt;
 use std::sync::Arc;
 
 use crate::compile::is_needed;
-use crate::ground::{Config, Generality, ground_for};
+use crate::ground::{Generality, GroundConfig, ground_for};
 use crate::lifted::ObjectId;
 use crate::limits::{Interrupted, Limits};
 use crate::number::Int;
@@ -60,7 +60,12 @@ impl Replanner {
     /// Grounds a problem with all that `available` says of some object taken for available. None if the domain does not lend
     /// itself to that: where availability is asked for otherwise than as a condition of actions on their parameters, where
     /// facts change by themselves, where there are preferences or constraints on trajectories, where actions earn something, or where the problem cannot be ground at all.
-    pub fn new(domain: &Domain, problem: &Problem, available: &[Name], config: &Config) -> Option<Self> {
+    pub fn new(
+        domain: &Domain,
+        problem: &Problem,
+        available: &[Name],
+        config: &GroundConfig,
+    ) -> Option<Self> {
         if is_needed(domain, problem) {
             return None;
         }

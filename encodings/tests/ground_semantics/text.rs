@@ -85,7 +85,7 @@ pub fn check_plan(task: &Task, (domain, problem): &(Domain, Problem), plan: &[St
     let plan = with_small_numbers(task, plan);
     let text: String = plan.iter().map(step_text).collect();
     let parsed = PlanText::parse(&Source::new("plan", text.clone())).expect("a generated plan is read");
-    let options = Options { tolerance: num_rational::BigRational::default(), ..Options::default() };
+    let options = Options::default().with_tolerance(num_rational::BigRational::default());
     let verdict = validate(domain, problem, &parsed, &options);
     let found = match &verdict.violation {
         None => Ok(()),

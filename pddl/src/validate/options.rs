@@ -3,8 +3,9 @@
 use num_bigint::BigInt;
 use num_rational::BigRational;
 
-/// How a plan is to be read.
+/// How a plan is to be read. Each `with_` changes one thing.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Options {
     /// Whether actions may overlap, by the rules of PDDL 2.1; otherwise each begins when the one before
     /// it has ended.
@@ -17,6 +18,19 @@ pub struct Options {
 }
 
 impl Options {
+    /// Whether actions may overlap, by the rules of PDDL 2.1.
+    #[must_use]
+    pub fn with_concurrent(self, concurrent: bool) -> Self {
+        Self { concurrent, ..self }
+    }
+
+    /// How far a stated duration may lie from the exact one, or, where actions may overlap, how far apart happenings that interfere
+    /// must be; in the domain's time unit.
+    #[must_use]
+    pub fn with_tolerance(self, tolerance: BigRational) -> Self {
+        Self { tolerance, ..self }
+    }
+
     /// How far a stated duration may lie from the exact one.
     pub(super) fn slack(&self) -> BigRational {
         let own = self.tolerance.clone();

@@ -1,5 +1,7 @@
 //! What the validator says about a plan.
 
+use std::fmt;
+
 use num_rational::BigRational;
 
 /// Whether a plan is right, what it costs, and otherwise the first thing that is wrong with it.
@@ -38,6 +40,14 @@ pub struct Violation {
     /// The conditions that do not hold.
     pub unmet: Vec<Unmet>,
 }
+
+impl fmt::Display for Violation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl std::error::Error for Violation {}
 
 /// A condition that does not hold.
 #[derive(Debug, Clone, PartialEq, Eq)]

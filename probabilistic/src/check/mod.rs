@@ -88,7 +88,7 @@ pub struct Report {
 /// # Errors
 /// Everything that is wrong with model, property, constants or policy, or that a limit was reached.
 pub fn check(model: &Model, property: &Property, options: &Options<'_>) -> Result<Report, Error> {
-    let reports = check_all(model, &[property], options)?;
+    let reports = check_all(model, [property], options)?;
     reports.into_iter().next().unwrap_or_else(|| Err(Error::Property(Vec::new().into())))
 }
 
@@ -97,17 +97,18 @@ pub fn check(model: &Model, property: &Property, options: &Options<'_>) -> Resul
 /// # Errors
 /// Everything that is wrong with model, constants or policy, or that a limit was reached. What is wrong with a single property stands
 /// in its place.
-pub fn check_all(
+pub fn check_all<'p>(
     model: &Model,
-    properties: &[&Property],
+    properties: impl IntoIterator<Item = &'p Property>,
     options: &Options<'_>,
 ) -> Result<Vec<Result<Report, Error>>, Error> {
     let start = Instant::now();
+    let properties: Vec<&Property> = properties.into_iter().collect();
     let joined = join(model, &options.declarations);
     let program = Program::<f64>::new(&joined, &options.settings)
         .map_err(|error| blame(error, model, &joined, &options.settings))?;
     let (mut wanted, mut refused) = (Vec::new(), Vec::new());
-    for property in properties {
+    for property in &properties {
         let needed = wanted_rewards(&program.reward_names, property, options)
             .and_then(|needed| validate(&program, property).map(|()| needed));
         refused.push(needed.map(|needed| wanted.extend(needed)).err());
@@ -117,7 +118,7 @@ pub fn check_all(
     }
     wanted.sort_unstable();
     wanted.dedup();
-    let end = match properties {
+    let end = match properties[..] {
         [only] => end_of(only, &program.names, options),
         _ => None,
     };

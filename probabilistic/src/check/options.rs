@@ -18,8 +18,9 @@ pub enum Exactness {
     Never,
 }
 
-/// How a property is checked.
-#[derive(Default)]
+/// How a property is checked. Each `with_` changes one thing.
+#[derive(Clone, Default)]
+#[non_exhaustive]
 pub struct Options<'a> {
     /// Values of constants.
     pub settings: Settings,
@@ -37,4 +38,61 @@ pub struct Options<'a> {
     pub precision: Option<Precision>,
     /// Constants and labels besides those of the model.
     pub declarations: Declarations,
+}
+
+impl<'a> Options<'a> {
+    /// The value of a constant that the model leaves open, as PRISM's `-const` has it.
+    #[must_use]
+    pub fn with_constant(mut self, name: impl Into<String>, value: impl Into<String>) -> Self {
+        self.settings.insert(name.into(), value.into());
+        self
+    }
+
+    /// The values of all constants that are set from outside.
+    #[must_use]
+    pub fn with_settings(self, settings: Settings) -> Self {
+        Self { settings, ..self }
+    }
+
+    /// Limits of exploration.
+    #[must_use]
+    pub fn with_bounds(self, bounds: Bounds<'a>) -> Self {
+        Self { bounds, ..self }
+    }
+
+    /// Whether to solve in rationals.
+    #[must_use]
+    pub fn with_exactness(self, exactness: Exactness) -> Self {
+        Self { exactness, ..self }
+    }
+
+    /// The reward that breaks ties of policies; `None` for the number of steps.
+    #[must_use]
+    pub fn with_secondary(self, reward: impl Into<Option<String>>) -> Self {
+        Self { secondary: reward.into(), ..self }
+    }
+
+    /// Whether a policy is wanted.
+    #[must_use]
+    pub fn with_policy(self, policy: bool) -> Self {
+        Self { policy, ..self }
+    }
+
+    /// A policy to evaluate; `None` for the best one.
+    #[must_use]
+    pub fn with_evaluation(self, policy: impl Into<Option<PolicyTable>>) -> Self {
+        Self { evaluate: policy.into(), ..self }
+    }
+
+    /// How wide bounds may be; `None` for as wide as they come.
+    #[must_use]
+    pub fn with_precision(self, precision: impl Into<Option<Precision>>) -> Self {
+        Self { precision: precision.into(), ..self }
+    }
+
+    /// Constants and labels besides those of the model.
+    #[must_use]
+    pub fn with_declarations(self, declarations: Declarations) -> Self {
+        Self { declarations, ..self }
+    }
 }
