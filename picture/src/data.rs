@@ -237,7 +237,7 @@ impl Kind {
     }
 }
 
-/// A page of parts, for answers that are no single plan.
+/// A page of parts, for answers that are not a single plan.
 #[derive(Debug, Clone, Default)]
 pub struct Sheet {
     /// What it is about.

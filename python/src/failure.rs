@@ -22,7 +22,7 @@ pub(crate) fn raise_one(py: Python<'_>, message: Message) -> PyErr {
     raise(py, &[message])
 }
 
-/// Messages that are no errors, as JSON: a list of objects.
+/// Messages that are not errors, as JSON: a list of objects.
 pub(crate) fn listed<'m>(messages: impl IntoIterator<Item = &'m Message>) -> String {
     let messages: Vec<Message> = messages.into_iter().cloned().collect();
     serde_json::to_string(&ErrorAnswer::new(&messages)).unwrap_or_default()

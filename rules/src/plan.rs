@@ -288,7 +288,7 @@ impl Planner<'_> {
                 let known = |column: &usize| bound.knows(sources[*column]);
                 let columns: Vec<usize> = (0..sources.len()).filter(known).collect();
                 let mask = columns.iter().fold(0, |mask, column| mask | 1 << column);
-                // Of a closure, most rows are no links, and looking at each would cost more than all that is concluded.
+                // Of a closure, most rows are not links, and looking at each would cost more than all that is concluded.
                 let without = is_link.then_some(self.number);
                 let index = (mask != 0).then(|| self.store.get_mut(*relation).index_without(mask, without));
                 let key = columns.iter().map(|&column| sources[column]).collect();

@@ -14,7 +14,7 @@ use crate::message::{Errors, Message};
 /// The steps of a plan: as text with a step on each line, or a `metaplan-plan/1` document.
 ///
 /// # Errors
-/// All lines that are no steps; M111, what is wrong with the document.
+/// All lines that are not steps; M111, what is wrong with the document.
 pub fn read_plan(source: &Source, mission: &Mission) -> Result<PlanText, Errors> {
     if source.text().trim_start().starts_with('{') {
         return json_plan(source, mission);

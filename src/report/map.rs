@@ -59,7 +59,7 @@ struct Moving<'d> {
     places: Vec<Name>,
 }
 
-/// Of several kinds of places, those that the plan has most moves between, and then those that most actions know. Designs are no places.
+/// Of several kinds of places, those that the plan has most moves between, and then those that most actions know. Designs are not places.
 fn places_of_most<'d>(scene: Scene<'_>, plan: &Plan, movements: &'d [Movement<'d>]) -> Option<Moving<'d>> {
     let designs: BTreeSet<Name> = scene.designs.keys().map(|design| Name::new(design)).collect();
     let mut kinds: BTreeMap<Vec<Name>, Vec<&'d Movement<'d>>> = BTreeMap::new();

@@ -47,7 +47,7 @@ impl ReportSection {
     /// Reads where places lie.
     ///
     /// # Errors
-    /// The file cannot be read, or has lines that are no positions: all of them.
+    /// The file cannot be read, or has lines that are not positions: all of them.
     pub fn positions(&self, origin: &ManifestPath) -> Result<Positions, Errors> {
         match &self.positions {
             None => Ok(Positions::Unknown),

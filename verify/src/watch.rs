@@ -69,7 +69,7 @@ impl Watch {
 /// A time from a number of seconds, as an option has it.
 ///
 /// # Errors
-/// It is none, or negative.
+/// It is not a number of seconds, or negative.
 pub fn seconds(text: &str) -> Result<Duration, String> {
     let seconds: f64 = text.parse().map_err(|_| format!("`{text}` is not a number of seconds"))?;
     Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())

@@ -72,7 +72,7 @@ pub(crate) fn exchanges(context: Context<'_>, initially: bool) -> Result<Vec<Exc
 /// A task taken apart, so that images of its parts are found at once.
 struct Parts<'t> {
     task: &'t Task,
-    /// By variable and value: the words of the atom, as positions among all words; none for values that are no atoms.
+    /// By variable and value: the words of the atom, as positions among all words; none for values that are not atoms.
     words: Vec<Vec<Option<Vec<usize>>>>,
     /// What atoms are in the task.
     facts: FxHashMap<Vec<usize>, Fact>,

@@ -113,7 +113,7 @@ impl Terms {
                 let plain = self.functional(own, Condition::Not(Box::new(equal)))?;
                 self.functional.insert(plain);
             }
-            // Statements are no axioms in general, and what a literal's datatype is PDDL cannot say.
+            // Statements are not axioms in general, and what a literal's datatype is PDDL cannot say.
             Axiom::ClassAssertion(ClassExpression::Class(_), _)
             | Axiom::ObjectPropertyAssertion(ObjectPropertyExpression::Property(_), ..)
             | Axiom::DataPropertyAssertion(..)

@@ -133,7 +133,7 @@ pub(super) fn operand(term: &Term) -> Operand {
 }
 
 impl Clause {
-    /// Whether all its variables are bound by atoms that are no types: it holds of few things, however many objects there are.
+    /// Whether all its variables are bound by atoms that are not types: it holds of few things, however many objects there are.
     pub fn is_bound(&self) -> bool {
         let atoms = self.body.iter().filter(|part| matches!(part, Literal::Holds(..)) && !part.is_type());
         let bound: BTreeSet<&Operand> = atoms.flat_map(Literal::operands).collect();

@@ -9,7 +9,7 @@ use crate::error::Warning;
 use crate::owl::{Axiom, DataRange, EntityKind, Iri, Literal, ObjectPropertyExpression, Ontology};
 use crate::vocab::{local_name, owl};
 
-/// What the names of relations start with that serve this crate only; they are no part of the knowledge base.
+/// What the names of relations start with that serve this crate only; they are not part of the knowledge base.
 pub const INTERNAL: &str = "urn:metaplan:";
 
 /// The identity's source of rules that stand for axioms; the label is then the axiom in functional-style syntax.

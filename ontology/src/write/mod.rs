@@ -96,7 +96,7 @@ fn serialize(format: RdfFormat, triples: &[Triple]) -> Result<String, String> {
         ("tomasys", tomasys::NS),
         ("xsd", xsd::NS),
     ] {
-        // A prefix that nothing uses is no help to a reader.
+        // A prefix that nothing uses does not help a reader.
         let uses = |iri: &NamedNode| iri.as_str().starts_with(namespace);
         let used = |triple: &Triple| {
             uses(&triple.predicate)

@@ -185,7 +185,7 @@ impl Driver {
             return Ok(());
         }
         let text = format!(
-            "designs of the mission are no modes of the robot; `[functions.F.modes]` of the settings names them: {}",
+            "designs of the mission are not modes of the robot; `[functions.F.modes]` of the settings names them: {}",
             missing.join("; ")
         );
         Err(Message::error("N132", text))

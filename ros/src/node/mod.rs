@@ -1,7 +1,7 @@
 //! A node of a ROS 2 graph over DDS: topics, services, actions, parameters, log and lifecycle, without a ROS installation.
 //!
 //! Names are expanded and remapped as ROS 2 does. What is heard is handed to closures on a thread of the executor, which must be quick;
-//! samples that are no message of their type, and endpoints whose type is not ours, are reported and left out. Our own services wait for
+//! samples that are not of their type, and endpoints whose type is not ours, are reported and left out. Our own services wait for
 //! the first participant that tells how services are mapped, see `rmw`.
 
 mod action;

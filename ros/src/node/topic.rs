@@ -14,7 +14,7 @@ use crate::interfaces::Msg;
 use crate::node::graph::Expected;
 use crate::node::{Node, Severity, client_name, dds_type, not_made};
 
-/// So often is said that samples of a topic are no messages of its type.
+/// So often is said that samples of a topic are not messages of its type.
 const RUBBISH: u64 = 1000;
 
 /// So long after its beginning a subscription looks at the age of what it hears.
