@@ -123,7 +123,7 @@ fn suave_has_27_rules_of_which_one_is_stated_twice() {
 }
 
 #[test]
-fn ten_reads_are_equal_to_the_byte() {
+fn several_reads_are_equal_to_the_byte() {
     let Some(real) = real() else { return };
     for (file, ..) in INVENTORY {
         let dump = || {
@@ -133,6 +133,6 @@ fn ten_reads_are_equal_to_the_byte() {
             format!("{ontology:?}\n{lowered:?}")
         };
         let first = dump();
-        assert!((1..10).all(|_| dump() == first), "{file}");
+        assert!((1..4).all(|_| dump() == first), "{file}");
     }
 }

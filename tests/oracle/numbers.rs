@@ -166,7 +166,7 @@ fn judge_task(seed: u64, task: &Task, tally: &mut Tally) {
 
 /// Judges every other seed, so that two cores share the work.
 fn judge_seeds(first: u64) {
-    let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", 1000));
+    let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", 600));
     let mut tally = Tally::default();
     for seed in (from + first..from + tasks).step_by(2) {
         judge_seed(seed, &mut tally);

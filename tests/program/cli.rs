@@ -376,7 +376,7 @@ fn the_word_of_a_program_is_not_a_proof() {
 fn memory_is_limited() {
     check(&metaplan(&["plan", "missions/ugv.toml", "--memory-limit", "0"]), 2, &["0 is not in"]);
     check(&metaplan(&["plan", "missions/ugv.toml", "--memory-limit", "4000"]), 0, &["optimal, proved"]);
-    let enough = ["--memory-limit", "80"];
+    let enough = ["--memory-limit", "40"];
     check(
         &plan(&sliding_tiles(""), &tiles_in_reverse(), &enough),
         12,
