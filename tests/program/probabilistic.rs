@@ -450,7 +450,7 @@ fn what_is_exported_is_the_process_itself() {
     for mission in ["camara_like", "ugv", "uuv"] {
         let mission = format!("missions/{mission}.toml");
         let [prism, jani] = ["prism", "jani"].map(|form| metaplan(&["export", &mission, "--to", form]));
-        let sizes = [prism, jani.clone()].map(|outcome| outcome.stdout.len());
+        let sizes = [&prism, &jani].map(|outcome| outcome.stdout.len());
         assert!(sizes[1] <= 10 * sizes[0], "{mission}: {sizes:?} bytes of PRISM and of JANI");
         assert_eq!(jani.json()["jani-version"], 1);
     }
