@@ -10,7 +10,7 @@ use tempfile::TempDir;
 use crate::common::{copy_folder, root, verifier, without_progress};
 
 /// What a session finds in its directory, which is not the project's, so that commands may write.
-pub const FILES: [&str; 7] = [
+pub const FILES: [&str; 8] = [
     "missions",
     "encodings/ugv",
     "encodings/uuv",
@@ -18,6 +18,7 @@ pub const FILES: [&str; 7] = [
     "ontology/kb",
     "rules/swrl",
     "docs",
+    "ros/examples",
 ];
 
 pub struct Session {

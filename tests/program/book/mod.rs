@@ -26,12 +26,6 @@ use crate::common::root;
 use console::Session;
 use page::{Block, Kind};
 
-/// Pages none of whose blocks can be run here, and why.
-const NOT_RUN: [(&str, &str); 2] = [
-    ("docs/ros.md", "a ROS 2 graph is needed; ros/tests has its commands"),
-    ("docs/benchmarks.md", "other planners are installed, and run for hours"),
-];
-
 /// README, the book, and the pages of other packages whose programs are built with these tests.
 fn pages() -> Vec<String> {
     let mut found = vec!["README.md".to_owned(), "verify/README.md".to_owned()];
@@ -52,15 +46,14 @@ fn pages() -> Vec<String> {
     found
 }
 
-/// The text of a page with its blocks, without the pages that are not run.
+/// The text of each page with its blocks.
 fn pages_with_blocks() -> Vec<(String, String, Vec<Block>)> {
-    let run = |page: &String| !NOT_RUN.iter().any(|(name, _)| name == page);
     let read = |page: String| {
         let text = std::fs::read_to_string(root().join(&page)).expect("a page");
         let blocks = page::blocks(&text);
         (page, text, blocks)
     };
-    pages().into_iter().filter(run).map(read).collect()
+    pages().into_iter().map(read).collect()
 }
 
 #[test]
@@ -68,9 +61,6 @@ fn every_session_is_as_shown() {
     if !Session::can_be_held() {
         println!("skipped: there is no shell `sh` of a Unix");
         return;
-    }
-    for (page, reason) in NOT_RUN {
-        println!("skipped: {page}: {reason}");
     }
     let mut wrong = Vec::new();
     let mut sessions = 0;
