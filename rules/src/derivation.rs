@@ -80,6 +80,53 @@ pub enum Cause {
     Clash,
 }
 
+impl Cause {
+    /// Prints what is violated in a line without its end: the label of a constraint or where it stands, or a sentence.
+    pub fn display<'a>(&'a self, symbols: &'a Symbols) -> impl fmt::Display + 'a {
+        DisplayCause { cause: self, symbols }
+    }
+}
+
+struct DisplayCause<'a> {
+    cause: &'a Cause,
+    symbols: &'a Symbols,
+}
+
+impl fmt::Display for DisplayCause<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.cause {
+            Cause::Constraint(RuleIdentity { label: Some(label), .. }) => f.write_str(label),
+            Cause::Constraint(identity) => write!(f, "{identity}"),
+            Cause::IllTyped(literal) => {
+                write!(f, "the datatype of {} forbids its value", self.symbols.value(*literal))
+            }
+            Cause::Clash => f.write_str("a literal is not the same as another literal or as an individual"),
+        }
+    }
+}
+
+impl Violation {
+    /// Prints what is violated and the facts that violate it together, in a line without its end.
+    pub fn display<'a>(&'a self, symbols: &'a Symbols) -> impl fmt::Display + 'a {
+        DisplayViolation { violation: self, symbols }
+    }
+}
+
+struct DisplayViolation<'a> {
+    violation: &'a Violation,
+    symbols: &'a Symbols,
+}
+
+impl fmt::Display for DisplayViolation<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.violation.cause.display(self.symbols))?;
+        for (position, fact) in self.violation.supports.iter().enumerate() {
+            write!(f, "{}{}", if position == 0 { ": " } else { ", " }, fact.display(self.symbols))?;
+        }
+        Ok(())
+    }
+}
+
 impl Derivation {
     /// Prints the derivation as an indented tree, a fact a line with its reason; what was printed before is not
     /// explained again.

@@ -102,6 +102,11 @@ fn violations_name_what_is_stated() {
     );
     let shown: Vec<String> = engine.violations().iter().map(|v| show_violation(&engine, v)).collect();
     assert_eq!(shown.len(), 3, "{shown:?}");
+    let lines: Vec<String> =
+        engine.violations().iter().map(|v| v.display(engine.symbols()).to_string()).collect();
+    assert!(lines.iter().any(|line| line.starts_with("test#0: <p>(<a>), <q>(<")), "{lines:?}");
+    let literal = "a literal is not the same as another literal or as an individual: ";
+    assert!(lines.iter().any(|line| line.starts_with(literal)), "{lines:?}");
     let delete = facts(engine.symbols_mut(), "sameAs(a, b), sameAs(c, d), sameAs(a, 1)");
     engine.apply(Delta { insert: vec![], delete }).expect("no budget needed");
     assert_eq!(engine.violations(), []);

@@ -429,15 +429,7 @@ impl Knowledge {
         let violations = self.engine().violations().into_iter();
         violations
             .map(|violation| Contradiction {
-                violated: match &violation.cause {
-                    rules::Cause::Constraint(identity) => {
-                        identity.label.as_deref().map_or_else(|| identity.to_string(), ToOwned::to_owned)
-                    }
-                    rules::Cause::IllTyped(literal) => {
-                        format!("the datatype of {} forbids its value", symbols.value(*literal))
-                    }
-                    other => format!("{other:?}"),
-                },
+                violated: violation.cause.display(symbols).to_string(),
                 facts: violation.supports.iter().map(|fact| shown(fact, symbols)).collect(),
             })
             .collect()
