@@ -2,7 +2,7 @@
 
 /// A word that stands for none of the variants.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{word}` is not a {what}: it must be one of {}", .known.join(", "))]
+#[error("unknown {what} `{word}`: it must be one of {}", .known.join(", "))]
 pub struct UnknownWord {
     what: &'static str,
     word: String,
