@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 use serde::Deserialize;
 
 /// What is copied of the workspace.
-const PARTS: [&str; 23] = [
+const PARTS: [&str; 24] = [
     "Cargo.toml",
     "Cargo.lock",
     "README.md",
@@ -36,6 +36,7 @@ const PARTS: [&str; 23] = [
     "python",
     "ros",
     "fleet",
+    ".ci/features",
     "tests",
     "benches",
     "missions",
