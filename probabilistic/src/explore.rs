@@ -169,7 +169,7 @@ impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
     pub fn new<G: Generator<N, State = S>>(generator: &G, bounds: &Bounds<'_>) -> Result<Self, Error> {
         let mut states = States::new(generator.codes());
         for start in generator.starts() {
-            let known = states.insert(generator.code(&start), start);
+            let known = states.insert(start, |state| generator.code(state));
             known
                 .ok_or_else(|| Error::StateLimit { states: states.len(), limit: bounds.states.min(MOST) })?;
         }
@@ -213,7 +213,7 @@ impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
             for (action, end) in choices.ends.drain(..) {
                 for _ in begin..end {
                     if let Some((target, probability)) = transitions.next() {
-                        let target = states.insert(generator.code(&target), target);
+                        let target = states.insert(target, |state| generator.code(state));
                         mdp.push_transition(target.ok_or_else(|| too_many(states.len()))?, probability);
                     }
                 }

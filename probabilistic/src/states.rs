@@ -38,16 +38,17 @@ impl<S: Eq + Hash> States<S> {
     }
 
     /// The number of a state, which it gets if it has none; none where there are too many states to number them. The code is
-    /// ignored where there are none.
-    pub(crate) fn insert(&mut self, code: usize, state: S) -> Option<u32> {
+    /// asked for where there are codes.
+    pub(crate) fn insert(&mut self, state: S, code: impl FnOnce(&S) -> usize) -> Option<u32> {
         let next = u32::try_from(self.list.len()).ok()?;
         let after = next.checked_add(1)?;
         match &mut self.numbers {
             Numbers::Table(table) => {
-                if let Some(known) = table[code].checked_sub(1) {
+                let number = &mut table[code(&state)];
+                if let Some(known) = number.checked_sub(1) {
                     return Some(known);
                 }
-                table[code] = after;
+                *number = after;
             }
             Numbers::Hash(table) => {
                 let list = &self.list;

@@ -26,48 +26,48 @@ type Sums<N> = SmallVec<[N; 4]>;
 /// Ends of the combined commands of an action in one state, at most.
 const COMBINED: usize = 1_000_000;
 
-/// What an enabled command does in a state.
-struct Effects<N> {
-    /// The probability of each update that is possible, and where its changes end.
-    updates: SmallVec<[(N, u32); 4]>,
-    /// Variables with their new values.
-    changes: SmallVec<[(u32, i64); 6]>,
-}
-
 /// The enabled commands of one action, which move together: one of each module.
 struct Meeting<N> {
     action: u32,
-    /// Of all modules, one after the other.
-    effects: SmallVec<[Effects<N>; 2]>,
-    /// Where those of each module begin.
-    begins: SmallVec<[u32; 4]>,
+    /// Where the commands of each module begin.
+    modules: SmallVec<[u32; 4]>,
+    /// Where the updates of each command end.
+    commands: SmallVec<[u32; 8]>,
+    /// The probability of each update that is possible, and where its changes end.
+    updates: SmallVec<[(N, u32); 8]>,
+    /// Variables with their new values.
+    changes: SmallVec<[(u32, i64); 16]>,
 }
 
 impl<N: Number> Program<N> {
-    /// What modules can do together in a state; none if one of them has no enabled command.
-    fn meet(&self, action: u32, groups: &[Group<N>], values: &[i64]) -> Result<Option<Meeting<N>>, Error> {
+    /// What modules can do together in a state; false if one of them has no enabled command.
+    fn meet(
+        &self,
+        meeting: &mut Meeting<N>,
+        action: u32,
+        groups: &[Group<N>],
+        values: &[i64],
+    ) -> Result<bool, Error> {
+        meeting.begin(action);
         let mut commands: SmallVec<[&Command<N>; 8]> = SmallVec::new();
-        let mut begins: SmallVec<[u32; 4]> = SmallVec::new();
         for group in groups {
             let begin = commands.len();
-            begins.push(dense(begin));
+            meeting.modules.push(dense(begin));
             for command in enabled(group, values) {
                 commands.push(command?);
             }
             if commands.len() == begin {
-                return Ok(None);
+                return Ok(false);
             }
         }
-        let mut effects: SmallVec<[Effects<N>; 2]> = SmallVec::new();
         for command in &commands {
-            effects.push(self.effects(command, values)?);
+            self.effects(meeting, command, values)?;
         }
-        let meeting = Meeting { action, effects, begins };
         let mut outcomes = 1_usize;
         for module in 0..groups.len() {
             let mut ends = 0_usize;
             for at in meeting.of(module) {
-                ends = ends.saturating_add(outcomes.saturating_mul(meeting.effects[at].updates.len()));
+                ends = ends.saturating_add(outcomes.saturating_mul(meeting.updates_of(at).len()));
                 if ends > COMBINED && module > 0 {
                     let text = format!("more than {COMBINED} ways in which modules move together in a state");
                     return Err(Diagnostic::new("Q306", commands[at].place, text).into());
@@ -75,22 +75,22 @@ impl<N: Number> Program<N> {
             }
             outcomes = ends;
         }
-        Ok(Some(meeting))
+        Ok(true)
     }
 
-    /// The updates of a command in a state.
-    fn effects(&self, command: &Command<N>, values: &[i64]) -> Result<Effects<N>, Error> {
-        let mut effects = Effects { updates: SmallVec::new(), changes: SmallVec::new() };
+    /// Adds the updates of a command in a state.
+    fn effects(&self, meeting: &mut Meeting<N>, command: &Command<N>, values: &[i64]) -> Result<(), Error> {
         for (update, probability) in command.updates.iter().zip(&*command.probabilities(values)?) {
             if probability.is_zero() {
                 continue;
             }
             for (variable, code, place) in &update.assignments {
-                effects.changes.push((*variable, self.assigned(*variable, code, *place, values)?));
+                meeting.changes.push((*variable, self.assigned(*variable, code, *place, values)?));
             }
-            effects.updates.push((probability.clone(), dense(effects.changes.len())));
+            meeting.updates.push((probability.clone(), dense(meeting.changes.len())));
         }
-        Ok(effects)
+        meeting.commands.push(dense(meeting.updates.len()));
+        Ok(())
     }
 
     /// What an assignment makes of a variable, which must be in its range.
@@ -105,18 +105,19 @@ impl<N: Number> Program<N> {
     }
 
     /// The states that a choice of one command of each module leads to.
-    fn lead(&self, state: &Packed, chosen: &[&Effects<N>], mut to: impl FnMut(Packed, N)) {
-        let mut at: SmallVec<[usize; 8]> = SmallVec::from_elem(0, chosen.len());
-        if chosen.iter().any(|effects| effects.updates.is_empty()) {
+    fn lead(&self, state: &Packed, meeting: &Meeting<N>, chosen: &[usize], mut to: impl FnMut(Packed, N)) {
+        let updates = |module: usize| meeting.updates_of(chosen[module]);
+        let mut at: SmallVec<[usize; 8]> = (0..chosen.len()).map(|module| updates(module).start).collect();
+        if (0..chosen.len()).any(|module| updates(module).is_empty()) {
             return;
         }
         loop {
             let mut next = state.clone();
             let mut together: Option<N> = None;
-            for (effects, at) in chosen.iter().zip(&at) {
-                let (probability, end) = &effects.updates[*at];
-                let begin = at.checked_sub(1).map_or(0, |before| effects.updates[before].1);
-                for (variable, value) in &effects.changes[begin as usize..*end as usize] {
+            for update in &at {
+                let (probability, end) = &meeting.updates[*update];
+                let begin = update.checked_sub(1).map_or(0, |before| meeting.updates[before].1);
+                for (variable, value) in &meeting.changes[begin as usize..*end as usize] {
                     self.layout.set(&mut next, *variable, *value);
                 }
                 together = Some(match together {
@@ -129,41 +130,67 @@ impl<N: Number> Program<N> {
             }
             // The updates of the last module change first.
             let Some(changes) =
-                (0..chosen.len()).rev().find(|own| at[*own].saturating_add(1) < chosen[*own].updates.len())
+                (0..at.len()).rev().find(|module| at[*module].saturating_add(1) < updates(*module).end)
             else {
                 return;
             };
             at[changes] = at[changes].saturating_add(1);
-            at[changes.saturating_add(1)..].fill(0);
+            for (module, at) in at.iter_mut().enumerate().skip(changes.saturating_add(1)) {
+                *at = updates(module).start;
+            }
         }
     }
 }
 
 impl<N> Meeting<N> {
+    const fn new() -> Self {
+        Self {
+            action: UNNAMED,
+            modules: SmallVec::new_const(),
+            commands: SmallVec::new_const(),
+            updates: SmallVec::new_const(),
+            changes: SmallVec::new_const(),
+        }
+    }
+
+    /// Forgets what was, for another action.
+    fn begin(&mut self, action: u32) {
+        self.action = action;
+        self.modules.clear();
+        self.commands.clear();
+        self.updates.clear();
+        self.changes.clear();
+    }
+
     /// The commands of a module, by position.
     fn of(&self, module: usize) -> std::ops::Range<usize> {
-        let end = self.begins.get(module.saturating_add(1)).map_or(self.effects.len(), |end| *end as usize);
-        self.begins[module] as usize..end
+        let end = self.modules.get(module.saturating_add(1)).map_or(self.commands.len(), |end| *end as usize);
+        self.modules[module] as usize..end
+    }
+
+    /// The updates of a command, by position.
+    fn updates_of(&self, command: usize) -> std::ops::Range<usize> {
+        let begin = command.checked_sub(1).map_or(0, |before| self.commands[before]);
+        begin as usize..self.commands[command] as usize
     }
 
     /// In how many ways one command of each module can be chosen.
     fn ways(&self) -> usize {
-        (0..self.begins.len()).map(|module| self.of(module).len()).product()
+        (0..self.modules.len()).map(|module| self.of(module).len()).product()
     }
 
     /// Each way to choose one command of each module.
-    fn each<E>(&self, mut way: impl FnMut(&[&Effects<N>]) -> Result<(), E>) -> Result<(), E> {
-        let mut at: SmallVec<[usize; 8]> = self.begins.iter().map(|begin| *begin as usize).collect();
+    fn each<E>(&self, mut way: impl FnMut(&[usize]) -> Result<(), E>) -> Result<(), E> {
+        let mut at: SmallVec<[usize; 8]> = self.modules.iter().map(|begin| *begin as usize).collect();
         loop {
-            let chosen: SmallVec<[&Effects<N>; 8]> = at.iter().map(|own| &self.effects[*own]).collect();
-            way(&chosen)?;
+            way(&at)?;
             // The command of the first module changes first.
             let Some(changes) = (0..at.len()).find(|own| at[*own].saturating_add(1) < self.of(*own).end)
             else {
                 return Ok(());
             };
             at[changes] = at[changes].saturating_add(1);
-            for (own, begin) in at.iter_mut().zip(&self.begins).take(changes) {
+            for (own, begin) in at.iter_mut().zip(&self.modules).take(changes) {
                 *own = *begin as usize;
             }
         }
@@ -268,6 +295,7 @@ impl<N: Number> Program<N> {
                 choices.end(UNNAMED, rewards(&self.action_rewards(UNNAMED, values)?));
             }
         }
+        let mut meeting = Meeting::new();
         for action in self.possible(values) {
             let number = dense(action);
             match &self.synchronised[action][..] {
@@ -278,10 +306,12 @@ impl<N: Number> Program<N> {
                     }
                 }
                 groups => {
-                    let Some(meeting) = self.meet(number, groups, values)? else { continue };
+                    if !self.meet(&mut meeting, number, groups, values)? {
+                        continue;
+                    }
                     let sums = rewards(&self.action_rewards(number, values)?);
                     meeting.each(|chosen| {
-                        self.lead(state, chosen, |next, probability| choices.to(next, probability));
+                        self.lead(state, &meeting, chosen, |next, probability| choices.to(next, probability));
                         choices.end(number, sums.iter().cloned());
                         Ok::<(), Error>(())
                     })?;
@@ -294,11 +324,18 @@ impl<N: Number> Program<N> {
     /// The one choice of a state of a Markov chain: each of the commands with the same probability.
     fn step(&self, state: &Packed, values: &Values, choices: &mut Choices<Packed, N>) -> Result<(), Error> {
         let mut meetings: SmallVec<[Meeting<N>; 1]> = SmallVec::new();
+        let mut meet = |action: u32, groups: &[Group<N>]| {
+            let mut meeting = Meeting::new();
+            if self.meet(&mut meeting, action, groups, values)? {
+                meetings.push(meeting);
+            }
+            Ok::<(), Error>(())
+        };
         for group in &self.free {
-            meetings.extend(self.meet(UNNAMED, std::slice::from_ref(group), values)?);
+            meet(UNNAMED, std::slice::from_ref(group))?;
         }
         for action in self.possible(values) {
-            meetings.extend(self.meet(dense(action), &self.synchronised[action], values)?);
+            meet(dense(action), &self.synchronised[action])?;
         }
         let ways = meetings.iter().map(Meeting::ways).fold(0, usize::saturating_add);
         if ways == 0 {
@@ -313,7 +350,7 @@ impl<N: Number> Program<N> {
                 for (sum, more) in total.iter_mut().zip(&rewards) {
                     *sum = sum.plus(&share(more));
                 }
-                self.lead(state, chosen, |next, probability| choices.to(next, share(&probability)));
+                self.lead(state, meeting, chosen, |next, probability| choices.to(next, share(&probability)));
                 Ok::<(), Error>(())
             })?;
         }

@@ -1,11 +1,36 @@
 //! The values of all variables to a few machine words, and back.
 
+use std::hash::{Hash, Hasher};
+
 use smallvec::SmallVec;
 
 use crate::mdp::dense;
 
 /// A state: the values of the variables, each in as many bits as its range needs.
-pub type Packed = SmallVec<[u64; 2]>;
+#[derive(Debug, Default)]
+pub struct Packed(SmallVec<[u64; 2]>);
+
+// What follows is written by hand because it is what exploration spends its time on.
+
+impl Clone for Packed {
+    fn clone(&self) -> Self {
+        Self(SmallVec::from_slice(&self.0))
+    }
+}
+
+impl PartialEq for Packed {
+    fn eq(&self, other: &Self) -> bool {
+        self.0.iter().eq(&other.0)
+    }
+}
+
+impl Eq for Packed {}
+
+impl Hash for Packed {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.0.iter().for_each(|word| state.write_u64(*word));
+    }
+}
 
 /// The values of the variables, truth values as 0 and 1.
 pub type Valuation = Vec<i64>;
@@ -59,9 +84,9 @@ impl Layout {
 
     /// Packs values, each in its range.
     pub fn pack(&self, values: &[i64]) -> Packed {
-        let mut packed: Packed = SmallVec::from_elem(0, self.words.max(1));
+        let mut packed = Packed(SmallVec::from_elem(0, self.words.max(1)));
         for (field, value) in self.fields.iter().zip(values) {
-            packed[field.word as usize] |= value.abs_diff(field.least) << field.shift;
+            packed.0[field.word as usize] |= value.abs_diff(field.least) << field.shift;
         }
         packed
     }
@@ -80,7 +105,7 @@ impl Layout {
     /// Changes one variable.
     pub fn set(&self, packed: &mut Packed, variable: u32, value: i64) {
         let field = &self.fields[variable as usize];
-        let word = &mut packed[field.word as usize];
+        let word = &mut packed.0[field.word as usize];
         *word = *word & !(field.mask << field.shift) | value.abs_diff(field.least) << field.shift;
     }
 
@@ -101,7 +126,7 @@ impl Layout {
 
 impl Field {
     fn raw(&self, packed: &Packed) -> u64 {
-        packed[self.word as usize] >> self.shift & self.mask
+        packed.0[self.word as usize] >> self.shift & self.mask
     }
 
     /// How many values there are.

@@ -11,6 +11,9 @@
 //! matrix-tree theorem; O'Cinneide, Numerische Mathematik 73, 1996), so that such factors come out once for each state, above and
 //! below.
 
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
 use crate::graph::components;
 use crate::mdp::dense;
 use crate::number::{Number, count};
@@ -207,14 +210,24 @@ fn eliminate<N: Number>(
         row.entries.sort_unstable_by_key(|(column, _)| *column);
         rows.push(row);
     }
-    let order = elimination_order(&rows, &users);
     let mut done = vec![false; members.len()];
     let (mut work, mut lost) = (0_u64, false);
     let mut widest = rows.iter().map(|row| row.entries.len()).max().unwrap_or(0);
-    for pivot in &order {
-        let p = *pivot as usize;
+    let mut order = Vec::with_capacity(members.len());
+    let mut queue: BinaryHeap<Reverse<(usize, u32)>> =
+        (0..dense(rows.len())).map(|state| Reverse((fill(&rows, &users, state), state))).collect();
+    while let Some(Reverse((cost, pivot))) = queue.pop() {
+        let p = pivot as usize;
+        // What was cheap may have become dear.
+        users[p].retain(|user| !done[*user as usize]);
+        let now = fill(&rows, &users, pivot);
+        if now > cost {
+            queue.push(Reverse((now, pivot)));
+            continue;
+        }
+        order.push(pivot);
         done[p] = true;
-        normalise(&mut rows[p], *pivot, budget)?;
+        normalise(&mut rows[p], pivot, budget)?;
         let row = std::mem::replace(
             &mut rows[p],
             Row { entries: Vec::new(), constant: N::zero(), leaving: N::zero() },
@@ -223,7 +236,7 @@ fn eliminate<N: Number>(
             if !done[user as usize] {
                 let touched = row.entries.len().saturating_add(rows[user as usize].entries.len());
                 work = work.saturating_add(u64::try_from(touched).unwrap_or(u64::MAX));
-                lost |= substitute(&mut rows[user as usize], *pivot, &row, user, &mut users, budget)?;
+                lost |= substitute(&mut rows[user as usize], pivot, &row, user, &mut users, budget)?;
                 widest = widest.max(rows[user as usize].entries.len());
             }
         }
@@ -232,6 +245,7 @@ fn eliminate<N: Number>(
             return None;
         }
     }
+    budget.touch(work);
     // What is left in a row refers to states that were eliminated later, whose values are known first.
     for pivot in order.iter().rev() {
         let p = *pivot as usize;
@@ -245,11 +259,9 @@ fn eliminate<N: Number>(
     Some(Precision { widest, lost })
 }
 
-/// Few entries first: rows that fill the others least. Greedy on the initial pattern.
-fn elimination_order<N>(rows: &[Row<N>], users: &[Vec<u32>]) -> Vec<u32> {
-    let mut order: Vec<u32> = (0..dense(rows.len())).collect();
-    order.sort_by_key(|i| rows[*i as usize].entries.len().saturating_mul(users[*i as usize].len()));
-    order
+/// The entries that eliminating a state touches (Markowitz, Management Science 3(3), 1957): those with the fewest go first.
+fn fill<N>(rows: &[Row<N>], users: &[Vec<u32>], state: u32) -> usize {
+    rows[state as usize].entries.len().saturating_mul(users[state as usize].len())
 }
 
 /// Removes the loop of a row, and divides by what leaves it.

@@ -11,6 +11,7 @@ use crate::solve::iterate::{Iterated, iterate, leave};
 use crate::solve::local::{EndComponents, Local, NONE, attractor, end_components};
 use crate::solve::problem::{Direction, Run, TINY};
 use crate::solve::quotient::Quotient;
+use crate::solve::users::Users;
 
 impl<N: Number> Run<'_, N> {
     /// Solves a component of more than one state; none where exact arithmetic takes too long.
@@ -69,18 +70,16 @@ impl<N: Number> Run<'_, N> {
         let ends = end_components(local, |_| true);
         let mut unsure = ends.inside;
         let owners = local.owners();
-        let mut users: Vec<Vec<u32>> = vec![Vec::new(); local.states.len()];
-        for choice in 0..local.choices.len() {
-            unsure[owners[choice] as usize] |= !outside_sure(choice);
-            for target in &local.rows.columns[local.rows.range(choice)] {
-                users[*target as usize].push(owners[choice]);
-            }
+        let users = Users::new(&local.rows, local.states.len());
+        for (choice, owner) in owners.iter().enumerate() {
+            unsure[*owner as usize] |= !outside_sure(choice);
         }
-        let mut queue: Vec<usize> = (0..unsure.len()).filter(|state| unsure[*state]).collect();
+        let mut queue: Vec<u32> = (0..dense(unsure.len())).filter(|state| unsure[*state as usize]).collect();
         while let Some(state) = queue.pop() {
-            for user in &users[state] {
-                if !std::mem::replace(&mut unsure[*user as usize], true) {
-                    queue.push(*user as usize);
+            for choice in users.of(state) {
+                let owner = owners[*choice as usize];
+                if !std::mem::replace(&mut unsure[owner as usize], true) {
+                    queue.push(owner);
                 }
             }
         }
@@ -270,15 +269,10 @@ fn to_exits<N: Number>(
     chosen: &mut [u32],
     queue: Vec<u32>,
 ) {
-    let mut users: Vec<Vec<u32>> = vec![Vec::new(); local.states.len()];
-    for choice in (0..local.choices.len()).filter(|choice| ends.alive[*choice]) {
-        for target in &local.rows.columns[local.rows.range(choice)] {
-            users[*target as usize].push(dense(choice));
-        }
-    }
+    let users = Users::new(&local.rows, local.states.len());
     let mut queue = VecDeque::from(queue);
     while let Some(state) = queue.pop_front() {
-        for choice in &users[state as usize] {
+        for choice in users.of(state).iter().filter(|choice| ends.alive[**choice as usize]) {
             let owner = owners[*choice as usize];
             if chosen[owner as usize] == NONE {
                 chosen[owner as usize] = *choice;

@@ -15,6 +15,7 @@ use crate::number::{Number, count};
 use crate::solve::local::NONE;
 use crate::solve::problem::Direction;
 use crate::solve::quotient::Quotient;
+use crate::solve::users::{Users, owners};
 
 /// Policies with values, and how far these can be from the truth.
 pub struct Enclosed<N> {
@@ -217,25 +218,7 @@ fn grow(old: &mut f64, new: f64) -> f64 {
 fn order<N: Number>(quotient: &Quotient<N>) -> Vec<u32> {
     let blocks = quotient.blocks();
     let mut seen = vec![false; blocks];
-    let mut starts = vec![0_u32; blocks.saturating_add(1)];
-    let owned =
-        |block: usize| quotient.range(block).flat_map(|row| &quotient.rows.columns[quotient.rows.range(row)]);
-    for column in (0..blocks).flat_map(owned) {
-        starts[*column as usize] = starts[*column as usize].saturating_add(1);
-    }
-    let mut end = 0_u32;
-    for start in &mut starts {
-        end = end.saturating_add(*start);
-        *start = end;
-    }
-    let mut users = vec![0_u32; quotient.rows.columns.len()];
-    for block in (0..blocks).rev() {
-        for column in owned(block) {
-            let at = &mut starts[*column as usize];
-            *at = at.saturating_sub(1);
-            users[*at as usize] = dense(block);
-        }
-    }
+    let (owners, users) = (owners(&quotient.first), Users::new(&quotient.rows, blocks));
     let mut order = Vec::with_capacity(blocks);
     let mut queue = VecDeque::new();
     for (block, seen) in seen.iter_mut().enumerate() {
@@ -246,10 +229,10 @@ fn order<N: Number>(quotient: &Quotient<N>) -> Vec<u32> {
     }
     while let Some(block) = queue.pop_front() {
         order.push(block);
-        let next = (block as usize).saturating_add(1);
-        for user in &users[starts[block as usize] as usize..starts[next] as usize] {
-            if !std::mem::replace(&mut seen[*user as usize], true) {
-                queue.push_back(*user);
+        for row in users.of(block) {
+            let user = owners[*row as usize];
+            if !std::mem::replace(&mut seen[user as usize], true) {
+                queue.push_back(user);
             }
         }
     }

@@ -8,12 +8,15 @@ use crate::solve::chain::{Rows, Solved, solve_chain};
 use crate::solve::local::NONE;
 use crate::solve::problem::Direction;
 use crate::solve::quotient::Quotient;
+use crate::solve::users::{Users, owners};
 use crate::solve::work::Work;
 
 /// Rounds of policy iteration after which the best policy so far is taken; the certificate tells what it is worth.
 const ROUNDS: usize = 1000;
-/// Sweeps between two solutions of the chain, where components are large.
-const SWEEPS: usize = 40;
+/// Sweeps between two solutions of the chain, at least and at most, where components are large.
+const SWEEPS: (u64, u64) = (2, 40);
+/// How many entries a sweep looks at in the time in which elimination touches one.
+const SWEPT: u64 = 4;
 /// Blocks from which on sweeps pay off.
 const LARGE: usize = 200;
 
@@ -34,11 +37,16 @@ pub fn iterate<N: Number>(
     work: &mut Work,
 ) -> Option<Iterated<N>> {
     let mut policy = start;
+    let mut touched = work.touched();
     let Solved { mut values, mut relative } = chain(quotient, &policy, work)?;
+    let large = !N::EXACT && quotient.blocks() >= LARGE;
     for _ in 0..ROUNDS {
         let mut improved = false;
-        let large = !N::EXACT && quotient.blocks() >= LARGE;
-        for _ in 0..if large { SWEEPS } else { 1 } {
+        // Sweeps are worth it for as long as elimination takes; where nothing fills up, that is not long.
+        let eliminated = work.touched().saturating_sub(touched).saturating_mul(SWEPT);
+        let sweeps =
+            eliminated.checked_div(quotient.rows.columns.len() as u64).unwrap_or(0).clamp(SWEEPS.0, SWEEPS.1);
+        for _ in 0..if large { sweeps } else { 1 } {
             let changed = improve(quotient, &mut policy, &mut values, direction, large, work)?;
             improved |= changed;
             if !changed {
@@ -48,6 +56,7 @@ pub fn iterate<N: Number>(
         if !improved {
             break;
         }
+        touched = work.touched();
         Solved { values, relative } = chain(quotient, &policy, work)?;
     }
     Some(Iterated { policy, values, relative })
@@ -112,24 +121,20 @@ fn improve<N: Number>(
 /// A policy under which every block is left, by rows that get closer to the outside.
 pub fn leave<N: Number>(quotient: &Quotient<N>) -> Vec<u32> {
     let mut policy = vec![NONE; quotient.blocks()];
-    let mut users: Vec<Vec<(u32, u32)>> = vec![Vec::new(); quotient.blocks()];
+    let (owners, users) = (owners(&quotient.first), Users::new(&quotient.rows, quotient.blocks()));
     let mut queue = VecDeque::new();
     for (block, chosen) in policy.iter_mut().enumerate() {
-        for row in quotient.range(block) {
-            if *chosen == NONE && !quotient.rows.leaving[row].is_zero() {
-                *chosen = dense(row);
-                queue.push_back(block);
-            }
-            for at in quotient.rows.range(row) {
-                users[quotient.rows.columns[at] as usize].push((dense(block), dense(row)));
-            }
+        if let Some(row) = quotient.range(block).find(|row| !quotient.rows.leaving[*row].is_zero()) {
+            *chosen = dense(row);
+            queue.push_back(dense(block));
         }
     }
     while let Some(at) = queue.pop_front() {
-        for (block, row) in &users[at] {
-            if policy[*block as usize] == NONE {
-                policy[*block as usize] = *row;
-                queue.push_back(*block as usize);
+        for row in users.of(at) {
+            let block = owners[*row as usize];
+            if policy[block as usize] == NONE {
+                policy[block as usize] = *row;
+                queue.push_back(block);
             }
         }
     }

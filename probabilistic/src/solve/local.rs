@@ -7,6 +7,7 @@ use crate::graph::components;
 use crate::mdp::dense;
 use crate::number::Number;
 use crate::solve::chain::Rows;
+use crate::solve::users::{Users, owners};
 
 /// No number.
 pub const NONE: u32 = u32::MAX;
@@ -74,11 +75,7 @@ impl<N: Number> Local<N> {
 
     /// For each choice the local state that it belongs to.
     pub fn owners(&self) -> Vec<u32> {
-        let mut owners = vec![0; self.choices.len()];
-        for state in 0..self.states.len() {
-            owners[self.range(state)].fill(dense(state));
-        }
-        owners
+        owners(&self.first)
     }
 }
 
@@ -96,7 +93,8 @@ pub struct EndComponents {
 }
 
 /// Maximal end components of the closed choices that `eligible` accepts (de Alfaro 1997): components of the graph,
-/// without the choices that leave one, until none does.
+/// without the choices that leave one, until none does. Choices that lead to a state without choices go first, which is
+/// all of them in a component where nobody can stay.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "the start of the next one is there, because the end is listed, too"
@@ -110,6 +108,10 @@ pub fn end_components<N: Number>(local: &Local<N>, eligible: impl Fn(usize) -> b
     }
     if let Some(whole) = whole(local, &alive) {
         return whole;
+    }
+    remove_dead_ends(local, &mut alive);
+    if !alive.contains(&true) {
+        return EndComponents { block: (0..dense(n)).collect(), blocks: n, inside: vec![false; n], alive };
     }
     let mut block = vec![0_u32; n];
     loop {
@@ -139,6 +141,28 @@ pub fn end_components<N: Number>(local: &Local<N>, eligible: impl Fn(usize) -> b
         if !changed {
             let inside = (0..n).map(|state| local.range(state).any(|choice| alive[choice])).collect();
             return EndComponents { block, blocks: found.len(), inside, alive };
+        }
+    }
+}
+
+/// Removes the choices that lead to states of which all choices are removed.
+fn remove_dead_ends<N: Number>(local: &Local<N>, alive: &mut [bool]) {
+    let (owners, users) = (local.owners(), Users::new(&local.rows, local.states.len()));
+    let mut left = vec![0_u32; local.states.len()];
+    for (choice, owner) in owners.iter().enumerate() {
+        left[*owner as usize] = left[*owner as usize].saturating_add(u32::from(alive[choice]));
+    }
+    let mut dead: Vec<u32> = (0..dense(left.len())).filter(|state| left[*state as usize] == 0).collect();
+    while let Some(state) = dead.pop() {
+        for choice in users.of(state) {
+            if std::mem::replace(&mut alive[*choice as usize], false) {
+                let owner = owners[*choice as usize];
+                let left = &mut left[owner as usize];
+                *left = left.saturating_sub(1);
+                if *left == 0 {
+                    dead.push(owner);
+                }
+            }
         }
     }
 }
@@ -185,12 +209,7 @@ fn whole<N: Number>(local: &Local<N>, alive: &[bool]) -> Option<EndComponents> {
 pub fn attractor<N: Number>(local: &Local<N>, fits: impl Fn(usize) -> bool) -> (Vec<bool>, Vec<u32>) {
     let n = local.states.len();
     let owners = local.owners();
-    let mut users: Vec<Vec<u32>> = vec![Vec::new(); n];
-    for choice in 0..local.choices.len() {
-        for target in &local.rows.columns[local.rows.range(choice)] {
-            users[*target as usize].push(dense(choice));
-        }
-    }
+    let users = Users::new(&local.rows, n);
     let mut usable: Vec<bool> = (0..local.choices.len()).map(&fits).collect();
     let mut candidate = vec![true; n];
     loop {
@@ -205,7 +224,7 @@ pub fn attractor<N: Number>(local: &Local<N>, fits: impl Fn(usize) -> bool) -> (
             }
         }
         while let Some(state) = queue.pop_front() {
-            for choice in &users[state as usize] {
+            for choice in users.of(state) {
                 let owner = owners[*choice as usize] as usize;
                 if usable[*choice as usize] && !reached[owner] && candidate[owner] {
                     reached[owner] = true;

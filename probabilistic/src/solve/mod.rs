@@ -16,6 +16,7 @@ mod iterate;
 pub(crate) mod local;
 mod problem;
 mod quotient;
+mod users;
 mod ways;
 pub(crate) mod work;
 

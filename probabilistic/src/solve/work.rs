@@ -16,6 +16,8 @@ pub struct Work {
     pub tight: f64,
     /// What may still be spent on components that doubles cannot tell enough of.
     spare: u64,
+    /// Entries that elimination has touched so far, in doubles, too.
+    touched: u64,
 }
 
 /// What may be spent on such components, all together.
@@ -24,7 +26,7 @@ const SPARE: u64 = 1_000_000_000;
 impl Work {
     /// A budget of so many units.
     pub const fn new(left: u64) -> Self {
-        Self { left, tight: TIGHT, spare: SPARE }
+        Self { left, tight: TIGHT, spare: SPARE, touched: 0 }
     }
 
     /// Pays for so many operations whose results are about as long as this one; none where the budget is spent.
@@ -39,6 +41,16 @@ impl Work {
         let cost = one.saturating_mul(u64::try_from(operations).unwrap_or(u64::MAX));
         self.left = self.left.saturating_sub(cost);
         if self.is_spent() { None } else { Some(()) }
+    }
+
+    /// Notes that elimination touched so many entries.
+    pub const fn touch(&mut self, entries: u64) {
+        self.touched = self.touched.saturating_add(entries);
+    }
+
+    /// Entries that elimination has touched so far.
+    pub const fn touched(self) -> u64 {
+        self.touched
     }
 
     /// Does something in rationals within a part of what is spare.
