@@ -17,6 +17,11 @@ use crate::solve::work::Work;
 /// Rounds of policy iteration for the longest way.
 const ROUNDS: usize = 200;
 
+/// The relative error of evaluating a row that was made of so many transitions.
+pub fn rounding(widest: usize) -> f64 {
+    (64.0 + 3.0 * count(widest)) * f64::EPSILON
+}
+
 /// For each block how far its value can be from the truth, apart from errors outside the component.
 pub fn certify<N: Number>(
     quotient: &Quotient<N>,
@@ -29,7 +34,7 @@ pub fn certify<N: Number>(
     let rows: Vec<(f64, f64)> = (0..quotient.choices.len())
         .map(|row| {
             let value = quotient.rows.apply(row, values).to_f64();
-            (value, (64.0 + 3.0 * count(quotient.widest)) * f64::EPSILON * value)
+            (value, rounding(quotient.widest) * value)
         })
         .collect();
     // How much worse a row is than the value that was found; negative where rounding makes it better.

@@ -3,7 +3,7 @@
 use num_rational::BigRational;
 
 use crate::number::{Number, count};
-use crate::solve::certify::certify;
+use crate::solve::certify::{certify, rounding};
 use crate::solve::chain::Rows;
 use crate::solve::interval::{self, Enclosed};
 use crate::solve::iterate::{Iterated, iterate};
@@ -29,6 +29,12 @@ pub fn enclosed<N: Number>(
 ) -> Option<Enclosed<N>> {
     let tight = work.tight;
     let Some(found) = found else { return interval::enclose(quotient, direction, tight) };
+    if quotient.blocks() > RATIONAL.1 && !is_level(quotient, &found.values, tight) {
+        let around = interval::around(quotient, &found.values, direction, tight);
+        if around.is_some() {
+            return around;
+        }
+    }
     let is_chain = (0..quotient.blocks()).all(|block| quotient.range(block).len() <= 1);
     let mut errors: Vec<f64> = if is_chain {
         found.values.iter().zip(&found.relative).map(|(value, relative)| value.to_f64() * relative).collect()
@@ -55,7 +61,18 @@ pub fn enclosed<N: Number>(
     if is_usual {
         return found.or(Some(rounded));
     }
-    found.or_else(|| interval::enclose(quotient, direction, tight)).or(Some(rounded))
+    found
+        .or_else(|| interval::around(quotient, &rounded.values, direction, tight))
+        .or_else(|| interval::enclose(quotient, direction, tight))
+        .or(Some(rounded))
+}
+
+/// Whether one error for all blocks, which is what a certificate tells, can be tight for the least value, too.
+fn is_level<N: Number>(quotient: &Quotient<N>, values: &[N], tight: f64) -> bool {
+    let values = values.iter().map(Number::to_f64).filter(|value| *value > 0.0);
+    let (least, most) =
+        values.fold((f64::INFINITY, 0.0_f64), |(least, most), value| (least.min(value), most.max(value)));
+    rounding(quotient.widest) * most <= tight * 0.5 * least
 }
 
 fn is_tight<N: Number>(values: &[N], errors: &[f64], tight: f64) -> bool {

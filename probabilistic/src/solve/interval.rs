@@ -29,48 +29,28 @@ pub struct Enclosed<N> {
 const WORK: u64 = 30_000_000_000;
 /// Sweeps from above before the values from below are made better.
 const UPPER_SWEEPS: usize = 40;
+/// How far bounds are taken from values that are close already, as a share of the width that is asked for.
+const NEAR: f64 = 0.45;
 /// Sweeps over the rows of one policy between two sweeps over all rows.
 const POLICY_SWEEPS: usize = 25;
 
 /// Bounds on the values of all blocks whose width is `width`, relative to the value; none where they do not get close in time.
 pub fn enclose<N: Number>(quotient: &Quotient<N>, direction: Direction, width: f64) -> Option<Enclosed<N>> {
     let rows = Rows::new(quotient, direction);
-    let (down, up) = (1.0 - rows.rounding, 1.0 + rows.rounding);
-    let all = rows.columns.len().saturating_add(rows.constants.len()) as u64;
-    let mut lower = vec![0.0_f64; quotient.blocks()];
-    let mut policy = vec![NONE; quotient.blocks()];
-    let (mut work, mut threshold) = (0_u64, width * 0.05);
-    while work < WORK {
-        loop {
-            let mut change = rows.sweep(&mut lower, &mut policy, down);
-            work = work.saturating_add(all);
-            // Some policy is not better than the best one, and so its values are lower bounds where the greatest ones are asked for.
-            if direction == Direction::Max && change > threshold {
-                for _ in 0..POLICY_SWEEPS {
-                    let (grown, looked) = rows.follow(&mut lower, &policy, down);
-                    work = work.saturating_add(looked);
-                    change = grown;
-                    if change <= threshold || work >= WORK {
-                        break;
-                    }
-                }
-                // What other rows are worth is seen by the next sweep.
-                continue;
-            }
-            if change <= threshold || work >= WORK {
-                break;
-            }
-        }
-        let mut upper: Vec<f64> = lower.iter().map(|value| value * (1.0 + width * 0.5)).collect();
-        for _ in 0..UPPER_SWEEPS {
-            work = work.saturating_add(all);
-            if !rows.raises(&mut upper, up) {
-                return Some(rows.enclosed(quotient, &lower, &upper));
-            }
-        }
-        threshold *= 0.1;
-    }
-    None
+    let (lower, upper) = rows.iterated(width)?;
+    Some(rows.enclosed(quotient, &lower, &upper))
+}
+
+/// The same around values that are close already; none where they are not close enough.
+pub fn around<N: Number>(
+    quotient: &Quotient<N>,
+    near: &[N],
+    direction: Direction,
+    width: f64,
+) -> Option<Enclosed<N>> {
+    let rows = Rows::new(quotient, direction);
+    let (lower, upper) = rows.around(near, width)?;
+    Some(rows.enclosed(quotient, &lower, &upper))
 }
 
 /// The rows in doubles, in the order in which they are swept.
@@ -152,6 +132,60 @@ impl Rows {
         best
     }
 
+    /// Bounds around values that are close already, by the same argument from both sides.
+    fn around<N: Number>(&self, near: &[N], width: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+        let near: Vec<f64> = self.order.iter().map(|block| near[*block as usize].to_f64()).collect();
+        let mut lower: Vec<f64> = near.iter().map(|value| value * (1.0 - width * NEAR)).collect();
+        let mut upper: Vec<f64> = near.iter().map(|value| value * (1.0 + width * NEAR)).collect();
+        let settles = |values: &mut [f64], moves: &dyn Fn(&mut [f64]) -> bool| {
+            (0..UPPER_SWEEPS).any(|_| !moves(values))
+        };
+        let holds = settles(&mut lower, &|values| self.lowers(values, 1.0 - self.rounding))
+            && settles(&mut upper, &|values| self.raises(values, 1.0 + self.rounding));
+        let within = lower.iter().zip(&upper).all(|(lower, upper)| upper - lower <= width * lower);
+        (holds && within).then_some((lower, upper))
+    }
+
+    /// Bounds by iteration from zero.
+    fn iterated(&self, width: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+        let (down, up) = (1.0 - self.rounding, 1.0 + self.rounding);
+        let all = self.columns.len().saturating_add(self.constants.len()) as u64;
+        let mut lower = vec![0.0_f64; self.order.len()];
+        let mut policy = vec![NONE; self.order.len()];
+        let (mut work, mut threshold) = (0_u64, width * 0.05);
+        while work < WORK {
+            loop {
+                let mut change = self.sweep(&mut lower, &mut policy, down);
+                work = work.saturating_add(all);
+                // Some policy is not better than the best one, and so its values are lower bounds where the greatest ones are asked for.
+                if self.direction == Direction::Max && change > threshold {
+                    for _ in 0..POLICY_SWEEPS {
+                        let (grown, looked) = self.follow(&mut lower, &policy, down);
+                        work = work.saturating_add(looked);
+                        change = grown;
+                        if change <= threshold || work >= WORK {
+                            break;
+                        }
+                    }
+                    // What other rows are worth is seen by the next sweep.
+                    continue;
+                }
+                if change <= threshold || work >= WORK {
+                    break;
+                }
+            }
+            let mut upper: Vec<f64> = lower.iter().map(|value| value * (1.0 + width * 0.5)).collect();
+            for _ in 0..UPPER_SWEEPS {
+                work = work.saturating_add(all);
+                if !self.raises(&mut upper, up) {
+                    return Some((lower, upper));
+                }
+            }
+            threshold *= 0.1;
+        }
+        None
+    }
+
     /// All values once more, and the rows that give them; the greatest relative growth.
     fn sweep(&self, values: &mut [f64], policy: &mut [u32], scale: f64) -> f64 {
         let mut change = 0.0_f64;
@@ -184,6 +218,18 @@ impl Rows {
             values[place] = value;
         }
         raised
+    }
+
+    /// All values once more from below; whether any is lowered. If none is, they are lower bounds: no equation lowers them, and from the
+    /// rows that were taken, which are left for sure, they only grow towards what these are worth.
+    fn lowers(&self, values: &mut [f64], scale: f64) -> bool {
+        let mut lowered = false;
+        for place in 0..values.len() {
+            let value = self.best(place, values).1 * scale;
+            lowered |= value < values[place];
+            values[place] = value;
+        }
+        lowered
     }
 
     fn enclosed<N: Number>(&self, quotient: &Quotient<N>, lower: &[f64], upper: &[f64]) -> Enclosed<N> {
@@ -284,6 +330,17 @@ mod tests {
             .expect("each place is left")
             .values;
             let exact = certify(&quotient, &found.policy, &values, direction);
+            let near = around(&quotient, &values, direction, 1e-7).expect("they are close");
+            for ((value, error), (known, rounding)) in
+                near.values.iter().zip(&near.errors).zip(values.iter().zip(&exact))
+            {
+                assert!((value - known).abs() <= error + rounding, "{value} ± {error}, not {known}");
+                assert!(*error <= 0.5e-7 * value, "{error} for {value}");
+            }
+            for factor in [0.99, 1.01] {
+                let far: Vec<f64> = values.iter().map(|value| value * factor).collect();
+                assert!(around(&quotient, &far, direction, 1e-7).is_none(), "values that are not close");
+            }
             for ((value, error), (known, rounding)) in
                 found.values.iter().zip(&found.errors).zip(values.iter().zip(exact))
             {
