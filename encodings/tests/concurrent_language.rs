@@ -1,6 +1,6 @@
 //! Overlapping actions whose durations or effects the state decides, and durations that are bounded: what is planned, and what is claimed of it.
 
-use metaplan_encodings::{GroundConfig, Limits, Status, ground_concurrent, optimize_concurrent};
+use metaplan_encodings::{GroundConfig, Limits, Part, Status, ground_concurrent, optimize_concurrent};
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use pddl::validate::{Options, PlanText, validate};
@@ -129,4 +129,48 @@ fn numbers_that_no_scale_makes_integers_are_told_with_their_action() {
     let place = error.place().expect("a place");
     assert_eq!(place.file, metaplan_encodings::File::Domain);
     assert!(domain[place.span.start as usize..place.span.end as usize].contains("halve"), "{place:?}");
+}
+
+/// Two rooms with a door that takes a while to open: the greedy search is not needed, and the history says when the plan was found.
+#[test]
+fn what_a_search_does_is_counted_and_dated() {
+    let tower = |count: usize| {
+        let names: Vec<String> = (0..count).map(|index| format!("k{index}")).collect();
+        let init: String = names.iter().map(|name| format!("(off {name})")).collect();
+        let goal: String = names.iter().map(|name| format!("(on {name})")).collect();
+        let domain = "(define (domain d) (:predicates (on ?x) (off ?x) (free)) (:functions (total-cost))
+          (:durative-action switch :parameters (?x) :duration (= ?duration 2)
+            :condition (and (at start (free)) (at start (off ?x)))
+            :effect (and (at start (not (free))) (at start (not (off ?x))) (at end (on ?x)) (at end (free)))))";
+        let objects = names.join(" ");
+        let problem = format!(
+            "(define (problem n) (:domain d) (:objects {objects}) (:init (free) {init}) (:goal (and {goal})))"
+        );
+        let read = read(&Source::new("domain", domain), &Source::new("problem", problem));
+        let (domain, problem, _) = read.expect("PDDL");
+        let separation = BigRational::new(BigInt::from(1), BigInt::from(1000));
+        let task = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation);
+        let mut heard = 0;
+        let limits = Limits::none().with_room(1 << 24);
+        let solution = optimize_concurrent(&task.expect("a task"), &limits, &mut |_| heard += 1);
+        (solution, heard)
+    };
+    let (solution, heard) = tower(3);
+    let statistics = &solution.statistics;
+    assert_eq!((solution.status, statistics.found_by), (Status::Optimal, Some(Part::Search)));
+    assert!(0 < statistics.expanded && statistics.expanded <= statistics.generated, "{statistics:?}");
+    assert!(0 < statistics.evaluated && statistics.evaluated <= statistics.generated + 1, "{statistics:?}");
+    let known = statistics.history.iter().filter(|moment| moment.cost.is_some()).count();
+    assert_eq!(known, heard, "{statistics:?}");
+    let last = statistics.history.last().expect("a moment");
+    assert_eq!(
+        (last.cost.as_ref(), Some(&last.lower_bound)),
+        (solution.plan.as_ref().map(|plan| &plan.cost), solution.lower_bound.as_ref())
+    );
+    assert!(statistics.history.is_sorted_by_key(|moment| moment.time));
+    assert!(statistics.history.iter().all(|moment| moment.time <= statistics.search));
+    // In as little room the search for a plan soon finds what A* does not.
+    let (solution, _) = tower(18);
+    assert_eq!(solution.statistics.found_by, Some(Part::Satisficing));
+    assert!(solution.statistics.history.iter().any(|moment| moment.cost.is_some()));
 }

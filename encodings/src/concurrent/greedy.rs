@@ -23,6 +23,7 @@ use crate::concurrent::guidance::{Guidance, Guide};
 use crate::concurrent::search::Sequence;
 use crate::limits::Limits;
 use crate::number::{Int, dense, words};
+use crate::search::Figures;
 use crate::task::OperatorId;
 
 /// So many more times preferred happenings come first after each progress.
@@ -80,6 +81,7 @@ pub(super) struct Greedy<'a> {
     /// Whether what is reached again, but sooner, is pursued again.
     pub(super) reopens: bool,
     nearest: u64,
+    pub(super) figures: Figures,
 }
 
 /// Two situations with one hash are taken for the same: this search claims nothing.
@@ -114,6 +116,7 @@ impl<'a> Greedy<'a> {
             known: Vec::new(),
             reopens,
             nearest: u64::MAX,
+            figures: Figures::default(),
         }
     }
 
@@ -195,6 +198,7 @@ impl<'a> Greedy<'a> {
             *incumbent = Some(self.sequence(&situation, parent, links));
             return Some(Outcome::Found);
         }
+        self.figures.evaluated = self.figures.evaluated.saturating_add(1);
         let Guide { left, preferred } = self.guidance.guide(&situation)?;
         if left < self.nearest {
             self.nearest = left;
@@ -202,7 +206,10 @@ impl<'a> Greedy<'a> {
         }
         let is_old = !self.has_news(&situation);
         let id = dense(self.nodes.len());
-        for operator in self.expansion.candidates(&situation) {
+        let candidates = self.expansion.candidates(&situation);
+        let own = Figures { expanded: 1, generated: candidates.len() as u64, evaluated: 0 };
+        self.figures = self.figures.plus(own);
+        for operator in candidates {
             let is_preferred = preferred.binary_search(&operator).is_ok();
             self.queues.push((left, value.1), id, operator, (is_preferred, is_old));
         }

@@ -19,6 +19,7 @@ mod guidance;
 mod happening;
 mod links;
 mod measure;
+mod record;
 mod relaxed;
 mod schedule;
 mod search;
@@ -43,7 +44,7 @@ use crate::lifted::{Expression, Lifted, Metric, Rational};
 use crate::limits::Limits;
 use crate::normalize::{normalize, partial};
 use crate::number::Int;
-use crate::plan::solution::{Improvement, Proof, Solution, Statistics, Status};
+use crate::plan::solution::{Improvement, Proof, Solution, Status};
 use crate::plan::{Exact, Plan, Step, measured};
 use crate::task::OperatorId;
 use pddl::ast::{self, ActionBody, Comparison, Direction, Domain, EffectTime, Problem, Span};
@@ -51,6 +52,7 @@ use pddl::ast::{self, ActionBody, Comparison, Direction, Domain, EffectTime, Pro
 pub use compile::Concurrent;
 
 use happening::Role;
+use record::Record;
 use search::{Ended, Sequence};
 use turns::take_turns;
 
@@ -180,11 +182,39 @@ pub fn optimize_concurrent(
     limits: &Limits,
     report: &mut dyn FnMut(Improvement),
 ) -> Solution {
-    let started = Instant::now();
     let task = &concurrent.task;
-    let statistics =
-        || Statistics { operators: task.operators.len(), search: started.elapsed(), ..Statistics::default() };
-    let solution = |status, proof| Solution {
+    let mut record = Record::new(concurrent, Instant::now(), report);
+    if let Some(reason) = &task.unreachable {
+        return ended(Status::Unsolvable, Some(Proof::Relaxation(reason.clone())), record);
+    }
+    let costs = task.operators.iter().any(|operator| operator.cost.constant > 0);
+    let bounds = (costs || !task.initial.numbers.is_empty())
+        .then(|| Bounds::new(Context::new(task, limits)).ok())
+        .flatten();
+    let span = info_span!("optimize", operators = task.operators.len());
+    let (how, incumbent) = span.in_scope(|| take_turns(concurrent, bounds.as_ref(), limits, &mut record));
+    let plan = incumbent.as_ref().map(|sequence| in_names(concurrent, sequence));
+    let (status, lower) = match (&how, &incumbent) {
+        (Ended::Exhausted, Some(incumbent)) => (Status::Optimal, Some(incumbent.value.0)),
+        (Ended::Exhausted, None) => (Status::Unsolvable, None),
+        (Ended::Stopped(lower), Some(incumbent)) => (Status::Feasible, Some(*lower.min(&incumbent.value.0))),
+        (Ended::Stopped(lower), None) => (Status::Unknown, Some(*lower)),
+    };
+    let proof = matches!(how, Ended::Exhausted).then_some(Proof::Search);
+    let steps = plan.as_ref().filter(|_| proof.is_some()).map_or(0, |plan| plan.steps.len());
+    Solution {
+        horizon: steps,
+        plan,
+        lower_bound: lower
+            .filter(|_| task.objective.rest.is_empty())
+            .map(|lower| concurrent.measure.metric(lower)),
+        ..ended(status, proof, record)
+    }
+}
+
+/// An answer without a plan.
+fn ended(status: Status, proof: Option<Proof>, record: Record<'_>) -> Solution {
+    Solution {
         status,
         plan: None,
         ground: None,
@@ -192,43 +222,7 @@ pub fn optimize_concurrent(
         horizon: 0,
         proof,
         unbounded: None,
-        statistics: statistics(),
-    };
-    if let Some(reason) = &task.unreachable {
-        return solution(Status::Unsolvable, Some(Proof::Relaxation(reason.clone())));
-    }
-    let costs = task.operators.iter().any(|operator| operator.cost.constant > 0);
-    let bounds = (costs || !task.initial.numbers.is_empty())
-        .then(|| Bounds::new(Context::new(task, limits)).ok())
-        .flatten();
-    let is_whole = task.objective.rest.is_empty();
-    let mut hear = |sequence: &Sequence, lower: Int| {
-        // What is compared is only a part of such a metric.
-        if !is_whole {
-            return;
-        }
-        report(Improvement {
-            cost: concurrent.measure.metric(sequence.value.0),
-            lower_bound: concurrent.measure.metric(lower.min(sequence.value.0)),
-            horizon: sequence.happenings.len(),
-        });
-    };
-    let span = info_span!("optimize", operators = task.operators.len());
-    let (ended, incumbent) = span.in_scope(|| take_turns(concurrent, bounds.as_ref(), limits, &mut hear));
-    let plan = incumbent.as_ref().map(|sequence| in_names(concurrent, sequence));
-    let (status, lower) = match (&ended, &incumbent) {
-        (Ended::Exhausted, Some(incumbent)) => (Status::Optimal, Some(incumbent.value.0)),
-        (Ended::Exhausted, None) => (Status::Unsolvable, None),
-        (Ended::Stopped(lower), Some(incumbent)) => (Status::Feasible, Some(*lower.min(&incumbent.value.0))),
-        (Ended::Stopped(lower), None) => (Status::Unknown, Some(*lower)),
-    };
-    let proof = matches!(ended, Ended::Exhausted).then_some(Proof::Search);
-    let steps = plan.as_ref().filter(|_| proof.is_some()).map_or(0, |plan| plan.steps.len());
-    Solution {
-        horizon: steps,
-        plan,
-        lower_bound: lower.filter(|_| is_whole).map(|lower| concurrent.measure.metric(lower)),
-        ..solution(status, proof)
+        statistics: record.end(),
     }
 }
 

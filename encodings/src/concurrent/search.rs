@@ -14,10 +14,12 @@ use crate::bounds::Bounds;
 use crate::concurrent::compile::Concurrent;
 use crate::concurrent::estimate::Estimate;
 use crate::concurrent::expansion::{Expansion, Nowhere, Situation};
+use crate::concurrent::record::Record;
 use crate::concurrent::store::{Origin, Store};
 use crate::limits::Limits;
 use crate::number::{GROWTH_LIMIT, Int};
-use crate::search::is_monotone;
+use crate::plan::solution::Part;
+use crate::search::{Figures, is_monotone};
 use crate::task::OperatorId;
 
 /// A plan as the search finds it.
@@ -52,6 +54,7 @@ pub(super) struct Search<'a> {
     pub(super) incumbent: Option<Sequence>,
     /// What was left out because its numbers do not fit: no plan of it has a lower metric than this, in integers.
     left_out: Option<Int>,
+    figures: Figures,
 }
 
 impl<'a> Search<'a> {
@@ -73,20 +76,23 @@ impl<'a> Search<'a> {
             open: BinaryHeap::new(),
             incumbent: None,
             left_out: None,
+            figures: Figures::default(),
         };
         // Costs and times are not negative.
         search.push(&expansion.root(), None, 0);
         search
     }
 
-    /// Searches until nothing better is left, `most` situations were looked at, or a limit is reached. It can go on then. `report` hears of each better plan and of what none can get below.
+    /// Searches until nothing better is left, `most` situations were looked at, or a limit is reached. It can go on then. `record` hears of each better plan and of what none can get below.
+    pub(super) fn run(&mut self, limits: &Limits, most: usize, record: &mut Record<'_>) -> Ended {
+        let before = self.figures;
+        let ended = self.go_on(limits, most, record);
+        self.figures.add_to(before, &mut record.statistics);
+        ended
+    }
+
     #[expect(clippy::arithmetic_side_effects, reason = "what was looked at is counted by 64 bits")]
-    pub(super) fn run(
-        &mut self,
-        limits: &Limits,
-        most: usize,
-        report: &mut dyn FnMut(&Sequence, Int),
-    ) -> Ended {
+    fn go_on(&mut self, limits: &Limits, most: usize, record: &mut Record<'_>) -> Ended {
         let mut looked_at = 0;
         let mut pulse = limits.pulse();
         while let Some(Reverse(priority)) = self.open.pop() {
@@ -98,7 +104,7 @@ impl<'a> Search<'a> {
             let situation = self.store.situation(id);
             if self.expansion.is_goal(&situation) {
                 let sequence = self.sequence(id, &situation);
-                report(&sequence, value.0);
+                record.improve(&sequence, self.known(value.0), Part::Search);
                 self.incumbent = Some(sequence);
                 continue;
             }
@@ -106,6 +112,7 @@ impl<'a> Search<'a> {
                 self.open.push(Reverse(priority));
                 return Ended::Stopped(self.lower());
             }
+            record.rise(self.known(value.0));
             looked_at += self.expand(id, &situation, value.0);
         }
         self.left_out.map_or(Ended::Exhausted, Ended::Stopped)
@@ -124,7 +131,11 @@ impl<'a> Search<'a> {
 
     /// No plan that is not known has a lower metric than this, in integers.
     pub(super) fn lower(&self) -> Int {
-        let open = self.open.peek().map_or(0, |Reverse(priority)| priority.0);
+        self.known(self.open.peek().map_or(0, |Reverse(priority)| priority.0))
+    }
+
+    /// What no plan can get below if none that goes on from what is open can get below `open`.
+    fn known(&self, open: Int) -> Int {
         self.left_out.map_or(open, |left_out| left_out.min(open))
     }
 
@@ -140,11 +151,13 @@ impl<'a> Search<'a> {
     /// Adds what can follow a node in which no plan has a lower metric than `lower`. Returns how much that is.
     #[expect(
         clippy::arithmetic_side_effects,
-        reason = "a node is no deeper than twice as many as there are nodes"
+        reason = "a node is no deeper than twice as many as there are nodes; what is done is counted by 64 bits"
     )]
     fn expand(&mut self, id: u32, situation: &Situation, lower: Int) -> usize {
         let candidates = self.expansion.candidates(situation);
         let count = candidates.len();
+        self.figures.expanded += 1;
+        self.figures.generated += count as u64;
         let depth = self.store.origin(id).map_or(0, |origin| origin.depth);
         for operator in candidates {
             match self.expansion.after(situation, operator, true) {
@@ -164,6 +177,7 @@ impl<'a> Search<'a> {
     /// Adds a situation, below a node in which no plan has a lower metric than `lower`.
     fn push(&mut self, situation: &Situation, origin: Option<Origin>, lower: Int) {
         let Situation { state, clocks, cost } = situation;
+        self.figures.evaluated = self.figures.evaluated.saturating_add(1);
         let Some(left) = self.estimate.left(state, clocks) else { return };
         let costs = match self.bounds {
             Some(bounds) => match bounds.estimate(state) {

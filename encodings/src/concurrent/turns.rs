@@ -10,10 +10,12 @@ use crate::concurrent::estimate::Estimate;
 use crate::concurrent::expansion::Expansion;
 use crate::concurrent::greedy::{Greedy, Outcome};
 use crate::concurrent::guidance::Guidance;
+use crate::concurrent::record::Record;
 use crate::concurrent::relaxed::Relaxed;
 use crate::concurrent::search::{Ended, Search, Sequence};
 use crate::limits::Limits;
 use crate::number::Int;
+use crate::plan::solution::Part;
 
 /// How many situations the exact search looks at before the greedy one has its turn.
 const SOON: usize = 10_000;
@@ -21,18 +23,19 @@ const SOON: usize = 10_000;
 const GREEDY: usize = 5_000;
 const EXACT: usize = 20_000;
 
-/// Searches until nothing better is left, or a limit is reached. `report` hears of each better plan and of what none can get below.
+/// Searches until nothing better is left, or a limit is reached. `record` hears of each better plan and of what none can get below.
 pub(super) fn take_turns(
     concurrent: &Concurrent,
     bounds: Option<&Bounds>,
     limits: &Limits,
-    report: &mut dyn FnMut(&Sequence, Int),
+    record: &mut Record<'_>,
 ) -> (Ended, Option<Sequence>) {
     let estimate = Estimate::new(concurrent);
     let expansion = Expansion::new(concurrent);
     let mut exact = Search::new(concurrent, &expansion, &estimate, bounds);
     let root = exact.lower();
-    let mut ended = info_span!("search").in_scope(|| exact.run(limits, SOON, report));
+    record.begin(root);
+    let mut ended = info_span!("search").in_scope(|| exact.run(limits, SOON, record));
     if exact.is_over() || limits.reached() {
         return (claimed(ended, concurrent, root), exact.incumbent);
     }
@@ -46,18 +49,26 @@ pub(super) fn take_turns(
     while !(exact.is_over() || limits.reached() || (greedy.is_none() && exact.is_full(limits))) {
         while let Some(own) = &mut greedy {
             let _span = info_span!("greedy").entered();
-            match own.run(&mut exact.incumbent, limits, GREEDY.saturating_mul(share)) {
+            let before = own.figures;
+            let outcome = own.run(&mut exact.incumbent, limits, GREEDY.saturating_mul(share));
+            own.figures.add_to(before, &mut record.statistics);
+            match outcome {
                 Outcome::Found => {
                     let lower = exact.lower();
-                    exact.incumbent.iter().for_each(|sequence| report(sequence, lower));
+                    let incumbent = exact.incumbent.iter();
+                    incumbent.for_each(|sequence| record.improve(sequence, lower, Part::Satisficing));
                 }
                 // What was left out may have come sooner.
-                Outcome::Exhausted => greedy = (!own.reopens).then(|| begin(true)),
+                Outcome::Exhausted => {
+                    greedy = (!own.reopens).then(|| begin(true));
+                    let restarts = &mut record.statistics.restarts;
+                    *restarts = restarts.saturating_add(usize::from(greedy.is_some()));
+                }
                 Outcome::Stopped => break,
             }
         }
         let _span = info_span!("search").entered();
-        ended = exact.run(limits, EXACT.saturating_mul(share), report);
+        ended = exact.run(limits, EXACT.saturating_mul(share), record);
         share = share.saturating_mul(2);
     }
     (claimed(ended, concurrent, root), exact.incumbent)
