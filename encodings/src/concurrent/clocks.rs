@@ -127,15 +127,6 @@ impl Clocks {
         after.iter().all(|(key, by)| self.entry(*key).is_none_or(|entry| entry.base + by <= time))
     }
 
-    /// About how many bytes this takes.
-    pub(super) fn bytes(&self) -> usize {
-        let times = self.entries.len().saturating_add(self.changed.len());
-        let pairs = times.saturating_mul(size_of::<(Key, Time)>());
-        let floats = self.floats.len().saturating_mul(size_of::<Start>());
-        let opens = self.opens.len().saturating_mul(size_of::<Open>());
-        pairs.saturating_add(floats).saturating_add(opens).saturating_add(size_of::<Self>())
-    }
-
     /// Whether everything so far has happened by some time, as nothing of it can be put off.
     pub(super) fn is_by(&self, time: Int) -> bool {
         self.latest.lags.is_empty() && self.latest() <= time

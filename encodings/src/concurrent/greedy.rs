@@ -2,13 +2,12 @@
 //!
 //! Situations are evaluated when they are taken up, not when they are found, and stand in the order of what was left before them;
 //! happenings that the relaxed plan begins with have a queue of their own [1]. In a third one those come first that follow a situation with a fact
-//! which no other one had before with as many goals to go [2]: a way that the relaxed plan does not see is found there. Of situations with the same state and the same actions under
+//! which no other one had before with as many goals to go [2]: a way that the relaxed plan does not see is found there. Where ends come right
+//! after starts in the sequence, far fewer situations are left, and most tasks have a plan among them; times overlap all the same. Of situations with the same state and the same actions under
 //! way only the first is pursued, so that this search may miss plans and proves nothing.
 //!
 //! [1] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010. [2] N. Lipovetzky, H. Geffner: Best-first width search, AAAI 2017.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 use std::collections::hash_map::Entry;
 use std::hash::{Hash, Hasher};
 
@@ -21,37 +20,76 @@ use crate::concurrent::estimate::Estimate;
 use crate::concurrent::expansion::{Expansion, Nowhere, Situation};
 use crate::concurrent::guidance::{Guidance, Guide};
 use crate::concurrent::search::Sequence;
+use crate::concurrent::store::{Packed, Packing};
 use crate::limits::Limits;
 use crate::number::{Int, dense, words};
+use crate::satisfice::open::Open;
 use crate::search::Figures;
 use crate::task::OperatorId;
 
-/// So many more times preferred happenings come first after each progress.
-const BOOST: i64 = 1_000;
-
-/// The queue of preferred happenings.
-const PREFERRED: usize = 1;
+/// What a node takes besides its situation, about: itself, its places in queues, and that it was seen.
+const OVERHEAD: usize = size_of::<Node>() + 80;
 
 /// A happening, and whether it takes place at the time of the one before.
 type Link = (OperatorId, bool);
+type Links = SmallVec<[Link; 2]>;
+
+/// What the search goes through.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Mode {
+    /// Actions one after another in the sequence; their times may overlap all the same, where they do not interfere.
+    Sequential,
+    /// Starts and ends by themselves.
+    Overlapping,
+    /// The same, and what is reached again, but sooner, is pursued again.
+    Sooner,
+}
+
+impl Mode {
+    /// What follows a situation by a happening. Timed initial literals that come before it come first.
+    fn happen(
+        self,
+        concurrent: &Concurrent,
+        expansion: &Expansion<'_>,
+        situation: &Situation,
+        operator: OperatorId,
+        links: &mut Links,
+    ) -> Option<Situation> {
+        let mut waited: Option<Situation> = None;
+        loop {
+            let before = waited.as_ref().unwrap_or(situation);
+            let together = before.clocks.unsettled();
+            match expansion.after(before, operator, false) {
+                // That others make up for it at the same time is rare.
+                Ok((situation, _)) if situation.clocks.unsettled() && self != Self::Sooner => return None,
+                Ok((situation, compressed)) => {
+                    links.push((operator, together));
+                    if compressed {
+                        links.push((concurrent.end_of(operator), false));
+                    }
+                    return Some(situation);
+                }
+                Err(Nowhere::TooLate) => {
+                    let (_, event) = expansion.next_event(&before.clocks)?;
+                    let next = expansion.step(before, event).ok()?;
+                    links.push((event, together));
+                    waited = Some(next);
+                }
+                Err(Nowhere::Impossible | Nowhere::Unfit) => return None,
+            }
+        }
+    }
+}
 
 struct Node {
-    situation: Situation,
+    packed: Packed,
     parent: u32,
     /// What has happened since the parent.
-    links: SmallVec<[Link; 2]>,
+    links: Links,
 }
 
-/// Whether it is nothing new, what was left before it, the least makespan, the order, the node before, and the happening.
-type Entrance = Reverse<(bool, u64, Int, u32, u32, OperatorId)>;
-
-/// Three queues: of all happenings, of the preferred ones, and of all again, what follows something new first.
-#[derive(Default)]
-struct Queues {
-    heaps: [BinaryHeap<Entrance>; 3],
-    priorities: [i64; 3],
-    order: u32,
-}
+/// Whether it is nothing new, what is left, and the least makespan.
+type Value = (bool, u64, Int);
 
 /// Why the search came to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,16 +108,19 @@ pub(super) struct Greedy<'a> {
     estimate: &'a Estimate,
     bounds: Option<&'a Bounds>,
     guidance: Guidance<'a>,
+    packing: Packing<'a>,
     nodes: Vec<Node>,
+    /// The node that was looked at last, unpacked.
+    latest: Option<(u32, Situation)>,
     /// By a hash of what must agree: the least makespan with which it was reached.
     seen: FxHashMap<u64, Int>,
     /// About how many bytes the nodes take.
     bytes: usize,
-    queues: Queues,
+    /// By what is left, preferred ones by that, and all again, what follows something new first.
+    open: Open<Value>,
     /// The facts that have held, by how many goals were to go.
     known: Vec<FxHashSet<(u32, u32)>>,
-    /// Whether what is reached again, but sooner, is pursued again.
-    pub(super) reopens: bool,
+    pub(super) mode: Mode,
     nearest: u64,
     pub(super) figures: Figures,
 }
@@ -98,10 +139,11 @@ impl<'a> Greedy<'a> {
         estimate: &'a Estimate,
         bounds: Option<&'a Bounds>,
         guidance: Guidance<'a>,
-        reopens: bool,
+        mode: Mode,
     ) -> Self {
         let (nodes, seen) = (Vec::new(), FxHashMap::default());
-        let queues = Queues::default();
+        let (packing, latest) = (Packing::new(concurrent), None);
+        let open = Open::new([false, true, false]);
         let bytes = 0;
         Self {
             bytes,
@@ -110,11 +152,13 @@ impl<'a> Greedy<'a> {
             estimate,
             bounds,
             guidance,
+            packing,
             nodes,
+            latest,
             seen,
-            queues,
+            open,
             known: Vec::new(),
-            reopens,
+            mode,
             nearest: u64::MAX,
             figures: Figures::default(),
         }
@@ -130,7 +174,7 @@ impl<'a> Greedy<'a> {
     ) -> Outcome {
         if self.nodes.is_empty() {
             let root = self.expansion.root();
-            if let Some(outcome) = self.take_up(root, 0, SmallVec::new(), incumbent) {
+            if let Some(outcome) = self.take_up(&root, 0, Links::new(), incumbent) {
                 return outcome;
             }
         }
@@ -140,82 +184,70 @@ impl<'a> Greedy<'a> {
                 return Outcome::Stopped;
             }
             // A quarter of the room is for this.
-            if self.bytes.saturating_add(self.queues.bytes()) > limits.room() / 4 {
+            if self.bytes.saturating_add(self.open.size().saturating_mul(8)) > limits.room() / 4 {
                 return Outcome::Exhausted;
             }
-            let Some((parent, operator)) = self.queues.pop() else { return Outcome::Exhausted };
-            let Some((situation, links)) = self.follow(parent, operator) else { continue };
+            let Some((parent, operator)) = self.open.pop() else { return Outcome::Exhausted };
+            let Some((situation, links)) = self.follow(parent, OperatorId(operator)) else { continue };
             work -= 1;
-            if let Some(outcome) = self.take_up(situation, parent, links, incumbent) {
+            if let Some(outcome) = self.take_up(&situation, parent, links, incumbent) {
                 return outcome;
             }
         }
     }
 
-    /// What follows a node by a happening; timed initial literals that come before it come first.
-    fn follow(&self, parent: u32, operator: OperatorId) -> Option<(Situation, SmallVec<[Link; 2]>)> {
-        let mut links = SmallVec::new();
-        let mut waited: Option<Situation> = None;
-        loop {
-            let before = waited.as_ref().unwrap_or(&self.nodes[parent as usize].situation);
-            let together = before.clocks.unsettled();
-            match self.expansion.after(before, operator, false) {
-                // That others make up for it at the same time is rare.
-                Ok((situation, _)) if situation.clocks.unsettled() && !self.reopens => return None,
-                Ok((situation, compressed)) => {
-                    links.push((operator, together));
-                    if compressed {
-                        links.push((self.concurrent.end_of(operator), false));
-                    }
-                    return Some((situation, links));
-                }
-                Err(Nowhere::TooLate) => {
-                    let (_, event) = self.expansion.next_event(&before.clocks)?;
-                    let next = self.expansion.step(before, event).ok()?;
-                    links.push((event, together));
-                    waited = Some(next);
-                }
-                Err(Nowhere::Impossible | Nowhere::Unfit) => return None,
-            }
+    /// What follows a node by a happening, or by a whole action; timed initial literals that come before it come first.
+    fn follow(&mut self, parent: u32, operator: OperatorId) -> Option<(Situation, Links)> {
+        let known = self.latest.take().filter(|(own, _)| *own == parent);
+        let unpack = || (parent, self.packing.unpack(&self.nodes[parent as usize].packed));
+        let (_, situation) = self.latest.insert(known.unwrap_or_else(unpack));
+        let mut links = Links::new();
+        let next = self.mode.happen(self.concurrent, self.expansion, situation, operator, &mut links)?;
+        let is_over = next.clocks.opens().is_empty();
+        if self.mode != Mode::Sequential || is_over {
+            return Some((next, links));
         }
+        let end = self.concurrent.end_of(operator);
+        let next = self.mode.happen(self.concurrent, self.expansion, &next, end, &mut links)?;
+        Some((next, links))
     }
 
     /// Evaluates a situation, and queues what can follow it.
     fn take_up(
         &mut self,
-        situation: Situation,
+        situation: &Situation,
         parent: u32,
-        links: SmallVec<[Link; 2]>,
+        links: Links,
         incumbent: &mut Option<Sequence>,
     ) -> Option<Outcome> {
-        let value = self.value(&situation)?;
+        let value = self.value(situation)?;
         if incumbent.as_ref().is_some_and(|incumbent| value >= incumbent.value)
-            || !self.is_new(&situation, value.1)
+            || !self.is_new(situation, value.1)
         {
             return None;
         }
-        if self.expansion.is_goal(&situation) {
-            *incumbent = Some(self.sequence(&situation, parent, links));
+        if self.expansion.is_goal(situation) {
+            *incumbent = Some(self.sequence(situation, parent, links));
             return Some(Outcome::Found);
         }
         self.figures.evaluated = self.figures.evaluated.saturating_add(1);
-        let Guide { left, preferred } = self.guidance.guide(&situation)?;
+        let Guide { left, preferred } = self.guidance.guide(situation)?;
         if left < self.nearest {
             self.nearest = left;
-            self.queues.boost();
+            self.open.boost();
         }
-        let is_old = !self.has_news(&situation);
+        let is_old = !self.has_news(situation);
         let id = dense(self.nodes.len());
-        let candidates = self.expansion.candidates(&situation);
+        let candidates: Vec<u32> = self.expansion.candidates(situation).iter().map(|own| own.0).collect();
         let own = Figures { expanded: 1, generated: candidates.len() as u64, evaluated: 0 };
         self.figures = self.figures.plus(own);
-        for operator in candidates {
-            let is_preferred = preferred.binary_search(&operator).is_ok();
-            self.queues.push((left, value.1), id, operator, (is_preferred, is_old));
-        }
-        let values = size_of_val(&situation.state.values[..]);
-        self.bytes = self.bytes.saturating_add(values).saturating_add(situation.clocks.bytes());
-        self.nodes.push(Node { situation, parent, links });
+        let is_preferred = |own: &u32| preferred.binary_search(&OperatorId(*own)).is_ok();
+        let preferred: Vec<u32> = candidates.iter().copied().filter(is_preferred).collect();
+        let values = [false, false, is_old].map(|is_old| (is_old, left, value.1));
+        self.open.push(id, values, &candidates, &preferred);
+        let packed = self.packing.pack(situation);
+        self.bytes = self.bytes.saturating_add(OVERHEAD).saturating_add(packed.bytes());
+        self.nodes.push(Node { packed, parent, links });
         None
     }
 
@@ -255,7 +287,7 @@ impl<'a> Greedy<'a> {
                 true
             }
             Entry::Occupied(mut entry) => {
-                let is_sooner = self.reopens && makespan < *entry.get();
+                let is_sooner = self.mode == Mode::Sooner && makespan < *entry.get();
                 if is_sooner {
                     entry.insert(makespan);
                 }
@@ -264,7 +296,7 @@ impl<'a> Greedy<'a> {
         }
     }
 
-    fn sequence(&self, situation: &Situation, parent: u32, links: SmallVec<[Link; 2]>) -> Sequence {
+    fn sequence(&self, situation: &Situation, parent: u32, links: Links) -> Sequence {
         let latest = situation.clocks.latest();
         let total = self.concurrent.measure.total(latest, situation.cost);
         let value = (total.expect("invariant: what is a goal was measured"), latest);
@@ -280,42 +312,5 @@ impl<'a> Greedy<'a> {
         all.reverse();
         let (happenings, together) = all.into_iter().unzip();
         Sequence { value, happenings, together }
-    }
-}
-
-#[expect(clippy::arithmetic_side_effects, reason = "counts of what is held in memory, and of what was")]
-impl Queues {
-    fn bytes(&self) -> usize {
-        self.heaps.iter().map(BinaryHeap::len).sum::<usize>() * size_of::<Entrance>()
-    }
-
-    fn boost(&mut self) {
-        self.priorities[PREFERRED] -= BOOST;
-    }
-
-    fn push(
-        &mut self,
-        value: (u64, Int),
-        parent: u32,
-        operator: OperatorId,
-        (is_preferred, is_old): (bool, bool),
-    ) {
-        self.order = self.order.wrapping_add(1);
-        let (left, makespan) = value;
-        let entrance = |is_old| Reverse((is_old, left, makespan, self.order, parent, operator));
-        let entrances = [entrance(false), entrance(false), entrance(is_old)];
-        for (queue, (heap, entrance)) in self.heaps.iter_mut().zip(entrances).enumerate() {
-            if queue != PREFERRED || is_preferred {
-                heap.push(entrance);
-            }
-        }
-    }
-
-    fn pop(&mut self) -> Option<(u32, OperatorId)> {
-        let filled = (0..self.heaps.len()).filter(|queue| !self.heaps[*queue].is_empty());
-        let queue = filled.min_by_key(|queue| self.priorities[*queue])?;
-        self.priorities[queue] += 1;
-        let Reverse((_, _, _, _, parent, operator)) = self.heaps[queue].pop()?;
-        Some((parent, operator))
     }
 }

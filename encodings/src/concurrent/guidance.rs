@@ -8,17 +8,19 @@
 //! revisited, ECAI 2008.
 
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
 
 use crate::concurrent::expansion::Situation;
 use crate::concurrent::relaxed::{Proposition, Relaxed};
-use crate::number::{Int, dense};
+use crate::number::Int;
+use crate::satisfice::queue::Queue;
 use crate::task::OperatorId;
 
 /// A cost that stands for being out of reach.
-const NEVER: u64 = u64::MAX;
+const NEVER: u32 = u32::MAX;
+/// Costs do not grow beyond this.
+const DEAREST: u32 = 1 << 30;
 /// No relaxed plan counts more than this of one rule.
-const MOST: u64 = 1 << 20;
+const MOST: u32 = 1 << 20;
 
 /// How far the goal is.
 #[derive(Debug, Clone)]
@@ -33,21 +35,23 @@ pub(super) struct Guide {
 pub(super) struct Guidance<'a> {
     relaxed: &'a Relaxed,
     /// By proposition.
-    costs: Vec<u64>,
+    costs: Vec<u32>,
     /// By proposition: the rule that brings it about, and how many times.
-    supporters: Vec<Option<(u32, u64)>>,
+    supporters: Vec<Option<(u32, u32)>>,
     /// By rule: how many of its needs are out of reach, and the sum of the costs of the others.
     unmet: Vec<u32>,
-    sums: Vec<u64>,
+    sums: Vec<u32>,
     marked: Vec<bool>,
     /// By numeric condition: how much is missing.
     missing: Vec<Option<Int>>,
-    open: BinaryHeap<Reverse<(u64, Proposition)>>,
+    open: Queue,
+    /// What a relaxed plan has to reach.
+    targets: Vec<Proposition>,
 }
 
 impl<'a> Guidance<'a> {
     pub(super) fn new(relaxed: &'a Relaxed) -> Self {
-        let (propositions, rules) = (relaxed.propositions, relaxed.rules.len());
+        let (propositions, rules) = (relaxed.propositions, relaxed.unmet.len());
         Self {
             relaxed,
             costs: vec![NEVER; propositions],
@@ -56,34 +60,32 @@ impl<'a> Guidance<'a> {
             sums: vec![0; rules],
             marked: vec![false; rules],
             missing: vec![None; relaxed.numeric.len()],
-            open: BinaryHeap::new(),
+            open: Queue::default(),
+            targets: Vec::new(),
         }
     }
 
     /// None if the goal is out of reach, or the end of an action under way.
     pub(super) fn guide(&mut self, situation: &Situation) -> Option<Guide> {
-        self.reach(situation);
         let relaxed = self.relaxed;
         let instances = situation.clocks.opens().iter().map(|open| open.instance as usize);
         let ends: Vec<u32> = instances.map(|instance| relaxed.ends[instance]).collect();
-        if ends.iter().any(|end| self.unmet[*end as usize] > 0)
-            || relaxed.goal.iter().any(|goal| self.costs[*goal as usize] == NEVER)
-        {
-            return None;
-        }
-        Some(self.extract(&ends))
+        self.targets.clone_from(&relaxed.goal);
+        self.targets.extend(ends.iter().flat_map(|end| relaxed.needs.of(*end)));
+        self.reach(situation);
+        let is_reached = |target: &Proposition| self.costs[*target as usize] < NEVER;
+        self.targets.iter().all(is_reached).then(|| self.extract(&ends))
     }
 
-    /// Dijkstra's algorithm over propositions.
+    /// Dijkstra's algorithm over propositions, until no target can cost less.
     #[expect(clippy::arithmetic_side_effects, reason = "values of variables are held in memory")]
     fn reach(&mut self, situation: &Situation) {
         let relaxed = self.relaxed;
         self.costs.fill(NEVER);
         self.supporters.fill(None);
         self.sums.fill(0);
-        for (unmet, rule) in self.unmet.iter_mut().zip(&relaxed.rules) {
-            *unmet = dense(rule.needs.len());
-        }
+        self.unmet.copy_from_slice(&relaxed.unmet);
+        self.open.clear();
         let state = &situation.state;
         for (missing, numeric) in self.missing.iter_mut().zip(&relaxed.numeric) {
             // What does not fit can be anything.
@@ -100,48 +102,53 @@ impl<'a> Guidance<'a> {
                 self.improve(relaxed.numeric[position].proposition, 0, None);
             }
         }
-        for rule in 0..relaxed.rules.len() {
-            if self.unmet[rule] == 0 {
-                self.fire(rule);
-            }
+        for rule in &relaxed.free {
+            self.fire(*rule);
         }
-        while let Some(Reverse((cost, proposition))) = self.open.pop() {
+        let mut level = 0;
+        while let Some((cost, proposition)) = self.open.pop_first() {
             if cost > self.costs[proposition as usize] {
                 continue;
             }
-            for rule in &relaxed.needing[proposition as usize] {
-                let rule = *rule as usize;
-                self.sums[rule] = self.sums[rule].saturating_add(cost);
-                self.unmet[rule] -= 1;
-                if self.unmet[rule] == 0 {
-                    self.fire(rule);
+            if cost > level {
+                level = cost;
+                if self.targets.iter().all(|target| self.costs[*target as usize] <= level) {
+                    return;
+                }
+            }
+            for rule in relaxed.needing.of(proposition) {
+                let sum = &mut self.sums[*rule as usize];
+                *sum = sum.saturating_add(cost);
+                let unmet = &mut self.unmet[*rule as usize];
+                *unmet -= 1;
+                if *unmet == 0 {
+                    self.fire(*rule);
                 }
             }
         }
     }
 
-    fn improve(&mut self, proposition: Proposition, cost: u64, by: Option<(u32, u64)>) {
+    fn improve(&mut self, proposition: Proposition, cost: u32, by: Option<(u32, u32)>) {
         let known = &mut self.costs[proposition as usize];
         if cost < *known {
             *known = cost;
             self.supporters[proposition as usize] = by;
-            self.open.push(Reverse((cost, proposition)));
+            self.open.push(cost, proposition);
         }
     }
 
-    fn fire(&mut self, rule: usize) {
+    fn fire(&mut self, rule: u32) {
         let relaxed = self.relaxed;
-        let own = &relaxed.rules[rule];
-        let weight = u64::from(own.weight);
-        let cost = self.sums[rule].saturating_add(weight).min(NEVER >> 1);
-        for add in &own.adds {
-            self.improve(*add, cost, Some((dense(rule), 1)));
+        let (weight, sum) = (relaxed.weights[rule as usize], self.sums[rule as usize]);
+        let cost = sum.saturating_add(weight).min(DEAREST);
+        for add in relaxed.adds.of(rule) {
+            self.improve(*add, cost, Some((rule, 1)));
         }
-        for (position, by) in &own.raises {
+        for (position, by) in &relaxed.raises[rule as usize] {
             let times = times(self.missing[*position as usize], *by);
-            let cost = self.sums[rule].saturating_add(weight.saturating_mul(times)).min(NEVER >> 1);
+            let cost = sum.saturating_add(weight.saturating_mul(times)).min(DEAREST);
             let proposition = relaxed.numeric[*position as usize].proposition;
-            self.improve(proposition, cost, Some((dense(rule), times)));
+            self.improve(proposition, cost, Some((rule, times)));
         }
     }
 
@@ -151,19 +158,20 @@ impl<'a> Guidance<'a> {
         let mut used: Vec<(OperatorId, u64)> = Vec::new();
         let mut preferred = Vec::new();
         let mut stack = relaxed.goal.clone();
-        let mut rules: Vec<(u32, u64)> = ends.iter().map(|end| (*end, 1)).collect();
+        let mut rules: Vec<(u32, u32)> = ends.iter().map(|end| (*end, 1)).collect();
         loop {
             while let Some((rule, times)) = rules.pop() {
-                let own = &relaxed.rules[rule as usize];
-                if let Some(origin) = own.origin {
-                    used.push((origin, times.saturating_mul(own.weight.into())));
+                let (index, origin) = (rule as usize, relaxed.origins[rule as usize]);
+                if let Some(origin) = origin {
+                    used.push((origin, u64::from(times).saturating_mul(relaxed.weights[index].into())));
                 }
-                if std::mem::replace(&mut self.marked[rule as usize], true) {
+                if std::mem::replace(&mut self.marked[index], true) {
                     continue;
                 }
-                stack.extend(&own.needs);
-                if own.needs.iter().all(|need| self.costs[*need as usize] == 0) {
-                    preferred.extend(own.origin);
+                let needs = relaxed.needs.of(rule);
+                stack.extend(needs);
+                if needs.iter().all(|need| self.costs[*need as usize] == 0) {
+                    preferred.extend(origin);
                 }
             }
             let Some(proposition) = stack.pop() else { break };
@@ -178,8 +186,8 @@ impl<'a> Guidance<'a> {
 }
 
 /// How many applications add what is missing.
-fn times(missing: Option<Int>, by: Option<Int>) -> u64 {
+fn times(missing: Option<Int>, by: Option<Int>) -> u32 {
     let (Some(missing), Some(by)) = (missing, by) else { return 1 };
     let times = missing.checked_add(by.saturating_sub(1)).and_then(|all| all.checked_div(by));
-    times.and_then(|times| u64::try_from(times).ok()).unwrap_or(MOST).clamp(1, MOST)
+    times.and_then(|times| u32::try_from(times).ok()).unwrap_or(MOST).clamp(1, MOST)
 }

@@ -12,6 +12,7 @@ use rustc_hash::FxHashMap;
 use crate::concurrent::compile::Concurrent;
 use crate::concurrent::happening::Role;
 use crate::number::{Int, dense};
+use crate::satisfice::lists::Lists;
 use crate::task::quantity::Linear;
 use crate::task::{Condition, Fact, Literal, Operator, OperatorId, Task};
 
@@ -20,17 +21,17 @@ pub(super) type Proposition = u32;
 
 /// From what is required to what is brought about.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Rule {
+struct Rule {
     /// Ascending.
-    pub(super) needs: Vec<Proposition>,
-    pub(super) adds: Vec<Proposition>,
-    /// Numeric conditions that it raises, by position, with how much it adds to them; none if that depends on the state.
-    pub(super) raises: Vec<(u32, Option<Int>)>,
-    /// What it counts in a relaxed plan.
-    pub(super) weight: u32,
-    /// The happening; none for clauses and derived facts.
-    pub(super) origin: Option<OperatorId>,
+    needs: Vec<Proposition>,
+    adds: Vec<Proposition>,
+    raises: Vec<Raise>,
+    weight: u32,
+    origin: Option<OperatorId>,
 }
+
+/// A numeric condition by position, and how much a rule adds to it; none if that depends on the state.
+type Raise = (u32, Option<Int>);
 
 /// A linear expression that must be at least 0.
 #[derive(Debug, Clone)]
@@ -39,14 +40,26 @@ pub(super) struct Numeric {
     pub(super) proposition: Proposition,
 }
 
-/// A relaxed task.
+/// A relaxed task; rules are numbered.
 pub(super) struct Relaxed {
     /// The proposition of each variable's first value.
     pub(super) first: Vec<Proposition>,
     pub(super) propositions: usize,
-    pub(super) rules: Vec<Rule>,
+    /// What each rule needs, ascending.
+    pub(super) needs: Lists,
+    /// How much that is.
+    pub(super) unmet: Vec<u32>,
+    /// The rules that need nothing.
+    pub(super) free: Vec<u32>,
+    pub(super) adds: Lists,
+    /// The numeric conditions that each rule raises.
+    pub(super) raises: Vec<Box<[Raise]>>,
+    /// What each rule counts in a relaxed plan.
+    pub(super) weights: Vec<u32>,
+    /// The happening of each rule; none for clauses and derived facts.
+    pub(super) origins: Vec<Option<OperatorId>>,
     /// The rules that need each proposition.
-    pub(super) needing: Vec<Vec<u32>>,
+    pub(super) needing: Lists,
     pub(super) numeric: Vec<Numeric>,
     /// Ascending.
     pub(super) goal: Vec<Proposition>,
@@ -89,13 +102,28 @@ impl Relaxed {
         let derived = task.variables.iter().enumerate().skip(task.basic);
         let defaults = derived.map(|(variable, own)| maker.last(variable, own.values.len())).collect();
         let Maker { first, propositions, rules, numeric, .. } = maker;
-        let mut needing = vec![Vec::new(); propositions as usize];
-        for (index, rule) in (0..).zip(&rules) {
-            for need in &rule.needs {
-                needing[*need as usize].push(index);
-            }
+        let (mut needs, mut adds) = (Lists::default(), Lists::default());
+        for rule in &rules {
+            needs.push(&rule.needs);
+            adds.push(&rule.adds);
         }
-        Self { first, propositions: propositions as usize, rules, needing, numeric, goal, ends, defaults }
+        let propositions = propositions as usize;
+        Self {
+            first,
+            propositions,
+            needing: needs.inverse(propositions),
+            needs,
+            unmet: rules.iter().map(|rule| dense(rule.needs.len())).collect(),
+            free: (0..).zip(&rules).filter(|(_, rule)| rule.needs.is_empty()).map(|(own, _)| own).collect(),
+            adds,
+            weights: rules.iter().map(|rule| rule.weight).collect(),
+            origins: rules.iter().map(|rule| rule.origin).collect(),
+            raises: rules.into_iter().map(|rule| rule.raises.into_boxed_slice()).collect(),
+            numeric,
+            goal,
+            ends,
+            defaults,
+        }
     }
 }
 

@@ -22,6 +22,9 @@ use crate::plan::solution::Part;
 use crate::search::{Figures, is_monotone};
 use crate::task::OperatorId;
 
+/// So many comparisons of situations are as much work as looking at one.
+const COMPARED: usize = 4;
+
 /// A plan as the search finds it.
 #[derive(Debug, Clone)]
 pub(super) struct Sequence {
@@ -156,6 +159,7 @@ impl<'a> Search<'a> {
     fn expand(&mut self, id: u32, situation: &Situation, lower: Int) -> usize {
         let candidates = self.expansion.candidates(situation);
         let count = candidates.len();
+        let compared = self.store.compared;
         self.figures.expanded += 1;
         self.figures.generated += count as u64;
         let depth = self.store.origin(id).map_or(0, |origin| origin.depth);
@@ -171,7 +175,7 @@ impl<'a> Search<'a> {
                 Err(Nowhere::Unfit) => self.leave_out(lower),
             }
         }
-        count + 1
+        count + 1 + (self.store.compared - compared) / COMPARED
     }
 
     /// Adds a situation, below a node in which no plan has a lower metric than `lower`.

@@ -51,17 +51,41 @@ struct Place {
     front: Vec<u32>,
 }
 
-/// Packed situations.
-pub(super) struct Store<'a> {
+/// How situations are packed.
+pub(super) struct Packing<'a> {
     concurrent: &'a Concurrent,
     fields: Vec<Field>,
     width: usize,
+}
+
+/// A packed situation.
+pub(super) struct Packed {
+    values: Box<[u32]>,
+    numbers: Box<[Int]>,
+    clocks: Box<[u8]>,
+    cost: Int,
+}
+
+impl Packed {
+    /// About how many bytes it takes besides itself.
+    pub(super) fn bytes(&self) -> usize {
+        let values = size_of_val(&*self.values).saturating_add(size_of_val(&*self.numbers));
+        values.saturating_add(self.clocks.len())
+    }
+}
+
+/// Packed situations.
+pub(super) struct Store<'a> {
+    concurrent: &'a Concurrent,
+    packing: Packing<'a>,
     /// Whether more of a number is never worse.
     monotone: bool,
     places: Vec<Place>,
     table: HashTable<u32>,
     nodes: Vec<Node>,
     bytes: usize,
+    /// How many pairs of situations were compared.
+    pub(super) compared: usize,
 }
 
 fn hash_of(key: &[u32]) -> u64 {
@@ -70,9 +94,9 @@ fn hash_of(key: &[u32]) -> u64 {
     hasher.finish()
 }
 
-#[expect(clippy::arithmetic_side_effects, reason = "counts of what is held in memory, and of its bits")]
-impl<'a> Store<'a> {
-    pub(super) fn new(concurrent: &'a Concurrent, monotone: bool) -> Self {
+#[expect(clippy::arithmetic_side_effects, reason = "the bits of values that are held in memory")]
+impl<'a> Packing<'a> {
+    pub(super) fn new(concurrent: &'a Concurrent) -> Self {
         let (mut word, mut used) = (0, 0);
         let mut fields = Vec::new();
         for variable in &concurrent.task.variables[..concurrent.task.basic] {
@@ -85,8 +109,53 @@ impl<'a> Store<'a> {
             fields.push(Field { word, shift: used.min(u32::BITS - 1), mask });
             used += bits;
         }
+        Self { concurrent, fields, width: word + 1 }
+    }
+
+    fn values(&self, state: &State) -> Vec<u32> {
+        let mut words = vec![0; self.width];
+        for (value, Field { word, shift, .. }) in state.values.iter().zip(&self.fields) {
+            words[*word] |= value << shift;
+        }
+        words
+    }
+
+    /// The state of which these are the values and the numbers.
+    fn state(&self, words: &[u32], numbers: &[Int]) -> State {
+        let task = &self.concurrent.task;
+        let mut values = task.initial.values.clone();
+        for (value, Field { word, shift, mask }) in values.iter_mut().zip(&self.fields) {
+            *value = (words[*word] >> shift) & mask;
+        }
+        let mut state = State { values, numbers: numbers.to_vec() };
+        task.close(&mut state);
+        state
+    }
+
+    pub(super) fn pack(&self, Situation { state, clocks, cost }: &Situation) -> Packed {
+        let (values, numbers) = (self.values(state).into_boxed_slice(), state.numbers.clone());
+        Packed { values, numbers: numbers.into_boxed_slice(), clocks: clocks.pack(), cost: *cost }
+    }
+
+    pub(super) fn unpack(&self, Packed { values, numbers, clocks, cost }: &Packed) -> Situation {
+        Situation { state: self.state(values, numbers), clocks: Clocks::unpack(clocks), cost: *cost }
+    }
+}
+
+#[expect(clippy::arithmetic_side_effects, reason = "counts of what is held in memory")]
+impl<'a> Store<'a> {
+    pub(super) fn new(concurrent: &'a Concurrent, monotone: bool) -> Self {
         let (places, table, nodes) = (Vec::new(), HashTable::new(), Vec::new());
-        Self { concurrent, fields, width: word + 1, monotone, places, table, nodes, bytes: 0 }
+        Self {
+            concurrent,
+            packing: Packing::new(concurrent),
+            monotone,
+            places,
+            table,
+            nodes,
+            bytes: 0,
+            compared: 0,
+        }
     }
 
     /// About how many bytes are taken.
@@ -110,6 +179,7 @@ impl<'a> Store<'a> {
         let found = self.table.find(hash, |place| self.places[*place as usize].key[..] == key[..]).copied();
         let place = if let Some(place) = found {
             let mut front = std::mem::take(&mut self.places[place as usize].front);
+            self.compared = self.compared.saturating_add(front.len());
             let mut known = front.iter().map(|known| &self.nodes[*known as usize]);
             let is_dominated = known.any(|known| self.dominates(known, situation));
             if !is_dominated {
@@ -154,23 +224,13 @@ impl<'a> Store<'a> {
     /// The situation of a node that is not dominated.
     pub(super) fn situation(&self, id: u32) -> Situation {
         let node = &self.nodes[id as usize];
-        let task = &self.concurrent.task;
-        let key = &self.places[node.place as usize].key;
-        let mut values = task.initial.values.clone();
-        for (value, Field { word, shift, mask }) in values.iter_mut().zip(&self.fields) {
-            *value = (key[*word] >> shift) & mask;
-        }
-        let mut state = State { values, numbers: node.numbers.to_vec() };
-        task.close(&mut state);
+        let state = self.packing.state(&self.places[node.place as usize].key, &node.numbers);
         Situation { state, clocks: Clocks::unpack(&node.clocks), cost: node.cost }
     }
 
     /// What must be equal where one situation dominates another one.
     fn key(&self, Situation { state, clocks, .. }: &Situation) -> Vec<u32> {
-        let mut key = vec![0; self.width];
-        for (value, Field { word, shift, .. }) in state.values.iter().zip(&self.fields) {
-            key[*word] |= value << shift;
-        }
+        let mut key = self.packing.values(state);
         clocks.signature(&mut key);
         if !self.monotone {
             key.extend(state.numbers.iter().flat_map(|number| words(*number)));
@@ -184,7 +244,13 @@ impl<'a> Store<'a> {
         node.cost <= *cost
             && node.latest <= clocks.latest()
             && node.numbers.iter().zip(&state.numbers).all(|(own, other)| own >= other)
-            && Clocks::unpack(&node.clocks).no_later(clocks, guards, separation)
+            && {
+                let mut own = Clocks::unpack_head(&node.clocks);
+                own.clocks.heads_no_later(clocks) && {
+                    own.finish();
+                    own.clocks.accesses_no_later(clocks, guards, separation)
+                }
+            }
     }
 
     /// Whether a situation of the same place is no worse than a node.
@@ -193,6 +259,12 @@ impl<'a> Store<'a> {
         node.cost >= *cost
             && node.latest >= clocks.latest()
             && node.numbers.iter().zip(&state.numbers).all(|(own, other)| own <= other)
-            && clocks.no_later(&Clocks::unpack(&node.clocks), guards, separation)
+            && {
+                let mut other = Clocks::unpack_head(&node.clocks);
+                clocks.heads_no_later(&other.clocks) && {
+                    other.finish();
+                    clocks.accesses_no_later(&other.clocks, guards, separation)
+                }
+            }
     }
 }

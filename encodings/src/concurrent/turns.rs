@@ -8,7 +8,7 @@ use crate::bounds::Bounds;
 use crate::concurrent::compile::Concurrent;
 use crate::concurrent::estimate::Estimate;
 use crate::concurrent::expansion::Expansion;
-use crate::concurrent::greedy::{Greedy, Outcome};
+use crate::concurrent::greedy::{Greedy, Mode, Outcome};
 use crate::concurrent::guidance::Guidance;
 use crate::concurrent::record::Record;
 use crate::concurrent::relaxed::Relaxed;
@@ -40,38 +40,57 @@ pub(super) fn take_turns(
         return (claimed(ended, concurrent, root), exact.incumbent);
     }
     let relaxed = Relaxed::new(concurrent);
-    let begin = |reopens| {
+    let begin = |mode| {
         let guidance = Guidance::new(&relaxed);
-        Greedy::new(concurrent, &expansion, &estimate, bounds, guidance, reopens)
+        Greedy::new(concurrent, &expansion, &estimate, bounds, guidance, mode)
     };
-    let mut greedy = Some(begin(false));
+    // Where each end comes right after its start, the one is the other.
+    let differs = concurrent.instances.iter().any(|instance| !instance.compressible);
+    let mut greedy = vec![begin(Mode::Overlapping)];
+    greedy.extend(differs.then(|| begin(Mode::Sequential)));
     let mut share = 1_usize;
-    while !(exact.is_over() || limits.reached() || (greedy.is_none() && exact.is_full(limits))) {
-        while let Some(own) = &mut greedy {
+    while !(exact.is_over() || limits.reached() || (greedy.is_empty() && exact.is_full(limits))) {
+        for position in (0..greedy.len()).rev() {
             let _span = info_span!("greedy").entered();
-            let before = own.figures;
-            let outcome = own.run(&mut exact.incumbent, limits, GREEDY.saturating_mul(share));
-            own.figures.add_to(before, &mut record.statistics);
-            match outcome {
-                Outcome::Found => {
-                    let lower = exact.lower();
-                    let incumbent = exact.incumbent.iter();
-                    incumbent.for_each(|sequence| record.improve(sequence, lower, Part::Satisficing));
-                }
+            let work = GREEDY.saturating_mul(share);
+            if pursue(&mut greedy[position], &mut exact, work, limits, record) == Outcome::Exhausted {
+                let mode = greedy.remove(position).mode;
                 // What was left out may have come sooner.
-                Outcome::Exhausted => {
-                    greedy = (!own.reopens).then(|| begin(true));
-                    let restarts = &mut record.statistics.restarts;
-                    *restarts = restarts.saturating_add(usize::from(greedy.is_some()));
-                }
-                Outcome::Stopped => break,
+                greedy.extend((mode == Mode::Overlapping).then(|| begin(Mode::Sooner)));
+                let restarts = &mut record.statistics.restarts;
+                *restarts = restarts.saturating_add(1);
             }
         }
+        // What is better than a plan overlaps more.
+        greedy.retain(|own| own.mode != Mode::Sequential || exact.incumbent.is_none());
         let _span = info_span!("search").entered();
-        ended = exact.run(limits, EXACT.saturating_mul(share), record);
+        // A plan is worth more than a bound.
+        let part = if exact.incumbent.is_none() { EXACT / 4 } else { EXACT };
+        ended = exact.run(limits, part.saturating_mul(share), record);
         share = share.saturating_mul(2);
     }
     (claimed(ended, concurrent, root), exact.incumbent)
+}
+
+/// Goes on with a greedy search, from one better plan to the next.
+fn pursue(
+    greedy: &mut Greedy<'_>,
+    exact: &mut Search<'_>,
+    work: usize,
+    limits: &Limits,
+    record: &mut Record<'_>,
+) -> Outcome {
+    loop {
+        let before = greedy.figures;
+        let outcome = greedy.run(&mut exact.incumbent, limits, work);
+        greedy.figures.add_to(before, &mut record.statistics);
+        if outcome != Outcome::Found {
+            return outcome;
+        }
+        let lower = exact.lower();
+        let incumbent = exact.incumbent.iter();
+        incumbent.for_each(|sequence| record.improve(sequence, lower, Part::Satisficing));
+    }
 }
 
 /// What can be said of all plans where the search leaves some out: what could be said before it began.

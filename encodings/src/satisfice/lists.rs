@@ -4,34 +4,34 @@ use crate::number::dense;
 
 /// Lists of numbers, one after the other.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Lists {
+pub(crate) struct Lists {
     /// Where each list ends.
     ends: Vec<u32>,
     items: Vec<u32>,
 }
 
 impl Lists {
-    pub(super) fn push(&mut self, list: &[u32]) {
+    pub(crate) fn push(&mut self, list: &[u32]) {
         self.items.extend_from_slice(list);
         self.ends.push(dense(self.items.len()));
     }
 
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.ends.len()
     }
 
-    pub(super) fn of(&self, index: u32) -> &[u32] {
+    pub(crate) fn of(&self, index: u32) -> &[u32] {
         let index = index as usize;
         let start = index.checked_sub(1).map_or(0, |before| self.ends[before]);
         &self.items[start as usize..self.ends[index] as usize]
     }
 
-    pub(super) fn iter(&self) -> impl Iterator<Item = &[u32]> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &[u32]> {
         (0..dense(self.len())).map(|index| self.of(index))
     }
 
     /// For each number below `count` the lists that have it.
-    pub(super) fn inverse(&self, count: usize) -> Self {
+    pub(crate) fn inverse(&self, count: usize) -> Self {
         let mut ends = vec![0_u32; count];
         for item in &self.items {
             ends[*item as usize] = ends[*item as usize].saturating_add(1);

@@ -11,9 +11,9 @@
 mod explore;
 mod known;
 mod landmarks;
-mod lists;
-mod open;
-mod queue;
+pub(crate) mod lists;
+pub(crate) mod open;
+pub(crate) mod queue;
 mod relaxation;
 mod search;
 mod status;

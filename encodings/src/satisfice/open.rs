@@ -1,6 +1,6 @@
 //! What is still to be tried: several lists that take turns, each the most promising first.
 //!
-//! All operators that are applicable in a state have its estimate, as states are looked at only when it is their turn [1]; so a
+//! All operators that are applicable in a state have its value, as states are looked at only when it is their turn [1]; so a
 //! list holds states, each with its operators. Lists of preferred operators get more turns when there is progress.
 //!
 //! [1] M. Helmert: The Fast Downward planning system, JAIR 26, 2006, section 5.
@@ -18,48 +18,52 @@ struct Entry {
 /// Turns that progress brings to lists of preferred operators.
 const BOOST: i64 = 1_000;
 
-#[derive(Debug, Default)]
-struct List {
-    buckets: BTreeMap<u64, VecDeque<Entry>>,
+#[derive(Debug)]
+struct List<K> {
+    buckets: BTreeMap<K, VecDeque<Entry>>,
     /// The list with the least has its turn.
     turns: i64,
     preferred: bool,
 }
 
-/// Lists by several estimates, of all operators and of preferred ones.
-#[derive(Debug, Default)]
-pub(super) struct Open {
-    lists: Vec<List>,
+/// Lists of all operators and of preferred ones, each in the order of its own values.
+#[derive(Debug)]
+pub(crate) struct Open<K> {
+    lists: Vec<List<K>>,
     /// Operators, with their designs, of entries.
     steps: Vec<u32>,
 }
 
-impl Open {
-    /// Lists for so many estimates.
-    pub(super) fn new(estimates: usize) -> Self {
-        let list = |preferred| List { preferred, ..List::default() };
-        let lists = (0..estimates).flat_map(|_| [list(false), list(true)]).collect();
-        Self { lists, steps: Vec::new() }
+impl<K: Ord> Open<K> {
+    /// A list for each of these: whether it is of preferred operators.
+    pub(crate) fn new(lists: impl IntoIterator<Item = bool>) -> Self {
+        let list = |preferred| List { preferred, buckets: BTreeMap::new(), turns: 0 };
+        Self { lists: lists.into_iter().map(list).collect(), steps: Vec::new() }
     }
 
-    /// Notes a state: its value by each estimate, all of its steps, and those that are preferred.
-    pub(super) fn push(&mut self, state: u32, values: &[u64], steps: &[u32], preferred: &[u32]) {
-        for (own, is_preferred) in [(steps, false), (preferred, true)] {
-            if own.is_empty() {
-                continue;
-            }
+    /// Notes a state: its value in each list, all of its steps, and those that are preferred.
+    pub(crate) fn push(
+        &mut self,
+        state: u32,
+        values: impl IntoIterator<Item = K>,
+        steps: &[u32],
+        preferred: &[u32],
+    ) {
+        let [all, preferred] = [steps, preferred].map(|own| {
             let next = crate::number::dense(self.steps.len());
             self.steps.extend_from_slice(own);
-            let end = crate::number::dense(self.steps.len());
-            let lists = self.lists.iter_mut().filter(|list| list.preferred == is_preferred);
-            for (list, value) in lists.zip(values) {
-                list.buckets.entry(*value).or_default().push_back(Entry { state, next, end });
+            Entry { state, next, end: crate::number::dense(self.steps.len()) }
+        });
+        for (list, value) in self.lists.iter_mut().zip(values) {
+            let entry = if list.preferred { preferred } else { all };
+            if entry.next < entry.end {
+                list.buckets.entry(value).or_default().push_back(entry);
             }
         }
     }
 
     /// A state and the step to be tried next.
-    pub(super) fn pop(&mut self) -> Option<(u32, u32)> {
+    pub(crate) fn pop(&mut self) -> Option<(u32, u32)> {
         let waiting = self.lists.iter_mut().filter(|list| !list.buckets.is_empty());
         let list = waiting.min_by_key(|list| list.turns)?;
         list.turns = list.turns.saturating_add(1);
@@ -78,12 +82,12 @@ impl Open {
     }
 
     /// Words that all that was noted occupies, about.
-    pub(super) fn size(&self) -> usize {
+    pub(crate) fn size(&self) -> usize {
         self.steps.len() / 2
     }
 
     /// There is progress by some estimate.
-    pub(super) fn boost(&mut self) {
+    pub(crate) fn boost(&mut self) {
         for list in self.lists.iter_mut().filter(|list| list.preferred) {
             list.turns = list.turns.saturating_sub(BOOST);
         }

@@ -5,24 +5,26 @@ const BUCKETS: usize = 1 << 16;
 
 /// Numbers in buckets by cost. What is put in while it is emptied costs no less than what was taken out last.
 #[derive(Debug, Default)]
-pub(super) struct Queue {
+pub(crate) struct Queue {
     buckets: Vec<Vec<u32>>,
     at: usize,
+    /// How many of the cheapest bucket [`Queue::pop_first`] has taken.
+    taken: usize,
     /// How many are in buckets.
     count: usize,
     dear: std::collections::BinaryHeap<std::cmp::Reverse<(u32, u32)>>,
 }
 
 impl Queue {
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         for bucket in &mut self.buckets {
             bucket.clear();
         }
         self.dear.clear();
-        (self.at, self.count) = (0, 0);
+        (self.at, self.taken, self.count) = (0, 0, 0);
     }
 
-    pub(super) fn push(&mut self, cost: u32, item: u32) {
+    pub(crate) fn push(&mut self, cost: u32, item: u32) {
         let place = cost as usize;
         if place >= BUCKETS {
             self.dear.push(std::cmp::Reverse((cost, item)));
@@ -35,7 +37,8 @@ impl Queue {
         self.count = self.count.saturating_add(1);
     }
 
-    pub(super) fn pop(&mut self) -> Option<(u32, u32)> {
+    /// One of the cheapest, those that came last first.
+    pub(crate) fn pop(&mut self) -> Option<(u32, u32)> {
         if self.count == 0 {
             return self.dear.pop().map(|std::cmp::Reverse(least)| least);
         }
@@ -45,6 +48,20 @@ impl Queue {
                 return Some((crate::number::dense(self.at), item));
             }
             self.at = self.at.saturating_add(1);
+        }
+    }
+
+    /// One of the cheapest, those that came first first. A queue is emptied by this or by [`Queue::pop`], never by both.
+    pub(crate) fn pop_first(&mut self) -> Option<(u32, u32)> {
+        if self.count == 0 {
+            return self.dear.pop().map(|std::cmp::Reverse(least)| least);
+        }
+        loop {
+            if let Some(item) = self.buckets[self.at].get(self.taken) {
+                (self.taken, self.count) = (self.taken.saturating_add(1), self.count.saturating_sub(1));
+                return Some((crate::number::dense(self.at), *item));
+            }
+            (self.at, self.taken) = (self.at.saturating_add(1), 0);
         }
     }
 }

@@ -54,7 +54,7 @@ pub(super) struct Search<N> {
     nodes: Vec<Node<N>>,
     /// Which landmarks were reached, so many words for each state.
     reached: Vec<u64>,
-    open: Open,
+    open: Open<u64>,
     /// The best value by each estimate.
     best: [u32; 2],
     /// Whether states were left out because their numbers do not fit, or because they are too dear.
@@ -73,7 +73,7 @@ impl<N: TaskNumber> Search<N> {
             store: Store::new(known.task),
             nodes: Vec::new(),
             reached: Vec::new(),
-            open: Open::new(estimates),
+            open: Open::new([false, true].repeat(estimates)),
             best: [u32::MAX; 2],
             incomplete: false,
         };
@@ -179,7 +179,8 @@ impl<N: TaskNumber> Search<N> {
             }
         };
         let landmarks = left.saturating_mul(self.mean);
-        self.open.push(id, &[value(relaxed), value(landmarks)], &steps, &preferred);
+        let (relaxed, landmarks) = (value(relaxed), value(landmarks));
+        self.open.push(id, [relaxed, relaxed, landmarks, landmarks], &steps, &preferred);
     }
 
     fn plan(&self, known: &Known<'_, N>, goal: u32) -> GroundPlan<N> {

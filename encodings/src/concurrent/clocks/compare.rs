@@ -33,27 +33,28 @@ impl Clocks {
         guard.is_some_and(|guard| time.precedes(guard, separation))
     }
 
-    /// Whether whatever can follow `other` can follow `self`, no later. Their signatures must agree.
-    pub(in crate::concurrent) fn no_later(
-        &self,
-        other: &Self,
-        guards: &[Option<u32>],
-        separation: Int,
-    ) -> bool {
+    /// Whether whatever can follow `other` can follow `self`, no later, as far as accesses do not matter. Their signatures must agree.
+    pub(in crate::concurrent) fn heads_no_later(&self, other: &Self) -> bool {
         let floats = || self.floats.iter().zip(&other.floats);
         let lasts = || self.opens.iter().zip(&other.opens);
         let last = |(own, other): (&Open, &Open)| match (&own.last, &other.last) {
             (Some(own), Some(other)) => own.precedes(other, 0),
             _ => true,
         };
-        if self.floor > other.floor
-            || (self.waits() && !other.waits())
-            || !self.latest.precedes(&other.latest, 0)
-            || !floats().all(|(own, other)| own.lower.precedes(&other.lower, 0) && own.upper >= other.upper)
-            || !lasts().all(last)
-        {
-            return false;
-        }
+        self.floor <= other.floor
+            && (!self.waits() || other.waits())
+            && self.latest.precedes(&other.latest, 0)
+            && floats().all(|(own, other)| own.lower.precedes(&other.lower, 0) && own.upper >= other.upper)
+            && lasts().all(last)
+    }
+
+    /// The same of accesses alone.
+    pub(in crate::concurrent) fn accesses_no_later(
+        &self,
+        other: &Self,
+        guards: &[Option<u32>],
+        separation: Int,
+    ) -> bool {
         let mut theirs = other.entries.iter().peekable();
         self.entries.iter().all(|(key, time)| {
             while theirs.next_if(|(other, _)| other < key).is_some() {}

@@ -89,13 +89,8 @@ impl Reader<'_> {
 impl Clocks {
     pub(in crate::concurrent) fn pack(&self) -> Box<[u8]> {
         let mut writer = Writer::default();
-        for list in [&self.entries, &self.changed] {
-            writer.length(list.len());
-            for (key, time) in list {
-                writer.index(*key);
-                writer.time(time);
-            }
-        }
+        writer.number(self.floor);
+        writer.time(&self.latest);
         writer.length(self.floats.len());
         for Start { lower, upper } in &self.floats {
             writer.time(lower);
@@ -113,15 +108,26 @@ impl Clocks {
             writer.index(float);
             writer.number(offset);
         });
-        writer.time(&self.latest);
-        writer.number(self.floor);
+        for list in [&self.entries, &self.changed] {
+            writer.length(list.len());
+            for (key, time) in list {
+                writer.index(*key);
+                writer.time(time);
+            }
+        }
         writer.0.into_boxed_slice()
     }
 
     pub(in crate::concurrent) fn unpack(bytes: &[u8]) -> Self {
+        let mut packed = Self::unpack_head(bytes);
+        packed.finish();
+        packed.clocks
+    }
+
+    /// Only what [`Clocks::heads_no_later`] looks at, which is little and rules most comparisons out.
+    pub(in crate::concurrent) fn unpack_head(bytes: &[u8]) -> Packed<'_> {
         let mut reader = Reader(bytes.iter());
-        let times = |reader: &mut Reader<'_>| reader.list(|reader| (reader.index(), reader.time()));
-        let (entries, changed) = (times(&mut reader), times(&mut reader));
+        let (floor, latest) = (reader.number(), reader.time());
         let floats = reader.list(|reader| {
             let lower = reader.time();
             Start { lower, upper: reader.maybe(Reader::number).unwrap_or(Int::MAX) }
@@ -132,8 +138,23 @@ impl Clocks {
             Open { instance, float, offset, duration, last: reader.maybe(Reader::time) }
         });
         let group = reader.maybe(|reader| (reader.index(), reader.number()));
-        let latest = reader.time();
-        Self { entries, changed, floats, opens, group, latest, floor: reader.number() }
+        let (entries, changed) = (Vec::new(), Vec::new());
+        Packed { clocks: Self { entries, changed, floats, opens, group, latest, floor }, rest: reader }
+    }
+}
+
+/// Clocks of which the head is unpacked.
+pub(in crate::concurrent) struct Packed<'a> {
+    pub(in crate::concurrent) clocks: Clocks,
+    rest: Reader<'a>,
+}
+
+impl Packed<'_> {
+    /// Unpacks the rest.
+    pub(in crate::concurrent) fn finish(&mut self) {
+        let rest = &mut self.rest;
+        let mut times = || rest.list(|reader| (reader.index(), reader.time()));
+        (self.clocks.entries, self.clocks.changed) = (times(), times());
     }
 }
 
