@@ -32,14 +32,15 @@ def run(command, directory, seconds, megabytes, core=None, ask=False, patience=P
                                errors="replace", start_new_session=True,
                                preexec_fn=lambda: limit(command, hard, megabytes))
     try:
-        output, asked, killed = wait(process, started, seconds, hard, patience, ask)
+        output, asked, killed, spent = wait(process, started, seconds, hard, patience, ask)
     finally:
         # Also where this program is stopped.
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
     wall = time.monotonic() - started
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    # Children whose parent was killed before them are not counted there.
+    cpu = max(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, spent if killed else 0)
     # Who is stopped by the limit has used a little less than it, as far as the parent is told.
     late = asked or killed or cpu >= 0.9 * hard
     # The kernel tells the largest child so far only.
@@ -48,11 +49,11 @@ def run(command, directory, seconds, megabytes, core=None, ask=False, patience=P
 
 
 def wait(process, started, seconds, hard, patience, ask):
-    """A process's output, whether it was asked to end, and whether it was killed."""
-    asked, killed = False, False
+    """A process's output, whether it was asked to end, whether it was killed, and the processor time that was seen last."""
+    asked, killed, spent = False, False, 0
     while True:
         try:
-            return process.communicate(timeout=0.2)[0], asked, killed
+            return process.communicate(timeout=0.2)[0], asked, killed, spent
         except subprocess.TimeoutExpired:
             if killed:
                 continue
