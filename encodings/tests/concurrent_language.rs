@@ -110,7 +110,7 @@ fn what_effects_under_a_condition_do_is_planned_and_not_claimed_to_be_best() {
 fn durations_within_bounds() {
     let bounded = |bounds: &str| durative("a", bounds, "", "(at end (g))");
     check(&bounded("(and (>= ?duration 4) (<= ?duration 4))"), "", "(g)", (Status::Optimal, Some("4")));
-    check(&bounded("(and (>= ?duration 4) (<= ?duration 6))"), "", "(g)", (Status::Feasible, Some("4")));
+    check(&bounded("(and (>= ?duration 4) (<= ?duration 6))"), "", "(g)", (Status::Optimal, Some("4")));
 }
 
 #[test]
@@ -131,7 +131,6 @@ fn numbers_that_no_scale_makes_integers_are_told_with_their_action() {
     assert!(domain[place.span.start as usize..place.span.end as usize].contains("halve"), "{place:?}");
 }
 
-/// Two rooms with a door that takes a while to open: the greedy search is not needed, and the history says when the plan was found.
 #[test]
 fn what_a_search_does_is_counted_and_dated() {
     let tower = |count: usize| {

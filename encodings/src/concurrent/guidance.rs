@@ -14,6 +14,7 @@ use crate::concurrent::expansion::Situation;
 use crate::concurrent::relaxed::{Proposition, Relaxed};
 use crate::number::{Int, dense};
 use crate::task::OperatorId;
+use crate::task::quantity::Linear;
 
 /// A cost that stands for being out of reach.
 const NEVER: u64 = u64::MAX;
@@ -61,11 +62,22 @@ impl<'a> Guidance<'a> {
     }
 
     /// None if the goal is out of reach, or the end of an action under way.
-    pub(super) fn guide(&mut self, situation: &Situation) -> Option<Guide> {
-        self.reach(situation);
+    pub(super) fn guide(&mut self, Situation { state, clocks, .. }: &Situation) -> Option<Guide> {
+        let value = |linear: &Linear<Int>| linear.value(&state.numbers, &[], &[]);
+        self.guide_from(&state.values, clocks.opens().iter().map(|open| open.instance), &value)
+    }
+
+    /// As [`Self::guide`], from values of variables, the instances under way, and what linear expressions are at most; none if they can be
+    /// anything.
+    pub(super) fn guide_from(
+        &mut self,
+        values: &[u32],
+        instances: impl Iterator<Item = u32>,
+        most: &dyn Fn(&Linear<Int>) -> Option<Int>,
+    ) -> Option<Guide> {
+        self.reach(values, most);
         let relaxed = self.relaxed;
-        let instances = situation.clocks.opens().iter().map(|open| open.instance as usize);
-        let ends: Vec<u32> = instances.map(|instance| relaxed.ends[instance]).collect();
+        let ends: Vec<u32> = instances.map(|instance| relaxed.ends[instance as usize]).collect();
         if ends.iter().any(|end| self.unmet[*end as usize] > 0)
             || relaxed.goal.iter().any(|goal| self.costs[*goal as usize] == NEVER)
         {
@@ -76,7 +88,7 @@ impl<'a> Guidance<'a> {
 
     /// Dijkstra's algorithm over propositions.
     #[expect(clippy::arithmetic_side_effects, reason = "values of variables are held in memory")]
-    fn reach(&mut self, situation: &Situation) {
+    fn reach(&mut self, values: &[u32], most: &dyn Fn(&Linear<Int>) -> Option<Int>) {
         let relaxed = self.relaxed;
         self.costs.fill(NEVER);
         self.supporters.fill(None);
@@ -84,12 +96,11 @@ impl<'a> Guidance<'a> {
         for (unmet, rule) in self.unmet.iter_mut().zip(&relaxed.rules) {
             *unmet = dense(rule.needs.len());
         }
-        let state = &situation.state;
         for (missing, numeric) in self.missing.iter_mut().zip(&relaxed.numeric) {
             // What does not fit can be anything.
-            *missing = numeric.linear.value(&state.numbers, &[], &[]).map(Int::saturating_neg);
+            *missing = most(&numeric.linear).map(Int::saturating_neg);
         }
-        for (first, value) in relaxed.first.iter().zip(&state.values) {
+        for (first, value) in relaxed.first.iter().zip(values) {
             self.improve(first + value, 0, None);
         }
         for default in &relaxed.defaults {
