@@ -3,6 +3,7 @@
 
 use std::fmt::Write as _;
 
+use crate::random::Random;
 use metaplan_encodings::{
     GroundConfig, Limits, Plan, Solution, Status, ground_concurrent, optimize_concurrent,
 };
@@ -224,4 +225,159 @@ fn what_holds_over_all_rests_on_durations() {
     // Of a condition over all that several happenings can keep up nothing is claimed.
     let cost = solution.plan.as_ref().map(|plan| plan.cost.to_string());
     assert_eq!((solution.status, cost.as_deref()), (Status::Feasible, Some("8.75")));
+}
+
+fn literal(random: &mut Random) -> String {
+    let atom = ["(p)", "(q)", "(h)"][random.below(3) as usize];
+    if random.below(3) == 0 { format!("(not {atom})") } else { atom.to_owned() }
+}
+
+fn condition(random: &mut Random) -> String {
+    match random.below(6) {
+        0 => format!("(<= (fuel) {})", 1 + random.below(3)),
+        1 | 2 => format!("(>= (fuel) {})", 1 + random.below(4)),
+        _ => literal(random),
+    }
+}
+
+fn effect(random: &mut Random, is_durative: bool) -> String {
+    match random.below(9) {
+        0 | 1 if is_durative => format!("(increase (fuel) (* {} ?duration))", 1 + random.below(2)),
+        2 if is_durative => "(decrease (fuel) ?duration)".to_owned(),
+        3 if is_durative => "(assign (charge) (- 4 ?duration))".to_owned(),
+        4 => format!("(decrease (fuel) {})", 1 + random.below(2)),
+        5 => format!("(increase (charge) {})", 1 + random.below(2)),
+        _ => literal(random),
+    }
+}
+
+fn timed(random: &mut Random, times: &[&str], part: &mut dyn FnMut(&mut Random) -> String) -> String {
+    let count = 1 + random.below(2);
+    let parts = (0..count).map(|_| {
+        let time = times[random.below(times.len() as u64) as usize];
+        format!("({time} {})", part(random))
+    });
+    parts.collect::<Vec<_>>().join(" ")
+}
+
+/// A random task of three actions, and how long each may take: nothing for one that is instantaneous.
+fn sample(random: &mut Random) -> (String, String, [Vec<i128>; 3]) {
+    let mut durations = [const { Vec::new() }; 3];
+    let mut actions = Vec::new();
+    for (index, allowed) in durations.iter_mut().enumerate() {
+        if index == 2 && random.below(2) == 0 {
+            actions.push(format!(
+                "(:action a{index} :parameters () :precondition (and {})
+                   :effect (and {} {} (increase (total-cost) 2)))",
+                condition(random),
+                effect(random, false),
+                literal(random)
+            ));
+            continue;
+        }
+        let least = i128::from(1 + random.below(2));
+        let most = least + i128::from(random.below(3));
+        *allowed = (least..=most).collect();
+        let upper = if random.below(4) == 0 { "(+ (charge) 1)".to_owned() } else { most.to_string() };
+        let bounds = format!("(and (>= ?duration {least}) (<= ?duration {upper}))");
+        if upper.contains("charge") {
+            *allowed = (least..=4).collect();
+        }
+        let conditions = timed(random, &["at start", "over all", "at end"], &mut condition);
+        let times = ["at start", "at end"];
+        let effects = timed(random, &times, &mut |random| effect(random, true));
+        let more = timed(random, &times, &mut literal);
+        let cost = ["2", "?duration", "(* 2 ?duration)"][random.below(3) as usize];
+        let effects = format!("{effects} {more} (at end (increase (total-cost) {cost}))");
+        actions.push(durative(&format!("a{index}"), &bounds, &conditions, &effects));
+    }
+    let mut init = format!("(= (fuel) {})", random.below(3));
+    for atom in ["(p)", "(q)", "(h)"] {
+        if random.below(2) == 0 {
+            let _ = write!(init, " {atom}");
+        }
+    }
+    if random.below(4) == 0 {
+        let _ = write!(init, " (at {} {})", 1 + random.below(4), literal(random));
+    }
+    let goal = format!("{} {} {}", literal(random), condition(random), condition(random));
+    let metric = ["(total-time)", "(+ (total-time) (total-cost))"][random.below(2) as usize];
+    let problem = problem(&init, &goal, metric).replacen("(= (fuel) 0)", "", 1);
+    (domain(&actions), problem, durations)
+}
+
+/// The last start that brute force tries.
+const LAST: i128 = 4;
+
+/// The least metric of valid plans of up to three actions that start and last whole units, which are the separation.
+fn brute_force(durations: &[Vec<i128>; 3], domain: &Domain, problem: &Problem) -> Option<BigRational> {
+    let separation = rational(1, 1);
+    let mut best: Option<BigRational> = None;
+    let mut open: Vec<Vec<(i128, usize, i128)>> = vec![Vec::new()];
+    while let Some(plan) = open.pop() {
+        let mut text = String::new();
+        for (start, action, duration) in &plan {
+            let _ = writeln!(text, "{start}: (a{action}) [{duration}]");
+        }
+        if let Ok(value) = metric(domain, problem, &text, &separation)
+            && best.as_ref().is_none_or(|best| value < *best)
+        {
+            best = Some(value);
+        }
+        if plan.len() == 3 {
+            continue;
+        }
+        let last = plan.last().copied().unwrap_or((0, 0, 0));
+        for start in last.0..=LAST {
+            for (action, allowed) in durations.iter().enumerate() {
+                let instant = if allowed.is_empty() { &[0][..] } else { &[] };
+                for duration in allowed.iter().chain(instant) {
+                    if (start, action, *duration) >= last {
+                        open.push([&plan[..], &[(start, action, *duration)]].concat());
+                    }
+                }
+            }
+        }
+    }
+    best
+}
+
+/// Whether a task is decided; then no plan of brute force is better than the one that is found, or there is none.
+fn agree(seed: u64) -> bool {
+    let (domain, problem, durations) = sample(&mut Random(seed));
+    let (read_domain, read_problem) = parse(&domain, &problem);
+    let limits = Limits::none().with_time(std::time::Duration::from_secs(1)).with_room(1 << 24);
+    let solution = solve(&read_domain, &read_problem, &rational(1, 1), &limits);
+    if solution.status == Status::Unknown {
+        return false;
+    }
+    let expected = brute_force(&durations, &read_domain, &read_problem);
+    let found = solution.plan.as_ref().map(|plan| plan.cost.to_rational());
+    let context = || format!("seed {seed}: {found:?}, {expected:?}\n{domain}\n{problem}");
+    let bound = solution.lower_bound.as_ref().map(metaplan_encodings::Exact::to_rational);
+    if let (Some(bound), Some(expected)) = (bound, &expected) {
+        assert!(bound <= *expected, "{}", context());
+    }
+    match solution.status {
+        Status::Unsolvable => assert_eq!(expected, None, "{}", context()),
+        Status::Optimal => {
+            assert!(expected.as_ref().is_none_or(|best| found.as_ref() <= Some(best)), "{}", context());
+        }
+        _ => return false,
+    }
+    true
+}
+
+#[test]
+fn no_plan_on_a_grid_is_better() {
+    let decided = (0..60).filter(|seed| agree(*seed)).count();
+    assert!(decided >= 20, "{decided} of 60 decided");
+}
+
+#[test]
+#[ignore = "half an hour"]
+fn no_plan_on_a_grid_is_better_on_many() {
+    let from = std::env::var("FROM").ok().and_then(|text| text.parse().ok()).unwrap_or(1_000);
+    let decided = (from..from + 1_000).filter(|seed| agree(*seed)).count();
+    assert!(decided >= 300, "{decided} of 1000 decided");
 }

@@ -83,10 +83,10 @@ pub fn ground_concurrent(
         .into());
     }
     let own = (domain, problem, config, &separation);
-    if is_fixed(domain) {
-        return ground_with(own, &normalize);
-    }
     let shortest = ground_with(own, &normalize);
+    if is_fixed(domain) && shortest.is_ok() {
+        return shortest;
+    }
     match (ground_with(own, &normalize_freely), shortest) {
         (Ok(mut free), shortest) => {
             free.is_exact = free.is_exact && chosen::is_exact(&free);
