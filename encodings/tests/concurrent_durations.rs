@@ -204,6 +204,60 @@ fn bounds_may_be_numbers_that_actions_change() {
     );
 }
 
+/// Plans are written in decimals, and have to be valid as they are written.
+#[test]
+fn durations_are_decimals() {
+    let load = durative(
+        "load",
+        "(and (>= ?duration 1) (<= ?duration 10))",
+        "(at start (q))",
+        "(at start (not (q))) (at end (increase (charge) (* 1.5 ?duration))) (at end (g))",
+    );
+    let all = domain(&[load]);
+    let (domain, problem) = parse(&all, &problem("(q)", "(g) (>= (charge) 5)", "(total-time)"));
+    let solution = solve(&domain, &problem, &rational(1, 1000), &Limits::none());
+    let plan = solution.plan.expect("a plan");
+    // A third more costs less than a millionth: that there is nothing in between is not claimed.
+    assert_eq!((solution.status, plan.cost.to_string()), (Status::Feasible, "3.333334".to_owned()));
+    assert_eq!(solution.lower_bound.map(|bound| bound.to_string()), Some("10/3".to_owned()));
+}
+
+#[test]
+fn more_than_a_number_is_a_little_more() {
+    let load = durative(
+        "load",
+        "(and (> ?duration 2) (< ?duration 3))",
+        "(at start (q))",
+        "(at start (not (q))) (at end (increase (charge) ?duration)) (at end (g))",
+    );
+    let all = domain(&[load]);
+    let goal =
+        |most: &str| problem("(q)", &format!("(g) (> (charge) 2.5) (< (charge) {most})"), "(total-time)");
+    check("between", &all, &goal("3"), (Status::Feasible, Some("2.500001"), &["0: (load) [2.500001]"]));
+    let (domain, problem) = parse(&all, &goal("2.5"));
+    let limits = Limits::none().with_room(1 << 20);
+    assert_eq!(solve(&domain, &problem, &rational(1, 1000), &limits).status, Status::Unknown);
+}
+
+/// What is shorter than the separation the planner does not look at, and claims nothing of.
+#[test]
+fn no_action_is_shorter_than_the_separation() {
+    for (bounds, status) in [
+        ("(>= ?duration 0.001)", Status::Optimal),
+        ("(>= ?duration 0.0001)", Status::Feasible),
+        ("(>= ?duration 0)", Status::Feasible),
+        ("()", Status::Feasible),
+    ] {
+        let all = domain(&[durative("a", bounds, "(at start (q))", "(at start (not (q))) (at end (g))")]);
+        check(
+            bounds,
+            &all,
+            &problem("(q)", "(g)", "(total-time)"),
+            (status, Some("0.001"), &["0: (a) [0.001]"]),
+        );
+    }
+}
+
 /// A boiler must be warm enough all along, and cools when it is used.
 #[test]
 fn what_holds_over_all_rests_on_durations() {
@@ -242,7 +296,7 @@ fn condition(random: &mut Random) -> String {
 
 fn effect(random: &mut Random, is_durative: bool) -> String {
     match random.below(9) {
-        0 | 1 if is_durative => format!("(increase (fuel) (* {} ?duration))", 1 + random.below(2)),
+        0 | 1 if is_durative => format!("(increase (fuel) (* {} ?duration))", 1 + random.below(3)),
         2 if is_durative => "(decrease (fuel) ?duration)".to_owned(),
         3 if is_durative => "(assign (charge) (- 4 ?duration))".to_owned(),
         4 => format!("(decrease (fuel) {})", 1 + random.below(2)),

@@ -58,6 +58,9 @@ use record::Record;
 use search::{Ended, Sequence};
 use turns::take_turns;
 
+/// Where durations are chosen, what has to be more than a number is so much more: one part in so many.
+const PRECISION: Int = 1_000_000;
+
 /// Grounds a domain and a problem that have passed `pddl::check`, for plans whose actions overlap. Interfering happenings are
 /// to lie `separation` apart, in the domain's time unit.
 ///
@@ -150,12 +153,14 @@ fn ground_normal(
     lifted.metrics = vec![metric];
     let is_strict = strict::compares_strictly(&lifted);
     let mut split = split::split(lifted, &config.solves, &|action| mentions_duration(domain, action));
-    // Where durations are chosen, more than some integer need not be the next one.
+    // Where durations are chosen, more than some number is this much more, at least.
     let is_chosen = split.chosen.contains(&true);
     split.is_exact = if is_chosen { !is_strict } else { is_fixed(domain) };
     let none = vec![Vec::new(); split.designs.len()];
     let (lifted, designs) = (&split.lifted, &split.designs);
-    let generality = Generality { measures_ends: true, measures_rewards: true, ..Generality::default() };
+    let precision = (is_chosen && is_strict).then_some(PRECISION);
+    let generality =
+        Generality { measures_ends: true, measures_rewards: true, precision, ..Generality::default() };
     let (task, reached) = ground_lifted(lifted, designs, &none, &generality, &config.limits)?;
     let _span = info_span!("happenings", operators = task.operators.len()).entered();
     compile::compile(task, &split, &reached, separation, weight, &config.limits)

@@ -60,7 +60,7 @@ pub(super) fn check(concurrent: Concurrent) -> Result<Concurrent, Errors> {
 
 /// Whether every plan is among those that an exhaustive search goes through, with the times and durations that it can have.
 ///
-/// Not so where an action may take no time, which makes one happening of it, where several happenings can keep up a condition together at one
+/// Not so where an action may take less time than the separation, or none, which makes one happening of it, where several happenings can keep up a condition together at one
 /// time, and where a plan ends right before timed initial literals.
 pub(super) fn is_exact(concurrent: &Concurrent) -> bool {
     let takes_time = |own: &Instance| {
@@ -68,9 +68,10 @@ pub(super) fn is_exact(concurrent: &Concurrent) -> bool {
         !own.is_chosen
             || condition.comparisons.iter().any(|linear| {
                 let [(number, factor)] = linear.coefficients[..] else { return false };
-                own.timer.is_some_and(|(timer, _)| timer == number)
-                    && factor > 0
-                    && linear.quantity.constant < 0
+                let Some((_, times)) = own.timer.filter(|(timer, _)| *timer == number) else { return false };
+                let least = linear.quantity.constant.saturating_neg().checked_mul(times);
+                let short = concurrent.separation.checked_mul(factor);
+                factor > 0 && least.zip(short).is_some_and(|(least, short)| least >= short)
             })
     };
     let is_decided = |own: &Instance| own.timer.is_none() || own.is_chosen;
@@ -104,7 +105,8 @@ pub(super) fn only_grows(task: &Task, instances: &[Instance]) -> bool {
 pub(super) fn optimize(concurrent: &Concurrent, limits: &Limits, mut record: Record<'_>) -> Solution {
     let span = info_span!("optimize", operators = concurrent.task.operators.len());
     let (is_over, lower, best) = span.in_scope(|| take_turns_choosing(concurrent, limits, &mut record));
-    let is_proved = is_over && concurrent.is_exact;
+    // Durations that are decimals may cost a little.
+    let is_proved = is_over && concurrent.is_exact && best.as_ref().is_none_or(|best| lower >= best.value);
     let status = match (&best, is_proved) {
         (Some(_), true) => Status::Optimal,
         (Some(_), false) => Status::Feasible,
@@ -196,7 +198,7 @@ fn shortest(
     let value = concurrent.measure.total_of(&plan.cost);
     if best.as_ref().is_none_or(|best| value < best.value) {
         let steps = plan.steps.len();
-        *best = Some(Answer { value: value.clone(), plan });
+        *best = Some(Answer { value: value.clone(), least: value.clone(), plan });
         record.improve(value, steps, lower.clone(), figures.found_by.unwrap_or(part));
     }
 }

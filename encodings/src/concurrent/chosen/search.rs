@@ -58,6 +58,8 @@ pub(super) struct Search<'a> {
     order: u32,
     nearest: u64,
     bytes: usize,
+    /// The least that a plan which was found could come to if its durations need not be decimals.
+    reached: Option<Rational>,
     pub(super) figures: Figures,
 }
 
@@ -88,13 +90,15 @@ impl<'a> Search<'a> {
             order: 0,
             nearest: u64::MAX,
             bytes: 0,
+            reached: None,
             figures: Figures::default(),
         }
     }
 
     /// No plan that is not known has a lower metric than this, if the search leaves nothing out.
     pub(super) fn lower(&self) -> Option<Rational> {
-        self.queues[0].peek().map(|Reverse((_, least, ..))| least.clone())
+        let open = self.queues[0].peek().map(|Reverse((_, least, ..))| least);
+        open.into_iter().chain(&self.reached).min().cloned()
     }
 
     /// Whether it takes a quarter of the room that there is.
@@ -139,6 +143,7 @@ impl<'a> Search<'a> {
         let mut outcome = None;
         if course.is_goal(self.concurrent)
             && let Some(found) = answer(self.concurrent, &course)
+            && self.is_reached(&found)
             && best.as_ref().is_none_or(|best| found.value < best.value)
         {
             *best = Some(found);
@@ -165,6 +170,14 @@ impl<'a> Search<'a> {
         self.bytes = self.bytes.saturating_add(course.bytes());
         self.nodes.push(course);
         outcome
+    }
+
+    /// Notes what a plan could come to if its durations need not be decimals.
+    fn is_reached(&mut self, found: &Answer) -> bool {
+        if self.reached.as_ref().is_none_or(|reached| found.least < *reached) {
+            self.reached = Some(found.least.clone());
+        }
+        true
     }
 
     /// How far the goal is from a sequence; none if it is nothing new, or a dead end.
