@@ -135,8 +135,8 @@ fn numbers_that_no_scale_makes_integers_are_told_with_their_action() {
 fn what_a_search_does_is_counted_and_dated() {
     let tower = |count: usize| {
         let names: Vec<String> = (0..count).map(|index| format!("k{index}")).collect();
-        let init: String = names.iter().map(|name| format!("(off {name})")).collect();
-        let goal: String = names.iter().map(|name| format!("(on {name})")).collect();
+        let each = |text: &str| names.iter().map(|name| [text, name, ")"].concat()).collect::<String>();
+        let (init, goal) = (each("(off "), each("(on "));
         let domain = "(define (domain d) (:predicates (on ?x) (off ?x) (free)) (:functions (total-cost))
           (:durative-action switch :parameters (?x) :duration (= ?duration 2)
             :condition (and (at start (free)) (at start (off ?x)))

@@ -252,7 +252,7 @@ pub fn optimize_concurrent(
     Solution {
         horizon: steps,
         plan,
-        lower_bound: lower.filter(|_| task.objective.rest.is_empty()).map(|lower| metric(lower)),
+        lower_bound: lower.filter(|_| concurrent.is_whole).map(metric),
         ..ended(status, proof, record)
     }
 }

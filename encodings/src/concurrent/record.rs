@@ -39,13 +39,13 @@ impl<'r> Record<'r> {
     }
 
     /// Notes a better plan of so many happenings, and what none can get below.
-    pub(super) fn improve(&mut self, value: Rational, horizon: usize, lower: Rational, part: Part) {
+    pub(super) fn improve(&mut self, value: &Rational, horizon: usize, lower: Rational, part: Part) {
         self.statistics.found_by = Some(part);
         self.cost = Some(value.clone());
         let lower = self.rise(lower);
         if self.concurrent.is_whole {
             (self.report)(Improvement {
-                cost: self.concurrent.measure.metric(&value),
+                cost: self.concurrent.measure.metric(value),
                 lower_bound: self.concurrent.measure.metric(&lower),
                 horizon,
             });

@@ -36,7 +36,7 @@ impl Sequence {
     /// Tells the record of a better plan, and of what none can get below.
     pub(super) fn tell(&self, lower: Int, part: Part, record: &mut Record<'_>) {
         let [value, lower] = [self.value.0, lower].map(Rational::from_integer);
-        record.improve(value, self.happenings.len(), lower, part);
+        record.improve(&value, self.happenings.len(), lower, part);
     }
 }
 

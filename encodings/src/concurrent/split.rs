@@ -160,11 +160,8 @@ fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Ha
     let mut condition = vec![schema.start_condition.clone()];
     condition.extend((known.is_none() && choice.is_none()).then(|| compare(Comparison::Greater)));
     condition.extend(settled);
-    if let Some(choice) = choice {
-        let own = condition.iter().flat_map(conjuncts).filter(|conjunct| is_static(lifted, conjunct));
-        let own = own.cloned().collect();
-        all.push((Half::Choice, instantaneous(own, vec![choice])));
-    }
+    let choice = choice.map(|choice| instantaneous(settled_of(lifted, &condition), vec![choice]));
+    all.extend(choice.map(|choice| (Half::Choice, choice)));
     let mut effects = schema.start_effects.clone();
     effects.push(effect(Change::Add(running, parameters.clone())));
     effects.extend(timer.and_then(|timer| timer.set(schema)));
@@ -191,6 +188,12 @@ fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Ha
     effects.extend(timer.map(|timer| timer.clear(schema)));
     all.push((Half::End, instantaneous(condition, effects)));
     all
+}
+
+/// What no action changes of some conditions.
+fn settled_of(lifted: &Lifted, conditions: &[Formula]) -> Vec<Formula> {
+    let all = conditions.iter().flat_map(conjuncts);
+    all.filter(|conjunct| is_static(lifted, conjunct)).cloned().collect()
 }
 
 /// What happens by itself at one time, after what happened before.

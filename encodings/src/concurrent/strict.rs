@@ -19,10 +19,9 @@ fn is_strict(lifted: &Lifted, formula: &Formula) -> bool {
     match formula {
         Formula::And(parts) | Formula::Or(parts) => parts.iter().any(|part| is_strict(lifted, part)),
         Formula::Exists(_, body) | Formula::ForAll(_, body) => is_strict(lifted, body),
-        Formula::Literal { .. } | Formula::Equal { .. } => false,
         Formula::Compare(Comparison::Less | Comparison::Greater, left, right, _) => {
             depends_on_state(lifted, left) || depends_on_state(lifted, right)
         }
-        Formula::Compare(..) => false,
+        Formula::Literal { .. } | Formula::Equal { .. } | Formula::Compare(..) => false,
     }
 }

@@ -114,7 +114,7 @@ pub(super) fn duration(
     let Some(chosen) = taken else {
         names.unsupported(
             "a duration without one bound that the metric makes it take",
-            "one `(= ?duration …)`, or one `(>= ?duration …)` and a metric that does not reward time",
+            "one `(= ?duration …)`, one `(>= ?duration …)` and a metric that does not reward time, or `--concurrent`",
             File::Domain,
             span,
         );

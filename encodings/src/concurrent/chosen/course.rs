@@ -13,7 +13,7 @@ use crate::concurrent::chosen::answer::value;
 use crate::concurrent::chosen::program::Program;
 use crate::concurrent::clocks::Key;
 use crate::concurrent::compile::Concurrent;
-use crate::concurrent::happening::Role;
+use crate::concurrent::happening::{Instance, Role};
 use crate::number::{Int, Rational, dense};
 use crate::task::number::TaskNumber;
 use crate::task::quantity::Linear;
@@ -167,12 +167,11 @@ impl Course {
         let own = &concurrent.task.operators[operator.index()];
         let column = duration_of(self.passed.len());
         let chosen = chosen(concurrent, role);
-        if let Some(timer) = chosen.flatten() {
-            let (number, factor) = timer;
-            self.numbers[number as usize] = Affine::column(column).times(&rational(factor).recip());
+        if let Some((number, factor)) = chosen.and_then(|own| own.timer) {
+            self.numbers[number.index()] = Affine::column(column).times(&rational(factor).recip());
         }
         for linear in own.condition.linears() {
-            self.ask(self.value(linear), asked)?;
+            ask(self.value(linear), asked)?;
         }
         if chosen.is_some() {
             self.note_range(column, rational(concurrent.separation), asked)?;
@@ -192,18 +191,6 @@ impl Course {
         terms.fold(constant, |sum, (variable, factor)| {
             sum.plus(&self.numbers[variable.index()], &rational(*factor))
         })
-    }
-
-    /// Asks that an expression is not below 0. None if it always is.
-    #[expect(clippy::unused_self, reason = "reads as the others")]
-    fn ask(&self, expression: Affine, asked: &mut Vec<Affine>) -> Option<()> {
-        match expression.known() {
-            Some(value) => (!value.is_negative()).then_some(()),
-            None => {
-                asked.push(expression);
-                Some(())
-            }
-        }
     }
 
     /// Notes between what bounds a duration lies. None if there is nothing between them.
@@ -261,7 +248,7 @@ impl Course {
             duration = self.duration(concurrent, instance, position);
             let end = time.plus(&duration, &rational(1));
             asked.push(Affine::column(MAKESPAN).minus(&end));
-            self.ask(duration.shifted(&rational(concurrent.separation.saturating_neg())), asked)?;
+            ask(duration.shifted(&rational(concurrent.separation.saturating_neg())), asked)?;
             // What it marked before the start, its end comes after.
             let after =
                 &concurrent.happenings[concurrent.instances[instance as usize].end.index()].accesses.after;
@@ -276,14 +263,14 @@ impl Course {
         if let Role::Timed(at) = role {
             // Nothing so far is after this, and nothing from now on is before.
             for passed in &self.passed {
-                self.ask(time.minus(&passed.time), asked)?;
+                ask(time.minus(&passed.time), asked)?;
             }
             for open in &self.opens {
-                self.ask(open.end.minus(&time), asked)?;
+                ask(open.end.minus(&time), asked)?;
             }
             self.floor = at;
         } else if self.floor > 0 {
-            self.ask(time.shifted(&rational(self.floor.saturating_neg())), asked)?;
+            ask(time.shifted(&rational(self.floor.saturating_neg())), asked)?;
         }
         if !matches!(role, Role::End(_)) {
             self.come_after(concurrent, &time, &happening.accesses.after, asked)?;
@@ -291,7 +278,7 @@ impl Course {
         for open in &self.opens {
             let end = &concurrent.happenings[concurrent.instances[open.instance as usize].end.index()];
             if let Some(by) = gap(&end.accesses.after, &happening.accesses.marks) {
-                self.ask(open.end.minus(&time).shifted(&rational(by.saturating_neg())), asked)?;
+                ask(open.end.minus(&time).shifted(&rational(by.saturating_neg())), asked)?;
             }
         }
         let measured = self.measured(concurrent);
@@ -320,7 +307,7 @@ impl Course {
         for passed in &self.passed {
             let marks = &concurrent.happenings[passed.operator.index()].accesses.marks;
             if let Some(by) = gap(after, marks) {
-                self.ask(time.minus(&passed.time).shifted(&rational(by.saturating_neg())), asked)?;
+                ask(time.minus(&passed.time).shifted(&rational(by.saturating_neg())), asked)?;
             }
         }
         Some(())
@@ -339,7 +326,7 @@ impl Course {
         for index in 0..self.opens.len() {
             let Open { instance, ref last, .. } = self.opens[index];
             if let Some(last) = last.as_ref().filter(|_| concurrent.touches(operator, instance)) {
-                self.ask(time.minus(last), asked)?;
+                ask(time.minus(last), asked)?;
                 self.opens[index].last = Some(time.clone());
             }
             let Some(over_all) = concurrent.instances[instance as usize].over_all else { continue };
@@ -350,7 +337,7 @@ impl Course {
             for linear in condition.linears() {
                 let mentions = |variable| linear.coefficients.iter().any(|(own, _)| *own == variable);
                 if role == Role::Start(instance) || writes.iter().any(|effect| mentions(effect.variable)) {
-                    self.ask(self.value(linear), asked)?;
+                    ask(self.value(linear), asked)?;
                 }
             }
         }
@@ -386,7 +373,7 @@ impl Course {
     pub(super) fn goal(&self, concurrent: &Concurrent) -> Option<Vec<Affine>> {
         let mut asked = Vec::new();
         for linear in concurrent.task.goal.linears() {
-            self.ask(self.value(linear), &mut asked)?;
+            ask(self.value(linear), &mut asked)?;
         }
         for (time, event) in concurrent.events.iter().filter(|(time, _)| *time > self.floor) {
             let before = Affine::constant(rational(time.saturating_sub(1)));
@@ -398,11 +385,19 @@ impl Course {
     }
 }
 
-/// The number that holds a chosen duration, if anything reads it, and by what it is multiplied; none if the happening chooses none.
-fn chosen(concurrent: &Concurrent, role: Role) -> Option<Option<(u32, Int)>> {
+/// Asks that an expression is not below 0. None if it always is.
+fn ask(expression: Affine, asked: &mut Vec<Affine>) -> Option<()> {
+    if let Some(value) = expression.known() {
+        return (!value.is_negative()).then_some(());
+    }
+    asked.push(expression);
+    Some(())
+}
+
+/// The instance that a happening starts, if it takes as long as the planner chooses.
+fn chosen(concurrent: &Concurrent, role: Role) -> Option<&Instance> {
     let Role::Start(instance) = role else { return None };
-    let instance = &concurrent.instances[instance as usize];
-    instance.is_chosen.then(|| instance.timer.map(|(number, factor)| (number.0, factor)))
+    Some(&concurrent.instances[instance as usize]).filter(|own| own.is_chosen)
 }
 
 /// How long what waits for some kinds of access comes after what makes others; none if it does not have to.

@@ -38,8 +38,6 @@ use search::{Outcome, Search};
 /// How many sequences the exhaustive search looks at before others have a turn, and how many each of the two looks at in its first turn.
 const SOON: u64 = 300;
 const TURN: u64 = 300;
-/// How many turns the searches have that take the shortest durations.
-const ROUNDS: usize = 1;
 
 /// The task, if such durations can be planned with.
 ///
@@ -149,7 +147,7 @@ fn take_turns_choosing(
                 }
                 left = left.saturating_sub(search.figures.evaluated.saturating_sub(looked_at));
                 let found = best.iter().map(|best| (best.value.clone(), best.plan.steps.len()));
-                found.for_each(|(value, steps)| record.improve(value, steps, lower.clone(), part));
+                found.for_each(|(value, steps)| record.improve(&value, steps, lower.clone(), part));
             };
             search.figures.add_to(before, &mut record.statistics);
             if part == Part::Search && concurrent.is_exact {
@@ -162,11 +160,14 @@ fn take_turns_choosing(
     if ended == Outcome::Exhausted || limits.reached() {
         return (ended == Outcome::Exhausted, known, best);
     }
-    shortest(concurrent, limits, &mut best, (record, &known));
     let relaxed = Relaxed::new(concurrent);
     let mut greedy = Search::greedy(concurrent, &expansion, Guidance::new(&relaxed));
-    let mut work = TURN;
+    let (mut work, mut rounds) = (TURN, 1..);
     while ended != Outcome::Exhausted && !limits.reached() {
+        // These begin anew each time, for twice as long: not where there is a plan that they need not find.
+        if let Some(rounds) = rounds.next().filter(|rounds| *rounds == 1 || best.is_none()) {
+            shortest(concurrent, (limits, rounds), &mut best, (record, &known));
+        }
         let (greedily, _) = turn(&mut greedy, &mut best, work, Part::Satisficing, record);
         if exhaustive.is_full(limits) && (greedily == Outcome::Exhausted || greedy.is_full(limits)) {
             break;
@@ -177,17 +178,17 @@ fn take_turns_choosing(
     (ended == Outcome::Exhausted, known, best)
 }
 
-/// Looks for a plan in which every action is as short as it may be, where that can be planned with.
+/// Looks for a plan in which every action is as short as it may be, where that can be planned with, for so many rounds.
 fn shortest(
     concurrent: &Concurrent,
-    limits: &Limits,
+    (limits, rounds): (&Limits, usize),
     best: &mut Option<Answer>,
     (record, lower): (&mut Record<'_>, &Rational),
 ) {
     let Some(shortest) = concurrent.shortest.as_deref() else { return };
     let mut unheard = |_| {};
     let mut own = Record::new(shortest, std::time::Instant::now(), &mut unheard);
-    let (_, found) = take_turns(shortest, None, limits, &mut own, ROUNDS);
+    let (_, found) = take_turns(shortest, None, limits, &mut own, rounds);
     let (figures, part) = (own.statistics, Part::Satisficing);
     let statistics = &mut record.statistics;
     statistics.expanded = statistics.expanded.saturating_add(figures.expanded);
@@ -199,6 +200,6 @@ fn shortest(
     if best.as_ref().is_none_or(|best| value < best.value) {
         let steps = plan.steps.len();
         *best = Some(Answer { value: value.clone(), least: value.clone(), plan });
-        record.improve(value, steps, lower.clone(), figures.found_by.unwrap_or(part));
+        record.improve(&value, steps, lower.clone(), figures.found_by.unwrap_or(part));
     }
 }
