@@ -4,6 +4,7 @@ mod adl;
 mod certificate;
 mod concurrent;
 mod concurrent_definition;
+mod concurrent_durations;
 mod concurrent_language;
 mod designs;
 mod exact;

@@ -6,7 +6,7 @@ use crate::concurrent::access::{Designs, Keys, prune};
 use crate::concurrent::footprint::{Footprint, Footprints};
 use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::split::{Half, Split};
-use crate::concurrent::timer::TIMER;
+use crate::concurrent::timer::{FREE, TIMER};
 use crate::concurrent::unit::{Divisors, Unit};
 use crate::context::Context;
 use crate::error::{Error, Errors};
@@ -92,7 +92,8 @@ impl<'a> Builder<'a> {
             let arguments: Vec<ObjectId> = operator.arguments.iter().copied().filter_map(object).collect();
             let mut binding: Binding = arguments.iter().map(|object| Some(*object)).collect();
             binding.resize(schema.variables, None);
-            let effects = if origin.half == Half::OverAll { &[] } else { &schema.end_effects[..] };
+            let is_none = matches!(origin.half, Half::OverAll | Half::Choice);
+            let effects = if is_none { &[] } else { &schema.end_effects[..] };
             // What is under way, how many events there were and whether they were waited for has no place in the files.
             let time = (!self.split.events.is_empty()).then_some(self.split.lifted.time);
             let own = |predicate| time.is_some_and(|time| [time.phase, time.waited].contains(&predicate));
@@ -121,7 +122,7 @@ impl<'a> Builder<'a> {
                     self.written.push(Footprint::default());
                 }
             }
-            if matches!(origin.half, Half::Whole | Half::Timed(_)) {
+            if matches!(origin.half, Half::Whole | Half::Timed(_) | Half::Choice) {
                 continue;
             }
             let key = (origin.schema, arguments);
@@ -162,11 +163,14 @@ impl<'a> Builder<'a> {
             let schema = &self.split.schemas[key.0];
             let placed = |error: Error| error.within(&format!("`{}`", schema.name), Some(schema.place));
             let factor = |timer| unit.factor(task, timer, divisor).map(|factor| (timer, factor));
-            let timer = timer(task, start).map(factor).transpose().map_err(placed)?;
+            let is_chosen = self.split.chosen[key.0];
+            // Those that the planner chooses are cleared at the end, and set by no happening.
+            let timer = timer(task, if is_chosen { end } else { start });
+            let timer = timer.map(factor).transpose().map_err(placed)?;
             // One that the state decides is looked at when it starts.
             let duration = match timer {
-                Some(_) => self.separation,
-                None => unit.duration(task, start).map_err(placed)?,
+                None if !is_chosen => unit.duration(task, start).map_err(placed)?,
+                _ => self.separation,
             };
             if duration < self.separation {
                 let construct =
@@ -184,6 +188,7 @@ impl<'a> Builder<'a> {
                 over_all,
                 duration,
                 timer,
+                is_chosen,
                 designs,
                 joint,
                 compressible: false,
@@ -320,10 +325,13 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// The number that says how long an instance takes, if the state decides that.
-fn timer(task: &Task, start: OperatorId) -> Option<NumericId> {
-    let mut changed = task.operators[start.index()].numeric_effects.iter().map(|effect| effect.variable);
-    changed.find(|number| task.number_names[number.index()].starts_with(TIMER))
+/// The number that says how long an instance takes, which a happening sets or clears.
+fn timer(task: &Task, id: OperatorId) -> Option<NumericId> {
+    let mut changed = task.operators[id.index()].numeric_effects.iter().map(|effect| effect.variable);
+    changed.find(|number| {
+        let name = &task.number_names[number.index()];
+        name.starts_with(TIMER) || name.starts_with(FREE)
+    })
 }
 
 /// Adds what comes from conditions over all and from designs.

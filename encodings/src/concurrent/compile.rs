@@ -4,6 +4,7 @@ use crate::error::Errors;
 use rustc_hash::FxHashSet;
 
 use crate::concurrent::builder::Builder;
+use crate::concurrent::chosen;
 use crate::concurrent::compress::compressible;
 use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::links::drop_links;
@@ -31,8 +32,12 @@ pub struct Concurrent {
     pub(super) measure: Measure,
     /// Whether every plan is among those that the search goes through, with the times that it can have.
     pub(super) is_exact: bool,
+    /// Whether what plans are compared by is the whole metric.
+    pub(super) is_whole: bool,
     /// How far apart interfering happenings are, in the task's time unit.
     pub(super) separation: Int,
+    /// The same with durations that are as short as they may be, where the planner chooses some, and if that can be planned with.
+    pub(super) shortest: Option<Box<Self>>,
 }
 
 /// Makes happenings of a split ground task.
@@ -65,7 +70,9 @@ pub(super) fn compile(
             _ => {}
         }
     }
-    let is_exact = split.is_exact && !builder.supposes() && task.objective.rest.is_empty();
+    let chooses = instances.iter().any(|own| own.is_chosen);
+    let is_whole = task.objective.rest.is_empty() || chooses && chosen::only_grows(&task, &instances);
+    let is_exact = split.is_exact && !builder.supposes() && is_whole;
     let (happenings, keys) = builder.happenings(context, &roles, &mut instances).map_err(one)?;
     let mut events: Vec<(Int, OperatorId)> = Vec::new();
     for (role, id) in roles.iter().zip((0..).map(OperatorId)) {
@@ -79,8 +86,18 @@ pub(super) fn compile(
         own.compressible = compressible;
     }
     let guards = vec![None; keys];
-    let mut concurrent =
-        Concurrent { task, happenings, instances, events, guards, measure, is_exact, separation };
+    let mut concurrent = Concurrent {
+        task,
+        happenings,
+        instances,
+        events,
+        guards,
+        measure,
+        is_exact,
+        is_whole,
+        separation,
+        shortest: None,
+    };
     concurrent.guard(limits)?;
     Ok(concurrent)
 }

@@ -50,10 +50,15 @@ impl<'a> Expansion<'a> {
 
     /// The happenings whose propositional condition holds: starts, and ends of what is under way.
     pub(super) fn candidates(&self, situation: &Situation) -> Vec<OperatorId> {
-        let mut next = self.index.applicable(&self.concurrent.task, &situation.state);
+        let mut next = self.starts(&situation.state);
         let opens = situation.clocks.opens().iter();
         next.extend(opens.map(|open| self.concurrent.instances[open.instance as usize].end));
         next
+    }
+
+    /// The happenings but ends whose propositional condition holds.
+    pub(super) fn starts(&self, state: &State) -> Vec<OperatorId> {
+        self.index.applicable(&self.concurrent.task, state)
     }
 
     /// The timed initial literals that come next.

@@ -14,6 +14,7 @@ use crate::concurrent::relaxed::{Proposition, Relaxed};
 use crate::number::Int;
 use crate::satisfice::queue::Queue;
 use crate::task::OperatorId;
+use crate::task::quantity::Linear;
 
 /// A cost that stands for being out of reach.
 const NEVER: u32 = u32::MAX;
@@ -66,32 +67,42 @@ impl<'a> Guidance<'a> {
     }
 
     /// None if the goal is out of reach, or the end of an action under way.
-    pub(super) fn guide(&mut self, situation: &Situation) -> Option<Guide> {
+    pub(super) fn guide(&mut self, Situation { state, clocks, .. }: &Situation) -> Option<Guide> {
+        let value = |linear: &Linear<Int>| linear.value(&state.numbers, &[], &[]);
+        self.guide_from(&state.values, clocks.opens().iter().map(|open| open.instance), &value)
+    }
+
+    /// As [`Self::guide`], from values of variables, the instances under way, and what linear expressions are at most; none if they can be
+    /// anything.
+    pub(super) fn guide_from(
+        &mut self,
+        values: &[u32],
+        instances: impl Iterator<Item = u32>,
+        most: &dyn Fn(&Linear<Int>) -> Option<Int>,
+    ) -> Option<Guide> {
         let relaxed = self.relaxed;
-        let instances = situation.clocks.opens().iter().map(|open| open.instance as usize);
-        let ends: Vec<u32> = instances.map(|instance| relaxed.ends[instance]).collect();
+        let ends: Vec<u32> = instances.map(|instance| relaxed.ends[instance as usize]).collect();
         self.targets.clone_from(&relaxed.goal);
         self.targets.extend(ends.iter().flat_map(|end| relaxed.needs.of(*end)));
-        self.reach(situation);
+        self.reach(values, most);
         let is_reached = |target: &Proposition| self.costs[*target as usize] < NEVER;
         self.targets.iter().all(is_reached).then(|| self.extract(&ends))
     }
 
     /// Dijkstra's algorithm over propositions, until no target can cost less.
     #[expect(clippy::arithmetic_side_effects, reason = "values of variables are held in memory")]
-    fn reach(&mut self, situation: &Situation) {
+    fn reach(&mut self, values: &[u32], most: &dyn Fn(&Linear<Int>) -> Option<Int>) {
         let relaxed = self.relaxed;
         self.costs.fill(NEVER);
         self.supporters.fill(None);
         self.sums.fill(0);
         self.unmet.copy_from_slice(&relaxed.unmet);
         self.open.clear();
-        let state = &situation.state;
         for (missing, numeric) in self.missing.iter_mut().zip(&relaxed.numeric) {
             // What does not fit can be anything.
-            *missing = numeric.linear.value(&state.numbers, &[], &[]).map(Int::saturating_neg);
+            *missing = most(&numeric.linear).map(Int::saturating_neg);
         }
-        for (first, value) in relaxed.first.iter().zip(&state.values) {
+        for (first, value) in relaxed.first.iter().zip(values) {
             self.improve(first + value, 0, None);
         }
         for default in &relaxed.defaults {

@@ -41,8 +41,10 @@ pub(super) struct Instance {
     pub(super) over_all: Option<OperatorId>,
     /// At least, if the state decides.
     pub(super) duration: Int,
-    /// The number that holds the duration from the start to the end, if the state decides it, and by what it is multiplied.
+    /// The number that holds the duration from the start to the end, if the state or the planner decides it, and by what it is multiplied.
     pub(super) timer: Option<(NumericId, Int)>,
+    /// Whether the planner decides it.
+    pub(super) is_chosen: bool,
     pub(super) designs: Designs,
     /// What a condition over all reads that several happenings can keep up together; numbered as `Happening::writes`.
     pub(super) joint: Vec<u32>,

@@ -45,10 +45,15 @@ impl Measure {
     }
 
     /// The metric of the file.
-    #[expect(clippy::arithmetic_side_effects, reason = "offset and totals are at most GROWTH_LIMIT")]
-    pub(super) fn metric(&self, total: Int) -> Exact {
-        let sign = if self.maximize { -1 } else { 1 };
-        Exact::scaled(&(sign * (total + self.offset)), self.scale)
+    pub(super) fn metric(&self, total: &Rational) -> Exact {
+        let sum = total.clone() + Rational::from_integer(self.offset);
+        Exact::scaled(&if self.maximize { -sum } else { sum }, self.scale)
+    }
+
+    /// The total that has a metric.
+    pub(super) fn total_of(&self, metric: &Exact) -> Rational {
+        let scaled = Rational::from_big(metric.to_rational()) * Rational::from_integer(self.scale);
+        (if self.maximize { -scaled } else { scaled }) - &Rational::from_integer(self.offset)
     }
 }
 

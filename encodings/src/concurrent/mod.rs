@@ -8,6 +8,7 @@
 
 mod access;
 mod builder;
+mod chosen;
 mod clocks;
 mod compile;
 mod compress;
@@ -25,6 +26,7 @@ mod schedule;
 mod search;
 mod split;
 mod store;
+mod strict;
 mod time;
 mod timer;
 mod turns;
@@ -42,7 +44,7 @@ use crate::error::{Error, Errors, File, Place};
 use crate::ground::{Generality, GroundConfig, ground_lifted};
 use crate::lifted::{Expression, Lifted, Metric, Rational};
 use crate::limits::Limits;
-use crate::normalize::{normalize, partial};
+use crate::normalize::{normalize, normalize_freely, partial};
 use crate::number::Int;
 use crate::plan::solution::{Improvement, Proof, Solution, Status};
 use crate::plan::{Exact, Plan, Step, measured};
@@ -55,6 +57,9 @@ use happening::Role;
 use record::Record;
 use search::{Ended, Sequence};
 use turns::take_turns;
+
+/// Where durations are chosen, what has to be more than a number is so much more: one part in so many.
+const PRECISION: Int = 1_000_000;
 
 /// Grounds a domain and a problem that have passed `pddl::check`, for plans whose actions overlap. Interfering happenings are
 /// to lie `separation` apart, in the domain's time unit.
@@ -80,12 +85,44 @@ pub fn ground_concurrent(
         }]
         .into());
     }
+    let own = (domain, problem, config, &separation);
+    let shortest = ground_with(own, &normalize);
+    if is_fixed(domain) && shortest.is_ok() {
+        return shortest;
+    }
+    match (ground_with(own, &normalize_freely), shortest) {
+        (Ok(mut free), shortest) => {
+            free.is_exact = free.is_exact && chosen::is_exact(&free);
+            free.shortest = shortest.ok().map(Box::new);
+            Ok(free)
+        }
+        (Err(_), Ok(shortest)) => Ok(shortest),
+        (Err(errors), Err(_)) => Err(errors),
+    }
+}
+
+/// A domain, a problem, and how to ground them with a separation.
+type Files<'f> = (&'f Domain, &'f Problem, &'f GroundConfig, &'f Rational);
+
+/// The files to a lifted task.
+type Normalize = dyn Fn(&Domain, &Problem, &[ast::Metric]) -> Result<Lifted, Errors>;
+
+/// Grounds a task; numbers without a value are guarded where they need be.
+fn ground_with(
+    (domain, problem, config, separation): Files<'_>,
+    normalize: &Normalize,
+) -> Result<Concurrent, Errors> {
     let lifted = || normalize(domain, problem, &config.objectives);
-    match ground_normal(domain, lifted()?, config, &separation) {
+    let ground = |lifted| {
+        let task = ground_normal(domain, lifted, config, separation)?;
+        let is_open = task.instances.iter().any(|own| own.is_chosen);
+        if is_open { chosen::check(task) } else { Ok(task) }
+    };
+    match ground(lifted()?) {
         Err(errors) if errors.iter().any(Error::is_value_missing) => {
             let mut lifted = lifted()?;
             partial::guard(&mut lifted);
-            ground_normal(domain, lifted, config, &separation)
+            ground(lifted)
         }
         found => found,
     }
@@ -114,11 +151,16 @@ fn ground_normal(
         ),
     };
     lifted.metrics = vec![metric];
+    let is_strict = strict::compares_strictly(&lifted);
     let mut split = split::split(lifted, &config.solves, &|action| mentions_duration(domain, action));
-    split.is_exact = is_fixed(domain);
+    // Where durations are chosen, more than some number is this much more, at least.
+    let is_chosen = split.chosen.contains(&true);
+    split.is_exact = if is_chosen { !is_strict } else { is_fixed(domain) };
     let none = vec![Vec::new(); split.designs.len()];
     let (lifted, designs) = (&split.lifted, &split.designs);
-    let generality = Generality { measures_ends: true, measures_rewards: true, ..Generality::default() };
+    let precision = (is_chosen && is_strict).then_some(PRECISION);
+    let generality =
+        Generality { measures_ends: true, measures_rewards: true, precision, ..Generality::default() };
     let (task, reached) = ground_lifted(lifted, designs, &none, &generality, &config.limits)?;
     let _span = info_span!("happenings", operators = task.operators.len()).entered();
     compile::compile(task, &split, &reached, separation, weight, &config.limits)
@@ -187,12 +229,16 @@ pub fn optimize_concurrent(
     if let Some(reason) = &task.unreachable {
         return ended(Status::Unsolvable, Some(Proof::Relaxation(reason.clone())), record);
     }
+    if concurrent.instances.iter().any(|own| own.is_chosen) {
+        return chosen::optimize(concurrent, limits, record);
+    }
     let costs = task.operators.iter().any(|operator| operator.cost.constant > 0);
     let bounds = (costs || !task.initial.numbers.is_empty())
         .then(|| Bounds::new(Context::new(task, limits)).ok())
         .flatten();
     let span = info_span!("optimize", operators = task.operators.len());
-    let (how, incumbent) = span.in_scope(|| take_turns(concurrent, bounds.as_ref(), limits, &mut record));
+    let (how, incumbent) =
+        span.in_scope(|| take_turns(concurrent, bounds.as_ref(), limits, &mut record, usize::MAX));
     let plan = incumbent.as_ref().map(|sequence| in_names(concurrent, sequence));
     let (status, lower) = match (&how, &incumbent) {
         (Ended::Exhausted, Some(incumbent)) => (Status::Optimal, Some(incumbent.value.0)),
@@ -200,14 +246,13 @@ pub fn optimize_concurrent(
         (Ended::Stopped(lower), Some(incumbent)) => (Status::Feasible, Some(*lower.min(&incumbent.value.0))),
         (Ended::Stopped(lower), None) => (Status::Unknown, Some(*lower)),
     };
+    let metric = |total| concurrent.measure.metric(&Rational::from_integer(total));
     let proof = matches!(how, Ended::Exhausted).then_some(Proof::Search);
     let steps = plan.as_ref().filter(|_| proof.is_some()).map_or(0, |plan| plan.steps.len());
     Solution {
         horizon: steps,
         plan,
-        lower_bound: lower
-            .filter(|_| task.objective.rest.is_empty())
-            .map(|lower| concurrent.measure.metric(lower)),
+        lower_bound: lower.filter(|_| concurrent.is_whole).map(metric),
         ..ended(status, proof, record)
     }
 }
@@ -259,7 +304,8 @@ fn in_names(concurrent: &Concurrent, sequence: &Sequence) -> Plan {
     let steps = steps.into_iter().map(|(_, step)| step).collect();
     let objective = &concurrent.task.objective;
     let rest = Exact::scaled(&if objective.maximize { -rest } else { rest }, objective.scale);
-    let mut plan = Plan { steps, cost: concurrent.measure.metric(sequence.value.0).plus(&rest) };
+    let cost = concurrent.measure.metric(&Rational::from_integer(sequence.value.0));
+    let mut plan = Plan { steps, cost: cost.plus(&rest) };
     plan.note_reconfigured();
     plan
 }

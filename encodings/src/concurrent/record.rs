@@ -3,11 +3,10 @@
 use std::time::Instant;
 
 use crate::concurrent::compile::Concurrent;
-use crate::concurrent::search::Sequence;
-use crate::number::Int;
+use crate::number::{Int, Rational};
 use crate::plan::solution::{Improvement, Moment, Part, Statistics};
 
-/// Bounds are noted that are this part higher than the one before.
+/// Bounds are noted that are one part in so many higher than the one before.
 const PART: Int = 100;
 
 /// What has happened so far in one run.
@@ -16,10 +15,10 @@ pub(super) struct Record<'r> {
     report: &'r mut dyn FnMut(Improvement),
     started: Instant,
     /// The metric of the best plan, in integers, and what none can get below, as they were noted last.
-    noted: Option<(Option<Int>, Int)>,
-    cost: Option<Int>,
+    noted: Option<(Option<Rational>, Rational)>,
+    cost: Option<Rational>,
     /// Where the search leaves plans out: what could be said of all plans before it began.
-    ceiling: Option<Int>,
+    ceiling: Option<Rational>,
     pub(super) statistics: Statistics,
 }
 
@@ -34,41 +33,42 @@ impl<'r> Record<'r> {
     }
 
     /// What no plan can get below, before the search has begun.
-    pub(super) fn begin(&mut self, root: Int) {
-        self.ceiling = (!self.concurrent.is_exact).then_some(root);
+    pub(super) fn begin(&mut self, root: Rational) {
+        self.ceiling = (!self.concurrent.is_exact).then(|| root.clone());
         self.rise(root);
     }
 
-    /// Notes a better plan, and what none can get below.
-    pub(super) fn improve(&mut self, sequence: &Sequence, lower: Int, part: Part) {
+    /// Notes a better plan of so many happenings, and what none can get below.
+    pub(super) fn improve(&mut self, value: &Rational, horizon: usize, lower: Rational, part: Part) {
         self.statistics.found_by = Some(part);
-        self.cost = Some(sequence.value.0);
+        self.cost = Some(value.clone());
         let lower = self.rise(lower);
-        // What is compared is only a part of such a metric.
-        if self.concurrent.task.objective.rest.is_empty() {
+        if self.concurrent.is_whole {
             (self.report)(Improvement {
-                cost: self.concurrent.measure.metric(sequence.value.0),
-                lower_bound: self.concurrent.measure.metric(lower),
-                horizon: sequence.happenings.len(),
+                cost: self.concurrent.measure.metric(value),
+                lower_bound: self.concurrent.measure.metric(&lower),
+                horizon,
             });
         }
     }
 
     /// Notes what no plan can get below, and returns what of that can be claimed.
-    pub(super) fn rise(&mut self, lower: Int) -> Int {
-        let lower = self.ceiling.map_or(lower, |ceiling| ceiling.min(lower));
-        let lower = self.cost.map_or(lower, |cost| cost.min(lower));
-        let is_news = self.noted.is_none_or(|(known, bound)| {
-            let more = lower.saturating_sub(bound);
-            known != self.cost || more > bound / PART || more > 0 && self.cost == Some(lower)
+    pub(super) fn rise(&mut self, lower: Rational) -> Rational {
+        let known = self.ceiling.iter().chain(&self.cost);
+        let lower = known.fold(lower, |lower, known| if *known < lower { known.clone() } else { lower });
+        let is_news = self.noted.as_ref().is_none_or(|(known, bound)| {
+            let more = lower.clone() - bound;
+            *known != self.cost
+                || more.clone() * Rational::from_integer(PART) > *bound
+                || more.is_positive() && self.cost.as_ref() == Some(&lower)
         });
-        if is_news && self.concurrent.task.objective.rest.is_empty() {
-            self.noted = Some((self.cost, lower));
+        if is_news && self.concurrent.is_whole {
+            self.noted = Some((self.cost.clone(), lower.clone()));
             let metric = |total| self.concurrent.measure.metric(total);
             let moment = Moment {
                 time: self.started.elapsed(),
-                cost: self.cost.map(metric),
-                lower_bound: metric(lower),
+                cost: self.cost.as_ref().map(metric),
+                lower_bound: metric(&lower),
             };
             self.statistics.history.push(moment);
         }

@@ -2,18 +2,19 @@
 //!
 //! Each start, end and instantaneous action becomes a rule, as in the relaxed planning graphs of CRIKEY [1]: that an instance is under way
 //! is a fact that its start adds and its end requires, so required concurrency is seen. An end requires what must hold over all as well.
-//! A numeric condition is raised by so many applications of a rule as its amount asks for [2].
+//! A numeric condition is raised by so many applications of a rule as its amount asks for [2]; one on a duration that the planner chooses
+//! always holds.
 //!
 //! [1] A. Coles, M. Fox, D. Long, A. Smith: Planning with problems requiring temporal coordination, AAAI 2008.
 //! [2] E. Scala, P. Haslum, S. Thiébaux: Heuristics for numeric planning via subgoaling, IJCAI 2016.
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::concurrent::compile::Concurrent;
 use crate::concurrent::happening::Role;
 use crate::number::{Int, dense};
 use crate::satisfice::lists::Lists;
-use crate::task::quantity::Linear;
+use crate::task::quantity::{Linear, NumericId};
 use crate::task::{Condition, Fact, Literal, Operator, OperatorId, Task};
 
 /// A fact, a clause, or a numeric condition.
@@ -72,6 +73,8 @@ pub(super) struct Relaxed {
 /// Collects rules.
 struct Maker<'a> {
     task: &'a Task,
+    /// The numbers that the planner chooses.
+    chosen: FxHashSet<NumericId>,
     first: Vec<Proposition>,
     propositions: u32,
     rules: Vec<Rule>,
@@ -83,7 +86,9 @@ struct Maker<'a> {
 impl Relaxed {
     pub(super) fn new(concurrent: &Concurrent) -> Self {
         let task = &concurrent.task;
-        let mut maker = Maker::new(task);
+        let chosen = concurrent.instances.iter().filter(|own| own.is_chosen);
+        let chosen = chosen.filter_map(|own| own.timer.map(|(number, _)| number)).collect();
+        let mut maker = Maker::new(task, chosen);
         let mut ends = vec![0; concurrent.instances.len()];
         let ids = OperatorId::all(task.operators.len());
         for ((operator, happening), id) in task.operators.iter().zip(&concurrent.happenings).zip(ids) {
@@ -129,7 +134,7 @@ impl Relaxed {
 
 impl<'a> Maker<'a> {
     #[expect(clippy::arithmetic_side_effects, reason = "values of variables are held in memory")]
-    fn new(task: &'a Task) -> Self {
+    fn new(task: &'a Task, chosen: FxHashSet<NumericId>) -> Self {
         let mut first = Vec::with_capacity(task.variables.len());
         let mut propositions = 0;
         for variable in &task.variables {
@@ -138,7 +143,7 @@ impl<'a> Maker<'a> {
         }
         let (rules, numeric) = (Vec::new(), Vec::new());
         let (clauses, comparisons) = (FxHashMap::default(), FxHashMap::default());
-        Self { task, first, propositions, rules, clauses, comparisons, numeric }
+        Self { task, chosen, first, propositions, rules, clauses, comparisons, numeric }
     }
 
     #[expect(clippy::arithmetic_side_effects, reason = "values of variables are held in memory")]
@@ -163,7 +168,10 @@ impl<'a> Maker<'a> {
             needs.push(self.clause(clause));
         }
         for linear in condition.linears() {
-            needs.push(self.comparison(linear));
+            let mut mentioned = linear.coefficients.iter().map(|(number, _)| number);
+            if !mentioned.any(|number| self.chosen.contains(number)) {
+                needs.push(self.comparison(linear));
+            }
         }
         needs.sort_unstable();
         needs.dedup();

@@ -17,7 +17,7 @@ use crate::concurrent::expansion::{Expansion, Nowhere, Situation};
 use crate::concurrent::record::Record;
 use crate::concurrent::store::{Origin, Store};
 use crate::limits::Limits;
-use crate::number::{GROWTH_LIMIT, Int};
+use crate::number::{GROWTH_LIMIT, Int, Rational};
 use crate::plan::solution::Part;
 use crate::search::{Figures, is_monotone};
 use crate::task::OperatorId;
@@ -33,6 +33,14 @@ pub(super) struct Sequence {
     pub(super) happenings: Vec<OperatorId>,
     /// Which of them take place at the time of the one before.
     pub(super) together: Vec<bool>,
+}
+
+impl Sequence {
+    /// Tells the record of a better plan, and of what none can get below.
+    pub(super) fn tell(&self, lower: Int, part: Part, record: &mut Record<'_>) {
+        let [value, lower] = [self.value.0, lower].map(Rational::from_integer);
+        record.improve(&value, self.happenings.len(), lower, part);
+    }
 }
 
 /// How a search ended.
@@ -107,7 +115,7 @@ impl<'a> Search<'a> {
             let situation = self.store.situation(id);
             if self.expansion.is_goal(&situation) {
                 let sequence = self.sequence(id, &situation);
-                record.improve(&sequence, self.known(value.0), Part::Search);
+                sequence.tell(self.known(value.0), Part::Search, record);
                 self.incumbent = Some(sequence);
                 continue;
             }
@@ -115,7 +123,7 @@ impl<'a> Search<'a> {
                 self.open.push(Reverse(priority));
                 return Ended::Stopped(self.lower());
             }
-            record.rise(self.known(value.0));
+            record.rise(Rational::from_integer(self.known(value.0)));
             looked_at += self.expand(id, &situation, value.0);
         }
         self.left_out.map_or(Ended::Exhausted, Ended::Stopped)

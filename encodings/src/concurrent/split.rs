@@ -28,6 +28,8 @@ pub(super) enum Half {
     Whole,
     /// Timed initial literals, by position.
     Timed(usize),
+    /// No happening: that the planner can choose how long an instance takes.
+    Choice,
 }
 
 /// Where a schema of the split task comes from.
@@ -50,6 +52,8 @@ pub(super) struct Split {
     pub(super) events: Vec<Event>,
     /// The functions that hold durations.
     pub(super) durations: Vec<FunctionId>,
+    /// By schema of the domain, whether the planner chooses how long it takes.
+    pub(super) chosen: Vec<bool>,
     /// By schema of the domain, what such a number is divided by.
     pub(super) divisors: Vec<Option<Expression>>,
     /// Whether no duration was chosen where another one could be better.
@@ -60,7 +64,7 @@ pub(super) struct Split {
 /// `mentions` says whether the end of the action at a position mentions `?duration`.
 pub(super) fn split(mut lifted: Lifted, solves: &[Name], mentions: &dyn Fn(u32) -> bool) -> Split {
     let mut schemas = std::mem::take(&mut lifted.schemas);
-    let (mut durations, mut divisors) = (Vec::new(), Vec::new());
+    let (mut durations, mut divisors, mut chosen) = (Vec::new(), Vec::new(), Vec::new());
     let events = std::mem::take(&mut lifted.events);
     let (mut origins, mut designs) = (Vec::new(), Vec::new());
     let waited = lifted.time.waited;
@@ -75,10 +79,11 @@ pub(super) fn split(mut lifted: Lifted, solves: &[Name], mentions: &dyn Fn(u32) 
         let duration = schema.duration.as_ref().filter(|duration| depends_on_state(&lifted, duration));
         let duration = duration.cloned();
         let timer = duration.map(|duration| Timer::new(&mut lifted, schema, &duration));
+        chosen.push(timer.as_ref().is_some_and(Timer::is_chosen));
         divisors.push(timer.as_ref().and_then(|timer| timer.divisor.clone()));
         if let Some(timer) = &timer {
             durations.push(timer.function);
-            if mentions(schema.action) {
+            if !timer.is_chosen() && mentions(schema.action) {
                 *schema = timer.with_end(schema);
             }
         }
@@ -99,7 +104,7 @@ pub(super) fn split(mut lifted: Lifted, solves: &[Name], mentions: &dyn Fn(u32) 
         origins.push(Origin { schema: usize::MAX, half: Half::Timed(index) });
         designs.push(Vec::new());
     }
-    Split { lifted, schemas, origins, designs, events, durations, divisors, is_exact: true }
+    Split { lifted, schemas, origins, designs, events, durations, chosen, divisors, is_exact: true }
 }
 
 fn effect(change: Change) -> Effect {
@@ -128,8 +133,9 @@ fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Ha
     let compare = |comparison| {
         Formula::Compare(comparison, duration.clone(), Expression::Number(zero.clone()), schema.place)
     };
+    let choice = timer.and_then(|timer| timer.raise(schema));
     let mut all = Vec::new();
-    if known.is_none_or(|known| known == zero) {
+    if choice.is_none() && known.is_none_or(|known| known == zero) {
         let condition =
             vec![compare(Comparison::Equal), schema.start_condition.clone(), schema.at_end.clone()];
         let effects = schema.start_effects.iter().chain(&schema.end_effects).cloned().collect();
@@ -152,16 +158,18 @@ fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Ha
         conjuncts(&schema.over_all).into_iter().filter(|conjunct| !is_static(lifted, conjunct)).collect();
 
     let mut condition = vec![schema.start_condition.clone()];
-    condition.extend(known.is_none().then(|| compare(Comparison::Greater)));
+    condition.extend((known.is_none() && choice.is_none()).then(|| compare(Comparison::Greater)));
     condition.extend(settled);
+    let choice = choice.map(|choice| instantaneous(settled_of(lifted, &condition), vec![choice]));
+    all.extend(choice.map(|choice| (Half::Choice, choice)));
     let mut effects = schema.start_effects.clone();
     effects.push(effect(Change::Add(running, parameters.clone())));
-    effects.extend(timer.map(|timer| timer.set(schema)));
+    effects.extend(timer.and_then(|timer| timer.set(schema)));
     let fixed = schema.duration.clone().filter(|_| timer.is_none());
     all.push((Half::Start, Schema { duration: fixed, ..instantaneous(condition, effects) }));
 
     let mut condition = vec![literal(running, &parameters), schema.at_end.clone()];
-    condition.extend(timer.map(|timer| timer.is_set(schema)));
+    condition.extend(timer.and_then(|timer| timer.is_set(schema)));
     if !changing.is_empty() {
         let mut symbol = |text: &str| {
             let name = Name::new(&format!("{text} {}", schema.name));
@@ -180,6 +188,12 @@ fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Ha
     effects.extend(timer.map(|timer| timer.clear(schema)));
     all.push((Half::End, instantaneous(condition, effects)));
     all
+}
+
+/// What no action changes of some conditions.
+fn settled_of(lifted: &Lifted, conditions: &[Formula]) -> Vec<Formula> {
+    let all = conditions.iter().flat_map(conjuncts);
+    all.filter(|conjunct| is_static(lifted, conjunct)).cloned().collect()
 }
 
 /// What happens by itself at one time, after what happened before.

@@ -1,18 +1,22 @@
-//! Durations that the state decides: a number for each schema that a start sets and an end clears.
+//! Durations that the state or the planner decides: a number for each schema that a start sets and an end clears.
 //!
 //! `?duration` is what the expression comes to in the state in which the action starts [1]. So the start assigns it to a number of its own, from
-//! which the end and its effects take it, and the clocks.
+//! which the end and its effects take it, and the clocks. One that the planner chooses is set by an operator that never happens: to
+//! whoever asks what is in reach, it can be anything from 0 on.
 //!
 //! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 5.2.
 
 use crate::lifted::{
     Change, Effect, Expression, Formula, Function, FunctionId, Lifted, Rational, Schema, Term,
 };
+use crate::normalize::duration::CHOSEN;
 use crate::number::dense;
 use pddl::ast::{Assignment, Comparison, Name};
 
 /// What the names of these numbers begin with: no name in a file has a blank.
 pub(super) const TIMER: &str = "(duration of ";
+/// The same for those that the planner chooses, as ground numbers are written.
+pub(super) const FREE: &str = "(chosen duration of ";
 
 /// Whether some action changes what an expression mentions.
 pub(super) fn depends_on_state(lifted: &Lifted, expression: &Expression) -> bool {
@@ -28,18 +32,28 @@ pub(super) fn depends_on_state(lifted: &Lifted, expression: &Expression) -> bool
     }
 }
 
+/// The number that is the duration of a schema, if the planner chooses that.
+pub(super) fn chosen(lifted: &Lifted, duration: &Expression) -> Option<FunctionId> {
+    let Expression::Function(function, ..) = duration else { return None };
+    lifted.functions[function.index()].name.as_str().starts_with(CHOSEN).then_some(*function)
+}
+
 /// A number for the durations of a schema.
 pub(super) struct Timer {
     pub(super) function: FunctionId,
     terms: Vec<Term>,
-    /// What the start assigns.
-    numerator: Expression,
+    /// What the start assigns; none where the planner chooses.
+    numerator: Option<Expression>,
     /// The duration is the number divided by this, which no action changes.
     pub(super) divisor: Option<Expression>,
 }
 
 impl Timer {
     pub(super) fn new(lifted: &mut Lifted, schema: &Schema, duration: &Expression) -> Self {
+        let terms = (0..dense(schema.parameters.len())).map(Term::Parameter).collect();
+        if let Some(function) = chosen(lifted, duration) {
+            return Self { function, terms, numerator: None, divisor: None };
+        }
         let (numerator, divisor) = match duration {
             Expression::Quotient(left, right, _) if !depends_on_state(lifted, right) => {
                 ((**left).clone(), Some((**right).clone()))
@@ -49,8 +63,12 @@ impl Timer {
         let function = FunctionId(dense(lifted.functions.len()));
         let name = Name::new(&format!("duration of {}", schema.name));
         lifted.functions.push(Function { name, fluent: true, partial: true });
-        let terms = (0..dense(schema.parameters.len())).map(Term::Parameter).collect();
-        Self { function, terms, numerator, divisor }
+        Self { function, terms, numerator: Some(numerator), divisor }
+    }
+
+    /// Whether the planner chooses it.
+    pub(super) fn is_chosen(&self) -> bool {
+        self.numerator.is_none()
     }
 
     fn number(&self, schema: &Schema) -> Expression {
@@ -66,13 +84,20 @@ impl Timer {
         }
     }
 
-    pub(super) fn set(&self, schema: &Schema) -> Effect {
-        self.assign(schema, self.numerator.clone())
+    /// What the start does, if the planner does not choose.
+    pub(super) fn set(&self, schema: &Schema) -> Option<Effect> {
+        Some(self.assign(schema, Assignment::Assign, self.numerator.clone()?))
     }
 
-    fn assign(&self, schema: &Schema, expression: Expression) -> Effect {
+    /// What makes it any number, as far as can be told from what is in reach.
+    pub(super) fn raise(&self, schema: &Schema) -> Option<Effect> {
+        let one = Expression::Number(Rational::from_integer(1));
+        self.numerator.is_none().then(|| self.assign(schema, Assignment::Increase, one))
+    }
+
+    fn assign(&self, schema: &Schema, assignment: Assignment, expression: Expression) -> Effect {
         let change = Change::Assign {
-            assignment: Assignment::Assign,
+            assignment,
             function: self.function,
             terms: self.terms.clone(),
             expression,
@@ -82,12 +107,14 @@ impl Timer {
     }
 
     pub(super) fn clear(&self, schema: &Schema) -> Effect {
-        self.assign(schema, Expression::Number(Rational::from_integer(0)))
+        self.assign(schema, Assignment::Assign, Expression::Number(Rational::from_integer(0)))
     }
 
-    pub(super) fn is_set(&self, schema: &Schema) -> Formula {
+    /// That the start has set it.
+    pub(super) fn is_set(&self, schema: &Schema) -> Option<Formula> {
         let zero = Expression::Number(Rational::from_integer(0));
-        Formula::Compare(Comparison::Greater, self.number(schema), zero, schema.place)
+        let compare = || Formula::Compare(Comparison::Greater, self.number(schema), zero, schema.place);
+        self.numerator.is_some().then(compare)
     }
 
     /// The schema whose end takes its duration from the timer.

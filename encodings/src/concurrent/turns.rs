@@ -14,7 +14,7 @@ use crate::concurrent::record::Record;
 use crate::concurrent::relaxed::Relaxed;
 use crate::concurrent::search::{Ended, Search, Sequence};
 use crate::limits::Limits;
-use crate::number::Int;
+use crate::number::{Int, Rational};
 use crate::plan::solution::Part;
 
 /// How many situations the exact search looks at before the greedy one has its turn.
@@ -23,18 +23,19 @@ const SOON: usize = 10_000;
 const GREEDY: usize = 5_000;
 const EXACT: usize = 20_000;
 
-/// Searches until nothing better is left, or a limit is reached. `record` hears of each better plan and of what none can get below.
+/// Searches until nothing better is left, a limit is reached, or both have had so many turns. `record` hears of each better plan and of what none can get below.
 pub(super) fn take_turns(
     concurrent: &Concurrent,
     bounds: Option<&Bounds>,
     limits: &Limits,
     record: &mut Record<'_>,
+    rounds: usize,
 ) -> (Ended, Option<Sequence>) {
     let estimate = Estimate::new(concurrent);
     let expansion = Expansion::new(concurrent);
     let mut exact = Search::new(concurrent, &expansion, &estimate, bounds);
     let root = exact.lower();
-    record.begin(root);
+    record.begin(Rational::from_integer(root));
     let mut ended = info_span!("search").in_scope(|| exact.run(limits, SOON, record));
     if exact.is_over() || limits.reached() {
         return (claimed(ended, concurrent, root), exact.incumbent);
@@ -49,7 +50,10 @@ pub(super) fn take_turns(
     let mut greedy = vec![begin(Mode::Overlapping)];
     greedy.extend(differs.then(|| begin(Mode::Sequential)));
     let mut share = 1_usize;
-    while !(exact.is_over() || limits.reached() || (greedy.is_empty() && exact.is_full(limits))) {
+    for _ in 0..rounds {
+        if exact.is_over() || limits.reached() || (greedy.is_empty() && exact.is_full(limits)) {
+            break;
+        }
         for position in (0..greedy.len()).rev() {
             let _span = info_span!("greedy").entered();
             let work = GREEDY.saturating_mul(share);
@@ -89,7 +93,7 @@ fn pursue(
         }
         let lower = exact.lower();
         let incumbent = exact.incumbent.iter();
-        incumbent.for_each(|sequence| record.improve(sequence, lower, Part::Satisficing));
+        incumbent.for_each(|sequence| sequence.tell(lower, Part::Satisficing, record));
     }
 }
 

@@ -53,6 +53,8 @@ pub(crate) struct Generality {
     /// If given, numbers of the initial state may be others, too, that are integers when multiplied by this: nothing is
     /// concluded from those of the problem.
     pub(crate) numbers: Option<Int>,
+    /// If given, all numbers are integers when multiplied by this.
+    pub(crate) precision: Option<Int>,
     /// Whether a metric may count fluents whose changes depend on the state: plans have that metric, and none is the best.
     pub(crate) measures_ends: bool,
     /// Whether fluents by which actions improve the metric are counted in the same way.

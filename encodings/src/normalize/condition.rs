@@ -101,7 +101,7 @@ pub(super) fn expression(names: &mut Names, written: &ast::Expression, scope: &m
             Duration::Open => {
                 names.unsupported(
                     "`?duration` where the duration is not fixed",
-                    "one `(= ?duration …)` in `:duration`",
+                    "one `(= ?duration …)` in `:duration`, or plan with `--concurrent`",
                     scope.file,
                     *span,
                 );

@@ -1,13 +1,18 @@
 //! Durations that are constrained rather than fixed.
 //!
 //! Actions execute one after another, and nothing happens by itself. So an action may as well take as little time
-//! as it must, or as much as it may where the metric rewards time, provided that no effect depends on how long it takes.
+//! as it must, or as much as it may where the metric rewards time, provided that no effect depends on how long it takes. Where
+//! actions overlap, a duration that is not fixed is a number that the planner chooses when the action starts.
 
-use crate::error::File;
-use crate::lifted::{Expression, Formula, Metric, Rational};
+use crate::error::{File, Place};
+use crate::lifted::{Expression, Formula, Function, FunctionId, Metric, Rational, Term};
 use crate::normalize::condition::expression;
 use crate::normalize::names::{Duration, Names, Scope};
-use pddl::ast::{self, Comparison, Direction, Span};
+use crate::number::dense;
+use pddl::ast::{self, Comparison, Direction, Name, Span};
+
+/// What the names of chosen durations begin with: no name in a file has a blank.
+pub(crate) const CHOSEN: &str = "chosen duration of ";
 
 /// Whether the metrics reward time; nothing if that cannot be told from the metrics alone, or if they disagree.
 pub(super) fn is_rewarded(metrics: &[Metric]) -> Option<bool> {
@@ -60,8 +65,8 @@ pub(crate) fn time_factor(expression: &Expression) -> Option<Rational> {
 /// rewards time, so that actions should take as long as they may.
 pub(super) fn duration(
     names: &mut Names,
-    constraints: &[ast::DurationConstraint],
-    span: Span,
+    (constraints, span): (&[ast::DurationConstraint], Span),
+    action: (&Name, usize),
     longest: Option<bool>,
     scope: &mut Scope,
 ) -> (Expression, Vec<Formula>) {
@@ -81,10 +86,21 @@ pub(super) fn duration(
         scope.duration = Duration::Fixed(duration.clone());
         return (duration.clone(), Vec::new());
     }
-    scope.duration = Duration::Open;
     let [lower, upper] = bounds;
     let span = constraints.first().map_or(span, |constraint| constraint.span);
-    let chosen = match longest {
+    if names.is_free {
+        let number = chosen(names, action, scope.place(span));
+        let fixed = fixed.into_iter().map(|(bound, span)| (Comparison::Equal, bound, span));
+        let open = lower.into_iter().chain(upper);
+        let all = open.map(|(bound, constraint)| (constraint.operator, bound, constraint.span)).chain(fixed);
+        let compare =
+            |(operator, bound, span)| Formula::Compare(operator, number.clone(), bound, scope.place(span));
+        let conditions = all.map(compare).collect();
+        scope.duration = Duration::Fixed(number.clone());
+        return (number, conditions);
+    }
+    scope.duration = Duration::Open;
+    let taken = match longest {
         Some(longest) if fixed.is_empty() => match if longest { &upper[..] } else { &lower[..] } {
             [(expression, constraint)]
                 if matches!(constraint.operator, Comparison::GreaterOrEqual | Comparison::LessOrEqual) =>
@@ -95,10 +111,10 @@ pub(super) fn duration(
         },
         _ => None,
     };
-    let Some(chosen) = chosen else {
+    let Some(chosen) = taken else {
         names.unsupported(
             "a duration without one bound that the metric makes it take",
-            "one `(= ?duration …)`, or one `(>= ?duration …)` and a metric that does not reward time",
+            "one `(= ?duration …)`, one `(>= ?duration …)` and a metric that does not reward time, or `--concurrent`",
             File::Domain,
             span,
         );
@@ -110,4 +126,12 @@ pub(super) fn duration(
     });
     let conditions = conditions.collect();
     (chosen, conditions)
+}
+
+/// The number that is the duration of an action with so many parameters.
+fn chosen(names: &mut Names, (action, parameters): (&Name, usize), place: Place) -> Expression {
+    let id = FunctionId(dense(names.functions.len()));
+    let name = Name::new(&format!("{CHOSEN}{action}"));
+    names.functions.push(Function { name, fluent: true, partial: true });
+    Expression::Function(id, (0..dense(parameters)).map(Term::Parameter).collect(), place)
 }

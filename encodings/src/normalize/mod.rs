@@ -28,7 +28,29 @@ pub(crate) fn normalize(
     problem: &ast::Problem,
     objectives: &[ast::Metric],
 ) -> Result<Lifted, Errors> {
+    named(Names::new(domain, problem), (domain, problem), objectives)
+}
+
+/// As [`normalize`], where a duration that is not fixed stays open: it is a number of its own ([`duration::CHOSEN`]), which its bounds
+/// and all that mention `?duration` read.
+///
+/// # Errors
+/// As [`normalize`].
+pub(crate) fn normalize_freely(
+    domain: &ast::Domain,
+    problem: &ast::Problem,
+    objectives: &[ast::Metric],
+) -> Result<Lifted, Errors> {
     let mut names = Names::new(domain, problem);
+    names.is_free = true;
+    named(names, (domain, problem), objectives)
+}
+
+fn named(
+    mut names: Names,
+    (domain, problem): (&ast::Domain, &ast::Problem),
+    objectives: &[ast::Metric],
+) -> Result<Lifted, Errors> {
     let written = if objectives.is_empty() { problem.metric.as_slice() } else { objectives };
     let metrics: Vec<_> = written
         .iter()
@@ -100,7 +122,9 @@ fn schema(names: &mut Names, longest: Option<bool>, action: &ast::Action, index:
         ast::ActionBody::Durative { duration, conditions, effects } => {
             let mut middle = Vec::new();
             let (mut over_all, mut at_end) = (Vec::new(), Vec::new());
-            let (chosen, mut start) = duration::duration(names, duration, action.span, longest, &mut scope);
+            let own = (&action.identifier.name, schema.parameters.len());
+            let (chosen, mut start) =
+                duration::duration(names, (duration, action.span), own, longest, &mut scope);
             schema.duration = Some(chosen);
             schema.is_chosen = matches!(scope.duration, Duration::Open) && longest == Some(false);
             for (time, condition) in conditions {

@@ -50,6 +50,8 @@ pub(super) struct Names {
     predicate_ids: FxHashMap<Name, PredicateId>,
     pub(super) functions: Vec<Function>,
     function_ids: FxHashMap<Name, FunctionId>,
+    /// Whether the planner can choose durations within any bounds.
+    pub(super) is_free: bool,
     pub(super) errors: Vec<Error>,
 }
 
@@ -95,6 +97,7 @@ impl Names {
             predicate_ids,
             functions,
             function_ids,
+            is_free: false,
             errors: Vec::new(),
         };
         names.declare_objects(domain, problem);

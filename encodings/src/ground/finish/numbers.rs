@@ -51,7 +51,7 @@ impl<N: TaskNumber> Numbers<N> {
             denominator.number(number);
             denominator.note(|| (task.world.numeric_name(*variable), None));
         }
-        if let Some(precision) = generality.numbers {
+        for precision in generality.numbers.into_iter().chain(generality.precision) {
             denominator.number(&Rational::new(1, precision));
         }
         let names = used.iter().map(|variable| task.world.numeric_name(*variable)).collect();
