@@ -43,7 +43,7 @@ pub(super) enum Outcome {
 
 /// What a sequence has to be new in.
 enum Kind<'a> {
-    Greedy { guidance: Guidance<'a>, seen: FxHashMap<Vec<Rational>, Rational> },
+    Greedy { guidance: Box<Guidance<'a>>, seen: FxHashMap<Vec<Rational>, Rational> },
     Exhaustive { traces: Traces<'a>, seen: FxHashSet<Vec<OperatorId>> },
 }
 
@@ -70,7 +70,8 @@ impl<'a> Search<'a> {
         expansion: &'a Expansion<'a>,
         guidance: Guidance<'a>,
     ) -> Self {
-        Self::new(concurrent, expansion, Kind::Greedy { guidance, seen: FxHashMap::default() })
+        let kind = Kind::Greedy { guidance: Box::new(guidance), seen: FxHashMap::default() };
+        Self::new(concurrent, expansion, kind)
     }
 
     /// Through all sequences.
