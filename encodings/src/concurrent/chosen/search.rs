@@ -12,7 +12,7 @@ use num_traits::{ToPrimitive, Zero};
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::concurrent::chosen::affine::Affine;
-use crate::concurrent::chosen::answer::{Answer, answer, least};
+use crate::concurrent::chosen::answer::{Answer, answer};
 use crate::concurrent::chosen::course::Course;
 use crate::concurrent::chosen::trace::Traces;
 use crate::concurrent::compile::Concurrent;
@@ -135,7 +135,7 @@ impl<'a> Search<'a> {
     /// Looks at a sequence, and queues what can follow it.
     fn take_up(&mut self, course: Course, best: &mut Option<Answer>) -> Option<Outcome> {
         self.figures.evaluated = self.figures.evaluated.saturating_add(1);
-        let least = least(self.concurrent, &course);
+        let least = course.least(self.concurrent);
         if best.as_ref().is_some_and(|best| is_lost(self.concurrent, &least, best)) {
             return None;
         }
