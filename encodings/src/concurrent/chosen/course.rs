@@ -95,8 +95,11 @@ impl Course {
     /// About how many bytes it takes.
     pub(super) fn bytes(&self) -> usize {
         let numbers = self.numbers.iter().map(Affine::bytes);
-        let times =
-            self.passed.iter().map(|passed| passed.time.bytes().saturating_add(passed.duration.bytes()));
+        // Each happening takes about as much again where sequences are told apart.
+        let times = self.passed.iter().map(|passed| {
+            let own = passed.time.bytes().saturating_add(passed.duration.bytes());
+            own.saturating_add(passed.measured.bytes()).saturating_add(size_of::<Passed>())
+        });
         let rest = size_of_val(&self.values[..]).saturating_add(self.program.bytes());
         numbers.chain(times).fold(rest, usize::saturating_add)
     }
