@@ -4,8 +4,8 @@ use crate::error::Errors;
 use rustc_hash::FxHashSet;
 
 use crate::concurrent::builder::Builder;
-use crate::concurrent::chosen;
 use crate::concurrent::compress::compressible;
+use crate::concurrent::grows::only_grows;
 use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::links::drop_links;
 use crate::concurrent::measure::Measure;
@@ -71,7 +71,7 @@ pub(super) fn compile(
         }
     }
     let chooses = instances.iter().any(|own| own.is_chosen);
-    let is_whole = task.objective.rest.is_empty() || chooses && chosen::only_grows(&task, &instances);
+    let is_whole = task.objective.rest.is_empty() || chooses && only_grows(&task, &instances);
     let is_exact = split.is_exact && !builder.supposes() && is_whole;
     let (happenings, keys) = builder.happenings(context, &roles, &mut instances).map_err(one)?;
     let mut events: Vec<(Int, OperatorId)> = Vec::new();

@@ -7,6 +7,7 @@
 //! through all sequences of happenings that matter, with what is left of their simple temporal network in `clocks`.
 
 mod access;
+mod answer;
 mod builder;
 mod chosen;
 mod clocks;
@@ -16,6 +17,7 @@ mod estimate;
 mod expansion;
 mod footprint;
 mod greedy;
+mod grows;
 mod guidance;
 mod happening;
 mod links;
@@ -47,15 +49,13 @@ use crate::limits::Limits;
 use crate::normalize::{normalize, normalize_freely, partial};
 use crate::number::Int;
 use crate::plan::solution::{Improvement, Proof, Solution, Status};
-use crate::plan::{Exact, Plan, Step, measured};
-use crate::task::OperatorId;
 use pddl::ast::{self, ActionBody, Comparison, Direction, Domain, EffectTime, Problem, Span};
 
 pub use compile::Concurrent;
 
-use happening::Role;
+use answer::{ended, in_names};
 use record::Record;
-use search::{Ended, Sequence};
+use search::Ended;
 use turns::take_turns;
 
 /// Where durations are chosen, what has to be more than a number is so much more: one part in so many.
@@ -255,57 +255,4 @@ pub fn optimize_concurrent(
         lower_bound: lower.filter(|_| concurrent.is_whole).map(metric),
         ..ended(status, proof, record)
     }
-}
-
-/// An answer without a plan.
-fn ended(status: Status, proof: Option<Proof>, record: Record<'_>) -> Solution {
-    Solution {
-        status,
-        plan: None,
-        ground: None,
-        lower_bound: None,
-        horizon: 0,
-        proof,
-        unbounded: None,
-        statistics: record.end(),
-    }
-}
-
-/// A sequence in names, its actions in the order of their starts.
-fn in_names(concurrent: &Concurrent, sequence: &Sequence) -> Plan {
-    let durations = schedule::durations(concurrent, &sequence.happenings);
-    let times = schedule::schedule(concurrent, &sequence.happenings, &sequence.together, &durations);
-    let mut steps: Vec<((Int, OperatorId), Step)> = Vec::new();
-    let happenings = sequence.happenings.iter().map(|id| (*id, &[][..]));
-    let (measured, rest) = measured(&concurrent.task, happenings);
-    let ends = |position: usize, end: OperatorId| {
-        let later = sequence.happenings.iter().zip(&measured).skip(position);
-        later.filter(|(id, _)| **id == end).map(|(_, added)| added.clone()).next().unwrap_or_default()
-    };
-    for (position, ((id, time), duration)) in sequence.happenings.iter().zip(times).zip(durations).enumerate()
-    {
-        let mut more = measured[position].clone();
-        let end = match concurrent.happenings[id.index()].role {
-            Role::Start(instance) => {
-                let instance = &concurrent.instances[instance as usize];
-                more += ends(position, instance.end);
-                concurrent.task.operators[instance.end.index()].cost.constant
-            }
-            Role::Whole => 0,
-            _ => continue,
-        };
-        let operator = &concurrent.task.operators[id.index()];
-        let cost = Rational::from_integer(operator.cost.constant) + &Rational::from_integer(end) + &more;
-        let cost = if concurrent.task.objective.maximize { -cost } else { cost };
-        let [start, duration] = [time, duration].map(Rational::from_integer);
-        steps.push(((time, *id), Step::new(&concurrent.task, operator, &[], (start, duration, cost))));
-    }
-    steps.sort_by_key(|(place, _)| *place);
-    let steps = steps.into_iter().map(|(_, step)| step).collect();
-    let objective = &concurrent.task.objective;
-    let rest = Exact::scaled(&if objective.maximize { -rest } else { rest }, objective.scale);
-    let cost = concurrent.measure.metric(&Rational::from_integer(sequence.value.0));
-    let mut plan = Plan { steps, cost: cost.plus(&rest) };
-    plan.note_reconfigured();
-    plan
 }

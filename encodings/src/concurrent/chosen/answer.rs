@@ -30,7 +30,7 @@ pub(super) fn answer(concurrent: &Concurrent, course: &Course) -> Option<Answer>
     if !program.constrain(&course.goal(concurrent)?) {
         return None;
     }
-    let value = value(concurrent, course);
+    let value = course.value_of_plan(concurrent);
     let durations: Vec<Affine> =
         course.chosen(concurrent).map(|position| Affine::column(duration_of(position))).collect();
     let exact = best(&program, &[&value, &Affine::column(MAKESPAN), &sum(&durations)]);
@@ -113,20 +113,6 @@ fn grain(concurrent: &Concurrent) -> Option<Rational> {
     let powers = std::iter::successors(Some(1_i128), |power| power.checked_mul(10));
     let mut grains = powers.map(|power| unit.clone() / Rational::from_integer(power));
     grains.find(|grain| *grain <= most)
-}
-
-/// The metric of a sequence as an expression, in integers of [`crate::concurrent::measure::Measure`].
-pub(super) fn value(concurrent: &Concurrent, course: &Course) -> Affine {
-    let integer = Rational::from_integer;
-    let measure = &concurrent.measure;
-    let whole = Affine::column(MAKESPAN).times(&integer(measure.time));
-    let whole = whole.shifted(&(integer(course.cost) * integer(measure.cost)));
-    whole.plus(&course.measured(concurrent), &integer(measure.cost))
-}
-
-/// No plan that begins with a sequence has a lower metric, if numbers that only count in the end only grow.
-pub(super) fn least(concurrent: &Concurrent, course: &Course) -> Rational {
-    course.program.value(&value(concurrent, course))
 }
 
 fn in_names(

@@ -9,7 +9,6 @@
 //! continuous linear numeric change, JAIR 44, 2012.
 
 use crate::concurrent::chosen::affine::{Affine, Column};
-use crate::concurrent::chosen::answer::value;
 use crate::concurrent::chosen::program::Program;
 use crate::concurrent::clocks::Key;
 use crate::concurrent::compile::Concurrent;
@@ -96,8 +95,11 @@ impl Course {
     /// About how many bytes it takes.
     pub(super) fn bytes(&self) -> usize {
         let numbers = self.numbers.iter().map(Affine::bytes);
-        let times =
-            self.passed.iter().map(|passed| passed.time.bytes().saturating_add(passed.duration.bytes()));
+        // Each happening takes about as much again where sequences are told apart.
+        let times = self.passed.iter().map(|passed| {
+            let own = passed.time.bytes().saturating_add(passed.duration.bytes());
+            own.saturating_add(passed.measured.bytes()).saturating_add(size_of::<Passed>())
+        });
         let rest = size_of_val(&self.values[..]).saturating_add(self.program.bytes());
         numbers.chain(times).fold(rest, usize::saturating_add)
     }
@@ -129,7 +131,7 @@ impl Course {
         }
         // Where that is the whole metric, no duration makes it better than it can be.
         if concurrent.is_whole && !concurrent.task.objective.rest.is_empty() {
-            let is_bounded = next.program.minimise(&value(concurrent, &next));
+            let is_bounded = next.program.minimise(&next.value_of_plan(concurrent));
             debug_assert!(is_bounded, "what only grows has a least value");
         }
         Some(next)
@@ -351,6 +353,19 @@ impl Course {
         objective.rest.iter().fold(Affine::default(), |sum, (variable, factor)| {
             sum.plus(&self.numbers[variable.index()], &(factor.clone() * &unit))
         })
+    }
+
+    /// The metric as an expression, in integers of [`crate::concurrent::measure::Measure`].
+    pub(super) fn value_of_plan(&self, concurrent: &Concurrent) -> Affine {
+        let measure = &concurrent.measure;
+        let whole = Affine::column(MAKESPAN).times(&rational(measure.time));
+        let whole = whole.shifted(&(rational(self.cost) * rational(measure.cost)));
+        whole.plus(&self.measured(concurrent), &rational(measure.cost))
+    }
+
+    /// No plan that begins with this has a lower metric, if numbers that only count in the end only grow.
+    pub(super) fn least(&self, concurrent: &Concurrent) -> Rational {
+        self.program.value(&self.value_of_plan(concurrent))
     }
 
     /// The positions at which durations are chosen.

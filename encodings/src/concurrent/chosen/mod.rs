@@ -14,9 +14,9 @@ mod program;
 mod search;
 mod trace;
 
-use rustc_hash::FxHashSet;
 use tracing::info_span;
 
+use crate::concurrent::answer::{ended, in_names};
 use crate::concurrent::compile::Concurrent;
 use crate::concurrent::expansion::Expansion;
 use crate::concurrent::guidance::Guidance;
@@ -24,14 +24,12 @@ use crate::concurrent::happening::Instance;
 use crate::concurrent::record::Record;
 use crate::concurrent::relaxed::Relaxed;
 use crate::concurrent::turns::take_turns;
-use crate::concurrent::{ended, in_names};
 use crate::error::{Error, Errors};
 use crate::limits::Limits;
-use crate::number::{Int, Rational};
+use crate::number::Rational;
 use crate::plan::solution::{Part, Proof, Solution, Status};
-use crate::task::{NumericId, Operator, Task};
 
-use answer::{Answer, least};
+use answer::Answer;
 use course::Course;
 use search::{Outcome, Search};
 
@@ -78,27 +76,6 @@ pub(super) fn is_exact(concurrent: &Concurrent) -> bool {
         && concurrent.instances.iter().all(|own| own.joint.is_empty() && is_decided(own) && takes_time(own))
 }
 
-/// Whether no happening lowers what numbers that only count in the end come to, whatever the durations.
-pub(super) fn only_grows(task: &Task, instances: &[Instance]) -> bool {
-    let timers: FxHashSet<NumericId> = instances.iter().filter_map(|own| Some(own.timer?.0)).collect();
-    let grows = |operator: &Operator, variable: NumericId, factor: &Rational| {
-        let mut effects = operator.numeric_effects.iter().filter(|effect| effect.variable == variable);
-        effects.all(|effect| {
-            let value = &effect.value;
-            let has_sign = |number: Int| !(Rational::from_integer(number) * factor).is_negative();
-            let others = value.coefficients.iter().filter(|(own, _)| *own != variable);
-            value.coefficients.contains(&(variable, 1))
-                && value.quantity.tables.is_empty()
-                && has_sign(value.quantity.constant)
-                && others.clone().all(|(own, by)| timers.contains(own) && has_sign(*by))
-        })
-    };
-    task.objective
-        .rest
-        .iter()
-        .all(|(variable, factor)| task.operators.iter().all(|operator| grows(operator, *variable, factor)))
-}
-
 /// Finds a best plan; of those, one with the least makespan and the shortest durations.
 pub(super) fn optimize(concurrent: &Concurrent, limits: &Limits, mut record: Record<'_>) -> Solution {
     let span = info_span!("optimize", operators = concurrent.task.operators.len());
@@ -133,7 +110,7 @@ fn take_turns_choosing(
     let expansion = Expansion::new(concurrent);
     let mut best: Option<Answer> = None;
     let mut exhaustive = Search::exhaustive(concurrent, &expansion);
-    let mut lower = least(concurrent, &Course::new(concurrent));
+    let mut lower = Course::new(concurrent).least(concurrent);
     record.begin(lower.clone());
     let mut turn =
         |search: &mut Search<'_>, best: &mut Option<Answer>, work, part, record: &mut Record<'_>| {

@@ -7,12 +7,13 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::hash::{Hash, Hasher};
 
-use num_traits::{ToPrimitive, Zero};
-use rustc_hash::{FxHashMap, FxHashSet};
+use num_traits::ToPrimitive;
+use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
 
 use crate::concurrent::chosen::affine::Affine;
-use crate::concurrent::chosen::answer::{Answer, answer, least};
+use crate::concurrent::chosen::answer::{Answer, answer};
 use crate::concurrent::chosen::course::Course;
 use crate::concurrent::chosen::trace::Traces;
 use crate::concurrent::compile::Concurrent;
@@ -43,7 +44,7 @@ pub(super) enum Outcome {
 
 /// What a sequence has to be new in.
 enum Kind<'a> {
-    Greedy { guidance: Box<Guidance<'a>>, seen: FxHashMap<Vec<Rational>, Rational> },
+    Greedy { guidance: Box<Guidance<'a>>, seen: FxHashMap<u64, Rational> },
     Exhaustive { traces: Traces<'a>, seen: FxHashSet<Vec<OperatorId>> },
 }
 
@@ -136,7 +137,7 @@ impl<'a> Search<'a> {
     /// Looks at a sequence, and queues what can follow it.
     fn take_up(&mut self, course: Course, best: &mut Option<Answer>) -> Option<Outcome> {
         self.figures.evaluated = self.figures.evaluated.saturating_add(1);
-        let least = least(self.concurrent, &course);
+        let least = course.least(self.concurrent);
         if best.as_ref().is_some_and(|best| is_lost(self.concurrent, &least, best)) {
             return None;
         }
@@ -222,17 +223,17 @@ fn is_lost(concurrent: &Concurrent, least: &Rational, best: &Answer) -> bool {
     concurrent.is_whole && *least >= best.value
 }
 
-/// What tells sequences apart for the greedy search: values, actions under way, and the ranges of numbers.
-fn signature(course: &Course) -> Vec<Rational> {
-    let whole = |number: u32| Rational::from_integer(number.into());
-    let mut key: Vec<Rational> = course.values.iter().copied().map(whole).collect();
-    key.extend(course.instances().map(whole));
+/// A hash of what tells sequences apart for the greedy search: values, actions under way, and the ranges of numbers. Two sequences with one
+/// hash are taken for the same: this search claims nothing.
+fn signature(course: &Course) -> u64 {
+    let mut hasher = FxHasher::default();
+    course.values.hash(&mut hasher);
+    course.instances().for_each(|instance| instance.hash(&mut hasher));
     for number in &course.numbers {
-        key.push(Rational::from_integer(-1));
-        key.extend(course.highest(number));
+        course.highest(number).hash(&mut hasher);
         if number.known().is_none() {
-            key.push(course.highest(&Affine::default().minus(number)).unwrap_or_else(Rational::zero));
+            course.highest(&Affine::default().minus(number)).hash(&mut hasher);
         }
     }
-    key
+    hasher.finish()
 }
