@@ -1,5 +1,6 @@
 //! The equations of one component with cycles to the values of its states: end components merged, policy iteration.
 
+use std::cmp::Reverse;
 use std::collections::VecDeque;
 
 use crate::mdp::dense;
@@ -24,7 +25,10 @@ impl<N: Number> Run<'_, N> {
     }
 
     fn whole_component(&mut self, component: &[u32], local: &mut Local<N>) -> Option<()> {
-        self.cut(component, local, |_, _| true);
+        // States that were found at about the same time lie side by side, and those that were found last are left first.
+        let mut component = component.to_vec();
+        component.sort_unstable_by_key(|state| Reverse(*state));
+        self.cut(&component, local, |_, _| true);
         let members = self.sure_members(local);
         if self.problem.rewards.is_some() {
             for (state, sure) in local.states.iter().zip(&members) {
