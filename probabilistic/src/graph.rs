@@ -11,6 +11,9 @@ const UNSEEN: u32 = 0;
 /// A node whose component is complete.
 const DONE: u32 = u32::MAX;
 
+/// Nodes of a component that is worth the time to give memory back.
+const LARGE: usize = 100_000;
+
 /// A visit that has begun.
 struct Frame<'a> {
     node: u32,
@@ -81,6 +84,10 @@ pub fn visit_components<'a, E>(
                 take(&[node])?;
             } else {
                 stack.push(node);
+                if stack.len() - begin >= LARGE {
+                    // What took many visits takes much memory, which is better left to whom it is handed over.
+                    frames.shrink_to_fit();
+                }
                 take(&stack[begin..])?;
                 stack.truncate(begin);
             }

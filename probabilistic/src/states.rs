@@ -64,7 +64,7 @@ impl Places {
 
     /// Twice as many places where less than a third is free. None where hashes have no more bits for that.
     fn make_room(&mut self, taken: usize) -> Option<()> {
-        if taken < self.entries.len() / 3 * 2 {
+        if taken.saturating_mul(3) < self.entries.len().saturating_mul(2) {
             return Some(());
         }
         let mut more = Self::new(33_u32.checked_sub(self.shift).filter(|bits| *bits <= 32)?);
@@ -78,7 +78,6 @@ impl Places {
     }
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "the upper half")]
 const fn upper(entry: u64) -> u32 {
     (entry >> 32) as u32
 }
@@ -170,6 +169,11 @@ impl<S: Eq + Hash> States<S> {
             }
         };
         found.map(|number| number as usize)
+    }
+
+    /// Forgets how to find the numbers of states, which takes memory: [`number`](Self::number) finds none any more.
+    pub(crate) fn forget_numbers(&mut self) {
+        self.numbers = Numbers::Table(Vec::new());
     }
 
     /// How many there are.

@@ -130,6 +130,9 @@ pub fn check_all<'p>(
         Some(exact.with_rewards(&wanted).stopping(end.as_ref()))
     };
     let mut found = Processes::explore(&program, exact.as_ref(), options)?;
+    if options.evaluate.is_none() {
+        found.forget_numbers();
+    }
     let build = start.elapsed();
     let mut reports = Vec::new();
     for (property, refused) in properties.iter().zip(refused) {
@@ -233,6 +236,12 @@ impl Processes {
             None => explore(&Remembered::new(program), bounds)?,
         };
         Ok(Self { exact: None, doubles: Some(found), budget: 0 })
+    }
+
+    /// Gives back what only a policy that is evaluated needs, and solving has better use for.
+    fn forget_numbers(&mut self) {
+        self.exact.iter_mut().for_each(|explored| explored.states.forget_numbers());
+        self.doubles.iter_mut().for_each(|explored| explored.states.forget_numbers());
     }
 
     fn report(

@@ -166,7 +166,9 @@ impl Code {
             Self::Variable(variable) => tell(*variable),
             Self::Not(inner) | Self::Negative(inner, _) => inner.each_variable(tell),
             Self::All(parts) | Self::Any(parts) | Self::Call(_, _, parts) => {
-                parts.iter().for_each(|part| part.each_variable(tell));
+                for part in parts {
+                    part.each_variable(tell);
+                }
             }
             Self::Iff(left, right)
             | Self::Compare(_, _, left, right)
@@ -175,7 +177,9 @@ impl Code {
                 right.each_variable(tell);
             }
             Self::If(condition, then, otherwise) => {
-                [condition, then, otherwise].into_iter().for_each(|part| part.each_variable(tell));
+                for part in [condition, then, otherwise] {
+                    part.each_variable(tell);
+                }
             }
         }
     }

@@ -188,7 +188,7 @@ impl<N: Number> Memory<N> {
                     *sum = sum.plus(&share(more));
                 }
                 lead.go(team, state, parts, chosen, |next, probability| {
-                    choices.to(next, share(&probability))
+                    choices.to(next, share(&probability));
                 });
             })
         })?;
@@ -293,21 +293,30 @@ impl<N: Number> Lead<N> {
             {
                 for (next, together) in &mut self.open {
                     next.edit(edits);
-                    *together = together.times(probability);
+                    *together = product(together, probability);
                 }
                 continue;
             }
             self.next.clear();
-            for (before, together) in self.open.drain(..) {
+            for (before, together) in &self.open {
                 for (probability, edits) in team.modules[parts[at].0].updates(chosen[at]) {
                     let mut next = before.clone();
                     next.edit(edits);
-                    self.next.push((next, together.times(probability)));
+                    self.next.push((next, product(together, probability)));
                 }
             }
             std::mem::swap(&mut self.open, &mut self.next);
         }
         self.open.drain(..).for_each(|(next, probability)| to(next, probability));
+    }
+}
+
+/// Most moves of modules are certain, and rationals are long to multiply.
+fn product<N: Number>(left: &N, right: &N) -> N {
+    match (left.is_unit(), right.is_unit()) {
+        (true, _) => right.clone(),
+        (_, true) => left.clone(),
+        _ => left.times(right),
     }
 }
 

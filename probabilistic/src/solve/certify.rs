@@ -8,14 +8,16 @@
 
 use crate::mdp::dense;
 use crate::number::{Number, count};
-use crate::solve::chain::solve_chain;
-use crate::solve::local::NONE;
+use crate::solve::chain::Chain;
 use crate::solve::problem::Direction;
 use crate::solve::quotient::Quotient;
 use crate::solve::work::Work;
 
 /// Rounds of policy iteration for the longest way.
 const ROUNDS: usize = 200;
+
+/// Sweeps between two solutions of a chain.
+const SWEEPS: usize = 10;
 
 /// The relative error of evaluating a row that was made of so many transitions.
 pub fn rounding(widest: usize) -> f64 {
@@ -69,13 +71,7 @@ pub fn certify<N: Number>(
         delta *= 2.0;
         let holds = (0..blocks).all(|block| {
             quotient.range(block).all(|row| {
-                let after: f64 = quotient
-                    .rows
-                    .range(row)
-                    .map(|at| {
-                        quotient.rows.probabilities[at].to_f64() * steps[quotient.rows.columns[at] as usize]
-                    })
-                    .sum();
+                let after = after(quotient, row, &steps);
                 let growth = delta * (after - steps[block]) + delta * 1e-9 * (after + steps[block]);
                 loss(block, row) - rows[row].1 - own_rounding(block) >= growth
             })
@@ -87,43 +83,59 @@ pub fn certify<N: Number>(
     vec![f64::INFINITY; blocks]
 }
 
+/// Expected steps after a row, where those of the blocks are known.
+fn after<N: Number>(quotient: &Quotient<N>, row: usize, steps: &[f64]) -> f64 {
+    let range = quotient.rows.range(row);
+    let transitions = quotient.rows.columns[range.clone()].iter().zip(&quotient.rows.probabilities[range]);
+    transitions.map(|(column, probability)| probability.to_f64() * steps[*column as usize]).sum()
+}
+
 /// Expected steps, at most, by rows that are near the best ones.
 fn longest<N: Number>(
     quotient: &Quotient<N>,
     policy: &[u32],
     near: impl Fn(usize, usize) -> bool,
 ) -> Option<Vec<f64>> {
-    let mut rows = crate::solve::chain::Rows::<f64>::new();
-    for row in 0..quotient.choices.len() {
-        for at in quotient.rows.range(row) {
-            rows.columns.push(quotient.rows.columns[at]);
-            rows.probabilities.push(quotient.rows.probabilities[at].to_f64());
-        }
-        rows.end(1.0, quotient.rows.leaving[row].to_f64());
-    }
-    let idle = dense(rows.len());
-    rows.end(1.0, 1.0);
-    let mut policy: Vec<u32> = policy.iter().map(|row| if *row == NONE { idle } else { *row }).collect();
+    let rows = &quotient.rows;
+    let mut policy = policy.to_vec();
     for _ in 0..ROUNDS {
-        let steps = solve_chain(&rows, &policy, |_| 1.0, &mut Work::new(0))?.values;
+        let chain = Chain { rows, policy: &policy, costs: Some(N::one()) };
+        let steps = chain.solve(&mut Work::new(0))?.values;
+        let mut steps: Vec<f64> = steps.iter().map(Number::to_f64).collect();
         if steps.iter().any(|steps| !steps.is_finite()) {
             return None;
         }
         let mut changed = false;
-        for (block, chosen) in policy.iter_mut().enumerate() {
-            let mut best = steps[block];
-            for row in quotient.range(block).filter(|row| near(block, *row)) {
-                let value = rows.apply(row, &steps);
-                if value > best + 0.01 {
-                    best = value;
-                    *chosen = dense(row);
-                    changed = true;
-                }
+        for _ in 0..SWEEPS {
+            if !lengthen(quotient, &near, &mut policy, &mut steps) {
+                break;
             }
+            changed = true;
         }
         if !changed {
             return Some(steps);
         }
     }
     None
+}
+
+/// Takes rows by which it takes longer, and writes how long; whether any was taken.
+fn lengthen<N: Number>(
+    quotient: &Quotient<N>,
+    near: impl Fn(usize, usize) -> bool,
+    policy: &mut [u32],
+    steps: &mut [f64],
+) -> bool {
+    let mut changed = false;
+    for (block, chosen) in policy.iter_mut().enumerate() {
+        for row in quotient.range(block).filter(|row| near(block, *row)) {
+            let longer = after(quotient, row, steps) + 1.0;
+            if *chosen as usize != row && longer > steps[block] + 0.01 {
+                steps[block] = longer;
+                *chosen = dense(row);
+                changed = true;
+            }
+        }
+    }
+    changed
 }
