@@ -81,7 +81,7 @@ impl<N: Number> Module<N> {
             return (known != WRONG).then_some(known as usize);
         }
         self.forget();
-        let is_full = self.kept[0] >= KEPT[0] || self.kept[3] >= KEPT[1];
+        let is_full = self.numbers.is_none() || self.kept[0] >= KEPT[0] || self.kept[3] >= KEPT[1];
         let found = self.write(program, number, &values()).ok().map(|()| self.kept[0]);
         if found.is_none() {
             self.forget();

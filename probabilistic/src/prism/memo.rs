@@ -83,10 +83,11 @@ impl<T> Memo<T> {
             return self.values.get(known as usize);
         }
         let value = find()?;
-        self.values.truncate(KEPT);
+        let most = if self.numbers.is_some() { KEPT } else { 0 };
+        self.values.truncate(most);
         self.values.push(value);
         let number = self.values.len().saturating_sub(1);
-        if number < KEPT
+        if number < most
             && let (Some(numbers), Ok(number)) = (&mut self.numbers, u32::try_from(number))
         {
             numbers.note(state, number);

@@ -53,14 +53,16 @@ pub fn certify<N: Number>(
         return vec![better + rounding];
     }
     for threshold in [1e-8, 1e-12] {
-        let near = |block: usize, row: usize| {
+        let is_near = |block: usize, row: usize| {
             loss(block, row) <= threshold * v[block].max(1e-12) || policy[block] as usize == row
         };
-        let Some(steps) = longest(quotient, policy, near) else { continue };
+        let near = (0..blocks).flat_map(|block| quotient.range(block).map(move |row| (block, row)));
+        let near: Vec<bool> = near.map(|(block, row)| is_near(block, row)).collect();
+        let Some(steps) = longest(quotient, policy, &near) else { continue };
         let own_rounding = |block: usize| 4.0 * f64::EPSILON * v[block];
         let mut delta = 0.0_f64;
         for (block, chosen) in policy.iter().enumerate() {
-            for row in quotient.range(block).filter(|row| near(block, *row)) {
+            for row in quotient.range(block).filter(|row| near[*row]) {
                 let rounding = rows[row].1 + own_rounding(block);
                 delta = delta.max(rounding - loss(block, row));
                 if *chosen as usize == row {
@@ -91,11 +93,7 @@ fn after<N: Number>(quotient: &Quotient<N>, row: usize, steps: &[f64]) -> f64 {
 }
 
 /// Expected steps, at most, by rows that are near the best ones.
-fn longest<N: Number>(
-    quotient: &Quotient<N>,
-    policy: &[u32],
-    near: impl Fn(usize, usize) -> bool,
-) -> Option<Vec<f64>> {
+fn longest<N: Number>(quotient: &Quotient<N>, policy: &[u32], near: &[bool]) -> Option<Vec<f64>> {
     let rows = &quotient.rows;
     let mut policy = policy.to_vec();
     for _ in 0..ROUNDS {
@@ -107,7 +105,7 @@ fn longest<N: Number>(
         }
         let mut changed = false;
         for _ in 0..SWEEPS {
-            if !lengthen(quotient, &near, &mut policy, &mut steps) {
+            if !lengthen(quotient, near, &mut policy, &mut steps) {
                 break;
             }
             changed = true;
@@ -120,15 +118,10 @@ fn longest<N: Number>(
 }
 
 /// Takes rows by which it takes longer, and writes how long; whether any was taken.
-fn lengthen<N: Number>(
-    quotient: &Quotient<N>,
-    near: impl Fn(usize, usize) -> bool,
-    policy: &mut [u32],
-    steps: &mut [f64],
-) -> bool {
+fn lengthen<N: Number>(quotient: &Quotient<N>, near: &[bool], policy: &mut [u32], steps: &mut [f64]) -> bool {
     let mut changed = false;
     for (block, chosen) in policy.iter_mut().enumerate() {
-        for row in quotient.range(block).filter(|row| near(block, *row)) {
+        for row in quotient.range(block).filter(|row| near[*row]) {
             let longer = after(quotient, row, steps) + 1.0;
             if *chosen as usize != row && longer > steps[block] + 0.01 {
                 steps[block] = longer;
