@@ -33,22 +33,20 @@ pub fn certify<N: Number>(
 ) -> Vec<f64> {
     let blocks = values.len();
     let v: Vec<f64> = values.iter().map(Number::to_f64).collect();
-    let rows: Vec<(f64, f64)> = (0..quotient.choices.len())
-        .map(|row| {
-            let value = quotient.rows.apply(row, values).to_f64();
-            (value, rounding(quotient.widest) * value)
-        })
-        .collect();
+    let rows: Vec<f64> =
+        (0..quotient.choices.len()).map(|row| quotient.rows.apply(row, values).to_f64()).collect();
+    let relative = rounding(quotient.widest);
+    let own_error = |row: usize| relative * rows[row];
     // How much worse a row is than the value that was found; negative where rounding makes it better.
     let loss = |block: usize, row: usize| match direction {
-        Direction::Min => rows[row].0 - v[block],
-        Direction::Max => v[block] - rows[row].0,
+        Direction::Min => rows[row] - v[block],
+        Direction::Max => v[block] - rows[row],
     };
     if blocks == 1 {
         // Each row is worth what it is worth alone; one that is better by less than rounding may not have been taken.
         let (better, rounding) = (0..rows.len()).fold((0.0_f64, 0.0_f64), |(better, rounding), row| {
             let near = loss(0, row) <= v[0];
-            (better.max(-loss(0, row)), if near { rounding.max(rows[row].1) } else { rounding })
+            (better.max(-loss(0, row)), if near { rounding.max(own_error(row)) } else { rounding })
         });
         return vec![better + rounding];
     }
@@ -63,7 +61,7 @@ pub fn certify<N: Number>(
         let mut delta = 0.0_f64;
         for (block, chosen) in policy.iter().enumerate() {
             for row in quotient.range(block).filter(|row| near[*row]) {
-                let rounding = rows[row].1 + own_rounding(block);
+                let rounding = own_error(row) + own_rounding(block);
                 delta = delta.max(rounding - loss(block, row));
                 if *chosen as usize == row {
                     delta = delta.max(rounding + loss(block, row));
@@ -75,7 +73,7 @@ pub fn certify<N: Number>(
             quotient.range(block).all(|row| {
                 let after = after(quotient, row, &steps);
                 let growth = delta * (after - steps[block]) + delta * 1e-9 * (after + steps[block]);
-                loss(block, row) - rows[row].1 - own_rounding(block) >= growth
+                loss(block, row) - own_error(row) - own_rounding(block) >= growth
             })
         });
         if holds {

@@ -29,6 +29,8 @@ impl<N: Number> Run<'_, N> {
         let mut component = component.to_vec();
         component.sort_unstable_by_key(|state| Reverse(*state));
         self.cut(&component, local, |_, _| true);
+        let states = component.len();
+        drop(component);
         let members = self.sure_members(local);
         if self.problem.rewards.is_some() {
             for (state, sure) in local.states.iter().zip(&members) {
@@ -54,12 +56,13 @@ impl<N: Number> Run<'_, N> {
         }
         let must_be_sure = self.problem.rewards.is_some() && self.problem.direction == Direction::Min;
         // What is sought for all is cut out already.
-        if must_be_sure || rest.len() < component.len() {
+        if must_be_sure || rest.len() < states {
             self.cut(&rest, local, |run, choice| {
                 let targets = run.problem.mdp.targets(choice);
                 !must_be_sure || targets.iter().all(|t| run.solution.sure.contains(*t as usize))
             });
         }
+        drop((rest, members));
         self.values(local)
     }
 

@@ -185,9 +185,10 @@ impl<'a, N: Number> Rows<'a, N> {
 
     /// Bounds around values that are close already, by the same argument from both sides.
     fn around(&self, near: &[N], width: f64) -> Option<(Vec<f64>, Vec<f64>)> {
-        let near: Vec<f64> = (0..self.places()).map(|place| near[self.block(place)].to_f64()).collect();
-        let mut lower: Vec<f64> = near.iter().map(|value| value * (1.0 - width * NEAR)).collect();
-        let mut upper: Vec<f64> = near.iter().map(|value| value * (1.0 + width * NEAR)).collect();
+        let scaled = |scale: f64| -> Vec<f64> {
+            (0..self.places()).map(|place| near[self.block(place)].to_f64() * scale).collect()
+        };
+        let (mut lower, mut upper) = (scaled(1.0 - width * NEAR), scaled(1.0 + width * NEAR));
         let settles = |values: &mut [f64], moves: &dyn Fn(&mut [f64]) -> bool| {
             (0..UPPER_SWEEPS).any(|_| !moves(values))
         };
