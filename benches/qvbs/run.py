@@ -3,12 +3,14 @@
 
   run.py PROGRAM --models ../shared/real/qvbs values [--limit 60]
   run.py PROGRAM --models ../shared/real/qvbs speed --storm VENV/bin/python [--limit 60] [--from 10000]
+  run.py PROGRAM --models ../shared/real/qvbs speed --reuse CSV
 
 `values` asks every instance for all of its properties, by default and with --inexact, and compares with the reference of `index.json`: an
 exact value has to be equal, bounds have to enclose it. An approximate reference is met within 0.001 of its value, as the set itself does.
 `speed` runs each property of each instance alone, ours (`--inexact`) and Storm's (stormpy 2.0.0, the quickest of its sound settings), and
 counts processor time from text to answer and memory; Storm's import is left out of both. A line of CSV for each row on standard output, and
-a summary on standard error.
+a summary on standard error. Storm's side does not change with ours: `--reuse CSV` takes it from a table that was made before, and the program
+`-` makes a table of Storm's side alone.
 """
 import argparse, csv, json, math, os, resource, subprocess, sys, time
 from fractions import Fraction
@@ -155,42 +157,67 @@ def values(arguments):
         print(f'{mode:8} {kind:20} {count}', file=sys.stderr)
 
 
+def storm_best(arguments, model, constants, properties, name):
+    """What the quickest setting says of itself; a setting that takes longer than the best one so far is stopped."""
+    best, limit = None, arguments.limit
+    for setting in SETTINGS:
+        text, _, _, _, said = run([arguments.storm, '-c', STORM, str(model), constants, str(properties), name, setting], limit)
+        try:
+            found = json.loads(text.splitlines()[-1]) | {'setting': setting}
+        except (ValueError, IndexError):
+            if arguments.verbose:
+                print(model.name, name, setting, said[-300:], file=sys.stderr)
+            continue
+        if best is None or found['seconds'] < best['seconds']:
+            best = found
+            # Its start takes up to two seconds.
+            limit = min(limit, math.ceil(best['seconds']) + 3)
+    return best
+
+
+def storm_known(path):
+    """Storm's side of a table that was made before."""
+    known = {}
+    for row in csv.DictReader(open(path)) if path else ():
+        if row['storm s']:
+            known[row['model'], row['constants'], row['property']] = {
+                'setting': row['storm setting'], 'seconds': float(row['storm s']), 'memory': float(row['storm MB']),
+                'value': row['storm value']}
+    return known
+
+
 def speed(arguments):
     rows = csv.writer(sys.stdout)
     rows.writerow(['model', 'constants', 'property', 'states', 'ours s', 'ours MB', 'storm setting', 'storm s', 'storm MB', 'ratio',
                    'value', 'storm value'])
-    ratios, memory = [], []
+    ratios, memory, known = [], [], storm_known(arguments.reuse)
     for short, model, constants, properties, references, states in instances(arguments.models):
         if states is None or not getattr(arguments, 'from') <= states <= arguments.to:
             continue
         for name in references:
-            output, seconds, used, status, _ = ours(arguments.program, model, constants, properties, ['--inexact'], arguments.limit, name)
-            try:
-                answer = json.loads(output)
-                answer = answer.get('answers', [answer])[0]
-            except (ValueError, IndexError):
-                answer = {}
-            best = None
-            for setting in SETTINGS:
-                text, cpu, _, _, said = run([arguments.storm, '-c', STORM, str(model), constants, str(properties), name, setting],
-                                      arguments.limit)
+            answer, seconds, used = {}, 0.0, 0.0
+            if arguments.program != '-':
+                output, seconds, used, _, _ = ours(arguments.program, model, constants, properties, ['--inexact'], arguments.limit, name)
                 try:
-                    found = json.loads(text.splitlines()[-1]) | {'setting': setting}
+                    answer = json.loads(output)
+                    answer = answer.get('answers', [answer])[0]
                 except (ValueError, IndexError):
-                    if arguments.verbose:
-                        print(model.name, name, setting, said[-300:], file=sys.stderr)
-                    continue
-                if best is None or found['seconds'] < best['seconds']:
-                    best = found
-            row = [model.name, constants, name, answer.get('statistics', {}).get('states'), f'{seconds:.3f}', f'{used:.0f}']
-            if best is None or not answer:
+                    pass
+            if arguments.reuse:
+                best = known.get((model.name, constants, name))
+            else:
+                best = storm_best(arguments, model, constants, properties, name)
+            row = [model.name, constants, name, answer.get('statistics', {}).get('states', states), f'{seconds:.3f}', f'{used:.0f}']
+            if best is None:
                 rows.writerow([*row, '', '', '', '', answer.get('value'), ''])
             else:
-                ratio = best['seconds'] / seconds
-                ratios.append((ratio, model.name, constants, name))
-                memory.append((best['memory'] / used, model.name, constants, name))
-                rows.writerow([*row, best['setting'], f"{best['seconds']:.3f}", f"{best['memory']:.0f}", f'{ratio:.2f}',
-                               answer.get('value'), best['value']])
+                ratio = ''
+                if answer:
+                    ratio = f"{best['seconds'] / seconds:.2f}"
+                    ratios.append((best['seconds'] / seconds, model.name, constants, name))
+                    memory.append((best['memory'] / used, model.name, constants, name))
+                rows.writerow([*row, best['setting'], f"{best['seconds']:.3f}", f"{best['memory']:.0f}", ratio, answer.get('value'),
+                               best['value']])
             sys.stdout.flush()
     for what, found in (('time', ratios), ('memory', memory)):
         if found:
@@ -206,9 +233,12 @@ for name in ('values', 'speed'):
     sub = subparsers.add_parser(name)
     sub.add_argument('--limit', type=int, default=60)
     if name == 'speed':
-        sub.add_argument('--storm', required=True)
+        sub.add_argument('--storm')
+        sub.add_argument('--reuse')
         sub.add_argument('--from', type=int, default=10_000)
         sub.add_argument('--to', type=int, default=10_000_000)
         sub.add_argument('--verbose', action='store_true')
 arguments = parser.parse_args()
+if arguments.what == 'speed' and not (arguments.storm or arguments.reuse):
+    parser.error('--storm PYTHON or --reuse CSV')
 globals()[arguments.what](arguments)

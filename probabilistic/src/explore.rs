@@ -10,7 +10,7 @@ use num_rational::BigRational;
 use crate::error::Error;
 use crate::mdp::{MOST, Mdp, dense};
 use crate::number::{Number, rounded};
-use crate::states::States;
+use crate::states::{Look, States};
 
 /// The action of the loop that a state without choices gets.
 pub const DEADLOCK: u32 = u32::MAX;
@@ -50,7 +50,7 @@ pub trait Generator<N: Number> {
     fn successors(&self, state: &Self::State, choices: &mut Choices<Self::State, N>) -> Result<(), Error>;
 }
 
-/// The choices of one state, as a generator writes them.
+/// The choices of one state after the other, as a generator writes them.
 #[derive(Debug)]
 pub struct Choices<S, N> {
     transitions: Vec<(S, N)>,
@@ -89,6 +89,18 @@ impl<S: Clone, N: Number> Choices<S, N> {
     pub fn end(&mut self, action: u32, rewards: impl IntoIterator<Item = N>) {
         self.rewards.extend(rewards);
         self.ends.push((action, self.transitions.len()));
+    }
+
+    /// How much was written so far.
+    pub(crate) fn mark(&self) -> [usize; 3] {
+        [self.transitions.len(), self.ends.len(), self.rewards.len()]
+    }
+
+    /// Forgets what was written after a mark.
+    pub(crate) fn back_to(&mut self, [transitions, ends, rewards]: [usize; 3]) {
+        self.transitions.truncate(transitions);
+        self.ends.truncate(ends);
+        self.rewards.truncate(rewards);
     }
 
     fn clear(&mut self) {
@@ -162,6 +174,8 @@ pub(crate) struct Exploration<S, N> {
     pub found: Explored<S, N>,
     /// The state that is next.
     next: usize,
+    /// The state from which on progress is told again.
+    told: usize,
 }
 
 impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
@@ -169,53 +183,99 @@ impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
     pub fn new<G: Generator<N, State = S>>(generator: &G, bounds: &Bounds<'_>) -> Result<Self, Error> {
         let mut states = States::new(generator.codes());
         for start in generator.starts() {
-            let known = states.insert(start, |state| generator.code(state));
+            let look = states.look(&start, |state| generator.code(state));
+            let known = states.insert(start, look);
             known
                 .ok_or_else(|| Error::StateLimit { states: states.len(), limit: bounds.states.min(MOST) })?;
         }
         let rewards = vec![Vec::new(); generator.rewards()];
         let found = Explored { mdp: Mdp::default(), starts: states.len(), states, rewards, deadlocks: 0 };
-        Ok(Self { found, next: 0 })
+        Ok(Self { found, next: 0, told: 0 })
     }
 
-    /// Explores until all is known or there are so many transitions; whether all is known.
-    #[expect(
-        clippy::arithmetic_side_effects,
-        reason = "no more deadlocks than states, which are counted by 32 bits"
-    )]
+    /// Explores until all is known or there are so many transitions, or a few more; whether all is known.
     pub fn go_on<G: Generator<N, State = S>>(
         &mut self,
         generator: &G,
         bounds: &Bounds<'_>,
         transitions: usize,
     ) -> Result<bool, Error> {
-        let Explored { mdp, states, rewards, deadlocks, .. } = &mut self.found;
+        let mut batch = Batch { choices: Choices::default(), ends: Vec::new(), looks: Vec::new() };
         let most = bounds.states.min(MOST);
-        let too_many = |states: usize| Error::StateLimit { states, limit: most };
-        let mut choices = Choices::default();
-        for at in self.next..MOST {
-            self.next = at;
-            if at == states.len() {
+        loop {
+            let begin = self.next;
+            let end = self.found.states.len().min(begin.saturating_add(BATCH));
+            if begin == end {
                 return Ok(true);
             }
-            if mdp.transition_count() >= transitions {
+            if self.found.mdp.transition_count() >= transitions {
                 return Ok(false);
             }
-            if at % 65_536 == 0 && !(bounds.progress)(states.len()) {
-                return Err(Error::Interrupted { states: states.len() });
+            if begin >= self.told {
+                self.told = begin.saturating_add(TELL);
+                if !(bounds.progress)(self.found.states.len()) {
+                    return Err(Error::Interrupted { states: self.found.states.len() });
+                }
             }
-            choices.clear();
-            let state = states[at].clone();
-            generator.successors(&state, &mut choices)?;
-            let mut transitions = choices.transitions.drain(..);
-            let mut begin = 0;
-            let mut reward = choices.rewards.drain(..);
-            for (action, end) in choices.ends.drain(..) {
-                for _ in begin..end {
-                    if let Some((target, probability)) = transitions.next() {
-                        let target = states.insert(target, |state| generator.code(state));
-                        mdp.push_transition(target.ok_or_else(|| too_many(states.len()))?, probability);
-                    }
+            batch.write(generator, &self.found.states, begin..end)?;
+            self.found.add(&mut batch, begin, most)?;
+            self.next = end;
+        }
+    }
+}
+
+/// States whose successors are written before they are looked up.
+const BATCH: usize = 32;
+/// States between two words on progress.
+const TELL: usize = 65_536;
+
+/// The choices of a few states that come after each other.
+struct Batch<S, N> {
+    choices: Choices<S, N>,
+    /// For each state the end of its choices.
+    ends: Vec<usize>,
+    /// For each transition a first look at its target.
+    looks: Vec<Look>,
+}
+
+impl<S: Clone + Eq + Hash, N: Number> Batch<S, N> {
+    fn write<G: Generator<N, State = S>>(
+        &mut self,
+        generator: &G,
+        states: &States<S>,
+        range: std::ops::Range<usize>,
+    ) -> Result<(), Error> {
+        self.choices.clear();
+        self.ends.clear();
+        for state in range {
+            generator.successors(&states[state], &mut self.choices)?;
+            self.ends.push(self.choices.ends.len());
+        }
+        self.looks.clear();
+        let targets = self.choices.transitions.iter();
+        self.looks.extend(targets.map(|(target, _)| states.look(target, |state| generator.code(state))));
+        Ok(())
+    }
+}
+
+impl<S: Clone + Eq + Hash, N: Number> Explored<S, N> {
+    /// Adds the choices of the states from `first` on.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "no more deadlocks than states, which are counted by 32 bits, and positions in lists"
+    )]
+    fn add(&mut self, batch: &mut Batch<S, N>, first: usize, most: usize) -> Result<(), Error> {
+        let Self { mdp, states, rewards, deadlocks, .. } = self;
+        let too_many = |states: usize| Error::StateLimit { states, limit: most };
+        let mut transitions = batch.choices.transitions.drain(..).zip(&batch.looks);
+        let mut reward = batch.choices.rewards.drain(..);
+        let mut choices = batch.choices.ends.drain(..);
+        let (mut begin, mut taken) = (0, 0);
+        for (at, end) in batch.ends.iter().enumerate() {
+            for (action, end) in choices.by_ref().take(end - taken) {
+                for ((target, probability), look) in transitions.by_ref().take(end - begin) {
+                    let target = states.insert(target, *look);
+                    mdp.push_transition(target.ok_or_else(|| too_many(states.len()))?, probability);
                 }
                 begin = end;
                 mdp.end_choice(action)?;
@@ -223,12 +283,13 @@ impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
                     values.push(reward.next().unwrap_or_else(N::zero));
                 }
             }
+            taken = *end;
             if states.len() > most {
                 return Err(too_many(states.len()));
             }
             if mdp.open_choices() == 0 {
                 *deadlocks += 1;
-                mdp.push_transition(dense(at), N::one());
+                mdp.push_transition(dense(first + at), N::one());
                 mdp.end_choice(DEADLOCK)?;
                 for values in &mut *rewards {
                     values.push(N::zero());
@@ -236,14 +297,14 @@ impl<S: Clone + Eq + Hash, N: Number> Exploration<S, N> {
             }
             mdp.end_state();
         }
-        Ok(true)
+        Ok(())
     }
 }
 
 impl<S: Clone> Exploration<S, BigRational> {
     /// The same in doubles; none where a number is too large or too small for them.
     pub fn rounded(&self) -> Option<Exploration<S, f64>> {
-        Some(Exploration { found: self.found.rounded()?, next: self.next })
+        Some(Exploration { found: self.found.rounded()?, next: self.next, told: self.told })
     }
 }
 

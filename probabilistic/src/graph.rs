@@ -11,13 +11,16 @@ const UNSEEN: u32 = 0;
 /// A node whose component is complete.
 const DONE: u32 = u32::MAX;
 
+/// Nodes of a component that is worth the time to give memory back.
+const LARGE: usize = 100_000;
+
 /// A visit that has begun.
-struct Frame<'a> {
+struct Frame {
     node: u32,
     /// The number that the node got.
     own: u32,
-    /// The edges that are still to be followed.
-    edges: &'a [u32],
+    /// How many of its edges were followed.
+    followed: u32,
 }
 
 /// Hands over the strongly connected components of the nodes `0..n`, each after all that can be reached from it.
@@ -36,7 +39,7 @@ pub fn visit_components<'a, E>(
     // The least number of a node that is known to be reachable and not complete.
     let mut low = vec![UNSEEN; n];
     let mut stack: Vec<u32> = Vec::new();
-    let mut frames: Vec<Frame<'a>> = Vec::new();
+    let mut frames: Vec<Frame> = Vec::new();
     let mut next = 0_u32;
     for root in 0..dense(n) {
         if low[root as usize] != UNSEEN {
@@ -44,25 +47,26 @@ pub fn visit_components<'a, E>(
         }
         next += 1;
         low[root as usize] = next;
-        frames.push(Frame { node: root, own: next, edges: successors(root) });
+        frames.push(Frame { node: root, own: next, followed: 0 });
         while let Some(frame) = frames.last_mut() {
             let v = frame.node as usize;
+            let edges = &successors(frame.node)[frame.followed as usize..];
             let mut least = low[v];
             let mut child = None;
-            while let Some(target) = frame.edges.first() {
+            for target in edges {
                 let found = low[*target as usize];
                 if found == UNSEEN {
                     child = Some(*target);
                     break;
                 }
                 least = least.min(found);
-                frame.edges = &frame.edges[1..];
+                frame.followed += 1;
             }
             low[v] = least;
             if let Some(child) = child {
                 next += 1;
                 low[child as usize] = next;
-                frames.push(Frame { node: child, own: next, edges: successors(child) });
+                frames.push(Frame { node: child, own: next, followed: 0 });
                 continue;
             }
             let Frame { node, own, .. } = *frame;
@@ -81,6 +85,10 @@ pub fn visit_components<'a, E>(
                 take(&[node])?;
             } else {
                 stack.push(node);
+                if stack.len() - begin >= LARGE {
+                    // What took many visits takes much memory, which is better left to whom it is handed over.
+                    frames.shrink_to_fit();
+                }
                 take(&stack[begin..])?;
                 stack.truncate(begin);
             }

@@ -40,6 +40,8 @@ pub trait Number: Clone + Debug + PartialOrd + Send + Sync + 'static {
     /// The nearest number of this kind; where doubles are whole, they are exact: what would be rounded to a whole double
     /// becomes the one beside it.
     fn from_rational(value: &BigRational) -> Self;
+    /// The number that a double is; zero for what is not finite.
+    fn from_f64(value: f64) -> Self;
     /// The nearest double.
     fn to_f64(&self) -> f64;
     /// The rational, where arithmetic is exact.
@@ -58,6 +60,8 @@ pub trait Number: Clone + Debug + PartialOrd + Send + Sync + 'static {
     fn over(&self, other: &Self) -> Self;
     /// Whether this is exactly zero.
     fn is_zero(&self) -> bool;
+    /// Whether this is exactly one.
+    fn is_unit(&self) -> bool;
     /// Less than `other` by more than rounding errors can explain.
     fn clearly_less(&self, other: &Self) -> bool;
     /// Bits that the number takes; what makes exact solving slow.
@@ -102,6 +106,9 @@ impl Number for f64 {
             _ => nearest,
         }
     }
+    fn from_f64(value: f64) -> Self {
+        if value.is_finite() { value } else { 0.0 }
+    }
     fn to_f64(&self) -> f64 {
         *self
     }
@@ -111,6 +118,10 @@ impl Number for f64 {
     arithmetic!();
     fn is_zero(&self) -> bool {
         *self == 0.0
+    }
+    #[expect(clippy::float_cmp, reason = "exactly one")]
+    fn is_unit(&self) -> bool {
+        *self == 1.0
     }
     fn clearly_less(&self, other: &Self) -> bool {
         other - self > TOLERANCE * self.abs().max(other.abs())
@@ -132,6 +143,9 @@ impl Number for BigRational {
     fn from_rational(value: &BigRational) -> Self {
         value.clone()
     }
+    fn from_f64(value: f64) -> Self {
+        Self::from_float(value).unwrap_or_default()
+    }
     fn to_f64(&self) -> f64 {
         ToPrimitive::to_f64(self).unwrap_or(f64::NAN)
     }
@@ -141,6 +155,9 @@ impl Number for BigRational {
     arithmetic!();
     fn is_zero(&self) -> bool {
         Zero::is_zero(self)
+    }
+    fn is_unit(&self) -> bool {
+        One::is_one(self)
     }
     fn clearly_less(&self, other: &Self) -> bool {
         self < other

@@ -25,7 +25,7 @@ use crate::error::Error;
 use crate::explore::{Exploration, Explored, explore};
 use crate::number::Number;
 use crate::prism::ast::{BinaryOp, Expr, ExprKind, Model};
-use crate::prism::{Names, Packed, Program, Settings};
+use crate::prism::{Names, Packed, Program, Remembered, Settings};
 use crate::property::{Declarations, Path, Property, RewardPath, Steps};
 use crate::solve::NONE;
 use crate::solve::work::MOST;
@@ -43,7 +43,7 @@ const SMALL: usize = 150_000;
 /// What exact arithmetic may cost a model with so many transitions unless it was asked for, in units of about a nanosecond.
 fn budget(transitions: usize) -> u64 {
     let transitions = u64::try_from(transitions).unwrap_or(u64::MAX);
-    transitions.saturating_mul(500).saturating_add(10_000_000)
+    transitions.saturating_mul(500).max(3_000_000)
 }
 
 /// What came out.
@@ -130,6 +130,9 @@ pub fn check_all<'p>(
         Some(exact.with_rewards(&wanted).stopping(end.as_ref()))
     };
     let mut found = Processes::explore(&program, exact.as_ref(), options)?;
+    if options.evaluate.is_none() {
+        found.forget_numbers();
+    }
     let build = start.elapsed();
     let mut reports = Vec::new();
     for (property, refused) in properties.iter().zip(refused) {
@@ -204,26 +207,41 @@ impl Processes {
     ) -> Result<Self, Error> {
         let bounds = &options.bounds;
         let Some(exact) = exact else {
-            return Ok(Self { exact: None, doubles: Some(explore(program, bounds)?), budget: 0 });
+            return Ok(Self {
+                exact: None,
+                doubles: Some(explore(&Remembered::new(program), bounds)?),
+                budget: 0,
+            });
         };
         if options.exactness == Exactness::Always {
-            return Ok(Self { exact: Some(explore(exact, bounds)?), doubles: None, budget: u64::MAX });
+            return Ok(Self {
+                exact: Some(explore(&Remembered::new(exact), bounds)?),
+                doubles: None,
+                budget: u64::MAX,
+            });
         }
-        let mut exploration = Exploration::new(exact, bounds)?;
-        if exploration.go_on(exact, bounds, SMALL)? {
+        let exact = Remembered::new(exact);
+        let mut exploration = Exploration::new(&exact, bounds)?;
+        if exploration.go_on(&exact, bounds, SMALL)? {
             let budget = budget(exploration.found.mdp.transition_count());
             return Ok(Self { exact: Some(exploration.found), doubles: None, budget });
         }
         let found = match exploration.rounded() {
             Some(mut rounded) => {
                 drop(exploration);
-                rounded.go_on(program, bounds, usize::MAX)?;
+                rounded.go_on(&Remembered::new(program), bounds, usize::MAX)?;
                 rounded.found
             }
             // Says where the number stands.
-            None => explore(program, bounds)?,
+            None => explore(&Remembered::new(program), bounds)?,
         };
         Ok(Self { exact: None, doubles: Some(found), budget: 0 })
+    }
+
+    /// Gives back what only a policy that is evaluated needs, and solving has better use for.
+    fn forget_numbers(&mut self) {
+        self.exact.iter_mut().for_each(|explored| explored.states.forget_numbers());
+        self.doubles.iter_mut().for_each(|explored| explored.states.forget_numbers());
     }
 
     fn report(
@@ -243,7 +261,8 @@ impl Processes {
         }
         if self.doubles.is_none() {
             let rounded = self.exact.as_ref().and_then(Explored::rounded);
-            self.doubles = Some(rounded.map_or_else(|| explore(program, &options.bounds), Ok)?);
+            self.doubles =
+                Some(rounded.map_or_else(|| explore(&Remembered::new(program), &options.bounds), Ok)?);
         }
         let explored = self.doubles.as_ref().expect("invariant: explored just now");
         let found = Query::new(program, explored, options, wanted, 0)?.answer(property)?;
@@ -252,7 +271,7 @@ impl Processes {
         if let Some(exact) = exact.filter(|_| wide) {
             let budget = MOST.saturating_mul(10);
             if self.exact.is_none() {
-                self.exact = Some(explore(exact, &options.bounds)?);
+                self.exact = Some(explore(&Remembered::new(exact), &options.bounds)?);
             }
             if self.budget < budget {
                 self.budget = budget;

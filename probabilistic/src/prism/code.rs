@@ -149,35 +149,37 @@ impl Code {
 
     /// The least number that is above all of its variables.
     pub fn variables_below(&self) -> u32 {
-        let most = |parts: &[&Self]| parts.iter().map(|part| part.variables_below()).max().unwrap_or(0);
-        match self {
-            Self::Whole(_) | Self::Number(_) => 0,
-            Self::Variable(variable) => variable.saturating_add(1),
-            Self::Not(inner) | Self::Negative(inner, _) => inner.variables_below(),
-            Self::All(parts) | Self::Any(parts) | Self::Call(_, _, parts) => {
-                most(&parts.iter().collect::<Vec<_>>())
-            }
-            Self::Iff(left, right)
-            | Self::Compare(_, _, left, right)
-            | Self::Arithmetic(_, _, left, right) => most(&[left, right]),
-            Self::If(condition, then, otherwise) => most(&[condition, then, otherwise]),
-        }
+        let mut below = 0;
+        self.each_variable(&mut |variable| below = below.max(variable.saturating_add(1)));
+        below
     }
 
     /// Whether no variable occurs in it.
     pub fn is_constant(&self) -> bool {
+        self.variables_below() == 0
+    }
+
+    /// Tells all variables that occur in it, some of them more than once.
+    pub fn each_variable(&self, tell: &mut impl FnMut(u32)) {
         match self {
-            Self::Whole(_) | Self::Number(_) => true,
-            Self::Variable(_) => false,
-            Self::Not(inner) | Self::Negative(inner, _) => inner.is_constant(),
+            Self::Whole(_) | Self::Number(_) => {}
+            Self::Variable(variable) => tell(*variable),
+            Self::Not(inner) | Self::Negative(inner, _) => inner.each_variable(tell),
             Self::All(parts) | Self::Any(parts) | Self::Call(_, _, parts) => {
-                parts.iter().all(Self::is_constant)
+                for part in parts {
+                    part.each_variable(tell);
+                }
             }
             Self::Iff(left, right)
             | Self::Compare(_, _, left, right)
-            | Self::Arithmetic(_, _, left, right) => left.is_constant() && right.is_constant(),
+            | Self::Arithmetic(_, _, left, right) => {
+                left.each_variable(tell);
+                right.each_variable(tell);
+            }
             Self::If(condition, then, otherwise) => {
-                condition.is_constant() && then.is_constant() && otherwise.is_constant()
+                for part in [condition, then, otherwise] {
+                    part.each_variable(tell);
+                }
             }
         }
     }

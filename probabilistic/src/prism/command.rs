@@ -41,6 +41,15 @@ pub struct Command<N> {
 }
 
 impl<N: Number> Command<N> {
+    /// Tells all variables that what it does depends on.
+    pub fn each_variable(&self, tell: &mut impl FnMut(u32)) {
+        self.guard.each_variable(tell);
+        for update in &self.updates {
+            update.probability.each_variable(tell);
+            update.assignments.iter().for_each(|(_, value, _)| value.each_variable(tell));
+        }
+    }
+
     /// The probabilities of its updates in a state.
     pub fn probabilities(&self, values: &[i64]) -> Result<Cow<'_, [N]>, Error> {
         Ok(match &self.certain {
@@ -57,6 +66,14 @@ pub struct RewardItem<N> {
     /// The reward, where no variable occurs in it.
     pub certain: Option<N>,
     pub place: Place,
+}
+
+impl<N> RewardItem<N> {
+    /// Tells all variables that it depends on.
+    pub fn each_variable(&self, tell: &mut impl FnMut(u32)) {
+        self.guard.each_variable(tell);
+        self.reward.each_variable(tell);
+    }
 }
 
 /// The probabilities of the updates of a command, which sum to one.

@@ -39,6 +39,12 @@ impl Guard {
         &self.fixed
     }
 
+    /// Tells all variables that occur in it.
+    pub fn each_variable(&self, tell: &mut impl FnMut(u32)) {
+        self.tests.iter().for_each(|test| tell(test.variable));
+        self.rest.iter().for_each(|part| part.each_variable(tell));
+    }
+
     /// Whether it holds.
     pub fn holds(&self, values: &[i64]) -> Result<bool, Fault> {
         for test in &self.tests {

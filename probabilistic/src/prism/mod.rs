@@ -5,6 +5,7 @@
 //! labels. Anything else is refused with its place.
 
 pub mod ast;
+mod behaviour;
 mod build;
 mod code;
 mod command;
@@ -12,8 +13,10 @@ mod compile;
 pub(crate) mod expression;
 mod guard;
 pub(crate) mod lexer;
+mod memo;
 mod model;
 mod parser;
+mod remembered;
 mod rename;
 mod reserved;
 mod run;
@@ -27,6 +30,7 @@ pub use compile::Settings;
 pub use model::Program;
 pub use parser::parse;
 pub(crate) use parser::{constant_declaration, named_expression};
+pub use remembered::Remembered;
 pub use reserved::is_reserved;
 pub use state::{Packed, Valuation};
 pub(crate) use write::decimal;

@@ -24,6 +24,8 @@ pub const UNNAMED: u32 = u32::MAX - 1;
 /// The commands of one module that bear one action.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Group<N> {
+    /// The number of the module.
+    pub module: usize,
     pub commands: Vec<Command<N>>,
     /// The variable by whose value commands are found, its least value, and the commands for each value.
     pub index: Option<(u32, i64, Vec<Vec<u32>>)>,
@@ -217,7 +219,8 @@ impl<N: Number> Program<N> {
         numbers: &FxHashMap<&str, u32>,
         problems: &mut Vec<Diagnostic>,
     ) {
-        let mut free = Group { commands: Vec::new(), index: None };
+        let number = self.free.len();
+        let mut free = Group { module: number, commands: Vec::new(), index: None };
         let mut by_action: FxHashMap<u32, Group<N>> = FxHashMap::default();
         for command in &module.commands {
             let writable = |name: &str| {
@@ -228,18 +231,19 @@ impl<N: Number> Program<N> {
                 Ok(compiled) => match &command.action {
                     None => free.commands.push(compiled),
                     Some(action) => {
-                        let number = numbers[action.as_str()];
-                        let group = by_action
-                            .entry(number)
-                            .or_insert_with(|| Group { commands: Vec::new(), index: None });
+                        let group = by_action.entry(numbers[action.as_str()]).or_insert_with(|| Group {
+                            module: number,
+                            commands: Vec::new(),
+                            index: None,
+                        });
                         group.commands.push(compiled);
                     }
                 },
                 Err(more) => problems.extend(more),
             }
         }
-        for (number, group) in by_action {
-            self.synchronised[number as usize].push(group);
+        for (action, group) in by_action {
+            self.synchronised[action as usize].push(group);
         }
         self.free.push(free);
     }

@@ -19,12 +19,12 @@ use crate::prism::model::{Group, Program, UNNAMED};
 use crate::prism::state::{Packed, above_least};
 
 /// The values of the variables, of one state at a time.
-type Values = SmallVec<[i64; 16]>;
+pub(super) type Values = SmallVec<[i64; 16]>;
 /// The rewards of a choice.
-type Sums<N> = SmallVec<[N; 4]>;
+pub(super) type Sums<N> = SmallVec<[N; 4]>;
 
 /// Ends of the combined commands of an action in one state, at most.
-const COMBINED: usize = 1_000_000;
+pub(super) const COMBINED: usize = 1_000_000;
 
 /// The enabled commands of one action, which move together: one of each module.
 struct Meeting<N> {
@@ -94,7 +94,13 @@ impl<N: Number> Program<N> {
     }
 
     /// What an assignment makes of a variable, which must be in its range.
-    fn assigned(&self, variable: u32, code: &Code, place: Place, values: &[i64]) -> Result<i64, Error> {
+    pub(super) fn assigned(
+        &self,
+        variable: u32,
+        code: &Code,
+        place: Place,
+        values: &[i64],
+    ) -> Result<i64, Error> {
         let value = code.whole(values).map_err(|fault| at(fault, place))?;
         let Variable { name, least, greatest, .. } = &self.variables[variable as usize];
         if (*least..=*greatest).contains(&value) {
@@ -198,7 +204,7 @@ impl<N> Meeting<N> {
 }
 
 /// The enabled commands of a group.
-fn enabled<'a, N: Number>(
+pub(super) fn enabled<'a, N: Number>(
     group: &'a Group<N>,
     values: &'a [i64],
 ) -> impl Iterator<Item = Result<&'a Command<N>, Error>> {
@@ -218,16 +224,21 @@ fn enabled<'a, N: Number>(
 }
 
 impl<N: Number> Program<N> {
+    /// The values of the variables in a state.
+    pub(super) fn values_of(&self, state: &Packed) -> Values {
+        self.layout.values(state).collect()
+    }
+
     /// The reward of a state alone, by the number of its structure.
     pub(crate) fn state_reward(&self, structure: usize, values: &[i64]) -> Result<N, Error> {
         sum(&self.rewards[structure].states, values)
     }
 
-    fn state_rewards(&self, values: &[i64]) -> Result<Sums<N>, Error> {
+    pub(super) fn state_rewards(&self, values: &[i64]) -> Result<Sums<N>, Error> {
         self.wanted.iter().map(|structure| sum(&self.rewards[*structure].states, values)).collect()
     }
 
-    fn action_rewards(&self, action: u32, values: &[i64]) -> Result<Sums<N>, Error> {
+    pub(super) fn action_rewards(&self, action: u32, values: &[i64]) -> Result<Sums<N>, Error> {
         let items = |structure: &usize| {
             let structure = &self.rewards[*structure];
             structure.actions.get(action as usize).unwrap_or(&structure.unnamed)
@@ -383,7 +394,7 @@ impl<N: Number> Generator<N> for Program<N> {
     }
 
     fn successors(&self, state: &Packed, choices: &mut Choices<Packed, N>) -> Result<(), Error> {
-        let values: Values = self.layout.values(state).collect();
+        let values = self.values_of(state);
         if self.stop.as_ref().is_some_and(|stop| stop.holds(&values).unwrap_or(false)) {
             choices.to(state.clone(), N::one());
             choices.end(UNNAMED, self.wanted.iter().map(|_| N::zero()));

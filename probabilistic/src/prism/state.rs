@@ -1,34 +1,113 @@
 //! The values of all variables to a few machine words, and back.
 
+use std::collections::BTreeSet;
 use std::hash::{Hash, Hasher};
-
-use smallvec::SmallVec;
 
 use crate::mdp::dense;
 
 /// A state: the values of the variables, each in as many bits as its range needs.
-#[derive(Debug, Default)]
-pub struct Packed(SmallVec<[u64; 2]>);
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Packed(Words);
 
-// What follows is written by hand because it is what exploration spends its time on.
+// Exploration spends its time on copying, comparing and hashing these: two words are copied at once, without a look at their number.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Words {
+    Few([u64; FEW]),
+    Many(Box<[u64]>),
+}
 
-impl Clone for Packed {
-    fn clone(&self) -> Self {
-        Self(SmallVec::from_slice(&self.0))
+/// Words that need no memory of their own.
+const FEW: usize = 2;
+
+impl Default for Words {
+    fn default() -> Self {
+        Self::Few([0; FEW])
     }
 }
 
-impl PartialEq for Packed {
-    fn eq(&self, other: &Self) -> bool {
-        self.0.iter().eq(&other.0)
+impl Packed {
+    fn new(words: usize) -> Self {
+        Self(if words <= FEW { Words::default() } else { Words::Many(vec![0; words].into()) })
+    }
+
+    fn words(&self) -> &[u64] {
+        match &self.0 {
+            Words::Few(words) => words,
+            Words::Many(words) => words,
+        }
+    }
+
+    fn words_mut(&mut self) -> &mut [u64] {
+        match &mut self.0 {
+            Words::Few(words) => words,
+            Words::Many(words) => words,
+        }
     }
 }
-
-impl Eq for Packed {}
 
 impl Hash for Packed {
     fn hash<H: Hasher>(&self, state: &mut H) {
-        self.0.iter().for_each(|word| state.write_u64(*word));
+        self.words().iter().for_each(|word| state.write_u64(*word));
+    }
+}
+
+/// What becomes of a word of a state.
+#[derive(Debug, Clone, Copy)]
+pub struct Edit {
+    word: u32,
+    clear: u64,
+    set: u64,
+}
+
+impl Edit {
+    /// Whether both change the same word.
+    pub const fn joins(&self, other: &Self) -> bool {
+        self.word == other.word
+    }
+
+    /// Makes another change of the same word, too.
+    pub const fn join(&mut self, after: &Self) {
+        self.clear |= after.clear;
+        self.set = self.set & !after.clear | after.set;
+    }
+}
+
+impl Packed {
+    /// Makes changes to it.
+    pub fn edit(&mut self, edits: &[Edit]) {
+        let words = self.words_mut();
+        for Edit { word, clear, set } in edits {
+            let word = &mut words[*word as usize];
+            *word = *word & !clear | set;
+        }
+    }
+}
+
+/// The places of some variables, which take no more than 64 bits.
+#[derive(Debug, Clone, Default)]
+pub struct Key {
+    pieces: Vec<Piece>,
+    /// How many bits they take.
+    pub bits: u32,
+}
+
+/// Bits that lie side by side.
+#[derive(Debug, Clone, Copy)]
+struct Piece {
+    word: u32,
+    shift: u32,
+    mask: u64,
+    /// Where they begin in the number that is made of them.
+    at: u32,
+}
+
+impl Key {
+    /// The values of the variables as a number.
+    pub fn of(&self, packed: &Packed) -> u64 {
+        let words = packed.words();
+        self.pieces.iter().fold(0, |number, piece| {
+            number | (words[piece.word as usize] >> piece.shift & piece.mask) << piece.at
+        })
     }
 }
 
@@ -84,9 +163,10 @@ impl Layout {
 
     /// Packs values, each in its range.
     pub fn pack(&self, values: &[i64]) -> Packed {
-        let mut packed = Packed(SmallVec::from_elem(0, self.words.max(1)));
+        let mut packed = Packed::new(self.words);
+        let words = packed.words_mut();
         for (field, value) in self.fields.iter().zip(values) {
-            packed.0[field.word as usize] |= value.abs_diff(field.least) << field.shift;
+            words[field.word as usize] |= value.abs_diff(field.least) << field.shift;
         }
         packed
     }
@@ -104,9 +184,33 @@ impl Layout {
 
     /// Changes one variable.
     pub fn set(&self, packed: &mut Packed, variable: u32, value: i64) {
+        packed.edit(&[self.edit(variable, value)]);
+    }
+
+    /// A change of one variable.
+    pub fn edit(&self, variable: u32, value: i64) -> Edit {
         let field = &self.fields[variable as usize];
-        let word = &mut packed.0[field.word as usize];
-        *word = *word & !(field.mask << field.shift) | value.abs_diff(field.least) << field.shift;
+        let set = value.abs_diff(field.least) << field.shift;
+        Edit { word: field.word, clear: field.mask << field.shift, set }
+    }
+
+    /// Where some variables lie; none where their values together take more than 64 bits.
+    pub fn key(&self, variables: &BTreeSet<u32>) -> Option<Key> {
+        let mut key = Key::default();
+        for field in variables.iter().map(|variable| &self.fields[*variable as usize]) {
+            let bits = field.mask.count_ones();
+            if let Some(last) = key.pieces.last_mut()
+                && last.word == field.word
+                && last.shift.saturating_add(last.mask.count_ones()) == field.shift
+            {
+                last.mask = last.mask << bits | field.mask;
+            } else if bits > 0 {
+                let (word, shift, mask) = (field.word, field.shift, field.mask);
+                key.pieces.push(Piece { word, shift, mask, at: key.bits });
+            }
+            key.bits = key.bits.saturating_add(bits);
+        }
+        (key.bits <= 64).then_some(key)
     }
 
     /// How many combinations of values there are, if they can be counted.
@@ -126,7 +230,7 @@ impl Layout {
 
 impl Field {
     fn raw(&self, packed: &Packed) -> u64 {
-        packed.0[self.word as usize] >> self.shift & self.mask
+        packed.words()[self.word as usize] >> self.shift & self.mask
     }
 
     /// How many values there are.

@@ -8,14 +8,16 @@
 
 use crate::mdp::dense;
 use crate::number::{Number, count};
-use crate::solve::chain::solve_chain;
-use crate::solve::local::NONE;
+use crate::solve::chain::Chain;
 use crate::solve::problem::Direction;
 use crate::solve::quotient::Quotient;
 use crate::solve::work::Work;
 
 /// Rounds of policy iteration for the longest way.
 const ROUNDS: usize = 200;
+
+/// Sweeps between two solutions of a chain.
+const SWEEPS: usize = 10;
 
 /// The relative error of evaluating a row that was made of so many transitions.
 pub fn rounding(widest: usize) -> f64 {
@@ -31,35 +33,35 @@ pub fn certify<N: Number>(
 ) -> Vec<f64> {
     let blocks = values.len();
     let v: Vec<f64> = values.iter().map(Number::to_f64).collect();
-    let rows: Vec<(f64, f64)> = (0..quotient.choices.len())
-        .map(|row| {
-            let value = quotient.rows.apply(row, values).to_f64();
-            (value, rounding(quotient.widest) * value)
-        })
-        .collect();
+    let rows: Vec<f64> =
+        (0..quotient.choices.len()).map(|row| quotient.rows.apply(row, values).to_f64()).collect();
+    let relative = rounding(quotient.widest);
+    let own_error = |row: usize| relative * rows[row];
     // How much worse a row is than the value that was found; negative where rounding makes it better.
     let loss = |block: usize, row: usize| match direction {
-        Direction::Min => rows[row].0 - v[block],
-        Direction::Max => v[block] - rows[row].0,
+        Direction::Min => rows[row] - v[block],
+        Direction::Max => v[block] - rows[row],
     };
     if blocks == 1 {
         // Each row is worth what it is worth alone; one that is better by less than rounding may not have been taken.
         let (better, rounding) = (0..rows.len()).fold((0.0_f64, 0.0_f64), |(better, rounding), row| {
             let near = loss(0, row) <= v[0];
-            (better.max(-loss(0, row)), if near { rounding.max(rows[row].1) } else { rounding })
+            (better.max(-loss(0, row)), if near { rounding.max(own_error(row)) } else { rounding })
         });
         return vec![better + rounding];
     }
     for threshold in [1e-8, 1e-12] {
-        let near = |block: usize, row: usize| {
+        let is_near = |block: usize, row: usize| {
             loss(block, row) <= threshold * v[block].max(1e-12) || policy[block] as usize == row
         };
-        let Some(steps) = longest(quotient, policy, near) else { continue };
+        let near = (0..blocks).flat_map(|block| quotient.range(block).map(move |row| (block, row)));
+        let near: Vec<bool> = near.map(|(block, row)| is_near(block, row)).collect();
+        let Some(steps) = longest(quotient, policy, &near) else { continue };
         let own_rounding = |block: usize| 4.0 * f64::EPSILON * v[block];
         let mut delta = 0.0_f64;
         for (block, chosen) in policy.iter().enumerate() {
-            for row in quotient.range(block).filter(|row| near(block, *row)) {
-                let rounding = rows[row].1 + own_rounding(block);
+            for row in quotient.range(block).filter(|row| near[*row]) {
+                let rounding = own_error(row) + own_rounding(block);
                 delta = delta.max(rounding - loss(block, row));
                 if *chosen as usize == row {
                     delta = delta.max(rounding + loss(block, row));
@@ -69,15 +71,9 @@ pub fn certify<N: Number>(
         delta *= 2.0;
         let holds = (0..blocks).all(|block| {
             quotient.range(block).all(|row| {
-                let after: f64 = quotient
-                    .rows
-                    .range(row)
-                    .map(|at| {
-                        quotient.rows.probabilities[at].to_f64() * steps[quotient.rows.columns[at] as usize]
-                    })
-                    .sum();
+                let after = after(quotient, row, &steps);
                 let growth = delta * (after - steps[block]) + delta * 1e-9 * (after + steps[block]);
-                loss(block, row) - rows[row].1 - own_rounding(block) >= growth
+                loss(block, row) - own_error(row) - own_rounding(block) >= growth
             })
         });
         if holds {
@@ -87,43 +83,50 @@ pub fn certify<N: Number>(
     vec![f64::INFINITY; blocks]
 }
 
+/// Expected steps after a row, where those of the blocks are known.
+fn after<N: Number>(quotient: &Quotient<N>, row: usize, steps: &[f64]) -> f64 {
+    let range = quotient.rows.range(row);
+    let transitions = quotient.rows.columns[range.clone()].iter().zip(&quotient.rows.probabilities[range]);
+    transitions.map(|(column, probability)| probability.to_f64() * steps[*column as usize]).sum()
+}
+
 /// Expected steps, at most, by rows that are near the best ones.
-fn longest<N: Number>(
-    quotient: &Quotient<N>,
-    policy: &[u32],
-    near: impl Fn(usize, usize) -> bool,
-) -> Option<Vec<f64>> {
-    let mut rows = crate::solve::chain::Rows::<f64>::new();
-    for row in 0..quotient.choices.len() {
-        for at in quotient.rows.range(row) {
-            rows.columns.push(quotient.rows.columns[at]);
-            rows.probabilities.push(quotient.rows.probabilities[at].to_f64());
-        }
-        rows.end(1.0, quotient.rows.leaving[row].to_f64());
-    }
-    let idle = dense(rows.len());
-    rows.end(1.0, 1.0);
-    let mut policy: Vec<u32> = policy.iter().map(|row| if *row == NONE { idle } else { *row }).collect();
+fn longest<N: Number>(quotient: &Quotient<N>, policy: &[u32], near: &[bool]) -> Option<Vec<f64>> {
+    let rows = &quotient.rows;
+    let mut policy = policy.to_vec();
     for _ in 0..ROUNDS {
-        let steps = solve_chain(&rows, &policy, |_| 1.0, &mut Work::new(0))?.values;
+        let chain = Chain { rows, policy: &policy, costs: Some(N::one()) };
+        let steps = chain.solve(&mut Work::new(0))?.values;
+        let mut steps: Vec<f64> = steps.iter().map(Number::to_f64).collect();
         if steps.iter().any(|steps| !steps.is_finite()) {
             return None;
         }
         let mut changed = false;
-        for (block, chosen) in policy.iter_mut().enumerate() {
-            let mut best = steps[block];
-            for row in quotient.range(block).filter(|row| near(block, *row)) {
-                let value = rows.apply(row, &steps);
-                if value > best + 0.01 {
-                    best = value;
-                    *chosen = dense(row);
-                    changed = true;
-                }
+        for _ in 0..SWEEPS {
+            if !lengthen(quotient, near, &mut policy, &mut steps) {
+                break;
             }
+            changed = true;
         }
         if !changed {
             return Some(steps);
         }
     }
     None
+}
+
+/// Takes rows by which it takes longer, and writes how long; whether any was taken.
+fn lengthen<N: Number>(quotient: &Quotient<N>, near: &[bool], policy: &mut [u32], steps: &mut [f64]) -> bool {
+    let mut changed = false;
+    for (block, chosen) in policy.iter_mut().enumerate() {
+        for row in quotient.range(block).filter(|row| near[*row]) {
+            let longer = after(quotient, row, steps) + 1.0;
+            if *chosen as usize != row && longer > steps[block] + 0.01 {
+                steps[block] = longer;
+                *chosen = dense(row);
+                changed = true;
+            }
+        }
+    }
+    changed
 }

@@ -17,6 +17,7 @@ use std::collections::BinaryHeap;
 use crate::graph::components;
 use crate::mdp::dense;
 use crate::number::{Number, count};
+use crate::solve::local::NONE;
 use crate::solve::work::Work;
 
 /// Rows of a chain: where a state leads inside, what it costs, and with which probability it leaves for good.
@@ -70,19 +71,57 @@ impl<N: Number> Rows<N> {
         self.leaving.push(leaving);
     }
 
+    /// Writes a row, whose entries are told, in the place `to`, which is at or before its own, with the loop at `own` divided
+    /// out. False, and nothing is written, if it never leaves. Rows behind keep their ends, and not their beginnings.
+    pub fn keep_unlooped(
+        &mut self,
+        row: usize,
+        entries: std::ops::Range<usize>,
+        to: usize,
+        own: u32,
+    ) -> bool {
+        let mut end = self.first[to] as usize;
+        let (begin, mut loops, mut leaves) = (end, false, self.leaving[row].clone());
+        for at in entries {
+            if self.columns[at] == own {
+                loops = true;
+                continue;
+            }
+            leaves = leaves.plus(&self.probabilities[at]);
+            self.columns[end] = self.columns[at];
+            self.probabilities.swap(end, at);
+            end = end.saturating_add(1);
+        }
+        if leaves.is_zero() {
+            return false;
+        }
+        self.constants.swap(to, row);
+        self.leaving.swap(to, row);
+        if loops {
+            let parts = self.probabilities[begin..end].iter_mut();
+            for part in parts.chain([&mut self.constants[to], &mut self.leaving[to]]) {
+                *part = part.over(&leaves);
+            }
+        }
+        self.first[to.saturating_add(1)] = dense(end);
+        true
+    }
+
+    /// Forgets all but so many rows.
+    pub fn truncate(&mut self, rows: usize) {
+        let end = self.first[rows] as usize;
+        self.first.truncate(rows.saturating_add(1));
+        self.columns.truncate(end);
+        self.probabilities.truncate(end);
+        self.constants.truncate(rows);
+        self.leaving.truncate(rows);
+    }
+
     /// constant + Σ probability · value.
     pub fn apply(&self, row: usize, values: &[N]) -> N {
         self.range(row).fold(self.constants[row].clone(), |sum, at| {
             sum.plus(&self.probabilities[at].times(&values[self.columns[at] as usize]))
         })
-    }
-
-    fn clear(&mut self) {
-        self.first.truncate(1);
-        self.columns.clear();
-        self.probabilities.clear();
-        self.constants.clear();
-        self.leaving.clear();
     }
 }
 
@@ -102,53 +141,83 @@ pub struct Solved<N> {
 /// Doubles below are so small that products of them lose digits.
 const LOST: f64 = 1e-290;
 
-/// Solves the chain in which state `i` has the row `policy[i]`, with the constants of the rows.
-///
-/// None if some state never leaves, or if elimination takes too long.
-pub fn solve_chain<N: Number>(
-    rows: &Rows<N>,
-    policy: &[u32],
-    constants: impl Fn(usize) -> N,
-    work: &mut Work,
-) -> Option<Solved<N>> {
-    let mut chain = Rows::new();
-    chain.clear();
-    for row in policy {
-        let row = *row as usize;
-        for at in rows.range(row) {
-            chain.columns.push(rows.columns[at]);
-            chain.probabilities.push(rows.probabilities[at].clone());
-        }
-        chain.end(constants(row), rows.leaving[row].clone());
-    }
-    let order = components(policy.len(), |state| &chain.columns[chain.range(state as usize)]);
-    let mut values = vec![N::zero(); policy.len()];
-    let mut relative = vec![0.0_f64; policy.len()];
-    for component in order.iter() {
-        let before = if N::EXACT { 0.0 } else { worst_outside(&chain, component, &relative) };
-        if let [state] = component {
-            let state = *state as usize;
-            let looping = chain.range(state).any(|at| chain.columns[at] as usize == state);
-            if !looping {
-                values[state] = chain.apply(state, &values);
-                work.spend(&values[state], chain.range(state).len())?;
-                relative[state] = before + rounding::<N>(1, chain.range(state).len());
-                continue;
-            }
-        }
-        let Precision { widest, lost } = eliminate(&chain, component, &mut values, work)?;
-        let own = if lost { f64::INFINITY } else { rounding::<N>(component.len(), widest) };
-        for state in component {
-            relative[*state as usize] = before + own;
-        }
-    }
-    Some(Solved { values, relative })
+/// A chain: the rows that a policy takes.
+pub struct Chain<'a, N> {
+    /// All rows.
+    pub rows: &'a Rows<N>,
+    /// For each state its row, or [`NONE`] where nothing happens any more.
+    pub policy: &'a [u32],
+    /// The cost of each row, in place of what it says itself; all others cost nothing.
+    pub costs: Option<N>,
 }
 
-/// The greatest relative error of what a component leads to.
-fn worst_outside<N: Number>(chain: &Rows<N>, component: &[u32], relative: &[f64]) -> f64 {
-    let entries = component.iter().flat_map(|state| chain.range(*state as usize));
-    entries.fold(0.0, |worst, at| worst.max(relative[chain.columns[at] as usize]))
+impl<N: Number> Chain<'_, N> {
+    fn range(&self, state: usize) -> std::ops::Range<usize> {
+        match self.policy[state] {
+            NONE => 0..0,
+            row => self.rows.range(row as usize),
+        }
+    }
+
+    fn targets(&self, state: usize) -> &[u32] {
+        &self.rows.columns[self.range(state)]
+    }
+
+    fn transitions(&self, state: usize) -> impl ExactSizeIterator<Item = (u32, &N)> {
+        let range = self.range(state);
+        self.rows.columns[range.clone()].iter().copied().zip(&self.rows.probabilities[range])
+    }
+
+    fn constant(&self, state: usize) -> N {
+        match (self.policy[state], &self.costs) {
+            (NONE, _) => N::zero(),
+            (_, Some(costs)) => costs.clone(),
+            (row, None) => self.rows.constants[row as usize].clone(),
+        }
+    }
+
+    fn leaving(&self, state: usize) -> N {
+        match self.policy[state] {
+            NONE => N::one(),
+            row => self.rows.leaving[row as usize].clone(),
+        }
+    }
+
+    /// Solves it; none if some state never leaves, or if elimination takes too long.
+    pub fn solve(&self, work: &mut Work) -> Option<Solved<N>> {
+        let order = components(self.policy.len(), |state| self.targets(state as usize));
+        let mut values = vec![N::zero(); self.policy.len()];
+        let mut relative = vec![0.0_f64; self.policy.len()];
+        for component in order.iter() {
+            let before = if N::EXACT { 0.0 } else { self.worst_outside(component, &relative) };
+            if let [state] = component {
+                let state = *state as usize;
+                if self.targets(state).iter().all(|target| *target as usize != state) {
+                    let terms = self.transitions(state);
+                    let width = terms.len();
+                    let value = terms.fold(self.constant(state), |sum, (target, probability)| {
+                        sum.plus(&probability.times(&values[target as usize]))
+                    });
+                    work.spend(&value, width)?;
+                    values[state] = value;
+                    relative[state] = before + rounding::<N>(1, width);
+                    continue;
+                }
+            }
+            let Precision { widest, lost } = eliminate(self, component, &mut values, work)?;
+            let own = if lost { f64::INFINITY } else { rounding::<N>(component.len(), widest) };
+            for state in component {
+                relative[*state as usize] = before + own;
+            }
+        }
+        Some(Solved { values, relative })
+    }
+
+    /// The greatest relative error of what a component leads to.
+    fn worst_outside(&self, component: &[u32], relative: &[f64]) -> f64 {
+        let targets = component.iter().flat_map(|state| self.targets(*state as usize));
+        targets.fold(0.0, |worst, target| worst.max(relative[*target as usize]))
+    }
 }
 
 /// The relative error of eliminating so many states, in rows of so many entries.
@@ -179,7 +248,7 @@ struct Precision {
 
 /// The values of a component.
 fn eliminate<N: Number>(
-    chain: &Rows<N>,
+    chain: &Chain<'_, N>,
     component: &[u32],
     values: &mut [N],
     budget: &mut Work,
@@ -191,19 +260,14 @@ fn eliminate<N: Number>(
     let mut users: Vec<Vec<u32>> = vec![Vec::new(); members.len()];
     for (i, state) in members.iter().enumerate() {
         let state = *state as usize;
-        let mut row = Row {
-            entries: Vec::new(),
-            constant: chain.constants[state].clone(),
-            leaving: chain.leaving[state].clone(),
-        };
-        for at in chain.range(state) {
-            let probability = &chain.probabilities[at];
-            if let Some(j) = local(chain.columns[at]) {
+        let mut row =
+            Row { entries: Vec::new(), constant: chain.constant(state), leaving: chain.leaving(state) };
+        for (target, probability) in chain.transitions(state) {
+            if let Some(j) = local(target) {
                 row.entries.push((dense(j), probability.clone()));
                 users[j].push(dense(i));
             } else {
-                let value = &values[chain.columns[at] as usize];
-                row.constant = row.constant.plus(&probability.times(value));
+                row.constant = row.constant.plus(&probability.times(&values[target as usize]));
                 row.leaving = row.leaving.plus(probability);
             }
         }

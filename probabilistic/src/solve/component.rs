@@ -1,5 +1,6 @@
 //! The equations of one component with cycles to the values of its states: end components merged, policy iteration.
 
+use std::cmp::Reverse;
 use std::collections::VecDeque;
 
 use crate::mdp::dense;
@@ -24,7 +25,12 @@ impl<N: Number> Run<'_, N> {
     }
 
     fn whole_component(&mut self, component: &[u32], local: &mut Local<N>) -> Option<()> {
-        self.cut(component, local, |_, _| true);
+        // States that were found at about the same time lie side by side, and those that were found last are left first.
+        let mut component = component.to_vec();
+        component.sort_unstable_by_key(|state| Reverse(*state));
+        self.cut(&component, local, |_, _| true);
+        let states = component.len();
+        drop(component);
         let members = self.sure_members(local);
         if self.problem.rewards.is_some() {
             for (state, sure) in local.states.iter().zip(&members) {
@@ -49,10 +55,14 @@ impl<N: Number> Run<'_, N> {
             return Some(());
         }
         let must_be_sure = self.problem.rewards.is_some() && self.problem.direction == Direction::Min;
-        self.cut(&rest, local, |run, choice| {
-            !must_be_sure
-                || run.problem.mdp.targets(choice).iter().all(|t| run.solution.sure.contains(*t as usize))
-        });
+        // What is sought for all is cut out already.
+        if must_be_sure || rest.len() < states {
+            self.cut(&rest, local, |run, choice| {
+                let targets = run.problem.mdp.targets(choice);
+                !must_be_sure || targets.iter().all(|t| run.solution.sure.contains(*t as usize))
+            });
+        }
+        drop((rest, members));
         self.values(local)
     }
 
@@ -294,16 +304,55 @@ fn stay<N: Number>(local: &Local<N>, ends: &EndComponents, state: usize) -> u32 
     choices.find(|choice| ends.alive[*choice]).map_or(NONE, |choice| local.choices[choice])
 }
 
-fn quotient<N: Number>(local: &Local<N>, ends: &EndComponents) -> Quotient<N> {
-    let mut members: Vec<Vec<u32>> = vec![Vec::new(); ends.blocks];
-    for (state, block) in ends.block.iter().enumerate() {
-        members[*block as usize].push(dense(state));
+/// Each state as a block of its own. The rows are taken from `local`, and only their own loops are divided out.
+fn unmerged<N: Number>(local: &mut Local<N>) -> Quotient<N> {
+    let mut rows = std::mem::replace(&mut local.rows, Rows::new());
+    let (mut first, mut choices, mut begin) = (vec![0], Vec::with_capacity(local.choices.len()), 0);
+    for state in 0..local.states.len() {
+        for choice in local.range(state) {
+            let end = rows.first[choice.saturating_add(1)] as usize;
+            if rows.keep_unlooped(choice, begin..end, choices.len(), dense(state)) {
+                choices.push(dense(choice));
+            }
+            begin = end;
+        }
+        first.push(dense(choices.len()));
     }
+    rows.truncate(choices.len());
+    Quotient { first, rows, choices, widest: local.widest }
+}
+
+/// The states of each block side by side: where each block starts, and the states.
+fn members(ends: &EndComponents) -> (Vec<u32>, Vec<u32>) {
+    let mut starts = vec![0_u32; ends.blocks.saturating_add(1)];
+    for block in &ends.block {
+        let next = &mut starts[(*block as usize).saturating_add(1)];
+        *next = next.saturating_add(1);
+    }
+    let mut end = 0_u32;
+    for start in &mut starts {
+        end = end.saturating_add(*start);
+        *start = end;
+    }
+    let (mut members, mut free) = (vec![0_u32; ends.block.len()], starts.clone());
+    for (state, block) in ends.block.iter().enumerate() {
+        let at = &mut free[*block as usize];
+        members[*at as usize] = dense(state);
+        *at = at.saturating_add(1);
+    }
+    (starts, members)
+}
+
+fn quotient<N: Number>(local: &mut Local<N>, ends: &EndComponents) -> Quotient<N> {
+    if !ends.inside.contains(&true) {
+        return unmerged(local);
+    }
+    let (starts, members) = members(ends);
     let mut result =
         Quotient { first: vec![0], rows: Rows::new(), choices: Vec::new(), widest: local.widest };
     let mut entries: Vec<(u32, N)> = Vec::new();
-    for (block, states) in members.iter().enumerate() {
-        for state in states {
+    for (block, window) in starts.windows(2).enumerate() {
+        for state in &members[window[0] as usize..window[1] as usize] {
             for choice in local.range(*state as usize) {
                 entries.clear();
                 let (mut leaves, mut loops) = (local.rows.leaving[choice].clone(), false);

@@ -28,14 +28,18 @@ pub fn enclosed<N: Number>(
     work: &mut Work,
 ) -> Option<Enclosed<N>> {
     let tight = work.tight;
-    let Some(found) = found else { return interval::enclose(quotient, direction, tight) };
+    let Some(mut found) = found else { return interval::enclose(quotient, direction, tight) };
+    let is_chain = (0..quotient.blocks()).all(|block| quotient.range(block).len() <= 1);
+    if !is_chain {
+        // What they are off by is told of this policy only.
+        found.relative = Vec::new();
+    }
     if quotient.blocks() > RATIONAL.1 && !is_level(quotient, &found.values, tight) {
         let around = interval::around(quotient, &found.values, direction, tight);
         if around.is_some() {
             return around;
         }
     }
-    let is_chain = (0..quotient.blocks()).all(|block| quotient.range(block).len() <= 1);
     let mut errors: Vec<f64> = if is_chain {
         found.values.iter().zip(&found.relative).map(|(value, relative)| value.to_f64() * relative).collect()
     } else {

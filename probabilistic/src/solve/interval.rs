@@ -8,8 +8,6 @@
 
 use std::collections::VecDeque;
 
-use num_rational::BigRational;
-
 use crate::mdp::dense;
 use crate::number::{Number, count};
 use crate::solve::local::NONE;
@@ -36,7 +34,8 @@ const POLICY_SWEEPS: usize = 25;
 
 /// Bounds on the values of all blocks whose width is `width`, relative to the value; none where they do not get close in time.
 pub fn enclose<N: Number>(quotient: &Quotient<N>, direction: Direction, width: f64) -> Option<Enclosed<N>> {
-    let rows = Rows::new(quotient, direction);
+    let sorted = Sorted::new(quotient);
+    let rows = sorted.rows(quotient, direction);
     let (lower, upper) = rows.iterated(width)?;
     Some(rows.enclosed(quotient, &lower, &upper))
 }
@@ -48,70 +47,122 @@ pub fn around<N: Number>(
     direction: Direction,
     width: f64,
 ) -> Option<Enclosed<N>> {
-    let rows = Rows::new(quotient, direction);
+    let rows = Rows::of(quotient, direction);
     let (lower, upper) = rows.around(near, width)?;
     Some(rows.enclosed(quotient, &lower, &upper))
 }
 
-/// The rows in doubles, in the order in which they are swept.
-struct Rows {
+/// Rows in the order in which they are swept.
+struct Rows<'a, N> {
     direction: Direction,
-    /// The block at each place of the order.
-    order: Vec<u32>,
+    /// The block at each place of the order, and the number of each row in the component; none where they are in their own order.
+    sorted: Option<(&'a [u32], &'a [u32])>,
     /// For each place its first row, and the end.
-    blocks: Vec<u32>,
+    blocks: &'a [u32],
     /// For each row its first transition, and the end.
-    first: Vec<u32>,
+    first: &'a [u32],
     /// Places that rows lead to.
-    columns: Vec<u32>,
-    probabilities: Vec<f64>,
-    constants: Vec<f64>,
-    /// The number of each row in the component.
-    numbers: Vec<u32>,
+    columns: &'a [u32],
+    probabilities: &'a [N],
+    constants: &'a [N],
     /// The relative error of evaluating one row.
     rounding: f64,
 }
 
-impl Rows {
-    fn new<N: Number>(quotient: &Quotient<N>, direction: Direction) -> Self {
+/// Rows by the order in which blocks are left.
+struct Sorted<N> {
+    order: Vec<u32>,
+    blocks: Vec<u32>,
+    first: Vec<u32>,
+    columns: Vec<u32>,
+    probabilities: Vec<N>,
+    constants: Vec<N>,
+    numbers: Vec<u32>,
+}
+
+impl<N: Number> Sorted<N> {
+    fn new(quotient: &Quotient<N>) -> Self {
         let order = order(quotient);
         let mut places = vec![0_u32; order.len()];
         for (place, block) in order.iter().enumerate() {
             places[*block as usize] = dense(place);
         }
-        let mut rows = Self {
-            direction,
+        let mut sorted = Self {
             blocks: vec![0],
             first: vec![0],
             columns: Vec::with_capacity(quotient.rows.columns.len()),
             probabilities: Vec::with_capacity(quotient.rows.columns.len()),
             constants: Vec::with_capacity(quotient.rows.len()),
             numbers: Vec::with_capacity(quotient.rows.len()),
-            rounding: (count(quotient.widest) + 16.0) * f64::EPSILON,
             order: Vec::new(),
         };
         for block in &order {
             for row in quotient.range(*block as usize) {
                 for at in quotient.rows.range(row) {
-                    rows.columns.push(places[quotient.rows.columns[at] as usize]);
-                    rows.probabilities.push(quotient.rows.probabilities[at].to_f64());
+                    sorted.columns.push(places[quotient.rows.columns[at] as usize]);
+                    sorted.probabilities.push(quotient.rows.probabilities[at].clone());
                 }
-                rows.constants.push(quotient.rows.constants[row].to_f64());
-                rows.numbers.push(dense(row));
-                rows.first.push(dense(rows.columns.len()));
+                sorted.constants.push(quotient.rows.constants[row].clone());
+                sorted.numbers.push(dense(row));
+                sorted.first.push(dense(sorted.columns.len()));
             }
-            rows.blocks.push(dense(rows.constants.len()));
+            sorted.blocks.push(dense(sorted.constants.len()));
         }
-        rows.order = order;
-        rows
+        sorted.order = order;
+        sorted
+    }
+
+    fn rows(&self, quotient: &Quotient<N>, direction: Direction) -> Rows<'_, N> {
+        Rows {
+            direction,
+            sorted: Some((&self.order, &self.numbers)),
+            blocks: &self.blocks,
+            first: &self.first,
+            columns: &self.columns,
+            probabilities: &self.probabilities,
+            constants: &self.constants,
+            rounding: rounding(quotient),
+        }
+    }
+}
+
+fn rounding<N: Number>(quotient: &Quotient<N>) -> f64 {
+    (count(quotient.widest) + 16.0) * f64::EPSILON
+}
+
+impl<'a, N: Number> Rows<'a, N> {
+    /// The rows as they stand: states that were found last come first, and these are mostly left soonest.
+    fn of(quotient: &'a Quotient<N>, direction: Direction) -> Self {
+        Self {
+            direction,
+            sorted: None,
+            blocks: &quotient.first,
+            first: &quotient.rows.first,
+            columns: &quotient.rows.columns,
+            probabilities: &quotient.rows.probabilities,
+            constants: &quotient.rows.constants,
+            rounding: rounding(quotient),
+        }
+    }
+
+    fn block(&self, place: usize) -> usize {
+        self.sorted.map_or(place, |(order, _)| order[place] as usize)
+    }
+
+    fn number(&self, row: u32) -> u32 {
+        self.sorted.map_or(row, |(_, numbers)| numbers[row as usize])
+    }
+
+    fn places(&self) -> usize {
+        self.blocks.len().saturating_sub(1)
     }
 
     #[expect(clippy::arithmetic_side_effects, reason = "the end is listed, too")]
     fn apply(&self, row: usize, values: &[f64]) -> f64 {
         let range = self.first[row] as usize..self.first[row + 1] as usize;
         let transitions = self.columns[range.clone()].iter().zip(&self.probabilities[range]);
-        transitions.fold(self.constants[row], |sum, (column, probability)| {
-            sum + probability * values[*column as usize]
+        transitions.fold(self.constants[row].to_f64(), |sum, (column, probability)| {
+            sum + probability.to_f64() * values[*column as usize]
         })
     }
 
@@ -133,10 +184,11 @@ impl Rows {
     }
 
     /// Bounds around values that are close already, by the same argument from both sides.
-    fn around<N: Number>(&self, near: &[N], width: f64) -> Option<(Vec<f64>, Vec<f64>)> {
-        let near: Vec<f64> = self.order.iter().map(|block| near[*block as usize].to_f64()).collect();
-        let mut lower: Vec<f64> = near.iter().map(|value| value * (1.0 - width * NEAR)).collect();
-        let mut upper: Vec<f64> = near.iter().map(|value| value * (1.0 + width * NEAR)).collect();
+    fn around(&self, near: &[N], width: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+        let scaled = |scale: f64| -> Vec<f64> {
+            (0..self.places()).map(|place| near[self.block(place)].to_f64() * scale).collect()
+        };
+        let (mut lower, mut upper) = (scaled(1.0 - width * NEAR), scaled(1.0 + width * NEAR));
         let settles = |values: &mut [f64], moves: &dyn Fn(&mut [f64]) -> bool| {
             (0..UPPER_SWEEPS).any(|_| !moves(values))
         };
@@ -150,8 +202,8 @@ impl Rows {
     fn iterated(&self, width: f64) -> Option<(Vec<f64>, Vec<f64>)> {
         let (down, up) = (1.0 - self.rounding, 1.0 + self.rounding);
         let all = self.columns.len().saturating_add(self.constants.len()) as u64;
-        let mut lower = vec![0.0_f64; self.order.len()];
-        let mut policy = vec![NONE; self.order.len()];
+        let mut lower = vec![0.0_f64; self.places()];
+        let mut policy = vec![NONE; self.places()];
         let (mut work, mut threshold) = (0_u64, width * 0.05);
         while work < WORK {
             loop {
@@ -232,7 +284,7 @@ impl Rows {
         lowered
     }
 
-    fn enclosed<N: Number>(&self, quotient: &Quotient<N>, lower: &[f64], upper: &[f64]) -> Enclosed<N> {
+    fn enclosed(&self, quotient: &Quotient<N>, lower: &[f64], upper: &[f64]) -> Enclosed<N> {
         // The choices that keep a bound from getting worse have values that are within it.
         let kept = if self.direction == Direction::Min { upper } else { lower };
         let blocks = quotient.blocks();
@@ -241,12 +293,12 @@ impl Rows {
             values: vec![N::zero(); blocks],
             errors: vec![0.0; blocks],
         };
-        for (place, block) in self.order.iter().enumerate() {
-            let block = *block as usize;
+        for place in 0..self.places() {
+            let block = self.block(place);
             let (row, _) = self.best(place, kept);
-            found.policy[block] = if row == NONE { NONE } else { self.numbers[row as usize] };
+            found.policy[block] = if row == NONE { NONE } else { self.number(row) };
             let middle = f64::midpoint(lower[place], upper[place]);
-            found.values[block] = N::from_rational(&BigRational::from_float(middle).unwrap_or_default());
+            found.values[block] = N::from_f64(middle);
             found.errors[block] = (upper[place] - lower[place]) * 0.5 + middle * 4.0 * f64::EPSILON;
         }
         found
@@ -321,14 +373,8 @@ mod tests {
         for direction in [Direction::Min, Direction::Max] {
             let quotient = square(12);
             let found = enclose(&quotient, direction, 1e-7).expect("it converges");
-            let values = chain::solve_chain(
-                &quotient.rows,
-                &found.policy,
-                |row| quotient.rows.constants[row],
-                &mut Work::new(0),
-            )
-            .expect("each place is left")
-            .values;
+            let chain = chain::Chain { rows: &quotient.rows, policy: &found.policy, costs: None };
+            let values = chain.solve(&mut Work::new(0)).expect("each place is left").values;
             let exact = certify(&quotient, &found.policy, &values, direction);
             let near = around(&quotient, &values, direction, 1e-7).expect("they are close");
             for ((value, error), (known, rounding)) in

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use crate::mdp::dense;
 use crate::number::Number;
-use crate::solve::chain::{Rows, Solved, solve_chain};
+use crate::solve::chain::{Chain, Solved};
 use crate::solve::local::NONE;
 use crate::solve::problem::Direction;
 use crate::solve::quotient::Quotient;
@@ -64,26 +64,7 @@ pub fn iterate<N: Number>(
 
 /// The values of a policy.
 fn chain<N: Number>(quotient: &Quotient<N>, policy: &[u32], work: &mut Work) -> Option<Solved<N>> {
-    // Blocks that nothing leaves are worth nothing; they get an empty row.
-    if policy.contains(&NONE) {
-        let mut padded = Rows::new();
-        let mut chosen = Vec::with_capacity(policy.len());
-        for row in policy {
-            if *row != NONE {
-                for at in quotient.rows.range(*row as usize) {
-                    padded.columns.push(quotient.rows.columns[at]);
-                    padded.probabilities.push(quotient.rows.probabilities[at].clone());
-                }
-            }
-            let constant =
-                if *row == NONE { N::zero() } else { quotient.rows.constants[*row as usize].clone() };
-            let leaving = if *row == NONE { N::one() } else { quotient.rows.leaving[*row as usize].clone() };
-            chosen.push(dense(padded.len()));
-            padded.end(constant, leaving);
-        }
-        return solve_chain(&padded, &chosen, |row| padded.constants[row].clone(), work);
-    }
-    solve_chain(&quotient.rows, policy, |row| quotient.rows.constants[row].clone(), work)
+    Chain { rows: &quotient.rows, policy, costs: None }.solve(work)
 }
 
 /// Takes the best row of each block; `sweep` writes its value, too. Whether any changed.
