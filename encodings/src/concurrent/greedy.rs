@@ -314,3 +314,65 @@ impl<'a> Greedy<'a> {
         Sequence { value, happenings, together }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use num_rational::BigRational;
+    use pddl::{Source, read};
+
+    use super::*;
+    use crate::concurrent::ground_concurrent;
+    use crate::concurrent::happening::Role;
+    use crate::concurrent::relaxed::Relaxed;
+    use crate::ground::GroundConfig;
+
+    /// Robots on three cells in a row and three beside them change places, and none enters a cell before it has been left.
+    const DOMAIN: &str = "(define (domain crowd) (:requirements :strips :typing :durative-actions)
+        (:types robot cell) (:predicates (at ?r - robot ?c - cell) (clear ?c - cell) (next ?a ?b - cell))
+        (:durative-action move :parameters (?r - robot ?from ?to - cell) :duration (= ?duration 1)
+          :condition (and (at start (at ?r ?from)) (at start (clear ?to)) (over all (next ?from ?to)))
+          :effect (and (at start (not (at ?r ?from))) (at start (not (clear ?to)))
+            (at end (at ?r ?to)) (at end (clear ?from)))))";
+    const PROBLEM: &str = "(define (problem swap) (:domain crowd) (:objects r1 r2 r3 - robot a1 a2 a3 b1 b2 b3 - cell)
+        (:init (at r1 a1) (at r2 a2) (at r3 a3) (clear b1) (clear b2) (clear b3)
+          (next a1 a2) (next a2 a1) (next a2 a3) (next a3 a2) (next b1 b2) (next b2 b1) (next b2 b3) (next b3 b2)
+          (next a1 b1) (next b1 a1) (next a2 b2) (next b2 a2) (next a3 b3) (next b3 a3))
+        (:goal (and (at r1 a3) (at r2 a2) (at r3 a1))))";
+
+    fn first(mode: Mode) -> (Sequence, Vec<Role>) {
+        let (domain, problem, _) =
+            read(&Source::new("domain", DOMAIN), &Source::new("problem", PROBLEM)).expect("PDDL");
+        let separation = BigRational::new(1.into(), 1000.into());
+        let concurrent =
+            ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation).expect("a task");
+        let (estimate, expansion) = (Estimate::new(&concurrent), Expansion::new(&concurrent));
+        let relaxed = Relaxed::new(&concurrent);
+        let mut greedy = Greedy::new(&concurrent, &expansion, &estimate, None, Guidance::new(&relaxed), mode);
+        let mut incumbent = None;
+        let outcome = greedy.run(&mut incumbent, &Limits::none(), 100_000);
+        assert_eq!(outcome, Outcome::Found);
+        let sequence = incumbent.expect("a plan");
+        let roles = sequence.happenings.iter().map(|id| concurrent.happenings[id.index()].role);
+        (sequence.clone(), roles.collect())
+    }
+
+    #[test]
+    fn whole_actions_follow_each_other_and_overlap_in_time() {
+        let (sequence, roles) = first(Mode::Sequential);
+        assert!(roles.len() > 6, "{roles:?}");
+        for pair in roles.chunks(2) {
+            let [Role::Start(start), Role::End(end)] = pair else { panic!("{roles:?}") };
+            assert_eq!(start, end);
+        }
+        let actions = Int::try_from(roles.len() / 2).expect("few");
+        assert!(sequence.value.1 < actions * 1000, "{:?}", sequence.value);
+    }
+
+    #[test]
+    fn starts_and_ends_by_themselves_reach_the_goal_too() {
+        for mode in [Mode::Overlapping, Mode::Sooner] {
+            let (sequence, roles) = first(mode);
+            assert_eq!(sequence.together.len(), roles.len());
+        }
+    }
+}
