@@ -17,8 +17,10 @@ use std::collections::BinaryHeap;
 use crate::graph::components;
 use crate::mdp::dense;
 use crate::number::{Number, count};
-use crate::solve::local::NONE;
 use crate::solve::work::Work;
+
+/// No number.
+pub const NONE: u32 = u32::MAX;
 
 /// Rows of a chain: where a state leads inside, what it costs, and with which probability it leaves for good.
 #[derive(Debug, Clone, Default)]

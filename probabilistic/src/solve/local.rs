@@ -9,8 +9,7 @@ use crate::number::Number;
 use crate::solve::chain::Rows;
 use crate::solve::users::{Users, owners};
 
-/// No number.
-pub const NONE: u32 = u32::MAX;
+pub use crate::solve::chain::NONE;
 
 /// The choices of some states; local numbers count the states and the choices from 0.
 #[derive(Debug, Clone)]
