@@ -43,7 +43,7 @@ const SMALL: usize = 150_000;
 /// What exact arithmetic may cost a model with so many transitions unless it was asked for, in units of about a nanosecond.
 fn budget(transitions: usize) -> u64 {
     let transitions = u64::try_from(transitions).unwrap_or(u64::MAX);
-    transitions.saturating_mul(500).max(2_000_000)
+    transitions.saturating_mul(500).max(3_000_000)
 }
 
 /// What came out.
