@@ -145,11 +145,12 @@ impl<'a> Search<'a> {
         let mut outcome = None;
         if course.is_goal(self.concurrent)
             && let Some(found) = answer(self.concurrent, &course)
-            && self.is_reached(&found)
-            && best.as_ref().is_none_or(|best| found.value < best.value)
         {
-            *best = Some(found);
-            outcome = Some(Outcome::Found);
+            self.note_reached(&found.least);
+            if best.as_ref().is_none_or(|best| found.value < best.value) {
+                *best = Some(found);
+                outcome = Some(Outcome::Found);
+            }
         }
         if left < self.nearest {
             self.nearest = left;
@@ -175,11 +176,10 @@ impl<'a> Search<'a> {
     }
 
     /// Notes what a plan could come to if its durations need not be decimals.
-    fn is_reached(&mut self, found: &Answer) -> bool {
-        if self.reached.as_ref().is_none_or(|reached| found.least < *reached) {
-            self.reached = Some(found.least.clone());
+    fn note_reached(&mut self, least: &Rational) {
+        if self.reached.as_ref().is_none_or(|reached| least < reached) {
+            self.reached = Some(least.clone());
         }
-        true
     }
 
     /// How far the goal is from a sequence; none if it is nothing new, or a dead end.
