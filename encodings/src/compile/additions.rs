@@ -15,6 +15,11 @@ pub(super) fn declare(domain: &mut Domain, name: &str) {
     domain.predicates.push(Declaration { identifier: identifier(name), parameters: Vec::new() });
 }
 
+/// An action without parameters that is none of the domain.
+pub(super) fn hidden(name: &str, body: ActionBody, span: Span) -> Action {
+    Action { identifier: identifier(name), parameters: Vec::new(), body, preferences: Vec::new(), span }
+}
+
 /// Adds a condition to an action, in the state before what it does at a time.
 pub(super) fn require(action: &mut Action, time: EffectTime, condition: Condition) {
     match &mut action.body {

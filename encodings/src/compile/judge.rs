@@ -1,6 +1,8 @@
 //! Preferences as actions after the plan, which are not shown: each instance of a preference is met, or violated at a cost.
 //!
 //! They come in one order, each is possible in one way only, and they change nothing else. So every plan can be judged in exactly one way.
+//! Where actions overlap, the plan would last longer by them: there is one for each instance that is violated, which never happens. Its
+//! condition is looked up in the last state.
 
 use num_rational::BigRational;
 use num_traits::{One, Zero};
@@ -10,11 +12,18 @@ use pddl::ast::{
     InitialElement, Name, Problem, Span,
 };
 
-use super::additions::{Wanted, declare, happen, require};
-use super::terms::{all, flag, holds, identifier, not};
+use super::additions::{Wanted, declare, happen, hidden, require};
+use super::course::Course;
+use super::terms::{all, flag, holds, not};
 
 /// Holds as long as actions can be executed.
 const GOING_ON: &str = "the plan goes on";
+
+/// How the names of actions end that judge an instance violated.
+pub(super) const VIOLATION: &str = " is violated";
+
+/// Never holds.
+const VIOLATED: &str = "a preference is violated";
 
 /// The function that counts the violations of a preference.
 pub(super) fn count(preference: &Name) -> Atom {
@@ -27,7 +36,12 @@ fn violate(preference: &Name) -> Effect {
 }
 
 /// Adds the preferences that are asked for.
-pub(super) fn install(domain: &mut Domain, problem: &mut Problem, wanted: Vec<Wanted>, asked: &[Name]) {
+pub(super) fn install(
+    domain: &mut Domain,
+    problem: &mut Problem,
+    (wanted, asked): (Vec<Wanted>, &[Name]),
+    course: Course<'_>,
+) {
     for name in asked {
         let function = count(name);
         domain.functions.push(Declaration { identifier: function.predicate.clone(), parameters: Vec::new() });
@@ -36,9 +50,15 @@ pub(super) fn install(domain: &mut Domain, problem: &mut Problem, wanted: Vec<Wa
     for action in &mut domain.actions {
         count_preferences(action, asked);
     }
-    if wanted.is_empty() {
-        return;
+    if matches!(course, Course::Overlapping(_)) {
+        look_up(domain, problem.name.span, wanted);
+    } else if !wanted.is_empty() {
+        follow(domain, problem, wanted);
     }
+}
+
+/// Adds the actions that judge after the plan.
+fn follow(domain: &mut Domain, problem: &mut Problem, wanted: Vec<Wanted>) {
     declare(domain, GOING_ON);
     problem.init.push(InitialElement::Fact(flag(GOING_ON)));
     for action in &mut domain.actions {
@@ -54,25 +74,31 @@ pub(super) fn install(domain: &mut Domain, problem: &mut Problem, wanted: Vec<Wa
         let ready = all([holds(&before)].into_iter().chain(first.take()));
         let pass = [Effect::Delete(flag(&before)), Effect::Add(flag(&after))];
         let met = (format!("preference {number} is met"), condition.clone(), None);
-        let violated = (format!("preference {number} is violated"), not(condition), Some(violate(&name)));
+        let violated = (format!("preference {number}{VIOLATION}"), not(condition), Some(violate(&name)));
         for (own, condition, cost) in [met, violated] {
             let body = ActionBody::Instantaneous {
                 precondition: all([ready.clone(), condition]),
                 effect: Effect::And(pass.iter().cloned().chain(cost).collect()),
             };
-            let span = problem.name.span;
-            let identifier = identifier(&own);
-            domain.actions.push(Action {
-                identifier,
-                parameters: Vec::new(),
-                body,
-                preferences: Vec::new(),
-                span,
-            });
+            domain.actions.push(hidden(&own, body, problem.name.span));
         }
         before = after;
     }
     problem.goal = holds(&before);
+}
+
+/// Adds the actions whose condition is that an instance is violated.
+fn look_up(domain: &mut Domain, span: Span, wanted: Vec<Wanted>) {
+    if !wanted.is_empty() {
+        declare(domain, VIOLATED);
+    }
+    for ((name, condition), number) in wanted.into_iter().zip(1_u64..) {
+        // What changes nothing would be left out.
+        let precondition = all([not(condition), not(holds(VIOLATED))]);
+        let effect = Effect::And(vec![violate(&name), Effect::Add(flag(VIOLATED))]);
+        let body = ActionBody::Instantaneous { precondition, effect };
+        domain.actions.push(hidden(&format!("preference {number}{VIOLATION}"), body, span));
+    }
 }
 
 /// Lets an action count the violations of its own preferences.

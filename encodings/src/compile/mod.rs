@@ -3,7 +3,7 @@
 //! Each instance of a constraint gets atoms that remember what its automaton has to, and each action effects on them: a condition on
 //! the state *after* the action is regressed to the state before it (`regress`), so that no state is added to plans. What has to hold
 //! becomes a condition of actions and of the goal. Preferences are judged after the plan, by actions that are not shown (`judge`):
-//! each either is met, or costs what the metric says (A. Gerevini et al.: Deterministic planning in the fifth international planning
+//! each either is met, or costs what the metric says. Where actions overlap, they are looked up when the goal holds, and never happen (A. Gerevini et al.: Deterministic planning in the fifth international planning
 //! competition, Artificial Intelligence 173, 2009; regression after L. Bonassi et al.: On planning with qualitative
 //! state-trajectory constraints in PDDL3 by compiling them away, ICAPS 2021; preferences after E. Keyder, H. Geffner: Soft goals can be
 //! compiled away, JAIR 36, 2009).
@@ -11,18 +11,23 @@
 //! Names that are made up have a space, so that no file can mean them.
 
 mod additions;
+mod course;
+mod deadline;
 mod initial;
 mod instances;
 mod judge;
 mod monitor;
 mod regress;
 mod terms;
+mod timed;
 use std::borrow::Cow;
 
 use crate::error::{Errors, File};
 use pddl::ast::{Constraint, Domain, Expression, InitialElement, Metric, Name, Problem, Term};
 
 use additions::unsupported;
+pub(crate) use course::Course;
+pub(crate) use deadline::Deadline;
 use instances::Objects;
 use monitor::Monitors;
 
@@ -31,6 +36,10 @@ pub(crate) struct Compiled<'t> {
     pub(crate) domain: Cow<'t, Domain>,
     pub(crate) problem: Cow<'t, Problem>,
     pub(crate) objectives: Cow<'t, [Metric]>,
+    /// What plans have to keep in time, or should, which is judged when their times are known.
+    pub(crate) deadlines: Vec<Deadline>,
+    /// Whether nothing keeps happenings apart that the files do not. Of no meaning where actions do not overlap.
+    pub(crate) is_exact: bool,
 }
 
 /// Whether there is anything to compile.
@@ -44,6 +53,11 @@ pub(crate) fn is_hidden(action: &str) -> bool {
     action.contains(' ')
 }
 
+/// Whether an action of that name judges an instance of a preference violated.
+pub(crate) fn is_violation(action: &str) -> bool {
+    is_hidden(action) && action.ends_with(judge::VIOLATION)
+}
+
 /// Compiles preferences and constraints away. Preferences that no objective asks for are dropped.
 ///
 /// # Errors
@@ -52,14 +66,21 @@ pub(crate) fn compile<'t>(
     domain: &'t Domain,
     problem: &'t Problem,
     objectives: &'t [Metric],
+    course: Course<'_>,
 ) -> Result<Compiled<'t>, Errors> {
     if !is_needed(domain, problem) {
         let (domain, problem) = (Cow::Borrowed(domain), Cow::Borrowed(problem));
-        return Ok(Compiled { domain, problem, objectives: Cow::Borrowed(objectives) });
+        return Ok(Compiled {
+            domain,
+            problem,
+            objectives: Cow::Borrowed(objectives),
+            deadlines: Vec::new(),
+            is_exact: true,
+        });
     }
     let asked = asked(if objectives.is_empty() { problem.metric.as_slice() } else { objectives });
     let objects = Objects::of(domain, problem);
-    let mut monitors = Monitors::new(domain, problem, &objects);
+    let mut monitors = Monitors::new(domain, problem, &objects, course);
     let mut errors = Vec::new();
     for (file, constraint) in constraints(domain, problem) {
         if constraint.preference.as_ref().is_none_or(|name| asked.contains(&name.name)) {
@@ -73,7 +94,7 @@ pub(crate) fn compile<'t>(
         }
     }
     let has_events = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
-    if has_events && !asked.is_empty() {
+    if has_events && !asked.is_empty() && matches!(course, Course::Sequence) {
         errors.push(unsupported(
             "a preference beside timed initial literals",
             "a plan that waits for a literal after its last action would be judged too late",
@@ -85,19 +106,23 @@ pub(crate) fn compile<'t>(
     }
     let mut task = (domain.clone(), problem.clone());
     (task.0.constraints, task.1.constraints) = (Vec::new(), Vec::new());
-    let wanted = monitors.install(&mut task.0, &mut task.1);
+    let mut is_exact = monitors.keeps_apart_nothing();
+    let (wanted, deadlines) = monitors.install(&mut task.0, &mut task.1);
     let mut objectives = objectives.to_vec();
     for metric in task.1.metric.iter_mut().chain(&mut objectives) {
         name_violations(&mut metric.expression);
     }
     if !asked.is_empty() {
-        judge::install(&mut task.0, &mut task.1, wanted, &asked);
+        // What an action prefers, it reads.
+        let mut preferences = task.0.actions.iter().flat_map(|action| &action.preferences);
+        is_exact &= !preferences.any(|own| asked.contains(&own.name.name));
+        judge::install(&mut task.0, &mut task.1, (wanted, &asked), course);
     }
     for action in &mut task.0.actions {
         action.preferences.clear();
     }
     let (domain, problem) = (Cow::Owned(task.0), Cow::Owned(task.1));
-    Ok(Compiled { domain, problem, objectives: Cow::Owned(objectives) })
+    Ok(Compiled { domain, problem, objectives: Cow::Owned(objectives), deadlines, is_exact })
 }
 
 fn constraints<'t>(

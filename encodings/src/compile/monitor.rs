@@ -1,6 +1,7 @@
 //! What has to be remembered of the states so far, for each instance of a constraint, and how actions keep it.
 
-use num_traits::Signed;
+use num_rational::BigRational;
+use num_traits::{Signed, Zero};
 use pddl::ast::{
     Action, ActionBody, Comparison, Condition, Constraint, Domain, DurationConstraint, Effect, EffectTime,
     Expression, InitialElement, Problem, Span, Trajectory,
@@ -10,6 +11,8 @@ use rustc_hash::FxHashSet;
 use crate::error::{Error, File};
 
 use super::additions::{Wanted, declare, happen, require, unsupported};
+use super::course::Course;
+use super::deadline::{self, Deadline};
 use super::initial::Initial;
 use super::instances::{Binding, Objects, instance};
 use super::regress::{Happening, TooHard};
@@ -23,7 +26,7 @@ pub(super) struct Monitors<'t> {
     domain: &'t Domain,
     problem: &'t Problem,
     objects: &'t Objects<'t>,
-    initial: Initial<'t>,
+    pub(super) initial: Initial<'t>,
     /// What the actions have in addition, by action and time.
     additions: Vec<[Addition; 2]>,
     /// Atoms that remember, and whether they hold at first.
@@ -31,13 +34,20 @@ pub(super) struct Monitors<'t> {
     /// What has to hold in the end.
     goals: Vec<Condition>,
     wanted: Vec<Wanted>,
+    /// Atoms that timed initial literals add, and when.
+    pub(super) moments: Vec<(String, BigRational)>,
+    pub(super) course: Course<'t>,
+    /// What has to be kept in time: the two conditions, and what notes that it was.
+    pub(super) deadlines: Vec<(Deadline, [Condition; 2], Effect)>,
+    /// Whether durations are asked for that the files do not ask for.
+    narrows: bool,
     instances: usize,
     fresh: u64,
 }
 
 /// What one happening of an action has in addition.
 #[derive(Default)]
-struct Addition {
+pub(super) struct Addition {
     conditions: Vec<Condition>,
     effects: Vec<Effect>,
 }
@@ -45,7 +55,12 @@ struct Addition {
 const TIMES: [EffectTime; 2] = [EffectTime::AtStart, EffectTime::AtEnd];
 
 impl<'t> Monitors<'t> {
-    pub(super) fn new(domain: &'t Domain, problem: &'t Problem, objects: &'t Objects<'t>) -> Self {
+    pub(super) fn new(
+        domain: &'t Domain,
+        problem: &'t Problem,
+        objects: &'t Objects<'t>,
+        course: Course<'t>,
+    ) -> Self {
         Self {
             domain,
             problem,
@@ -55,6 +70,10 @@ impl<'t> Monitors<'t> {
             memory: Vec::new(),
             goals: Vec::new(),
             wanted: Vec::new(),
+            moments: Vec::new(),
+            course,
+            deadlines: Vec::new(),
+            narrows: false,
             instances: 0,
             fresh: 0,
         }
@@ -128,19 +147,27 @@ impl<'t> Monitors<'t> {
                 let (first, second) = (ground(first)?, ground(second)?);
                 self.sometime_before(&first, &second, hard, place)
             }
-            Trajectory::Within(..)
-            | Trajectory::AlwaysWithin(..)
-            | Trajectory::HoldDuring(..)
-            | Trajectory::HoldAfter(..) => Err(unsupported(
-                "a constraint on the times of states (`within`, `always-within`, `hold-during`, `hold-after`)",
-                "constraints on the order of states; `validate` judges those on times, too",
-                place,
-            )),
+            Trajectory::Within(time, what) => {
+                let what = ground(what)?;
+                self.within(time, &what, place)
+            }
+            Trajectory::HoldDuring(from, until, what) => {
+                let what = ground(what)?;
+                self.hold((from, Some(until)), &what, hard, place)
+            }
+            Trajectory::HoldAfter(from, what) => {
+                let what = ground(what)?;
+                self.hold((from, None), &what, hard, place)
+            }
+            Trajectory::AlwaysWithin(time, first, second) => {
+                let (first, second) = (ground(first)?, ground(second)?);
+                self.always_within(time, [&first, &second], hard, place)
+            }
         }
     }
 
     /// An atom that remembers something about an instance.
-    fn remember(&mut self, what: &str, at_first: bool) -> String {
+    pub(super) fn remember(&mut self, what: &str, at_first: bool) -> String {
         let name = format!("instance {} {what}", self.instances);
         self.memory.push((name.clone(), at_first));
         name
@@ -148,7 +175,7 @@ impl<'t> Monitors<'t> {
 
     /// Adds to each happening of each action that may change one of some conditions what is made of the condition that it does,
     /// and of the conditions after it.
-    fn after_each(
+    pub(super) fn after_each(
         &mut self,
         conditions: &[&Condition],
         place: (File, Span),
@@ -165,11 +192,16 @@ impl<'t> Monitors<'t> {
             if touched.iter().all(|touched| !is_false(touched))
                 && !takes_time(self.domain, self.problem, action)
             {
-                let construct = format!(
-                    "a constraint on what `{}` changes both at its start and at its end, which may be one time",
-                    action.identifier.name
-                );
-                return Err(unsupported(construct, "a duration that is known to be above 0", place));
+                let takes_time = positive(action).filter(|_| matches!(self.course, Course::Overlapping(_)));
+                let takes_time = takes_time.ok_or_else(|| {
+                    let construct = format!(
+                        "a constraint on what `{}` changes both at its start and at its end, which may be one time",
+                        action.identifier.name
+                    );
+                    unsupported(construct, "a duration that is known to be above 0", place)
+                })?;
+                additions[0].conditions.push(takes_time);
+                self.narrows = true;
             }
             for ((happening, touched), addition) in happenings.iter().zip(touched).zip(additions) {
                 if is_false(&touched) {
@@ -192,8 +224,17 @@ impl<'t> Monitors<'t> {
         Ok(())
     }
 
+    /// Whether what happenings have in addition keeps none of them apart from another one, and rules none out.
+    pub(super) fn keeps_apart_nothing(&self) -> bool {
+        let is_plain = |addition: &Addition| {
+            addition.conditions.is_empty()
+                && addition.effects.iter().all(|effect| matches!(effect, Effect::Add(_)))
+        };
+        !self.narrows && self.deadlines.is_empty() && self.additions.iter().flatten().all(is_plain)
+    }
+
     /// Whether nothing but actions changes a condition.
-    fn can_be_watched(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {
+    pub(super) fn can_be_watched(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {
         let mut predicates = FxHashSet::default();
         predicates_of(condition, &mut predicates);
         let derived = self.domain.derived.iter().map(|axiom| &axiom.head.identifier.name);
@@ -293,8 +334,12 @@ impl<'t> Monitors<'t> {
         Ok(broken.map_or(decided(!at_first), |broken| not(holds(&broken))))
     }
 
-    /// Changes the task. What is left are the preferences, and what has to hold in the last state for each.
-    pub(super) fn install(self, domain: &mut Domain, problem: &mut Problem) -> Vec<Wanted> {
+    /// Changes the task. What is left are the preferences, what has to hold in the last state for each, and what has to be kept in time.
+    pub(super) fn install(self, domain: &mut Domain, problem: &mut Problem) -> (Vec<Wanted>, Vec<Deadline>) {
+        for (name, time) in self.moments {
+            declare(domain, &name);
+            problem.init.push(InitialElement::Timed(time, flag(&name), true, Span::default()));
+        }
         for (name, at_first) in self.memory {
             declare(domain, &name);
             if at_first {
@@ -313,7 +358,8 @@ impl<'t> Monitors<'t> {
         }
         let goal = std::mem::replace(&mut problem.goal, Condition::And(Vec::new()));
         problem.goal = all([goal].into_iter().chain(self.goals));
-        self.wanted
+        let deadlines = deadline::install(domain, problem, self.deadlines);
+        (self.wanted, deadlines)
     }
 }
 
@@ -322,7 +368,7 @@ impl Addition {
         Self { conditions: vec![condition], effects: Vec::new() }
     }
 
-    fn notes(condition: Condition, effect: Effect) -> Self {
+    pub(super) fn notes(condition: Condition, effect: Effect) -> Self {
         let effect = match condition {
             condition if is_false(&condition) => return Self::default(),
             condition if is_true(&condition) => effect,
@@ -332,7 +378,7 @@ impl Addition {
     }
 
     /// Rules out what must not be, or notes that it was.
-    fn forbid(&mut self, what: Condition, broken: Option<&str>) {
+    pub(super) fn forbid(&mut self, what: Condition, broken: Option<&str>) {
         match broken {
             None => self.conditions.push(not(what)),
             Some(broken) => self.effects.extend(Self::notes(what, Effect::Add(flag(broken))).effects),
@@ -340,7 +386,7 @@ impl Addition {
     }
 }
 
-fn decided(holds: bool) -> Condition {
+pub(super) fn decided(holds: bool) -> Condition {
     if holds { all([]) } else { any([]) }
 }
 
@@ -363,6 +409,16 @@ fn predicates_of<'c>(condition: &'c Condition, found: &mut FxHashSet<&'c pddl::a
         }
         Condition::Equal(..) | Condition::Compare(..) => {}
     }
+}
+
+/// That an action takes time, if its duration is fixed.
+fn positive(action: &Action) -> Option<Condition> {
+    let ActionBody::Durative { duration, .. } = &action.body else { return None };
+    let [DurationConstraint { operator: Comparison::Equal, expression, span, .. }] = &duration[..] else {
+        return None;
+    };
+    let zero = Expression::Number(BigRational::zero(), *span);
+    Some(Condition::Compare(Comparison::Greater, expression.clone(), zero, *span))
 }
 
 /// Whether an action is known to have a start and an end apart.

@@ -30,7 +30,9 @@ pub(super) fn in_names(concurrent: &Concurrent, sequence: &Sequence) -> Plan {
     let durations = schedule::durations(concurrent, &sequence.happenings);
     let times = schedule::schedule(concurrent, &sequence.happenings, &sequence.together, &durations);
     let mut steps: Vec<((Int, OperatorId), Step)> = Vec::new();
-    let happenings = sequence.happenings.iter().map(|id| (*id, &[][..]));
+    let last = concurrent.last_state(&sequence.happenings, &sequence.together);
+    let violated: Vec<OperatorId> = last.iter().flat_map(|last| concurrent.violated(last)).collect();
+    let happenings = sequence.happenings.iter().chain(&violated).map(|id| (*id, &[][..]));
     let (measured, rest) = measured(&concurrent.task, happenings);
     let ends = |position: usize, end: OperatorId| {
         let later = sequence.happenings.iter().zip(&measured).skip(position);

@@ -92,7 +92,7 @@ impl<'a> Builder<'a> {
             let arguments: Vec<ObjectId> = operator.arguments.iter().copied().filter_map(object).collect();
             let mut binding: Binding = arguments.iter().map(|object| Some(*object)).collect();
             binding.resize(schema.variables, None);
-            let is_none = matches!(origin.half, Half::OverAll | Half::Choice);
+            let is_none = matches!(origin.half, Half::OverAll | Half::Choice | Half::Judge);
             let effects = if is_none { &[] } else { &schema.end_effects[..] };
             // What is under way, how many events there were and whether they were waited for has no place in the files.
             let time = (!self.split.events.is_empty()).then_some(self.split.lifted.time);
@@ -122,7 +122,7 @@ impl<'a> Builder<'a> {
                     self.written.push(Footprint::default());
                 }
             }
-            if matches!(origin.half, Half::Whole | Half::Timed(_) | Half::Choice) {
+            if matches!(origin.half, Half::Whole | Half::Timed(_) | Half::Choice | Half::Judge) {
                 continue;
             }
             let key = (origin.schema, arguments);

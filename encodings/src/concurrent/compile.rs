@@ -1,10 +1,14 @@
 //! The split ground task to happenings: what pairs a start with its end, what each waits for, and integers for all times.
 
+use std::collections::BTreeMap;
+
 use crate::error::Errors;
 use rustc_hash::FxHashSet;
 
+use crate::compile::is_violation;
 use crate::concurrent::builder::Builder;
 use crate::concurrent::compress::compressible;
+use crate::concurrent::deadline::Deadline;
 use crate::concurrent::grows::only_grows;
 use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::links::drop_links;
@@ -30,8 +34,14 @@ pub struct Concurrent {
     /// For each kind of access a variable whose current value everything reads that waits for such accesses.
     pub(super) guards: Vec<Option<u32>>,
     pub(super) measure: Measure,
+    /// For each preference that may be violated in the end: the operators of which one can be applied then. They never happen.
+    pub(super) violations: Vec<Vec<OperatorId>>,
+    /// What plans have to keep in time, or should.
+    pub(super) deadlines: Vec<Deadline>,
     /// Whether every plan is among those that the search goes through, with the times that it can have.
     pub(super) is_exact: bool,
+    /// Whether no plan is better than all that the search goes through. If not, only what costs and times are by themselves is known: not below 0.
+    pub(super) is_bounded: bool,
     /// Whether what plans are compared by is the whole metric.
     pub(super) is_whole: bool,
     /// How far apart interfering happenings are, in the task's time unit.
@@ -79,6 +89,7 @@ pub(super) fn compile(
         events.extend(if let Role::Timed(time) = role { Some((*time, id)) } else { None });
     }
     events.sort_unstable();
+    let violations = violations(&task);
     task.time_scale = unit.0;
     drop_links(&mut task, &instances);
     let compressible = compressible(&task, &happenings, &instances, limits);
@@ -93,7 +104,10 @@ pub(super) fn compile(
         events,
         guards,
         measure,
+        violations,
+        deadlines: Vec::new(),
         is_exact,
+        is_bounded: true,
         is_whole,
         separation,
         shortest: None,
@@ -174,4 +188,15 @@ impl Concurrent {
         let writes = &self.happenings[operator.index()].writes;
         !joint.is_empty() && writes.iter().any(|id| joint.binary_search(id).is_ok())
     }
+}
+
+/// The operators of preferences that are violated, by preference.
+fn violations(task: &Task) -> Vec<Vec<OperatorId>> {
+    let mut violations: BTreeMap<u32, Vec<OperatorId>> = BTreeMap::new();
+    for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {
+        if is_violation(&task.schema_names[operator.schema as usize]) {
+            violations.entry(operator.schema).or_default().push(id);
+        }
+    }
+    violations.into_values().collect()
 }

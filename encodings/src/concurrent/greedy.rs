@@ -226,12 +226,22 @@ impl<'a> Greedy<'a> {
         {
             return None;
         }
-        if self.expansion.is_goal(situation) {
-            *incumbent = Some(self.sequence(situation, parent, links));
-            return Some(Outcome::Found);
+        let found = if self.expansion.is_goal(situation) {
+            let better = self
+                .sequence(situation, parent, &links)
+                .filter(|own| incumbent.as_ref().is_none_or(|known| own.value < known.value));
+            let found = better.is_some().then_some(Outcome::Found);
+            *incumbent = better.or_else(|| incumbent.take());
+            found
+        } else {
+            None
+        };
+        // Where preferences are violated in the end, a longer plan may be better.
+        if found.is_some() && self.concurrent.violations.is_empty() {
+            return found;
         }
         self.figures.evaluated = self.figures.evaluated.saturating_add(1);
-        let Guide { left, preferred } = self.guidance.guide(situation)?;
+        let Some(Guide { left, preferred }) = self.guidance.guide(situation) else { return found };
         if left < self.nearest {
             self.nearest = left;
             self.open.boost();
@@ -248,7 +258,7 @@ impl<'a> Greedy<'a> {
         let packed = self.packing.pack(situation);
         self.bytes = self.bytes.saturating_add(OVERHEAD).saturating_add(packed.bytes());
         self.nodes.push(Node { packed, parent, links });
-        None
+        found
     }
 
     /// A lower bound of the metric of plans that go on from here, and of their makespan. None if there is none.
@@ -296,11 +306,10 @@ impl<'a> Greedy<'a> {
         }
     }
 
-    fn sequence(&self, situation: &Situation, parent: u32, links: Links) -> Sequence {
-        let latest = situation.clocks.latest();
-        let total = self.concurrent.measure.total(latest, situation.cost);
-        let value = (total.expect("invariant: what is a goal was measured"), latest);
-        let mut all: Vec<Link> = links.into_iter().rev().collect();
+    /// The sequence that leads to a goal; none if its metric does not fit, or it does not keep what it has to.
+    fn sequence(&self, situation: &Situation, parent: u32, links: &Links) -> Option<Sequence> {
+        let value = self.concurrent.value(situation)?;
+        let mut all: Vec<Link> = links.iter().rev().copied().collect();
         let mut at = parent as usize;
         while let Some(node) = self.nodes.get(at) {
             all.extend(node.links.iter().rev());
@@ -311,7 +320,7 @@ impl<'a> Greedy<'a> {
         }
         all.reverse();
         let (happenings, together) = all.into_iter().unzip();
-        Sequence { value, happenings, together }
+        self.concurrent.judge(Sequence { value, happenings, together }, situation.cost)
     }
 }
 

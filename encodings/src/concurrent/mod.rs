@@ -13,6 +13,7 @@ mod chosen;
 mod clocks;
 mod compile;
 mod compress;
+mod deadline;
 mod estimate;
 mod expansion;
 mod footprint;
@@ -20,6 +21,7 @@ mod greedy;
 mod grows;
 mod guidance;
 mod happening;
+mod judge;
 mod links;
 mod measure;
 mod record;
@@ -41,6 +43,7 @@ use num_traits::Signed;
 use tracing::info_span;
 
 use crate::bounds::Bounds;
+use crate::compile::{Compiled, Course, compile as compile_away, is_hidden};
 use crate::context::Context;
 use crate::error::{Error, Errors, File, Place};
 use crate::ground::{Generality, GroundConfig, ground_lifted};
@@ -54,6 +57,7 @@ use pddl::ast::{self, ActionBody, Comparison, Direction, Domain, EffectTime, Pro
 pub use compile::Concurrent;
 
 use answer::{ended, in_names};
+use deadline::Deadline;
 use record::Record;
 use search::Ended;
 use turns::take_turns;
@@ -77,17 +81,31 @@ pub fn ground_concurrent(
         return Err(overflow().into());
     }
     let separation = Rational::from_big(separation.clone());
-    if let Some(place) = first_constraint(domain, problem) {
-        return Err(vec![Error::Unsupported {
-            construct: "a preference, or a constraint on trajectories, where actions overlap".into(),
-            instead: "plan without `--concurrent`: states are in one order only where actions are".into(),
-            place,
-        }]
-        .into());
+    let own = Course::Overlapping(&separation.to_big());
+    let plain = info_span!("compile").in_scope(|| compile_away(domain, problem, &config.objectives, own))?;
+    let config = config.clone().with_objectives(plain.objectives.to_vec());
+    let mut task = ground_plain((&plain.domain, &plain.problem, &config, &separation))?;
+    let shortest = task.shortest.take().map(|shortest| Box::new(shortest.judged_by(&plain)));
+    Ok(Concurrent { shortest, ..task.judged_by(&plain) })
+}
+
+impl Concurrent {
+    /// The same where constraints on trajectories were compiled away.
+    fn judged_by(self, plain: &Compiled<'_>) -> Self {
+        Self {
+            deadlines: plain.deadlines.iter().map(|own| Deadline::new(&self.task, own)).collect(),
+            is_exact: self.is_exact && plain.is_exact,
+            is_bounded: plain.is_exact,
+            ..self
+        }
     }
-    let own = (domain, problem, config, &separation);
+}
+
+/// Grounds a task without constraints on trajectories.
+fn ground_plain(own: Files<'_>) -> Result<Concurrent, Errors> {
     let shortest = ground_with(own, &normalize);
-    if is_fixed(domain) && shortest.is_ok() {
+    let is_judged = own.0.actions.iter().any(|action| is_hidden(action.identifier.name.as_str()));
+    if shortest.is_ok() && (is_fixed(own.0) || is_judged) {
         return shortest;
     }
     match (ground_with(own, &normalize_freely), shortest) {
@@ -166,14 +184,6 @@ fn ground_normal(
     compile::compile(task, &split, &reached, separation, weight, &config.limits)
 }
 
-/// Where the first preference or constraint on trajectories stands.
-fn first_constraint(domain: &Domain, problem: &Problem) -> Option<Place> {
-    let of_actions = domain.actions.iter().flat_map(|action| &action.preferences).map(|own| own.span);
-    let of_domain = domain.constraints.iter().map(|own| own.span).chain(of_actions);
-    let of_problem = problem.constraints.iter().map(|own| Place { file: File::Problem, span: own.span });
-    of_domain.map(|span| Place { file: File::Domain, span }).chain(of_problem).next()
-}
-
 /// Whether no action has a duration that could be another one.
 fn is_fixed(domain: &Domain) -> bool {
     let number = |constraint: &ast::DurationConstraint| match &constraint.expression {
@@ -218,7 +228,8 @@ fn measures(effect: &ast::Effect) -> bool {
     }
 }
 
-/// Finds a best plan whose actions overlap; of those, one with the least makespan. `report` hears of every improvement.
+/// Finds a best plan whose actions overlap; of those, one with the least makespan if it is proved by search. `report` hears of every
+/// improvement.
 pub fn optimize_concurrent(
     concurrent: &Concurrent,
     limits: &Limits,
@@ -247,7 +258,8 @@ pub fn optimize_concurrent(
         (Ended::Stopped(lower), None) => (Status::Unknown, Some(*lower)),
     };
     let metric = |total| concurrent.measure.metric(&Rational::from_integer(total));
-    let proof = matches!(how, Ended::Exhausted).then_some(Proof::Search);
+    let proved = || if concurrent.is_exact { Proof::Search } else { Proof::Bound };
+    let proof = matches!(how, Ended::Exhausted).then(proved);
     let steps = plan.as_ref().filter(|_| proof.is_some()).map_or(0, |plan| plan.steps.len());
     Solution {
         horizon: steps,

@@ -35,6 +35,19 @@ pub(super) struct Sequence {
     pub(super) together: Vec<bool>,
 }
 
+impl Concurrent {
+    /// A sequence that costs so much without what is violated, measured by its times, too; none if it does not keep what it has to.
+    pub(super) fn judge(&self, sequence: Sequence, cost: Int) -> Option<Sequence> {
+        if self.deadlines.is_empty() {
+            return Some(sequence);
+        }
+        let last = self.last_state(&sequence.happenings, &sequence.together).ok()?;
+        let makespan = sequence.value.1;
+        let total = self.measure.total(makespan, cost.checked_add(self.penalty(&last)?)?)?;
+        Some(Sequence { value: (total, makespan), ..sequence })
+    }
+}
+
 impl Sequence {
     /// Tells the record of a better plan, and of what none can get below.
     pub(super) fn tell(&self, lower: Int, part: Part, record: &mut Record<'_>) {
@@ -75,9 +88,10 @@ impl<'a> Search<'a> {
         estimate: &'a Estimate,
         bounds: Option<&'a Bounds>,
     ) -> Self {
-        // A duration is not a resource.
-        let monotone =
-            is_monotone(&concurrent.task) && concurrent.instances.iter().all(|own| own.timer.is_none());
+        // A duration is not a resource, and of what a preference reads less may be better.
+        let monotone = is_monotone(&concurrent.task)
+            && concurrent.violations.is_empty()
+            && concurrent.instances.iter().all(|own| own.timer.is_none());
         let mut search = Self {
             concurrent,
             estimate,
@@ -114,10 +128,18 @@ impl<'a> Search<'a> {
             }
             let situation = self.store.situation(id);
             if self.expansion.is_goal(&situation) {
-                let sequence = self.sequence(id, &situation);
-                sequence.tell(self.known(value.0), Part::Search, record);
-                self.incumbent = Some(sequence);
-                continue;
+                match self.sequence(id, &situation) {
+                    Some(sequence) if self.is_better(sequence.value) => {
+                        sequence.tell(self.known(value.0), Part::Search, record);
+                        self.incumbent = Some(sequence);
+                    }
+                    Some(_) => {}
+                    None => self.leave_out(value.0),
+                }
+                // Where preferences are violated in the end, or something is missed, a longer plan may be better.
+                if self.concurrent.violations.is_empty() && self.concurrent.deadlines.is_empty() {
+                    continue;
+                }
             }
             if looked_at >= most || self.is_full(limits) || pulse.beat().is_err() {
                 self.open.push(Reverse(priority));
@@ -214,10 +236,9 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn sequence(&self, goal: u32, Situation { clocks, cost, .. }: &Situation) -> Sequence {
-        let latest = clocks.latest();
-        let total = self.concurrent.measure.total(latest, *cost);
-        let value = (total.expect("invariant: what is on the way to a goal was measured"), latest);
+    /// The sequence that leads to a goal; none if its metric does not fit, or it does not keep what it has to.
+    fn sequence(&self, goal: u32, situation: &Situation) -> Option<Sequence> {
+        let value = self.concurrent.value(situation)?;
         let (mut happenings, mut together) = (Vec::new(), Vec::new());
         let mut at = goal;
         while let Some(origin) = self.store.origin(at) {
@@ -231,6 +252,6 @@ impl<'a> Search<'a> {
         }
         happenings.reverse();
         together.reverse();
-        Sequence { value, happenings, together }
+        self.concurrent.judge(Sequence { value, happenings, together }, situation.cost)
     }
 }

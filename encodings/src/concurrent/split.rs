@@ -7,6 +7,7 @@
 //!
 //! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.
 
+use crate::compile::is_hidden;
 use crate::concurrent::timer::{Timer, depends_on_state};
 use crate::error::{File, Place};
 use crate::lifted::configuration::{SlotParameter, conjuncts, design_parameters, is_static};
@@ -30,6 +31,8 @@ pub(super) enum Half {
     Timed(usize),
     /// No happening: that the planner can choose how long an instance takes.
     Choice,
+    /// No happening: a condition by which the trajectory of a plan is judged.
+    Judge,
 }
 
 /// Where a schema of the split task comes from.
@@ -127,7 +130,10 @@ fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Ha
         duration: None,
         ..schema.clone()
     };
-    let Some(duration) = &schema.duration else { return vec![(Half::Whole, schema.clone())] };
+    let Some(duration) = &schema.duration else {
+        let half = if is_hidden(schema.name.as_str()) { Half::Judge } else { Half::Whole };
+        return vec![(half, schema.clone())];
+    };
     let known = if let Expression::Number(number) = duration { Some(number) } else { None };
     let zero = &Rational::from_integer(0);
     let compare = |comparison| {

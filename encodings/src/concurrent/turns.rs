@@ -34,11 +34,11 @@ pub(super) fn take_turns(
     let estimate = Estimate::new(concurrent);
     let expansion = Expansion::new(concurrent);
     let mut exact = Search::new(concurrent, &expansion, &estimate, bounds);
-    let root = exact.lower();
+    let root = if concurrent.is_bounded { exact.lower() } else { 0 };
     record.begin(Rational::from_integer(root));
     let mut ended = info_span!("search").in_scope(|| exact.run(limits, SOON, record));
     if exact.is_over() || limits.reached() {
-        return (claimed(ended, concurrent, root), exact.incumbent);
+        return (claimed(ended, (concurrent, &exact), root), exact.incumbent);
     }
     let relaxed = Relaxed::new(concurrent);
     let begin = |mode| {
@@ -51,7 +51,8 @@ pub(super) fn take_turns(
     greedy.extend(differs.then(|| begin(Mode::Sequential)));
     let mut share = 1_usize;
     for _ in 0..rounds {
-        if exact.is_over() || limits.reached() || (greedy.is_empty() && exact.is_full(limits)) {
+        let is_over = exact.is_over() || is_best(concurrent, &exact, root);
+        if is_over || limits.reached() || (greedy.is_empty() && exact.is_full(limits)) {
             break;
         }
         for position in (0..greedy.len()).rev() {
@@ -73,7 +74,7 @@ pub(super) fn take_turns(
         ended = exact.run(limits, part.saturating_mul(share), record);
         share = share.saturating_mul(2);
     }
-    (claimed(ended, concurrent, root), exact.incumbent)
+    (claimed(ended, (concurrent, &exact), root), exact.incumbent)
 }
 
 /// Goes on with a greedy search, from one better plan to the next.
@@ -98,6 +99,17 @@ fn pursue(
 }
 
 /// What can be said of all plans where the search leaves some out: what could be said before it began.
-fn claimed(ended: Ended, concurrent: &Concurrent, root: Int) -> Ended {
-    if concurrent.is_exact { ended } else { Ended::Stopped(root) }
+fn claimed(ended: Ended, (concurrent, search): (&Concurrent, &Search<'_>), root: Int) -> Ended {
+    match ended {
+        _ if is_best(concurrent, search, root) => Ended::Exhausted,
+        ended if concurrent.is_exact => ended,
+        _ => Ended::Stopped(root),
+    }
+}
+
+/// Whether a plan is as good as any can be, by what could be said before the search began: it may leave out shorter ones.
+fn is_best(concurrent: &Concurrent, search: &Search<'_>, root: Int) -> bool {
+    !concurrent.is_exact
+        && concurrent.is_whole
+        && search.incumbent.as_ref().is_some_and(|known| known.value.0 <= root)
 }

@@ -29,7 +29,7 @@ mod reach;
 mod tests;
 pub(crate) mod vocabulary;
 
-use crate::compile::compile;
+use crate::compile::{Course, compile};
 use crate::error::{Error, Errors};
 use crate::lifted::Lifted;
 use crate::lifted::configuration::{SlotParameter, design_parameters, slot_parameters};
@@ -81,7 +81,8 @@ pub(crate) fn ground_for<N: TaskNumber>(
     config: &GroundConfig,
     generality: &Generality,
 ) -> Result<Task<N>, Errors> {
-    let plain = info_span!("compile").in_scope(|| compile(domain, problem, &config.objectives))?;
+    let plain =
+        info_span!("compile").in_scope(|| compile(domain, problem, &config.objectives, Course::Sequence))?;
     let lifted =
         || info_span!("normalize").in_scope(|| normalize(&plain.domain, &plain.problem, &plain.objectives));
     let found = ground_normal(lifted()?, config, generality);

@@ -38,7 +38,7 @@ pub enum Proof {
         /// No plan with more steps can be cheaper.
         step_bound: usize,
     },
-    /// The cost of the plan equals a lower bound on the cost of all plans, by the cost to go in a projection.
+    /// The cost of the plan equals a lower bound on the cost of all plans, by the cost to go in a projection, or by what each action takes and costs by itself.
     Bound,
     /// A* with an admissible estimate ended; all that it left out is dominated.
     Search,

@@ -110,7 +110,8 @@ fn take_turns_choosing(
     let expansion = Expansion::new(concurrent);
     let mut best: Option<Answer> = None;
     let mut exhaustive = Search::exhaustive(concurrent, &expansion);
-    let mut lower = Course::new(concurrent).least(concurrent);
+    let least = || Course::new(concurrent).least(concurrent);
+    let mut lower = if concurrent.is_bounded { least() } else { Rational::from_integer(0) };
     record.begin(lower.clone());
     let mut turn =
         |search: &mut Search<'_>, best: &mut Option<Answer>, work, part, record: &mut Record<'_>| {
