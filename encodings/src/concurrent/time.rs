@@ -12,11 +12,19 @@ pub(super) fn place(float: Float) -> usize {
 }
 
 /// The least time of a happening: at least `base`, and at least so long after each of some floats.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[derive(Debug, PartialEq, Eq, Default)]
 pub(super) struct Time {
     pub(super) base: Int,
     /// Ascending by float.
     pub(super) lags: SmallVec<[(Float, Int); 1]>,
+}
+
+impl Clone for Time {
+    /// Most times have no lags, and situations have many times.
+    fn clone(&self) -> Self {
+        let lags = if self.lags.is_empty() { SmallVec::new() } else { SmallVec::from_slice(&self.lags) };
+        Self { base: self.base, lags }
+    }
 }
 
 impl Time {
@@ -65,8 +73,15 @@ impl Time {
 
     /// Gives the floats other numbers.
     pub(super) fn renumber(&mut self, numbers: &[Option<Float>]) {
-        let renamed = self.lags.iter().filter_map(|(float, lag)| Some((numbers[place(*float)]?, *lag)));
-        self.lags = renamed.collect();
-        self.lags.sort_unstable();
+        self.lags.retain(|(float, _)| match numbers[place(*float)] {
+            Some(number) => {
+                *float = number;
+                true
+            }
+            None => false,
+        });
+        if self.lags.len() > 1 {
+            self.lags.sort_unstable();
+        }
     }
 }
