@@ -42,6 +42,19 @@ fn durative(name: &str, duration: &str, condition: &str, effect: &str) -> String
     )
 }
 
+/// A start, or an end, in each way in which the condition of an effect on a number can turn out.
+#[test]
+fn effects_on_numbers_have_conditions() {
+    let light = durative("light", "(= ?duration 1)", "", "(at end (p))");
+    for time in ["at start", "at end"] {
+        let effect = format!("({time} (when (not (p)) (decrease (fuel) 3))) (at end (g))");
+        let all = [light.clone(), durative("go", "(= ?duration 2)", "", &effect)].concat();
+        check(&all, "", "(g)", (Status::Feasible, Some("2")));
+        let later = if time == "at start" { "3.001" } else { "2" };
+        check(&all, "", "(g) (>= (fuel) 2)", (Status::Feasible, Some(later)));
+    }
+}
+
 #[test]
 fn a_duration_is_that_of_the_state_at_the_start() {
     let fill =

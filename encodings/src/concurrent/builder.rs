@@ -20,12 +20,12 @@ use crate::number::{Int, dense};
 use crate::task::quantity::NumericId;
 use crate::task::{Argument, Operator, OperatorId, Task};
 
-/// The halves of an instance that the ground task has.
-#[derive(Clone, Copy, Default)]
+/// The halves of an instance that the ground task has: several starts, and ends, where effects on numbers have conditions.
+#[derive(Clone, Default)]
 struct Halves {
-    start: Option<OperatorId>,
+    starts: Vec<OperatorId>,
     over_all: Option<OperatorId>,
-    end: Option<OperatorId>,
+    ends: Vec<OperatorId>,
 }
 
 fn object(argument: Argument) -> Option<ObjectId> {
@@ -131,12 +131,32 @@ impl<'a> Builder<'a> {
             }
             let halves = self.instances.entry(key).or_default();
             match origin.half {
-                Half::Start => halves.start = Some(id),
-                Half::End => halves.end = Some(id),
+                Half::Start => halves.starts.push(id),
+                Half::End => halves.ends.push(id),
                 _ => halves.over_all = Some(id),
             }
         }
         if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
+    }
+
+    /// Gives each way in which an instance can start and end a start and an end of its own.
+    pub(super) fn pair(&mut self, task: &mut Task) {
+        for key in &self.order {
+            let Some(halves) = self.instances.get_mut(key) else { continue };
+            let mut copy = |own: OperatorId| {
+                task.operators.push(task.operators[own.index()].clone());
+                self.written.push(self.written[own.index()].clone());
+                OperatorId(dense(task.operators.len().saturating_sub(1)))
+            };
+            let (mut starts, mut ends) = (Vec::new(), Vec::new());
+            for (first, start) in halves.starts.iter().enumerate() {
+                for (second, end) in halves.ends.iter().enumerate() {
+                    starts.push(if second == 0 { *start } else { copy(*start) });
+                    ends.push(if first == 0 { *end } else { copy(*end) });
+                }
+            }
+            (halves.starts, halves.ends) = (starts, ends);
+        }
     }
 
     /// The instances that can be executed, and which operators are their starts and ends.
@@ -149,11 +169,12 @@ impl<'a> Builder<'a> {
     ) -> Result<Vec<Instance>, Error> {
         let Context { task, limits } = context;
         let mut instances = Vec::new();
-        for key in limits.watch(&self.order) {
-            let key = key?;
-            let Halves { start: Some(start), over_all, end: Some(end) } = self.instances[key] else {
-                continue;
-            };
+        let pairs = self.order.iter().flat_map(|key| {
+            let Halves { starts, over_all, ends } = &self.instances[key];
+            starts.iter().zip(ends).map(move |(start, end)| (key, *start, *over_all, *end))
+        });
+        for pair in limits.watch(pairs) {
+            let (key, start, over_all, end) = pair?;
             // What must hold over all is out of reach.
             if self.held.contains(&key.0) && over_all.is_none() {
                 continue;
@@ -217,8 +238,8 @@ impl<'a> Builder<'a> {
         for key in limits.watch(&self.order) {
             let key = key?;
             let schema = &self.split.schemas[key.0];
-            let (Some(start), Some(divisor)) = (self.instances[key].start, &self.split.divisors[key.0])
-            else {
+            let starts = &self.instances[key].starts;
+            let (Some(start), Some(divisor)) = (starts.first(), &self.split.divisors[key.0]) else {
                 continue;
             };
             let binding = binding(&task.operators[start.index()], schema.variables);
@@ -228,7 +249,7 @@ impl<'a> Builder<'a> {
                 instead: "a positive divisor".into(),
                 place: schema.place,
             })?;
-            divisors.insert(start, divisor);
+            divisors.extend(starts.iter().map(|start| (*start, divisor.clone())));
         }
         Ok(divisors)
     }

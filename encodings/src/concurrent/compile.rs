@@ -65,6 +65,8 @@ pub(super) fn compile(
     let mut builder = Builder::new(split, reached, &unlimited);
     let context = Context::new(&task, limits);
     builder.collect(context)?;
+    builder.pair(&mut task);
+    let context = Context::new(&task, limits);
     let divisors = builder.divisors(context).map_err(one)?;
     let unit = Unit::new(&task, split, separation, &divisors).map_err(one)?;
     let separation = unit.of(separation).map_err(one)?;
