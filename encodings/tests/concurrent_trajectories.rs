@@ -104,6 +104,22 @@ fn constraints_are_kept() {
     check("(sometime (q)) (always (imply (q) (p)))", "(p)", time, (Status::Feasible, Some("5.5"), &later));
 }
 
+/// Of which object an action is, it does not read.
+#[test]
+fn an_action_with_objects_may_note_that_it_was_there() {
+    let domain = "(define (domain d) (:predicates (on ?x) (off ?x))
+      (:durative-action light :parameters (?x) :duration (= ?duration 2)
+        :condition (at start (off ?x)) :effect (and (at start (not (off ?x))) (at end (on ?x)))))";
+    let problem =
+        "(define (problem n) (:domain d) (:objects a b c) (:init (off a) (off b) (off c)) (:goal (on a))
+      (:constraints (and (sometime (on b)) (preference w (sometime (on c)))))
+      (:metric minimize (+ (total-time) (is-violated w))))";
+    let (domain, problem) = parse(domain, problem);
+    let solution = solve(&domain, &problem, &Limits::none());
+    let cost = solution.plan.as_ref().map(|plan| plan.cost.to_string());
+    assert_eq!((solution.status, cost.as_deref()), (Status::Optimal, Some("2")));
+}
+
 #[test]
 fn times_are_kept() {
     let time = "(:metric minimize (total-time))";

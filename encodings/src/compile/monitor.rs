@@ -16,7 +16,7 @@ use super::deadline::{self, Deadline};
 use super::initial::Initial;
 use super::instances::{Binding, Objects, instance};
 use super::regress::{Happening, TooHard};
-use super::terms::{all, any, flag, holds, is_false, is_true, not};
+use super::terms::{all, any, assume, flag, holds, is_false, is_true, not, ways};
 
 /// Constraints have at most this many instances together.
 const INSTANCES: usize = 20_000;
@@ -216,9 +216,12 @@ impl<'t> Monitors<'t> {
                         place,
                     )
                 })?;
-                let more = make(touched, &after);
-                addition.conditions.extend(more.conditions.into_iter().filter(|own| !is_true(own)));
-                addition.effects.extend(more.effects);
+                for way in ways(touched) {
+                    let after: Vec<_> = after.iter().map(|condition| assume(condition, &way)).collect();
+                    let more = make(way, &after);
+                    addition.conditions.extend(more.conditions.into_iter().filter(|own| !is_true(own)));
+                    addition.effects.extend(more.effects);
+                }
             }
         }
         Ok(())
@@ -228,7 +231,12 @@ impl<'t> Monitors<'t> {
     pub(super) fn keeps_apart_nothing(&self) -> bool {
         let is_plain = |addition: &Addition| {
             addition.conditions.is_empty()
-                && addition.effects.iter().all(|effect| matches!(effect, Effect::Add(_)))
+                && addition.effects.iter().all(|effect| match effect {
+                    Effect::When(condition, effect) => {
+                        matches!(**effect, Effect::Add(_)) && reads_nothing(condition)
+                    }
+                    effect => matches!(effect, Effect::Add(_)),
+                })
         };
         !self.narrows && self.deadlines.is_empty() && self.additions.iter().flatten().all(is_plain)
     }
@@ -383,6 +391,19 @@ impl Addition {
             None => self.conditions.push(not(what)),
             Some(broken) => self.effects.extend(Self::notes(what, Effect::Add(flag(broken))).effects),
         }
+    }
+}
+
+/// Whether a condition is about the objects of an action only.
+fn reads_nothing(condition: &Condition) -> bool {
+    match condition {
+        Condition::And(parts) | Condition::Or(parts) => parts.iter().all(reads_nothing),
+        Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
+            reads_nothing(inner)
+        }
+        Condition::Imply(premise, conclusion) => reads_nothing(premise) && reads_nothing(conclusion),
+        Condition::Equal(..) => true,
+        Condition::Atom(_) | Condition::Compare(..) => false,
     }
 }
 

@@ -79,3 +79,22 @@ pub(super) fn exists(variables: &[TypedName], body: Condition) -> Condition {
     }
     Condition::Exists(variables.to_vec(), Box::new(body))
 }
+
+/// The conditions of which one holds if a condition does.
+pub(super) fn ways(condition: Condition) -> Vec<Condition> {
+    if let Condition::Or(parts) = condition { parts } else { vec![condition] }
+}
+
+/// A condition where another one holds, without what that decides.
+pub(super) fn assume(condition: &Condition, known: &Condition) -> Condition {
+    if format!("{condition:?}") == format!("{known:?}") {
+        return truth();
+    }
+    let each = |parts: &[Condition]| parts.iter().map(|part| assume(part, known)).collect::<Vec<_>>();
+    match condition {
+        Condition::And(parts) => all(each(parts)),
+        Condition::Or(parts) => any(each(parts)),
+        Condition::Not(inner) => not(assume(inner, known)),
+        _ => condition.clone(),
+    }
+}
