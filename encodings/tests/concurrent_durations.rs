@@ -17,14 +17,14 @@ fn rational(numerator: i128, denominator: i128) -> BigRational {
     BigRational::new(BigInt::from(numerator), BigInt::from(denominator))
 }
 
-fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
+pub fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     let read = read(&Source::new("domain", domain), &Source::new("problem", problem));
     let (domain, problem, _) = read.unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
     (domain, problem)
 }
 
 /// The best plan, by the planner; what it claims of it, the validator confirms.
-fn solve(domain: &Domain, problem: &Problem, separation: &BigRational, limits: &Limits) -> Solution {
+pub fn solve(domain: &Domain, problem: &Problem, separation: &BigRational, limits: &Limits) -> Solution {
     let task = ground_concurrent(domain, problem, &GroundConfig::default(), separation)
         .unwrap_or_else(|errors| panic!("{errors:?}"));
     let solution = optimize_concurrent(&task, limits, &mut |_| {});
@@ -36,7 +36,7 @@ fn solve(domain: &Domain, problem: &Problem, separation: &BigRational, limits: &
     solution
 }
 
-fn written(plan: &Plan) -> String {
+pub fn written(plan: &Plan) -> String {
     let mut text = String::new();
     for step in &plan.steps {
         let words = [std::slice::from_ref(&step.action), &step.arguments[..]].concat().join(" ");
@@ -46,7 +46,7 @@ fn written(plan: &Plan) -> String {
 }
 
 /// What the validator says a plan costs; else why it is not valid.
-fn metric(
+pub fn metric(
     domain: &Domain,
     problem: &Problem,
     text: &str,

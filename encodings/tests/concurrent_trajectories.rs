@@ -4,59 +4,16 @@
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 
+use crate::concurrent_durations::{metric, parse, solve, written};
 use crate::random::Random;
-use metaplan_encodings::{
-    GroundConfig, Limits, Plan, Solution, Status, ground_concurrent, optimize_concurrent,
-};
+use metaplan_encodings::{Limits, Status};
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use pddl::ast::{Domain, Problem};
-use pddl::validate::{Options, PlanText, validate};
-use pddl::{Source, read};
 
 /// Interfering happenings lie half a unit apart; plans of brute force have whole times.
 fn separation() -> BigRational {
     BigRational::new(BigInt::from(1), BigInt::from(2))
-}
-
-fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
-    let read = read(&Source::new("domain", domain), &Source::new("problem", problem));
-    let (domain, problem, _) = read.unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
-    (domain, problem)
-}
-
-/// The best plan, by the planner; what it says of its metric, the validator confirms.
-fn solve(domain: &Domain, problem: &Problem, limits: &Limits) -> Solution {
-    let task = ground_concurrent(domain, problem, &GroundConfig::default(), &separation())
-        .unwrap_or_else(|errors| panic!("{errors:?}"));
-    let solution = optimize_concurrent(&task, limits, &mut |_| {});
-    if let Some(plan) = &solution.plan {
-        let text = written(plan);
-        let value = metric(domain, problem, &text).unwrap_or_else(|why| panic!("{why}\n{text}"));
-        assert_eq!(value, plan.cost.to_rational(), "{text}");
-    }
-    solution
-}
-
-fn written(plan: &Plan) -> String {
-    let mut text = String::new();
-    for step in &plan.steps {
-        let words = [std::slice::from_ref(&step.action), &step.arguments[..]].concat().join(" ");
-        let _ = writeln!(text, "{}: ({words}) [{}]", step.start, step.duration);
-    }
-    text
-}
-
-/// What the validator says a plan costs; else why it is not valid.
-fn metric(domain: &Domain, problem: &Problem, text: &str) -> Result<BigRational, String> {
-    let plan =
-        PlanText::parse(&Source::new("plan", text)).unwrap_or_else(|errors| panic!("{errors:?}\n{text}"));
-    let options = Options::default().with_concurrent(true).with_tolerance(separation());
-    let verdict = validate(domain, problem, &plan, &options);
-    match verdict.violation {
-        None => Ok(verdict.metric.unwrap_or(verdict.total_time)),
-        Some(violation) => Err(violation.message),
-    }
 }
 
 const DOMAIN: &str = "(define (domain d) (:predicates (p) (q) (r))
@@ -73,7 +30,7 @@ fn check(constraints: &str, goal: &str, metric: &str, expected: (Status, Option<
         "(define (problem n) (:domain d) (:init) (:goal (and {goal})) (:constraints (and {constraints})) {metric})"
     );
     let (domain, problem) = parse(DOMAIN, &problem);
-    let solution = solve(&domain, &problem, &Limits::none());
+    let solution = solve(&domain, &problem, &separation(), &Limits::none());
     let cost = solution.plan.as_ref().map(|plan| plan.cost.to_string());
     let text = solution.plan.as_ref().map(written).unwrap_or_default();
     let lines: Vec<&str> = text.lines().collect();
@@ -115,7 +72,7 @@ fn an_action_with_objects_may_note_that_it_was_there() {
       (:constraints (and (sometime (on b)) (preference w (sometime (on c)))))
       (:metric minimize (+ (total-time) (is-violated w))))";
     let (domain, problem) = parse(domain, problem);
-    let solution = solve(&domain, &problem, &Limits::none());
+    let solution = solve(&domain, &problem, &separation(), &Limits::none());
     let cost = solution.plan.as_ref().map(|plan| plan.cost.to_string());
     assert_eq!((solution.status, cost.as_deref()), (Status::Optimal, Some("2")));
 }
@@ -259,7 +216,7 @@ fn brute_force(durations: [i128; 3], domain: &Domain, problem: &Problem) -> [Opt
         let count = times.len();
         times.sort_unstable();
         times.dedup();
-        if let Ok(value) = metric(domain, problem, &text) {
+        if let Ok(value) = metric(domain, problem, &text, &separation()) {
             for (best, counts) in best.iter_mut().zip([true, times.len() == count]) {
                 if counts && best.as_ref().is_none_or(|best| value < *best) {
                     *best = Some(value.clone());
@@ -280,8 +237,9 @@ fn agree(seed: u64) -> (bool, bool) {
     let (domain, problem, durations) = sample(&mut Random(seed));
     let (read_domain, read_problem) = parse(&domain, &problem);
     let time = Duration::from_secs(2);
+    let limits = Limits::none().with_time(time).with_room(1 << 24);
     let began = Instant::now();
-    let solution = solve(&read_domain, &read_problem, &Limits::none().with_time(time).with_room(1 << 24));
+    let solution = solve(&read_domain, &read_problem, &separation(), &limits);
     let is_over = began.elapsed() < time;
     let [best, apart] = brute_force(durations, &read_domain, &read_problem);
     let found = solution.plan.as_ref().map(|plan| plan.cost.to_rational());
