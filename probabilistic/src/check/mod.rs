@@ -1,4 +1,4 @@
-//! A model and a property to an answer: explored in doubles, and once more in rationals where the model is small.
+//! A model and a property to an answer: explored in fractions while the model is small, and in doubles otherwise.
 
 mod answer;
 mod ask;
@@ -19,10 +19,9 @@ mod vector;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use num_rational::BigRational;
-
 use crate::error::Error;
 use crate::explore::{Exploration, Explored, explore};
+use crate::fraction::Fraction;
 use crate::number::Number;
 use crate::prism::ast::{BinaryOp, Expr, ExprKind, Model};
 use crate::prism::{Names, Packed, Program, Remembered, Settings};
@@ -126,7 +125,7 @@ pub fn check_all<'p>(
     let exact = if options.exactness == Exactness::Never {
         None
     } else {
-        let exact = Program::<BigRational>::new(&joined, &options.settings)?;
+        let exact = Program::<Fraction>::new(&joined, &options.settings)?;
         Some(exact.with_rewards(&wanted).stopping(end.as_ref()))
     };
     let mut found = Processes::explore(&program, exact.as_ref(), options)?;
@@ -192,7 +191,7 @@ fn blame(error: Error, model: &Model, joined: &Model, settings: &Settings) -> Er
 
 /// A model that was explored: exactly, in doubles, or both.
 struct Processes {
-    exact: Option<Explored<Packed, BigRational>>,
+    exact: Option<Explored<Packed, Fraction>>,
     doubles: Option<Explored<Packed, f64>>,
     /// What exact arithmetic may cost each property.
     budget: u64,
@@ -202,7 +201,7 @@ impl Processes {
     /// Explores exactly as long as the model is small, and goes on in doubles unless exact values were asked for.
     fn explore(
         program: &Program<f64>,
-        exact: Option<&Program<BigRational>>,
+        exact: Option<&Program<Fraction>>,
         options: &Options<'_>,
     ) -> Result<Self, Error> {
         let bounds = &options.bounds;
@@ -247,7 +246,7 @@ impl Processes {
     fn report(
         &mut self,
         program: &Program<f64>,
-        exact: Option<&Program<BigRational>>,
+        exact: Option<&Program<Fraction>>,
         property: &Property,
         options: &Options<'_>,
         wanted: &[usize],
