@@ -298,3 +298,48 @@ fn models_without_a_keyword_and_actions_named_like_functions() {
     let model = "module m round : [0..1] init 0; [round] round=0 -> (round'=max(round,1)); endmodule";
     agree(model, "Pmax=? [ F round=1 ]", "1");
 }
+
+/// Written out by hand these are properties of the tests above; labels of the model come before properties of the same name.
+#[test]
+fn properties_that_are_parts_of_others_by_name() {
+    let text = "
+        \"sum\": \"less\" + 2 * \"ever\";
+        \"less\": 1 - \"ever\";
+        \"ever\": P=? [ F \"a\" ];
+        \"likely\": P>=0.45 [ X \"a\" ];
+        \"path\": P=? [ F (\"likely\" & s>0) ];
+        \"all\": filter(forall, \"likely\" <=> s=3 | s=4);
+        \"a\": P=? [ F \"a\" ];
+        \"deadlock\": filter(exists, \"deadlock\");
+        \"one\": 1 + \"two\"; \"two\": \"one\" / 2;
+        \"0\": 1; \"1\": \"0\" + \"0\"; \"2\": \"1\" + \"1\"; \"3\": \"2\" + \"2\"; \"4\": \"3\" + \"3\"; \"5\": \"4\" + \"4\";
+        \"6\": \"5\" + \"5\"; \"7\": \"6\" + \"6\"; \"8\": \"7\" + \"7\"; \"9\": \"8\" + \"8\"; \"10\": \"9\" + \"9\";
+        \"none\": \"nothing\" + 1;";
+    let file = property::parse_file(text).unwrap_or_else(|error| panic!("{error:?}"));
+    let model = prism::parse(CHAIN).expect("a model");
+    let options = Options::default().with_declarations(file.declarations);
+    for (name, expected) in [
+        ("sum", "17/10"),
+        ("less", "3/10"),
+        ("path", "7/10"),
+        ("all", "true"),
+        ("a", "7/10"),
+        ("deadlock", "false"),
+        ("one", "Q204"),
+        ("8", "256"),
+        ("10", "Q104"),
+        ("none", "Q202"),
+    ] {
+        let listed = file.properties.iter().find(|listed| listed.name.as_deref() == Some(name));
+        let property = &listed.unwrap_or_else(|| panic!("{name}")).property;
+        let found = match check(&model, property, &options).map(|report| report.outcome) {
+            Ok(Outcome::Value(answer)) => {
+                answer.quantity().and_then(|found| found.exact.clone()).expect("exact").to_string()
+            }
+            Ok(Outcome::Truth(holds, _)) => holds.to_string(),
+            Err(Error::Property(problems)) => problems[0].code.to_owned(),
+            other => panic!("{name}: {other:?}"),
+        };
+        assert_eq!(found, expected, "{name}");
+    }
+}

@@ -6,6 +6,7 @@ mod bounded;
 mod filters;
 mod longrun;
 mod multi;
+mod named;
 mod options;
 mod outcome;
 mod paths;
@@ -28,6 +29,7 @@ use crate::prism::{Names, Packed, Program, Remembered, Settings};
 use crate::property::{Declarations, Path, Property, RewardPath, Steps};
 use crate::solve::NONE;
 use crate::solve::work::MOST;
+use named::written_out;
 use query::Query;
 use state::is_of_states;
 use validate::{expressions_of, properties_in, steps_of, validate};
@@ -102,14 +104,18 @@ pub fn check_all<'p>(
     options: &Options<'_>,
 ) -> Result<Vec<Result<Report, Error>>, Error> {
     let start = Instant::now();
-    let properties: Vec<&Property> = properties.into_iter().collect();
     let joined = join(model, &options.declarations);
+    let properties =
+        properties.into_iter().map(|property| written_out(property, &joined, &options.declarations));
+    let properties: Vec<_> = properties.collect();
     let program = Program::<f64>::new(&joined, &options.settings)
         .map_err(|error| blame(error, model, &joined, &options.settings))?;
     let (mut wanted, mut refused) = (Vec::new(), Vec::new());
     for property in &properties {
-        let needed = wanted_rewards(&program.reward_names, property, options)
-            .and_then(|needed| validate(&program, property).map(|()| needed));
+        let needed = property.as_ref().map_err(Clone::clone).and_then(|property| {
+            let needed = wanted_rewards(&program.reward_names, property, options)?;
+            validate(&program, property).map(|()| needed)
+        });
         refused.push(needed.map(|needed| wanted.extend(needed)).err());
     }
     if !refused.iter().any(Option::is_none) {
@@ -117,8 +123,8 @@ pub fn check_all<'p>(
     }
     wanted.sort_unstable();
     wanted.dedup();
-    let end = match properties[..] {
-        [only] => end_of(only, &program.names, options),
+    let end = match &properties[..] {
+        [Ok(only)] => end_of(only, &program.names, options),
         _ => None,
     };
     let program = program.with_rewards(&wanted).stopping(end.as_ref());
@@ -135,10 +141,10 @@ pub fn check_all<'p>(
     let build = start.elapsed();
     let mut reports = Vec::new();
     for (property, refused) in properties.iter().zip(refused) {
-        if let Some(error) = refused {
-            reports.push(Err(error));
+        let (Ok(property), None) = (property, &refused) else {
+            reports.extend(refused.map(Err));
             continue;
-        }
+        };
         let start = Instant::now();
         let report = found.report(&program, exact.as_ref(), property, options, &wanted);
         reports.push(report.map(|report| Report { build, solve: start.elapsed(), ..report }));

@@ -49,8 +49,11 @@ fn is_comparison(op: BinaryOp) -> bool {
 }
 
 /// The labels that are known without declaration.
+pub const BUILT_IN: [&str; 2] = ["init", "deadlock"];
+
+/// Whether a label is one of those that are known without declaration, and is not declared.
 pub fn is_built_in(label: &str, names: &Names) -> bool {
-    ["init", "deadlock"].contains(&label) && names.label(label).is_none()
+    BUILT_IN.contains(&label) && names.label(label).is_none()
 }
 
 /// The same with truth values and numbers in the place of properties, for its type.
