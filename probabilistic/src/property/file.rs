@@ -5,7 +5,7 @@ use crate::prism::ast::{Constant, Named, Property};
 use crate::prism::expression::{Cursor, Read};
 use crate::prism::lexer::{Kind, tokens};
 use crate::prism::{constant_declaration, named_expression};
-use crate::property::BESIDES;
+use crate::property::grammar::{BESIDES, property};
 
 /// A file of properties: what it declares besides, and the properties in their order.
 #[derive(Debug, Clone, Default)]
@@ -80,7 +80,7 @@ fn entry(cursor: &mut Cursor<'_>, text: &str, file: &mut File) -> Read<()> {
     }
     let place = cursor.place();
     let begin = position(text, place);
-    let property = super::property(cursor)?;
+    let property = property(cursor)?;
     let end = if *cursor.peek() == Kind::End { text.len() } else { position(text, cursor.place()) };
     // A remark that stands between this property and the next is none of it.
     let written = text[begin..end].split("//").next().unwrap_or("").trim().to_owned();
