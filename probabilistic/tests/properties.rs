@@ -299,6 +299,18 @@ fn models_without_a_keyword_and_actions_named_like_functions() {
     agree(model, "Pmax=? [ F round=1 ]", "1");
 }
 
+/// The letter that begins a property of rewards is also an operator of paths.
+#[test]
+fn properties_of_rewards_need_no_semicolon_before() {
+    let text = "P=? [ F \"a\" ]\nR{\"t\"}=? [ C ]\n// RESULT: 0\nR=? [ I=6 ]\nR<100 [ C<=3 ]\n\"last\": P=? [ \"b\" R s!=3 ]";
+    let file = property::parse_file(text).unwrap_or_else(|error| panic!("{error:?}"));
+    let texts: Vec<_> = file.properties.iter().map(|listed| &listed.text[..]).collect();
+    assert_eq!(
+        texts,
+        ["P=? [ F \"a\" ]", "R{\"t\"}=? [ C ]", "R=? [ I=6 ]", "R<100 [ C<=3 ]", "P=? [ \"b\" R s!=3 ]"]
+    );
+}
+
 /// Written out by hand these are properties of the tests above; labels of the model come before properties of the same name.
 #[test]
 fn properties_that_are_parts_of_others_by_name() {

@@ -59,8 +59,11 @@ pub fn property(cursor: &mut Cursor<'_>) -> Read<Property> {
     ) {
         return Err(cursor.expected(PROPERTY));
     }
-    let expression = cursor.expression()?;
-    let expression = go_on(cursor, expression)?;
+    let mut expression = cursor.expression()?;
+    // In a file the next property may begin with this letter; no property is of the operator.
+    if !cursor.is_word("R") {
+        expression = go_on(cursor, expression)?;
+    }
     Ok(match expression.kind {
         ExprKind::Property(property) => *property,
         ExprKind::Temporal(_) => {
