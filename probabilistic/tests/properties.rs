@@ -311,6 +311,37 @@ fn properties_of_rewards_need_no_semicolon_before() {
     );
 }
 
+/// What is not handled is refused by itself; all else in the file is answered.
+#[test]
+fn properties_that_are_not_handled_leave_the_others_alone() {
+    let text = "P=? [ F \"a\" ]
+        P=? [ F (\"a\" & X \"b\") ] + P=? [ X (F \"a\") ]
+        R{\"t\"}=? [ (s<3 U \"a\") ]
+        \"ctl\": filter(forall, A [ G s<3 ], s<2) & (s=0);
+        E [ F \"a\" ]
+        \"part\": 1 + \"ctl\";
+        P=? [ F d=1 ]";
+    let file = property::parse_file(text).unwrap_or_else(|error| panic!("{error:?}"));
+    let model = prism::parse(CHAIN).expect("a model");
+    let options = Options::default().with_declarations(file.declarations);
+    let properties = file.properties.iter().map(|listed| &listed.property);
+    let found = check_all(&model, properties, &options).expect("answers");
+    let found = found.into_iter().map(|report| match report.map(|report| report.outcome) {
+        Ok(Outcome::Value(answer)) => {
+            answer.quantity().and_then(|found| found.exact.clone()).expect("exact").to_string()
+        }
+        Err(Error::Property(problems)) => problems[0].code.to_owned(),
+        other => panic!("{other:?}"),
+    });
+    let expected = ["7/10", "Q403", "Q403", "Q403", "Q403", "Q403", "3/10"];
+    assert_eq!(found.collect::<Vec<_>>(), expected);
+    assert_eq!(file.properties[3].text, "filter(forall, A [ G s<3 ], s<2) & (s=0)");
+    let broken = property::parse_file("P=? [ F (\"a\" & X \"b\") ]; P=? [ F \"a\" + ]");
+    assert!(
+        matches!(broken, Err(Error::Property(problems)) if problems.len() == 1 && problems[0].code == "Q102")
+    );
+}
+
 /// Written out by hand these are properties of the tests above; labels of the model come before properties of the same name.
 #[test]
 fn properties_that_are_parts_of_others_by_name() {

@@ -45,7 +45,7 @@ impl Writing<'_> {
                 let goal = self.expression(goal);
                 Property::Reward(question.clone(), name.clone(), RewardPath::Reach(goal))
             }
-            Property::Reward(..) => property.clone(),
+            Property::Reward(..) | Property::Refused(_) => property.clone(),
             Property::SteadyState(question, states) => {
                 Property::SteadyState(question.clone(), self.expression(states))
             }
@@ -100,6 +100,10 @@ impl Writing<'_> {
         }
         let declarations = self.declarations;
         let (_, property) = declarations.properties.iter().find(|(known, _)| known == name)?;
+        if let Property::Refused(problem) = property {
+            self.problem = Some(problem.clone());
+            return None;
+        }
         if self.within.iter().any(|open| open == name) {
             let text = format!("the property `\"{name}\"` has itself as a part");
             self.problem = Some(Diagnostic::new("Q204", place, text));

@@ -29,6 +29,7 @@ pub fn is_number(property: &Property) -> bool {
         },
         Property::Expression(inner) => is_numeric(inner),
         Property::Multi(_) => true,
+        Property::Refused(_) => false,
     }
 }
 

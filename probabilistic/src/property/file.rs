@@ -43,7 +43,8 @@ pub struct Listed {
 /// Reads a file of properties, with its constants and labels.
 ///
 /// # Errors
-/// All that is wrong with it; after a wrong property, reading goes on behind the next `;`.
+/// All that is wrong with it; after a wrong property, reading goes on behind the next `;`. What is read, but not handled, is a property
+/// that is refused when it is checked.
 pub fn parse_file(text: &str) -> Result<File, Error> {
     let tokens = tokens(text).map_err(|problems| Error::Property(problems.into()))?;
     let mut cursor = Cursor::of_properties(&tokens, BESIDES);
@@ -80,7 +81,15 @@ fn entry(cursor: &mut Cursor<'_>, text: &str, file: &mut File) -> Read<()> {
     }
     let place = cursor.place();
     let begin = position(text, place);
-    let property = property(cursor)?;
+    let start = cursor.position();
+    let property = match property(cursor) {
+        Err(problem) if problem.code == "Q403" => {
+            cursor.back_to(start);
+            leave_out(cursor);
+            Property::Refused(problem)
+        }
+        read => read?,
+    };
     let end = if *cursor.peek() == Kind::End { text.len() } else { position(text, cursor.place()) };
     // A remark that stands between this property and the next is none of it.
     let written = text[begin..end].split("//").next().unwrap_or("").trim().to_owned();
@@ -89,6 +98,25 @@ fn entry(cursor: &mut Cursor<'_>, text: &str, file: &mut File) -> Read<()> {
     }
     file.properties.push(Listed { name, property, text: written, place });
     Ok(())
+}
+
+/// Goes to the end of a property that is not handled: `;`, or brackets that close and something that goes on with nothing.
+fn leave_out(cursor: &mut Cursor<'_>) {
+    let mut open = 0_usize;
+    loop {
+        match cursor.peek() {
+            Kind::End => return,
+            Kind::Sign(";") if open == 0 => return,
+            Kind::Sign("(" | "[" | "{") => open = open.saturating_add(1),
+            Kind::Sign(")" | "]" | "}") => open = open.saturating_sub(1),
+            _ => {}
+        }
+        let closes = cursor.is("]") || cursor.is(")");
+        cursor.advance();
+        if closes && open == 0 && matches!(cursor.peek(), Kind::Name(_) | Kind::Quoted(_)) {
+            return;
+        }
+    }
 }
 
 /// The position of a place in a text, in bytes.
