@@ -60,7 +60,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "Q204",
         "A definition depends on itself.",
-        "A constant or formula stands for something with itself in it.",
+        "A constant, formula or property stands for something with itself in it.",
         "Break the circle.",
     ],
     [

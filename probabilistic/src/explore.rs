@@ -5,11 +5,10 @@
 
 use std::hash::Hash;
 
-use num_rational::BigRational;
-
 use crate::error::Error;
+use crate::fraction::Fraction;
 use crate::mdp::{MOST, Mdp, dense};
-use crate::number::{Number, rounded};
+use crate::number::Number;
 use crate::states::{Look, States};
 
 /// The action of the loop that a state without choices gets.
@@ -301,19 +300,19 @@ impl<S: Clone + Eq + Hash, N: Number> Explored<S, N> {
     }
 }
 
-impl<S: Clone> Exploration<S, BigRational> {
+impl<S: Clone> Exploration<S, Fraction> {
     /// The same in doubles; none where a number is too large or too small for them.
     pub fn rounded(&self) -> Option<Exploration<S, f64>> {
         Some(Exploration { found: self.found.rounded()?, next: self.next, told: self.told })
     }
 }
 
-impl<S: Clone> Explored<S, BigRational> {
+impl<S: Clone> Explored<S, Fraction> {
     /// The same in doubles; none where a number is too large or too small for them.
     pub(crate) fn rounded(&self) -> Option<Explored<S, f64>> {
-        let rewards = self.rewards.iter().map(|values| values.iter().map(rounded).collect());
+        let rewards = self.rewards.iter().map(|values| values.iter().map(Fraction::rounded).collect());
         Some(Explored {
-            mdp: self.mdp.rounded(rounded)?,
+            mdp: self.mdp.rounded()?,
             starts: self.starts,
             states: self.states.clone(),
             rewards: rewards.collect::<Option<_>>()?,

@@ -29,6 +29,7 @@ pub mod check;
 mod codes;
 pub mod error;
 pub mod explore;
+mod fraction;
 pub mod graph;
 pub mod jani;
 pub mod mdp;

@@ -6,6 +6,7 @@
 use num_rational::BigRational;
 
 use crate::error::Error;
+use crate::fraction::Fraction;
 use crate::number::Number;
 
 /// A process has at most so many states and choices: two numbers of 32 bits are left for what is none of them.
@@ -172,14 +173,14 @@ impl<N: Number> Mdp<N> {
     }
 }
 
-impl Mdp<BigRational> {
-    /// The same process with its probabilities rounded by a function, which may refuse to.
-    pub(crate) fn rounded(&self, by: fn(&BigRational) -> Option<f64>) -> Option<Mdp<f64>> {
+impl Mdp<Fraction> {
+    /// The same process in doubles; none where a probability is too small for them.
+    pub(crate) fn rounded(&self) -> Option<Mdp<f64>> {
         Some(Mdp {
             first_choice: self.first_choice.clone(),
             first_transition: self.first_transition.clone(),
             targets: self.targets.clone(),
-            probabilities: self.probabilities.iter().map(by).collect::<Option<_>>()?,
+            probabilities: self.probabilities.iter().map(Fraction::rounded).collect::<Option<_>>()?,
             actions: self.actions.clone(),
         })
     }

@@ -91,6 +91,19 @@ fn paths_and_rewards_of_a_chain() {
         ("R{\"r\"}=? [ I=3 ]", "53/40"),
         ("R{\"r\"}=? [ C<=4 ]", "799/120"),
         ("P=? [ F (P>=0.45 [ X \"a\" ] & s>0) ]", "7/10"),
+        // Storm reads these as `F[3,3]`, `X X X F`, and what they are the opposite of.
+        ("P=? [ F=3 \"b\" ]", "31/120"),
+        ("P=? [ G=3 !\"b\" ]", "89/120"),
+        ("P=? [ !\"a\" U=4 \"b\" ]", "349/1200"),
+        ("P=? [ F>2 s=0 ]", "49/144"),
+        ("P=? [ F<3 \"b\" ]", "1/4"),
+        ("P=? [ G[1,3] s!=0 ]", "5/12"),
+        ("P=? [ G>=2 s>=3 ]", "5/12"),
+        ("P=? [ s<3 U>=2 \"b\" ]", "3/5"),
+        ("P=? [ \"b\" R<=4 s!=3 ]", "53/72"),
+        ("P=? [ G<=3 s<3 ]", "7/12"),
+        ("P=? [ s<3 W<=4 \"b\" ]", "53/72"),
+        ("P=? [ G[2,4] s>=3 ]", "5/12"),
         // What follows has no form that Storm reads: by the complement, 3 and 4 are visited for ever once they are reached;
         // `a W b` and `b R !a` are `a U b` here, where one of 3 and 5 is reached.
         ("P=? [ F>=3 \"a\" ]", "7/10"),
@@ -109,6 +122,17 @@ fn paths_and_rewards_of_a_process() {
         ("Pmax=? [ F[2,4] \"b\" ]", "391/400"),
         ("Pmin=? [ F<=3 \"b\" ]", "0"),
         ("Pmin=? [ G s<5 ]", "0"),
+        ("Pmax=? [ F=3 \"a\" ]", "21/50"),
+        ("Pmin=? [ G=3 s<3 ]", "3/20"),
+        ("Pmax=? [ s<3 U=2 \"a\" ]", "21/50"),
+        ("Pmax=? [ F>=2 s=0 ]", "1"),
+        ("Pmin=? [ G[1,2] s!=2 ]", "7/10"),
+        ("Pmax=? [ s<3 W \"a\" ]", "1"),
+        ("Pmin=? [ s<3 W \"a\" ]", "0"),
+        ("Pmax=? [ \"b\" R s!=5 ]", "1"),
+        ("R{\"r\"}min=? [ I=3 ]", "3/10"),
+        ("R{\"r\"}max=? [ C<=4 ]", "264/25"),
+        ("Pmax=? [ F<=3 (Pmax>=0.85 [ X \"b\" ]) ]", "191/200"),
         ("Pmax=? [ G F \"a\" ]", "0"),
         ("Pmin=? [ G F \"b\" ]", "0"),
         ("Pmax=? [ F G \"b\" ]", "1"),
@@ -273,4 +297,92 @@ fn a_file_of_properties() {
 fn models_without_a_keyword_and_actions_named_like_functions() {
     let model = "module m round : [0..1] init 0; [round] round=0 -> (round'=max(round,1)); endmodule";
     agree(model, "Pmax=? [ F round=1 ]", "1");
+}
+
+/// The letter that begins a property of rewards is also an operator of paths.
+#[test]
+fn properties_of_rewards_need_no_semicolon_before() {
+    let text = "P=? [ F \"a\" ]\nR{\"t\"}=? [ C ]\n// RESULT: 0\nR=? [ I=6 ]\nR<100 [ C<=3 ]\n\"last\": P=? [ \"b\" R s!=3 ]";
+    let file = property::parse_file(text).unwrap_or_else(|error| panic!("{error:?}"));
+    let texts: Vec<_> = file.properties.iter().map(|listed| &listed.text[..]).collect();
+    assert_eq!(
+        texts,
+        ["P=? [ F \"a\" ]", "R{\"t\"}=? [ C ]", "R=? [ I=6 ]", "R<100 [ C<=3 ]", "P=? [ \"b\" R s!=3 ]"]
+    );
+}
+
+/// What is not handled is refused by itself; all else in the file is answered.
+#[test]
+fn properties_that_are_not_handled_leave_the_others_alone() {
+    let text = "P=? [ F \"a\" ]
+        P=? [ F (\"a\" & X \"b\") ] + P=? [ X (F \"a\") ]
+        R{\"t\"}=? [ (s<3 U \"a\") ]
+        \"ctl\": filter(forall, A [ G s<3 ], s<2) & (s=0);
+        E [ F \"a\" ]
+        \"part\": 1 + \"ctl\";
+        P=? [ F d=1 ]";
+    let file = property::parse_file(text).unwrap_or_else(|error| panic!("{error:?}"));
+    let model = prism::parse(CHAIN).expect("a model");
+    let options = Options::default().with_declarations(file.declarations);
+    let properties = file.properties.iter().map(|listed| &listed.property);
+    let found = check_all(&model, properties, &options).expect("answers");
+    let found = found.into_iter().map(|report| match report.map(|report| report.outcome) {
+        Ok(Outcome::Value(answer)) => {
+            answer.quantity().and_then(|found| found.exact.clone()).expect("exact").to_string()
+        }
+        Err(Error::Property(problems)) => problems[0].code.to_owned(),
+        other => panic!("{other:?}"),
+    });
+    let expected = ["7/10", "Q403", "Q403", "Q403", "Q403", "Q403", "3/10"];
+    assert_eq!(found.collect::<Vec<_>>(), expected);
+    assert_eq!(file.properties[3].text, "filter(forall, A [ G s<3 ], s<2) & (s=0)");
+    let broken = property::parse_file("P=? [ F (\"a\" & X \"b\") ]; P=? [ F \"a\" + ]");
+    assert!(
+        matches!(broken, Err(Error::Property(problems)) if problems.len() == 1 && problems[0].code == "Q102")
+    );
+}
+
+/// Written out by hand these are properties of the tests above; labels of the model come before properties of the same name.
+#[test]
+fn properties_that_are_parts_of_others_by_name() {
+    let text = "
+        \"sum\": \"less\" + 2 * \"ever\";
+        \"less\": 1 - \"ever\";
+        \"ever\": P=? [ F \"a\" ];
+        \"likely\": P>=0.45 [ X \"a\" ];
+        \"path\": P=? [ F (\"likely\" & s>0) ];
+        \"all\": filter(forall, \"likely\" <=> s=3 | s=4);
+        \"a\": P=? [ F \"a\" ];
+        \"deadlock\": filter(exists, \"deadlock\");
+        \"one\": 1 + \"two\"; \"two\": \"one\" / 2;
+        \"0\": 1; \"1\": \"0\" + \"0\"; \"2\": \"1\" + \"1\"; \"3\": \"2\" + \"2\"; \"4\": \"3\" + \"3\"; \"5\": \"4\" + \"4\";
+        \"6\": \"5\" + \"5\"; \"7\": \"6\" + \"6\"; \"8\": \"7\" + \"7\"; \"9\": \"8\" + \"8\"; \"10\": \"9\" + \"9\";
+        \"none\": \"nothing\" + 1;";
+    let file = property::parse_file(text).unwrap_or_else(|error| panic!("{error:?}"));
+    let model = prism::parse(CHAIN).expect("a model");
+    let options = Options::default().with_declarations(file.declarations);
+    for (name, expected) in [
+        ("sum", "17/10"),
+        ("less", "3/10"),
+        ("path", "7/10"),
+        ("all", "true"),
+        ("a", "7/10"),
+        ("deadlock", "false"),
+        ("one", "Q204"),
+        ("8", "256"),
+        ("10", "Q104"),
+        ("none", "Q202"),
+    ] {
+        let listed = file.properties.iter().find(|listed| listed.name.as_deref() == Some(name));
+        let property = &listed.unwrap_or_else(|| panic!("{name}")).property;
+        let found = match check(&model, property, &options).map(|report| report.outcome) {
+            Ok(Outcome::Value(answer)) => {
+                answer.quantity().and_then(|found| found.exact.clone()).expect("exact").to_string()
+            }
+            Ok(Outcome::Truth(holds, _)) => holds.to_string(),
+            Err(Error::Property(problems)) => problems[0].code.to_owned(),
+            other => panic!("{name}: {other:?}"),
+        };
+        assert_eq!(found, expected, "{name}");
+    }
 }

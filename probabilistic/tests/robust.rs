@@ -19,6 +19,7 @@ module second = first [s=t, d=e, a=c] endmodule
 rewards \"cost\"
   [a] d : 2; [c] true : s+0.5; done : 1;
 endrewards
+rewards \"toll\" [b] true : 2; s=1 : 1; endrewards
 label \"goal\" = done & t>=1;
 ";
 
@@ -49,12 +50,85 @@ const WORDS: [&str; 24] = [
     "init",
 ];
 
+const PROPERTIES: [&str; 12] = [
+    "Pmax=? [ (!d U[1,4] \"goal\") ]",
+    "1 - Pmin=? [ d=false W<=3 s=N ] / 2",
+    "Pmax>=1/2 [ F=3 s=1 ] & !(Pmin<0.1 [ \"goal\" R g<2 ])",
+    "filter(max, R{\"cost\"}min=? [ C<=4 ], s>0 | \"deadlock\")",
+    "filter(forall, Pmax>0 [ X (Pmin<=0 [ G F d ]) ], \"init\")",
+    "filter(print, Pmin=? [ F G g=2 ])",
+    "R{\"cost\"}max=? [ F done ] + filter(count, s=N)",
+    "R{\"cost\"}min=? [ I=2 ] * (2 - Pmax=? [ F>=2 done ])",
+    "R{\"cost\"}min=? [ C ]",
+    "Pmax=? [ F^{rew{\"toll\"}<=5} \"goal\" {g=0}{min} ]",
+    "multi(R{\"cost\"}min=? [ F \"goal\" ], Pmax>=0.5 [ F s=N ])",
+    "filter(argmax, Pmax=? [ G<=2 s<N ], mod(s,2)=0)",
+];
+
+const PROPERTY_WORDS: [&str; 32] = [
+    "P",
+    "Pmax",
+    "Pmin=?",
+    "R{\"cost\"}",
+    "=?",
+    ">=",
+    "<0.5",
+    "[",
+    "]",
+    "(",
+    ")",
+    "{",
+    "}",
+    "F",
+    "G",
+    "X",
+    "U",
+    "W",
+    "R",
+    "C",
+    "I=2",
+    "S",
+    "<=3",
+    "[1,2]",
+    "!",
+    "&",
+    "filter(",
+    "sum,",
+    ",",
+    "\"goal\"",
+    "multi(",
+    "s",
+];
+
 fn survive(text: &str) {
     if let Ok(model) = prism::parse(text) {
         let property = property::parse("Pmax=? [ F \"goal\" ]").expect("a property");
         let options = Options::default().with_bounds(Bounds::default().with_states(2000));
         let _ = check(&model, &property, &options);
         let _ = jani::write("model", &model);
+    }
+}
+
+/// Asks a question of the model, if it is one.
+fn ask(question: &str) {
+    thread_local! {
+        static READ: prism::ast::Model = prism::parse(MODEL).expect("a model");
+    }
+    if let Ok(property) = property::parse(question) {
+        let options = Options::default().with_bounds(Bounds::default().with_states(2000));
+        READ.with(|model| {
+            let _ = check(model, &property, &options);
+        });
+    }
+}
+
+/// All properties that are broken are answered as they stand.
+#[test]
+fn whole_properties_are_answered() {
+    let model = prism::parse(MODEL).expect("a model");
+    for question in PROPERTIES {
+        let property = property::parse(question).unwrap_or_else(|error| panic!("{question}: {error:?}"));
+        check(&model, &property, &Options::default()).unwrap_or_else(|error| panic!("{question}: {error:?}"));
     }
 }
 
@@ -138,6 +212,29 @@ proptest! {
         let text: Vec<&str> = words.into_iter().map(|word| WORDS[word]).collect();
         survive(&format!("mdp {}", text.join(" ")));
         let _ = property::parse(&text.join(" "));
+    }
+
+    #[test]
+    fn broken_properties_are_refused_without_panic(
+        which in 0..PROPERTIES.len(),
+        at in 0.0..1.0_f64,
+        length in 0_usize..12,
+        words in prop::collection::vec(0..PROPERTY_WORDS.len(), 0..3),
+    ) {
+        let text: Vec<char> = PROPERTIES[which].chars().collect();
+        let at = (at * text.len() as f64) as usize;
+        let end = (at + length).min(text.len());
+        let words: Vec<&str> = words.into_iter().map(|word| PROPERTY_WORDS[word]).collect();
+        let part = |range: &[char]| range.iter().collect::<String>();
+        ask(&format!("{} {} {}", part(&text[..at]), words.join(" "), part(&text[end..])));
+    }
+
+    #[test]
+    fn property_words_in_any_order_are_refused_without_panic(
+        words in prop::collection::vec(0..PROPERTY_WORDS.len(), 0..16),
+    ) {
+        let words: Vec<&str> = words.into_iter().map(|word| PROPERTY_WORDS[word]).collect();
+        ask(&words.join(" "));
     }
 }
 

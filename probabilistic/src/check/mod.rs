@@ -1,4 +1,4 @@
-//! A model and a property to an answer: explored in doubles, and once more in rationals where the model is small.
+//! A model and a property to an answer: explored in fractions while the model is small, and in doubles otherwise.
 
 mod answer;
 mod ask;
@@ -6,6 +6,7 @@ mod bounded;
 mod filters;
 mod longrun;
 mod multi;
+mod named;
 mod options;
 mod outcome;
 mod paths;
@@ -19,16 +20,16 @@ mod vector;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use num_rational::BigRational;
-
 use crate::error::Error;
 use crate::explore::{Exploration, Explored, explore};
+use crate::fraction::Fraction;
 use crate::number::Number;
 use crate::prism::ast::{BinaryOp, Expr, ExprKind, Model};
 use crate::prism::{Names, Packed, Program, Remembered, Settings};
 use crate::property::{Declarations, Path, Property, RewardPath, Steps};
 use crate::solve::NONE;
 use crate::solve::work::MOST;
+use named::written_out;
 use query::Query;
 use state::is_of_states;
 use validate::{expressions_of, properties_in, steps_of, validate};
@@ -103,14 +104,18 @@ pub fn check_all<'p>(
     options: &Options<'_>,
 ) -> Result<Vec<Result<Report, Error>>, Error> {
     let start = Instant::now();
-    let properties: Vec<&Property> = properties.into_iter().collect();
     let joined = join(model, &options.declarations);
+    let properties =
+        properties.into_iter().map(|property| written_out(property, &joined, &options.declarations));
+    let properties: Vec<_> = properties.collect();
     let program = Program::<f64>::new(&joined, &options.settings)
         .map_err(|error| blame(error, model, &joined, &options.settings))?;
     let (mut wanted, mut refused) = (Vec::new(), Vec::new());
     for property in &properties {
-        let needed = wanted_rewards(&program.reward_names, property, options)
-            .and_then(|needed| validate(&program, property).map(|()| needed));
+        let needed = property.as_ref().map_err(Clone::clone).and_then(|property| {
+            let needed = wanted_rewards(&program.reward_names, property, options)?;
+            validate(&program, property).map(|()| needed)
+        });
         refused.push(needed.map(|needed| wanted.extend(needed)).err());
     }
     if !refused.iter().any(Option::is_none) {
@@ -118,15 +123,15 @@ pub fn check_all<'p>(
     }
     wanted.sort_unstable();
     wanted.dedup();
-    let end = match properties[..] {
-        [only] => end_of(only, &program.names, options),
+    let end = match &properties[..] {
+        [Ok(only)] => end_of(only, &program.names, options),
         _ => None,
     };
     let program = program.with_rewards(&wanted).stopping(end.as_ref());
     let exact = if options.exactness == Exactness::Never {
         None
     } else {
-        let exact = Program::<BigRational>::new(&joined, &options.settings)?;
+        let exact = Program::<Fraction>::new(&joined, &options.settings)?;
         Some(exact.with_rewards(&wanted).stopping(end.as_ref()))
     };
     let mut found = Processes::explore(&program, exact.as_ref(), options)?;
@@ -136,10 +141,10 @@ pub fn check_all<'p>(
     let build = start.elapsed();
     let mut reports = Vec::new();
     for (property, refused) in properties.iter().zip(refused) {
-        if let Some(error) = refused {
-            reports.push(Err(error));
+        let (Ok(property), None) = (property, &refused) else {
+            reports.extend(refused.map(Err));
             continue;
-        }
+        };
         let start = Instant::now();
         let report = found.report(&program, exact.as_ref(), property, options, &wanted);
         reports.push(report.map(|report| Report { build, solve: start.elapsed(), ..report }));
@@ -192,7 +197,7 @@ fn blame(error: Error, model: &Model, joined: &Model, settings: &Settings) -> Er
 
 /// A model that was explored: exactly, in doubles, or both.
 struct Processes {
-    exact: Option<Explored<Packed, BigRational>>,
+    exact: Option<Explored<Packed, Fraction>>,
     doubles: Option<Explored<Packed, f64>>,
     /// What exact arithmetic may cost each property.
     budget: u64,
@@ -202,7 +207,7 @@ impl Processes {
     /// Explores exactly as long as the model is small, and goes on in doubles unless exact values were asked for.
     fn explore(
         program: &Program<f64>,
-        exact: Option<&Program<BigRational>>,
+        exact: Option<&Program<Fraction>>,
         options: &Options<'_>,
     ) -> Result<Self, Error> {
         let bounds = &options.bounds;
@@ -247,7 +252,7 @@ impl Processes {
     fn report(
         &mut self,
         program: &Program<f64>,
-        exact: Option<&Program<BigRational>>,
+        exact: Option<&Program<Fraction>>,
         property: &Property,
         options: &Options<'_>,
         wanted: &[usize],

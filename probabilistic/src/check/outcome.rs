@@ -37,6 +37,7 @@ impl<N: Number> Query<'_, N> {
                 Err(refusal("Q403", "`multi` is handled for models that start in one state"))
             }
             Property::Multi(parts) => Ok((self.multi(parts)?, None)),
+            Property::Refused(problem) => Err(Error::Property(problem.clone().into()).into()),
             Property::Probability(question, _)
             | Property::Reward(question, ..)
             | Property::SteadyState(question, _) => {
@@ -141,6 +142,7 @@ impl<N: Number> Query<'_, N> {
                 }
                 Ok(found)
             }
+            Property::Refused(problem) => Err(Error::Property(problem.clone().into()).into()),
             Property::Multi(_) => Err(refusal("Q403", "`multi` cannot be a part of another property")),
         }
     }

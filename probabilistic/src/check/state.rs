@@ -29,6 +29,7 @@ pub fn is_number(property: &Property) -> bool {
         },
         Property::Expression(inner) => is_numeric(inner),
         Property::Multi(_) => true,
+        Property::Refused(_) => false,
     }
 }
 
@@ -49,8 +50,11 @@ fn is_comparison(op: BinaryOp) -> bool {
 }
 
 /// The labels that are known without declaration.
+pub const BUILT_IN: [&str; 2] = ["init", "deadlock"];
+
+/// Whether a label is one of those that are known without declaration, and is not declared.
 pub fn is_built_in(label: &str, names: &Names) -> bool {
-    ["init", "deadlock"].contains(&label) && names.label(label).is_none()
+    BUILT_IN.contains(&label) && names.label(label).is_none()
 }
 
 /// The same with truth values and numbers in the place of properties, for its type.

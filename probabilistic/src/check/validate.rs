@@ -49,7 +49,7 @@ pub fn expressions_of(property: &Property) -> Vec<&Expr> {
         Property::SteadyState(_, states) => vec![states],
         Property::Filter(_, inner, states) => std::iter::once(inner).chain(states).collect(),
         Property::Expression(inner) => vec![inner],
-        Property::Reward(..) | Property::Multi(_) => Vec::new(),
+        Property::Reward(..) | Property::Multi(_) | Property::Refused(_) => Vec::new(),
     }
 }
 
@@ -120,6 +120,7 @@ impl Validation {
                 }
             }
             Property::Expression(inner) => self.any(inner),
+            Property::Refused(problem) => self.problems.push(problem.clone()),
         }
     }
 

@@ -2,7 +2,7 @@
 
 use num_rational::BigRational;
 
-use crate::error::Place;
+use crate::error::{Diagnostic, Place};
 use crate::solve::Direction;
 
 /// An expression and where it starts.
@@ -58,6 +58,8 @@ pub enum Property {
     Filter(Filter, Expr, Option<Expr>),
     /// A number or a truth value that is made of properties and of what holds in a state.
     Expression(Expr),
+    /// One that is not handled, and why; it stands in a file, where others are answered.
+    Refused(Diagnostic),
 }
 
 /// What a filter makes of the values in several states.

@@ -58,6 +58,12 @@ impl<'a> Cursor<'a> {
         self.depth = 0;
     }
 
+    /// Goes on after so many tokens, with nothing open.
+    pub fn back_to(&mut self, position: usize) {
+        self.at = position.min(self.tokens.len().saturating_sub(1));
+        self.depth = 0;
+    }
+
     /// The next token.
     pub fn peek(&self) -> &'a Kind {
         &self.tokens[self.at].kind

@@ -20,6 +20,9 @@ pub struct Work {
     touched: u64,
 }
 
+/// Bits of a numerator and a denominator that fit into a word each, mostly.
+const SHORT: u64 = 126;
+
 /// What may be spent on such components, all together.
 const SPARE: u64 = 1_000_000_000;
 
@@ -31,13 +34,17 @@ impl Work {
 
     /// Pays for so many operations whose results are about as long as this one; none where the budget is spent.
     ///
-    /// Fractions are reduced, which takes the square of their length; the first part is for the memory that they take.
+    /// Fractions are reduced, which takes the square of their length; the constant part is for the memory that long ones take.
     pub fn spend<N: Number>(&mut self, result: &N, operations: usize) -> Option<()> {
         if !N::EXACT {
             return Some(());
         }
         let bits = result.size();
-        let one = bits.saturating_mul((bits / 64).saturating_add(1)).saturating_add(200);
+        let one = if bits <= SHORT {
+            40
+        } else {
+            bits.saturating_mul((bits / 64).saturating_add(1)).saturating_add(200)
+        };
         let cost = one.saturating_mul(u64::try_from(operations).unwrap_or(u64::MAX));
         self.left = self.left.saturating_sub(cost);
         if self.is_spent() { None } else { Some(()) }
