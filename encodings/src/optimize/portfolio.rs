@@ -70,7 +70,7 @@ pub(super) fn solve(run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
         return run.finish(Status::Unknown, None, Some(lower), 0, None);
     };
     let space = prepared.as_ref().map(|prepared| Space { context, bounds, prepared, orbits: None });
-    let exact = space.map(|space| Duo::new(space, &context.task.initial));
+    let exact = space.map(|space| Duo::new(space, &context.task.initial).patient());
     let is_sat = run.config.engine != Engine::Search;
     let mut portfolio = Portfolio {
         first: is_sat.then(|| FirstPlan::new(&run)),
