@@ -33,7 +33,7 @@ const NODE_WORK: u64 = 2_000;
 /// … and to make a state after it, and to look it up.
 const STATE_WORK: u64 = 600;
 /// What it takes to see which other operators an operator makes worth looking at, too.
-const CHOICE_WORK: u64 = 100;
+const CHOICE_WORK: u64 = 10;
 
 /// What the search found.
 #[derive(Debug)]
