@@ -159,11 +159,11 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         let span = info_span!("satisfice", expanded = Empty, generated = Empty).entered();
         let nodes = work.saturating_mul(NODES) as u64;
         let limit = self.best.as_ref().map(|plan| plan.cost);
-        // A plan is worth more than a better one, and who finds none has less the next time, as long as there is another way.
-        let (twice, halved) = match (limit, &self.exact) {
-            (None, _) => (1, 0),
-            (Some(_), None) => (0, 0),
-            (Some(_), Some(_)) => (0, self.satisficer_share),
+        // A plan is worth more than a better one, and who finds none has less the next time, as long as there is hope for a proof.
+        let has_hope = self.exact.as_ref().is_some_and(Duo::has_hope);
+        let (twice, halved) = match limit {
+            None => (1, 0),
+            Some(_) => (0, if has_hope { self.satisficer_share } else { 0 }),
         };
         self.satisficer_share = self.satisficer_share.saturating_add(1).min(LEAST);
         let before = satisficer.figures;

@@ -161,6 +161,11 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Duo<'a, N, E> {
         Self { is_patient: true, ..self }
     }
 
+    /// Whether some search may come to the end with the memory that there is, if it goes on as it did.
+    pub(crate) fn has_hope(&self) -> bool {
+        self.searches.iter().any(|search| search.patience != Patience::Needed)
+    }
+
     /// A plan that costs this much is known: nothing dearer is looked at, and it ends once no plan can be cheaper.
     pub(crate) fn know(&mut self, cost: &N) {
         self.searches.iter_mut().for_each(|search| search.know(cost.clone()));
