@@ -24,6 +24,7 @@
 mod codes;
 mod error;
 mod limits;
+mod lists;
 mod number;
 mod words;
 

@@ -15,7 +15,7 @@ use crate::number::dense;
 use crate::task::Task;
 
 /// Steps of a computer for each thing that is looked at.
-const STEPS: u64 = 16;
+const STEPS: u64 = 8;
 /// What is not reached.
 const FAR: u64 = u64::MAX;
 /// No fact.

@@ -12,8 +12,8 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::concurrent::compile::Concurrent;
 use crate::concurrent::happening::Role;
+use crate::lists::Lists;
 use crate::number::{Int, dense};
-use crate::satisfice::lists::Lists;
 use crate::task::quantity::{Linear, NumericId};
 use crate::task::{Condition, Fact, Literal, Operator, OperatorId, Task};
 

@@ -22,13 +22,13 @@ use crate::plan::solution::{Part, Proof, Solution, Statistics, Status};
 use crate::satisfice::{Advance, Satisficer};
 use crate::search::{Duo, Found, Prepared, Space, ties};
 
-/// For each state that the exact search stores in a round: how many nodes the search for some plan goes through, and how many clauses a
-/// formula has at most.
+/// For each state that the exact search stores in a round: how many nodes and propositions the search for some plan goes through, and how
+/// many clauses a formula has at most.
 const NODES: usize = 200;
 const CLAUSES: usize = 50;
 /// For each conflict of the SAT solver, how many states the exact search stores.
 const STATES: u64 = 4;
-/// The allowance of formulas is halved so often at most.
+/// The allowances of formulas and of the search for some plan are halved so often at most.
 const LEAST: u32 = 3;
 
 /// What is left to be tried, and what is known.
@@ -43,8 +43,9 @@ struct Portfolio<'r, 'a> {
     lower: Int,
     /// Why no plan costs less than that.
     reason: Proof,
-    /// How often the allowance of formulas is halved.
+    /// How often the allowance of formulas is halved, and that of the search for some plan.
     share: u32,
+    satisficer_share: u32,
 }
 
 /// An answer, or that the next one has its turn.
@@ -69,7 +70,7 @@ pub(super) fn solve(run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
         return run.finish(Status::Unknown, None, Some(lower), 0, None);
     };
     let space = prepared.as_ref().map(|prepared| Space { context, bounds, prepared, orbits: None });
-    let exact = space.map(|space| Duo::new(space, &context.task.initial));
+    let exact = space.map(|space| Duo::new(space, &context.task.initial).patient());
     let is_sat = run.config.engine != Engine::Search;
     let mut portfolio = Portfolio {
         first: is_sat.then(|| FirstPlan::new(&run)),
@@ -82,6 +83,7 @@ pub(super) fn solve(run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
         lower,
         reason: Proof::Bound,
         share: LEAST,
+        satisficer_share: 0,
     };
     let ending = portfolio.rounds();
     portfolio.note_search(started);
@@ -153,19 +155,26 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
     }
 
     fn satisfice(&mut self, work: usize, _: usize) -> Turn {
-        // A plan is worth more than a better one.
-        let share = if self.best.is_none() { 2 } else { 1 };
         let satisficer = self.satisficer.as_mut()?;
         let span = info_span!("satisfice", expanded = Empty, generated = Empty).entered();
-        let nodes = work.saturating_mul(NODES).saturating_mul(share) as u64;
-        let most = nodes.checked_div(satisficer.size()).unwrap_or(nodes).max(1);
+        let nodes = work.saturating_mul(NODES) as u64;
         let limit = self.best.as_ref().map(|plan| plan.cost);
+        // A plan is worth more than a better one, and who finds none has less the next time, as long as there is hope for a proof.
+        let has_hope = self.exact.as_ref().is_some_and(Duo::has_hope);
+        let (twice, halved) = match limit {
+            None => (1, 0),
+            Some(_) => (0, if has_hope { self.satisficer_share } else { 0 }),
+        };
+        self.satisficer_share = self.satisficer_share.saturating_add(1).min(LEAST);
         let before = satisficer.figures;
-        let advance = satisficer.run(limit.as_ref(), most);
+        let advance = satisficer.run(limit.as_ref(), (nodes << twice >> halved).max(1));
         satisficer.figures.add_to(before, &mut self.run.statistics);
         record(&span, &self.run.statistics);
         match advance {
-            Ok(Advance::Plan(plan)) => self.improve(plan, Part::Satisficing),
+            Ok(Advance::Plan(plan)) => {
+                self.satisficer_share = 0;
+                self.improve(plan, Part::Satisficing)
+            }
             Ok(Advance::Unsolvable) => Some(Ending::Unsolvable),
             Ok(Advance::Paused) => None,
             Ok(Advance::Ended) => {

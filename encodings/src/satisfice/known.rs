@@ -51,6 +51,11 @@ impl<'a, N: TaskNumber> Known<'a, N> {
         Ok(Some(Self { task, relaxation, explorer, status, steps, first }))
     }
 
+    /// What it takes to look at a state, about, in nodes and propositions.
+    pub(super) fn size(&self) -> u64 {
+        self.relaxation.propositions.saturating_add(self.relaxation.operators.len()) as u64
+    }
+
     pub(super) fn step(&self, step: u32) -> (OperatorId, &[u32], &N) {
         let Step { operator, choice, cost } = &self.steps[step as usize];
         (*operator, choice, cost)

@@ -11,7 +11,6 @@
 mod explore;
 mod known;
 mod landmarks;
-pub(crate) mod lists;
 pub(crate) mod open;
 pub(crate) mod queue;
 mod relaxation;
@@ -69,19 +68,14 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
         Ok(Some(Self { known, limits: context.limits, phase: 0, search: None, figures: Figures::default() }))
     }
 
-    /// What it takes to look at a state, about, in nodes and propositions.
-    pub(crate) fn size(&self) -> u64 {
-        let relaxation = &self.known.relaxation;
-        (relaxation.propositions.saturating_add(relaxation.operators.len()) as u64).saturating_add(200)
-    }
-
     /// How often it has begun anew.
     pub(crate) fn restarts(&self) -> usize {
         self.phase
     }
 
-    /// Looks at up to so many further states for a plan that costs less than `limit`, or for any.
-    pub(crate) fn run(&mut self, limit: Option<&N>, most: u64) -> Result<Advance<N>, Interrupted> {
+    /// Looks for a plan that costs less than `limit`, or for any, until so much work is done: in nodes and propositions of the relaxed
+    /// task.
+    pub(crate) fn run(&mut self, limit: Option<&N>, work: u64) -> Result<Advance<N>, Interrupted> {
         let Some((priced, weight)) = PHASES.get(self.phase).copied() else { return Ok(Advance::Ended) };
         let search = match &mut self.search {
             Some(search) => search,
@@ -91,7 +85,7 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
                 none.insert(Search::new(&mut self.known, weight, prices))
             }
         };
-        let outcome = search.run(&mut self.known, limit, most, self.limits, &mut self.figures);
+        let outcome = search.run(&mut self.known, limit, work, self.limits, &mut self.figures);
         let is_large = search.size() > self.limits.room() / PART;
         match outcome? {
             Outcome::Plan(plan) => {

@@ -10,8 +10,8 @@
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::limits::{Interrupted, Limits};
+use crate::lists::Lists;
 use crate::number::dense;
-use crate::satisfice::lists::Lists;
 use crate::task::number::{TaskNumber, sum_of_products};
 use crate::task::quantity::{Linear, NumericId, Quantity};
 use crate::task::{Condition, Fact, Literal, Operator, OperatorId, State, Task, VariableId};

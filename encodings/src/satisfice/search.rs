@@ -16,6 +16,9 @@ use crate::search::Figures;
 use crate::task::number::TaskNumber;
 use crate::task::{OperatorId, State};
 
+/// What it takes to make the next state and to see whether it is new, in nodes and propositions of a relaxed task.
+const STEP_WORK: u64 = 200;
+
 /// How states are ordered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Weight {
@@ -91,19 +94,21 @@ impl<N: TaskNumber> Search<N> {
         self.store.size().saturating_add(self.reached.len()).saturating_add(self.open.size())
     }
 
-    /// Looks at up to so many further states for a plan that costs less than `limit`.
+    /// Looks for a plan that costs less than `limit` until so much work is done, in nodes and propositions.
     pub(super) fn run(
         &mut self,
         known: &mut Known<'_, N>,
         limit: Option<&N>,
-        mut most: u64,
+        mut work: u64,
         limits: &Limits,
         figures: &mut Figures,
     ) -> Result<Outcome<N>, Interrupted> {
         let mut pulse: Pulse<'_> = limits.pulse();
-        while most > 0 {
+        let look = known.size();
+        while work > 0 {
             pulse.beat()?;
             let Some((parent, step)) = self.open.pop() else { return Ok(Outcome::Exhausted) };
+            work = work.saturating_sub(STEP_WORK);
             figures.generated = figures.generated.saturating_add(1);
             let (operator, choice, cost) = known.step(step);
             let (total, price) = {
@@ -125,6 +130,9 @@ impl<N: TaskNumber> Search<N> {
                 continue;
             };
             let (id, is_new) = self.store.insert(&state);
+            if !is_new && (self.weight == Weight::Greedy || total >= self.nodes[id as usize].cost) {
+                continue;
+            }
             let stride = known.status.stride();
             let start = (parent as usize).saturating_mul(stride);
             let before = self.reached[start..start.saturating_add(stride)].to_vec();
@@ -134,18 +142,14 @@ impl<N: TaskNumber> Search<N> {
                 self.nodes.push(node);
                 self.reached.extend(&reached);
             } else {
-                let old = &mut self.nodes[id as usize];
-                if self.weight == Weight::Greedy || node.cost >= old.cost {
-                    continue;
-                }
-                *old = node;
+                self.nodes[id as usize] = node;
                 let start = (id as usize).saturating_mul(stride);
                 for (new, old) in reached.iter_mut().zip(&mut self.reached[start..]) {
                     *new &= *old;
                     *old = *new;
                 }
             }
-            most = most.saturating_sub(1);
+            work = work.saturating_sub(look);
             figures.evaluated = figures.evaluated.saturating_add(1);
             figures.expanded = figures.expanded.saturating_add(1);
             if known.task.is_goal(&state) {

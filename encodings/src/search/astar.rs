@@ -12,18 +12,19 @@
 
 use std::sync::Arc;
 
-use crate::bounds::{Bounds, LandmarkCut};
 use crate::context::Context;
 use crate::limits::{Interrupted, Limits, Pulse};
 use crate::number::Int;
 use crate::plan::ground::GroundPlan;
+use crate::search::estimate::{Estimate, Sharper};
 use crate::search::figures::Figures;
 use crate::search::open::Open;
 use crate::search::orbits::Orbits;
 use crate::search::prepared::Prepared;
 use crate::search::store::{NONE, Origin, Store};
+use crate::search::stubborn::Choosing;
 use crate::task::number::TaskNumber;
-use crate::task::{Fact, State, Task};
+use crate::task::{Fact, OperatorId, State, Task};
 
 /// As many states are stored before the first look at how far the search is.
 const FEW: usize = 200_000;
@@ -31,6 +32,8 @@ const FEW: usize = 200_000;
 const NODE_WORK: u64 = 2_000;
 /// … and to make a state after it, and to look it up.
 const STATE_WORK: u64 = 600;
+/// What it takes to see which other operators an operator makes worth looking at, too.
+const CHOICE_WORK: u64 = 10;
 
 /// What the search found.
 #[derive(Debug)]
@@ -41,55 +44,6 @@ pub(crate) enum Found<N = Int> {
     None,
     /// A limit was reached first; the best plan so far.
     Unknown(Option<GroundPlan<N>>),
-}
-
-/// A lower bound on the cost from a state to the goal.
-pub(crate) trait Estimate<N> {
-    /// None if the goal cannot be reached.
-    fn estimate(&self, state: &State<N>) -> Option<N>;
-
-    /// A sharper one that takes longer, if there is one.
-    fn sharper(&self, _: &Task<N>) -> Option<Box<dyn Sharper<N>>> {
-        None
-    }
-
-    /// What is known of objects that are interchangeable.
-    fn orbits(&self, _: Context<'_, N>) -> Option<Orbits> {
-        None
-    }
-}
-
-/// A lower bound that takes long, and is looked at only where a state is to be expanded.
-pub(crate) trait Sharper<N> {
-    /// None if the goal cannot be reached.
-    fn estimate(&mut self, state: &State<N>) -> Option<N>;
-
-    /// What it took so far, in steps of a computer.
-    fn work(&self) -> u64;
-}
-
-impl Sharper<Int> for LandmarkCut {
-    fn estimate(&mut self, state: &State) -> Option<Int> {
-        self.sum(&state.values).map(Int::from)
-    }
-
-    fn work(&self) -> u64 {
-        self.work()
-    }
-}
-
-impl Estimate<Int> for Bounds {
-    fn estimate(&self, state: &State) -> Option<Int> {
-        self.estimate(state)
-    }
-
-    fn sharper(&self, task: &Task) -> Option<Box<dyn Sharper<Int>>> {
-        LandmarkCut::new(task).map(|cut| Box::new(cut) as Box<dyn Sharper<Int>>)
-    }
-
-    fn orbits(&self, context: Context<'_>) -> Option<Orbits> {
-        Orbits::new(context).ok().flatten()
-    }
 }
 
 /// What a search goes through, and by which estimates.
@@ -110,6 +64,17 @@ pub(crate) enum Order {
     Nearest,
     /// That with the least estimate, whatever was paid.
     Greedy,
+}
+
+/// What becomes of a search that cannot come to the end with the memory that there is, if it goes on as it did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Patience {
+    /// It ends.
+    None,
+    /// It would go on.
+    Some,
+    /// It goes on.
+    Needed,
 }
 
 /// The cost and the steps that count, and then what is further.
@@ -133,6 +98,8 @@ pub(crate) struct Search<'a, N, E> {
     order: Order,
     /// Looked at, too, when a state is to be expanded.
     pub(super) sharper: Option<Box<dyn Sharper<N>>>,
+    /// Set if not all operators are applied that can be.
+    pub(super) choosing: Option<Choosing>,
     /// What it took so far apart from that, in steps of a computer.
     own_work: u64,
     /// Among how many searches memory is divided.
@@ -140,6 +107,7 @@ pub(crate) struct Search<'a, N, E> {
     /// The lower bound so far.
     bound: Option<N>,
     is_interrupted: bool,
+    pub(super) patience: Patience,
     /// The best goal state so far.
     best: Option<u32>,
     /// What a known plan costs, if there is one: nothing dearer is looked at.
@@ -172,10 +140,12 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
             incomplete: false,
             order,
             sharper: None,
+            choosing: None,
             own_work: 0,
             sharing: 1,
             bound: None,
             is_interrupted: false,
+            patience: Patience::None,
             best: None,
             limit,
             is_told: false,
@@ -225,7 +195,10 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
             }
             if self.store.len() >> self.progress.len() >= FEW {
                 self.progress.extend(self.bound.clone());
-                if !self.is_hopeful() {
+                let is_hopeful = self.is_hopeful();
+                if self.patience != Patience::None {
+                    self.patience = if is_hopeful { Patience::Some } else { Patience::Needed };
+                } else if !is_hopeful {
                     return Some(Found::Unknown(self.best_plan()));
                 }
             }
@@ -365,6 +338,19 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
         self.best.map(|goal| self.plan(goal))
     }
 
+    /// The operators whose propositional condition holds in the state, ascending; those that are enough.
+    fn applicable(&mut self) -> Vec<OperatorId> {
+        let mut applicable = self.prepared.index.applicable(self.task, &self.state);
+        if let Some(choosing) = &mut self.choosing {
+            let size = choosing.choose(self.task, &self.state.values, &mut applicable);
+            self.own_work = self.own_work.saturating_add(size.saturating_mul(CHOICE_WORK));
+            if choosing.is_idle() {
+                self.choosing = None;
+            }
+        }
+        applicable
+    }
+
     /// Adds all that can be reached by one step from a node, whose state is unpacked. A node whose expansion is interrupted is not expanded, so that the
     /// search must end there.
     #[expect(
@@ -378,7 +364,7 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
         let cost = self.store.cost(id).clone();
         let steps = self.store.origin(id).steps + 1;
         self.figures.expanded += 1;
-        for operator_id in prepared.index.applicable(task, &self.state) {
+        for operator_id in self.applicable() {
             let operator = &task.operators[operator_id.index()];
             let sizes = operator.sizes();
             let first = prepared.numbers[operator_id.index()];

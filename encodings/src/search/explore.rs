@@ -12,9 +12,11 @@ use crate::context::Context;
 use crate::limits::Interrupted;
 use crate::number::{Int, dense};
 use crate::plan::ground::GroundPlan;
-use crate::search::astar::{Estimate, Found, Hear, Order, Search, Space};
+use crate::search::astar::{Found, Hear, Order, Patience, Search, Space};
+use crate::search::estimate::Estimate;
 use crate::search::figures::Figures;
 use crate::search::prepared::Prepared;
+use crate::search::stubborn::{Choosing, Stubborn};
 use crate::task::State;
 use crate::task::number::TaskNumber;
 
@@ -24,8 +26,10 @@ pub(crate) const STATE_LIMIT: usize = 400_000;
 const SOON: usize = 20_000;
 /// The work that is worth as much as a state, in steps of a computer.
 const STATE: u64 = 2_500;
-/// After so much work the search that is clearly behind is given up.
+/// After so much work the search that is clearly behind has half as much as the other one…
 const LONG: u64 = 6_000_000_000;
+/// … and after so much it is given up.
+const TOO_LONG: u64 = 100_000_000_000;
 
 /// Searches a task whose operators all cost at least 0, as long as there is memory and hope to come to the end with it.
 pub(crate) fn search(context: Context<'_>, bounds: &Bounds) -> Found {
@@ -128,6 +132,8 @@ pub(crate) struct Duo<'a, N, E> {
     initial: State<N>,
     searches: Vec<Search<'a, N, E>>,
     has_begun: bool,
+    /// Whether searches go on without hope.
+    is_patient: bool,
     /// What no plan costs less than.
     bound: Option<N>,
     /// The best plan of searches that were given up, and what they have done.
@@ -143,10 +149,21 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Duo<'a, N, E> {
             initial: initial.clone(),
             searches,
             has_begun: false,
+            is_patient: false,
             bound: None,
             best: None,
             figures: Figures::default(),
         }
+    }
+
+    /// Searches go on, with half of the work, where they seem to have no hope to come to the end with the memory that there is.
+    pub(crate) fn patient(self) -> Self {
+        Self { is_patient: true, ..self }
+    }
+
+    /// Whether some search may come to the end with the memory that there is, if it goes on as it did.
+    pub(crate) fn has_hope(&self) -> bool {
+        self.searches.iter().any(|search| search.patience != Patience::Needed)
     }
 
     /// A plan that costs this much is known: nothing dearer is looked at, and it ends once no plan can be cheaper.
@@ -178,6 +195,7 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Duo<'a, N, E> {
         let until = STATE.saturating_mul(most as u64);
         let count = self.searches.len();
         let mut ended = Vec::new();
+        let behind = if until >= LONG { behind(&self.searches) } else { None };
         for position in 0..count {
             let bound = &mut self.bound;
             let mut told = |cost: Option<&N>, own: &N| {
@@ -190,7 +208,13 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Duo<'a, N, E> {
             search.share_room(count);
             // Most of what is proved at all is proved soon, and without landmarks.
             let is_soon = search.sharper.is_some() && most <= STATE_LIMIT;
-            let found = search.run_until(if is_soon { until / 4 } else { until }, &mut told);
+            let is_doubtful = behind == Some(position) || search.patience == Patience::Needed;
+            let parts = match (is_soon, is_doubtful) {
+                (true, _) => 4,
+                (false, true) => 2,
+                (false, false) => 1,
+            };
+            let found = search.run_until(until.checked_div(parts).unwrap_or(until), &mut told);
             let (is_met, is_interrupted) = (search.is_met(), search.is_interrupted());
             let best = self.best_plan();
             match found {
@@ -208,8 +232,8 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Duo<'a, N, E> {
                 others.for_each(|(_, other)| other.know(plan.cost.clone()));
             }
         }
-        if ended.is_empty() && until >= LONG {
-            ended.extend(behind(&self.searches));
+        if ended.is_empty() && until >= TOO_LONG {
+            ended.extend(behind);
         }
         for position in ended.into_iter().rev() {
             let search = self.searches.remove(position);
@@ -219,7 +243,8 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Duo<'a, N, E> {
         self.searches.is_empty().then(|| Found::Unknown(self.best.clone()))
     }
 
-    /// Lets the other search begin, and states count once that interchangeable objects tell apart.
+    /// Lets the other search begin, leaves out operators that are not needed, and counts states once that interchangeable objects tell
+    /// apart.
     fn begin(&mut self) {
         self.has_begun = true;
         let Space { context, bounds, .. } = self.space;
@@ -234,6 +259,13 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Duo<'a, N, E> {
             let mut other = Search::new(&self.space, &self.initial, Order::Nearest, limit);
             other.sharper = Some(sharper);
             self.searches.push(other);
+        }
+        let patience = if self.is_patient { Patience::Some } else { Patience::None };
+        self.searches.iter_mut().for_each(|search| search.patience = patience);
+        if let Some(stubborn) = Stubborn::new(context.task).map(Arc::new) {
+            for search in &mut self.searches {
+                search.choosing = Some(Choosing::new(Arc::clone(&stubborn)));
+            }
         }
     }
 }
@@ -293,9 +325,9 @@ mod tests {
     use crate::tests::random::Random;
     use crate::tests::{depot, fleet, ground_text, optimum, successors};
 
-    /// The cost and the number of steps of a plan that a search finds, with or without the sharper bound and the exchange of
-    /// objects.
-    fn found(task: &Task, order: Order, sharp: bool, exchanged: bool) -> Option<(Int, usize)> {
+    /// The cost and the number of steps of a plan that a search finds, with or without the sharper bound, the exchange of objects, and
+    /// stubborn sets.
+    fn found(task: &Task, order: Order, [sharp, exchanged, chosen]: [bool; 3]) -> Option<(Int, usize)> {
         let limits = Limits::none();
         let context = Context::new(task, &limits);
         let bounds = Bounds::new(context).expect("no limit");
@@ -304,6 +336,8 @@ mod tests {
         let space = Space { context, bounds: &bounds, prepared: &prepared, orbits };
         let mut search = Search::new(&space, &task.initial, order, None);
         search.sharper = if sharp { bounds.sharper(task) } else { None };
+        let stubborn = if chosen { Stubborn::new(task) } else { None };
+        search.choosing = stubborn.map(|stubborn| Choosing::new(Arc::new(stubborn)));
         match search.run(usize::MAX, &mut |_, _| {}) {
             Some(Found::Optimal(plan)) => Some((plan.cost, plan.steps.len())),
             Some(Found::None) => None,
@@ -318,13 +352,13 @@ mod tests {
             return false;
         }
         let cheapest = optimum(&task);
-        let plain = found(&task, Order::Fewest, false, false);
+        let plain = found(&task, Order::Fewest, [false; 3]);
         assert_eq!(plain.map(|(cost, _)| cost), cheapest, "{text:?}");
-        for (sharp, exchanged) in [(false, true), (true, false), (true, true)] {
-            let fewest = found(&task, Order::Fewest, sharp, exchanged);
-            assert_eq!(fewest, plain, "{sharp} {exchanged}: {text:?}");
-            let nearest = found(&task, Order::Nearest, sharp, exchanged);
-            assert_eq!(nearest.map(|(cost, _)| cost), cheapest, "{sharp} {exchanged}: {text:?}");
+        for ways in (1..8).map(|ways| [ways & 1, ways & 2, ways & 4].map(|way| way > 0)) {
+            let fewest = found(&task, Order::Fewest, ways);
+            assert_eq!(fewest, plain, "{ways:?}: {text:?}");
+            let nearest = found(&task, Order::Nearest, ways);
+            assert_eq!(nearest.map(|(cost, _)| cost), cheapest, "{ways:?}: {text:?}");
         }
         let mut cut = crate::bounds::LandmarkCut::new(&task).expect("small costs");
         let mut at = task.clone();

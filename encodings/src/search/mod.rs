@@ -2,6 +2,7 @@
 
 mod astar;
 mod directions;
+mod estimate;
 mod explore;
 mod figures;
 mod front;
@@ -10,11 +11,13 @@ mod open;
 mod orbits;
 mod prepared;
 mod store;
+mod stubborn;
 pub(crate) mod successors;
 pub(crate) mod ties;
 
-pub(crate) use astar::{Estimate, Found, Space};
+pub(crate) use astar::{Found, Space};
 pub(crate) use directions::is_monotone;
+pub(crate) use estimate::Estimate;
 pub(crate) use explore::{Duo, STATE_LIMIT, closed_labels, search, search_from, search_states};
 pub(crate) use figures::Figures;
 pub(crate) use prepared::Prepared;
