@@ -191,6 +191,8 @@ impl<'a> Builder<'a> {
                 is_chosen,
                 designs,
                 joint,
+                most: 1,
+                under_way: None,
                 compressible: false,
             });
         }
@@ -345,7 +347,6 @@ fn join(
     let accesses = &mut happening.accesses;
     match happening.role {
         Role::Start(instance) => {
-            accesses.after.push((keys.ended(instance), 0));
             let instance = &mut instances[instance as usize];
             accesses.join(&keys.over_all(over_all));
             accesses.after.extend(keys.designs(&instance.designs));
@@ -355,7 +356,6 @@ fn join(
             }
         }
         Role::End(instance) => {
-            accesses.marks.push(keys.ended(instance));
             accesses.marks.extend(keys.over_all(over_all).marks);
             accesses.marks.extend(keys.used(&instances[instance as usize].designs, false));
         }

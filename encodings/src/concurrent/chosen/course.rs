@@ -60,7 +60,7 @@ pub(super) struct Course {
     pub(super) values: Vec<u32>,
     /// The numbers of the task.
     pub(super) numbers: Vec<Affine>,
-    /// Ascending by instance.
+    /// Ascending by instance; of one instance in the order in which its runs have started, and end.
     pub(super) opens: Vec<Open>,
     pub(super) passed: Vec<Passed>,
     /// What each chosen duration can be at least and at most, by the bounds that rest on nothing else; ascending by column.
@@ -112,6 +112,11 @@ impl Course {
         self.opens.iter().map(|open| open.instance)
     }
 
+    /// How many runs of an instance are under way.
+    fn runs(&self, instance: u32) -> usize {
+        self.instances().filter(|open| *open == instance).count()
+    }
+
     /// The sequence after a happening; none if it has no times and durations.
     pub(super) fn after(&self, concurrent: &Concurrent, operator: OperatorId) -> Option<Self> {
         let role = concurrent.happenings[operator.index()].role;
@@ -120,8 +125,13 @@ impl Course {
         }
         let state = self.state(concurrent);
         let own = &concurrent.task.operators[operator.index()];
-        let values = concurrent.task.successor(own, &state, &[])?.values;
-        let mut next = Self { values, cost: self.cost.checked_add(own.cost.constant)?, ..self.clone() };
+        let mut after = concurrent.task.successor(own, &state, &[])?;
+        if let Role::End(instance) = role
+            && self.runs(instance) == 1
+        {
+            concurrent.cease(instance, &mut after);
+        }
+        let mut next = Self { values: after.values, cost: self.cost.checked_add(own.cost.constant)?, ..self.clone() };
         let mut asked = Vec::new();
         next.count(concurrent, operator, role, &mut asked)?;
         next.pass(concurrent, operator, role, &mut asked)?;
@@ -146,10 +156,11 @@ impl Course {
                 used.any(|(own, other)| own == function && other != design)
             })
         };
-        let is_open = |instance| self.instances().any(|open| open == instance);
         let is_possible = match role {
-            Role::Start(instance) => !is_open(instance) && !clashes(),
-            Role::End(instance) => is_open(instance),
+            Role::Start(instance) => {
+                self.runs(instance) < concurrent.instances[instance as usize].most as usize && !clashes()
+            }
+            Role::End(instance) => self.runs(instance) > 0,
             Role::Whole => !clashes(),
             Role::Timed(_) => true,
             Role::Never => false,
@@ -256,7 +267,7 @@ impl Course {
                 &concurrent.happenings[concurrent.instances[instance as usize].end.index()].accesses.after;
             self.come_after(concurrent, &end, after, asked)?;
             let last = (!concurrent.instances[instance as usize].joint.is_empty()).then(|| time.clone());
-            let place = self.opens.partition_point(|open| open.instance < instance);
+            let place = self.opens.partition_point(|open| open.instance <= instance);
             self.opens.insert(place, Open { instance, end, last });
         } else if role == Role::Whole {
             asked.push(Affine::column(MAKESPAN).minus(&time));

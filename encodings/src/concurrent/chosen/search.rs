@@ -157,8 +157,10 @@ impl<'a> Search<'a> {
             self.priorities[1] = self.priorities[1].saturating_sub(BOOST);
         }
         let mut candidates = self.expansion.starts(&course.state(self.concurrent));
-        let open = course.instances().map(|instance| self.concurrent.instances[instance as usize].end);
-        candidates.extend(open);
+        let mut open: Vec<u32> = course.instances().collect();
+        open.dedup();
+        let ends = open.iter().map(|instance| self.concurrent.instances[*instance as usize].end);
+        candidates.extend(ends);
         let own = Figures { expanded: 1, generated: candidates.len() as u64, evaluated: 0 };
         self.figures = self.figures.plus(own);
         let (id, depth) = (dense(self.nodes.len()), dense(course.passed.len()));
