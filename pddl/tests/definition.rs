@@ -330,10 +330,7 @@ fn an_instance_may_overlap_with_itself() {
     let b = durative("b", "1", "", "(at start (p)) (at end (not (q)))");
     task(&[a, b], "(p) (q)", "(g)").check(
         CONCURRENTLY,
-        &[
-            ("0: (a) [2]\n0.5: (a) [2]", "at_start"),
-            ("0: (a) [2]\n1: (b) [1]\n1.001: (a) [2]", "over_all"),
-        ],
+        &[("0: (a) [2]\n0.5: (a) [2]", "at_start"), ("0: (a) [2]\n1: (b) [1]\n1.001: (a) [2]", "over_all")],
     );
     // An end is kept apart from the end of another run like from any happening: setting a number twice is not simultaneous.
     for effect in ["(assign (x) 1)", "(assign (x) (+ (x) 1))"] {

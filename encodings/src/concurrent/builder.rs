@@ -193,6 +193,7 @@ impl<'a> Builder<'a> {
                 joint,
                 most: 1,
                 under_way: None,
+                counts_by_end: false,
                 compressible: false,
             });
         }

@@ -83,11 +83,6 @@ pub(super) fn compile(
     task.time_scale = unit.0;
     drop_links(&mut task, &instances);
     count_runs(&task, &happenings, &mut instances, separation, limits)?;
-    let mut is_exact = is_exact;
-    for own in instances.iter_mut().filter(|own| chooses && own.timer.is_some() && own.most > 1) {
-        // Which run ends first depends on what is chosen, and the number that holds durations is one.
-        (own.most, own.under_way, is_exact) = (1, None, false);
-    }
     let keys = keep_runs_apart(&mut task, &instances, &mut happenings, keys);
     let compressible = compressible(&task, &happenings, &instances, limits);
     for (own, compressible) in instances.iter_mut().zip(compressible?) {

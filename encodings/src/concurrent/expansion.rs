@@ -8,6 +8,10 @@ use crate::number::Int;
 use crate::search::generator::OperatorIndex;
 use crate::task::{OperatorId, State};
 
+/// More runs of an instance at a time are not looked for: where so many can make a difference, and where no bound is known.
+const RUNS: u32 = 16;
+const UNBOUNDED_RUNS: u32 = 4;
+
 /// Where a sequence of happenings has led.
 #[derive(Debug, Clone)]
 pub(super) struct Situation {
@@ -24,7 +28,7 @@ pub(super) enum Nowhere {
     Impossible,
     /// Timed initial literals come first.
     TooLate,
-    /// Numbers do not fit their type.
+    /// Numbers do not fit their type, or runs of an instance are too many or of different length: it is left out.
     Unfit,
 }
 
@@ -132,11 +136,20 @@ impl<'a> Expansion<'a> {
             Role::Never => return Err(Nowhere::Impossible),
         };
         let own = concurrent.instances.get(instance as usize);
+        let counts_by_end = own.is_some_and(|own| own.counts_by_end);
         let most = own.map_or(u32::MAX, |own| own.most);
         if kind == Kind::Start && clocks.runs(instance) >= most || self.clashes(clocks, happening) {
             return Err(Nowhere::Impossible);
         }
+        let looked_for = if most == u32::MAX { UNBOUNDED_RUNS } else { RUNS };
+        if kind == Kind::Start && clocks.runs(instance) >= looked_for {
+            return Err(Nowhere::Unfit);
+        }
         let mut after = concurrent.task.successor(operator, state, &[]).ok_or(Nowhere::Unfit)?;
+        // Without such a run everything else is as it was.
+        if kind == Kind::End && counts_by_end && after == *state {
+            return Err(Nowhere::Impossible);
+        }
         // Of the runs of an instance the first one ends first.
         let runs = || clocks.opens().iter().map(|open| open.instance);
         let ended = if kind == Kind::End { runs().position(|open| open == instance) } else { None };

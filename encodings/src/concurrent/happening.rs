@@ -52,6 +52,8 @@ pub(super) struct Instance {
     pub(super) most: u32,
     /// The fact that it is under way, if that is more than one.
     pub(super) under_way: Option<Fact>,
+    /// Several runs at a time can make a difference, and one whose end changes nothing makes none.
+    pub(super) counts_by_end: bool,
     /// Whether its end can come right after its start in a sequence, and nothing is lost.
     pub(super) compressible: bool,
 }

@@ -34,7 +34,8 @@ pub(super) fn count_runs(
         let own = own?;
         // Other atoms of its variable are false, and the start requires one of them: that is how such variables come about.
         let is_alone = |fact: Fact| task.variables[fact.variable.index()].values.len() == 2;
-        let is_single = !own.under_way.is_some_and(is_alone) || index.excludes_itself(own, &mut left) == Some(true);
+        let is_single =
+            !own.under_way.is_some_and(is_alone) || index.excludes_itself(own, &mut left) == Some(true);
         own.most = if is_single { 1 } else { u32::MAX };
     }
     let needed = needed(task);
@@ -43,16 +44,21 @@ pub(super) fn count_runs(
         let known = Known { most: &most, separation, needed: &needed };
         for own in limits.watch(&mut *instances) {
             let own = own?;
-            if own.most == u32::MAX {
-                own.most = index.most(own, &known, &mut left).flatten().unwrap_or(u32::MAX);
+            if own.most > 1
+                && let Some(bound) = index.most(own, &known, &mut left)
+            {
+                own.most = own.most.min(bound);
             }
         }
         if instances.iter().zip(&most).all(|(own, most)| own.most == *most) {
             break;
         }
     }
+    let known = Known { most: &[], separation, needed: &needed };
     for own in instances {
         own.under_way = own.under_way.filter(|_| own.most > 1);
+        own.counts_by_end =
+            own.under_way.is_some_and(|under_way| counts_by_end(task, own, under_way, &known));
     }
     Ok(())
 }
@@ -171,14 +177,14 @@ impl Index<'_> {
     }
 
     /// How many runs at a time can make a difference; none if that is not known, or takes too long to find out.
-    fn most(&self, own: &Instance, known: &Known<'_>, left: &mut usize) -> Option<Option<u32>> {
+    fn most(&self, own: &Instance, known: &Known<'_>, left: &mut usize) -> Option<u32> {
         let [start, end] = [own.start, own.end].map(|id| &self.task.operators[id.index()]);
         if own.is_chosen || ![start, end].into_iter().all(is_plain) || !assigns_constants(own, end) {
-            return Some(None);
+            return None;
         }
         let alone = self.invariant(own, true, left)?;
         if !self.lasts_as_long(own, start, &alone) {
-            return Some(None);
+            return None;
         }
         let under_way = own.under_way?.variable;
         let [starts, ends] = [start, end].map(|operator| -> Vec<Fact> {
@@ -186,7 +192,7 @@ impl Index<'_> {
         });
         // The one that ends first takes away what the other one needs all along: they start and end together, and one does for both.
         if ends.iter().any(|fact| clashes(*fact, &alone.over_all)) {
-            return Some(Some(1));
+            return Some(1);
         }
         let invariant = self.invariant(own, false, left)?;
         let wanted = known.wanted(&ends);
@@ -195,7 +201,7 @@ impl Index<'_> {
         for variable in &hidden {
             *left = left.checked_sub(self.task.operators.len())?;
             if !self.is_hidden(own, &invariant, &starts, *variable) {
-                return Some(None);
+                return None;
             }
         }
         let numbers = end.numeric_effects.iter().map(|effect| effect.variable);
@@ -205,13 +211,13 @@ impl Index<'_> {
         for (facts, numbers) in [(&set, &[][..]), (&wanted, &numbers)] {
             let facts = facts.iter().filter(|fact| !hidden.contains(&fact.variable)).copied();
             for id in self.undoing(own, &invariant, (facts.collect(), numbers), left)? {
-                let Some(times) = self.times(id, own, known) else { return Some(None) };
+                let times = self.times(id, own, known)?;
                 all = all.saturating_add(times);
             }
         }
         // Ends of earlier runs undo what starts have set: then it is known only that two runs, the first of all that overlap, need not do so.
         let is_cut = set.iter().any(|fact| clashes(*fact, &ends) && !hidden.contains(&fact.variable));
-        Some(u32::try_from(all).ok().filter(|all| *all == 1 || !is_cut))
+        u32::try_from(all).ok().filter(|all| *all == 1 || !is_cut)
     }
 
     /// The happenings of others that undo effects while a run is under way.
@@ -256,7 +262,8 @@ impl Index<'_> {
     /// Whether a run that starts while another one is under way takes as long.
     fn lasts_as_long(&self, own: &Instance, start: &Operator, invariant: &Invariant) -> bool {
         start.numeric_effects.iter().all(|effect| {
-            let mut numbers = effect.value.coefficients.iter().flat_map(|(number, _)| self.changing(own, *number));
+            let mut numbers =
+                effect.value.coefficients.iter().flat_map(|(number, _)| self.changing(own, *number));
             is_timer(own, effect.variable) && numbers.all(|id| self.is_outside(invariant, own, id))
         })
     }
@@ -309,6 +316,17 @@ fn mentions(operator: &Operator, variable: VariableId) -> bool {
 /// Whether the effects of a happening on facts do not depend on the state, and it earns nothing.
 fn is_plain(operator: &Operator) -> bool {
     operator.conditional.is_empty() && operator.cost.tables.is_empty() && operator.cost.constant >= 0
+}
+
+/// Whether only the end of a run changes anything that somebody may need, and another end does the same again.
+fn counts_by_end(task: &Task, own: &Instance, under_way: Fact, known: &Known<'_>) -> bool {
+    let [start, end] = [own.start, own.end].map(|id| &task.operators[id.index()]);
+    let starts = known.wanted(&start.effects);
+    !own.is_chosen
+        && [start, end].into_iter().all(is_plain)
+        && starts.iter().all(|fact| fact.variable == under_way.variable)
+        && start.numeric_effects.iter().all(|effect| is_timer(own, effect.variable))
+        && assigns_constants(own, end)
 }
 
 /// Whether a number holds how long an instance takes.

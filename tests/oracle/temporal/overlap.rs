@@ -255,7 +255,8 @@ impl Search<'_> {
                     if ticks > 0 {
                         more.running.push((instance, ticks));
                     }
-                    let counts = |it: &Happening| self.counts(it) || ticks > 0 && self.counts_at_end(instance);
+                    let counts =
+                        |it: &Happening| self.counts(it) || ticks > 0 && self.counts_at_end(instance);
                     let again = more.happenings.last().is_some_and(|it| !it.interferes(it) && counts(it));
                     let copies = more.starts.iter().filter(|(other, _)| *other == instance).count();
                     self.open |= again && copies == COPIES;
