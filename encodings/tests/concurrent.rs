@@ -13,23 +13,23 @@ use pddl::ast::{Domain, Problem};
 use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, read};
 
-fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
+pub fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     let read = read(&Source::new("domain", domain), &Source::new("problem", problem));
     let (domain, problem, _) = read.unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
     (domain, problem)
 }
 
-fn rational(numerator: i128, denominator: i128) -> BigRational {
+pub fn rational(numerator: i128, denominator: i128) -> BigRational {
     BigRational::new(BigInt::from(numerator), BigInt::from(denominator))
 }
 
-fn solve(domain: &Domain, problem: &Problem, separation: &BigRational) -> Solution {
+pub fn solve(domain: &Domain, problem: &Problem, separation: &BigRational) -> Solution {
     let task = ground_concurrent(domain, problem, &GroundConfig::default(), separation)
         .unwrap_or_else(|errors| panic!("{errors:?}"));
     optimize_concurrent(&task, &Limits::none(), &mut |_| {})
 }
 
-fn written(plan: &Plan) -> String {
+pub fn written(plan: &Plan) -> String {
     let mut text = String::new();
     for step in &plan.steps {
         let mut words = step.arguments.clone();
@@ -40,7 +40,7 @@ fn written(plan: &Plan) -> String {
 }
 
 /// What the validator says a plan costs; else why it is not valid.
-fn metric(
+pub fn metric(
     domain: &Domain,
     problem: &Problem,
     text: &str,
@@ -57,7 +57,7 @@ fn metric(
 }
 
 /// The metric and the lines of the plan; none if it is proved that there is no plan.
-fn check(
+pub fn check(
     name: &str,
     domain: &str,
     problem: &str,
@@ -319,7 +319,7 @@ fn sample(random: &mut Random) -> Sample {
 /// The last start that brute force tries. With a separation of one unit all times of a best plan are whole numbers.
 const LAST: i128 = 7;
 
-/// The least metric of valid plans of up to three actions, none of which overlaps with itself.
+/// The least metric of valid plans of up to three actions.
 fn brute_force(task: &Sample, domain: &Domain, problem: &Problem) -> Option<BigRational> {
     let separation = rational(1, 1);
     let mut best: Option<BigRational> = None;
@@ -340,10 +340,8 @@ fn brute_force(task: &Sample, domain: &Domain, problem: &Problem) -> Option<BigR
         let (from, after) = plan.last().copied().unwrap_or((0, 0));
         for start in from..=LAST {
             for action in 0..3 {
-                let again = |other: &(i128, usize)| {
-                    other.1 == action && start < other.0 + i128::from(task.durations[action])
-                };
-                if (start, action) >= (from, after) && !plan.iter().any(again) {
+                // The same action at the same time is another one.
+                if (start, action) >= (from, after) {
                     let mut longer = plan.clone();
                     longer.push((start, action));
                     open.push(longer);

@@ -140,8 +140,14 @@ fn what_is_spent_at_the_start_is_paid_for() {
         problem("(= (fuel) 9)", &format!("(h) (>= (temperature) {least})"), "(total-time)")
             .replace("(= (fuel) 0)", "")
     };
-    check("enough", &all, &goal("40"), (Status::Optimal, Some("4"), &["0: (burn) [4]"]));
-    check("all", &all, &goal("42.5"), (Status::Optimal, Some("4.5"), &["0: (burn) [4.5]"]));
+    let twice = ["0: (burn) [2]", "0.001: (burn) [2]"];
+    check("enough for two at once", &all, &goal("40"), (Status::Optimal, Some("2.001"), &twice));
+    let once = domain(&[burn
+        .replace("(at start (>=", "(at start (q)) (at start (>=")
+        .replace("(at start (decrease", "(at start (not (q))) (at start (decrease")]);
+    let goal_of_one = |least: &str| goal(least).replace("(= (fuel) 9)", "(= (fuel) 9) (q)");
+    check("enough", &once, &goal_of_one("40"), (Status::Optimal, Some("4"), &["0: (burn) [4]"]));
+    check("all", &once, &goal_of_one("42.5"), (Status::Optimal, Some("4.5"), &["0: (burn) [4.5]"]));
     let (domain, problem) = parse(&all, &goal("42.6"));
     let solution = solve(&domain, &problem, &rational(1, 1000), &Limits::none());
     assert_eq!((solution.status, solution.plan), (Status::Unsolvable, None));

@@ -48,8 +48,8 @@ fn wishes_for_the_end_are_weighed_and_proved() {
     check("(preference w (at end (not (p))))", "(p)", &metric("2"), (Status::Optimal, Some("5"), &raise));
     check("(preference w (at end (and (p) (r))))", "(p)", &metric("2"), (Status::Optimal, Some("5"), &raise));
     check("", "(p) (preference w (r))", &metric("2"), (Status::Optimal, Some("5"), &raise));
-    let all = ["0: (raise) [3]", "3.5: (lower) [2]", "4: (raise) [3]"];
-    check("", "(p) (preference w (r))", &metric("6"), (Status::Optimal, Some("7"), &all));
+    let all = ["0: (raise) [3]", "1: (raise) [3]", "3.5: (lower) [2]"];
+    check("", "(p) (preference w (r))", &metric("6"), (Status::Optimal, Some("5.5"), &all));
 }
 
 #[test]

@@ -6,6 +6,7 @@ mod concurrent;
 mod concurrent_definition;
 mod concurrent_durations;
 mod concurrent_language;
+mod concurrent_runs;
 mod concurrent_trajectories;
 mod designs;
 mod exact;

@@ -310,15 +310,48 @@ fn in_sequence_an_end_and_a_start_may_touch() {
 }
 
 #[test]
-fn an_instance_does_not_overlap_with_itself() {
+fn an_instance_may_overlap_with_itself() {
     let a = durative("a", "2", "", "(at end (increase (x) 1)) (at end (g))");
-    let free = task(std::slice::from_ref(&a), "", "(g)");
+    let free = task(std::slice::from_ref(&a), "", "(g) (= (x) 4)");
     free.check(
         CONCURRENTLY,
         &[
             ("0: (a) [2]\n2: (a) [2]", "valid"),
-            ("0: (a) [2]\n1.999: (a) [2]", "overlap"),
-            ("0: (a) [2]\n0: (a) [2]", "overlap"),
+            ("0: (a) [2]\n1.999: (a) [2]", "valid"),
+            // A plan may have the same action at the same time several times, and each of them counts.
+            ("0: (a) [2]\n0: (a) [2]", "valid"),
+            ("0: (a) [2]", "goal"),
+            ("0: (a) [2]\n0: (a) [2]\n0: (a) [2]", "goal"),
+        ],
+    );
+    free.check(IN_SEQUENCE, &[("0: (a) [2]\n1.999: (a) [2]", "overlap")]);
+    // Each run has its own start, its own end, and what must hold between them.
+    let a = durative("a", "2", "(at start (p)) (over all (q))", "(at start (not (p))) (at end (g))");
+    let b = durative("b", "1", "", "(at start (p)) (at end (not (q)))");
+    task(&[a, b], "(p) (q)", "(g)").check(
+        CONCURRENTLY,
+        &[("0: (a) [2]\n0.5: (a) [2]", "at_start"), ("0: (a) [2]\n1: (b) [1]\n1.001: (a) [2]", "over_all")],
+    );
+    // An end is kept apart from the end of another run like from any happening: setting a number twice is not simultaneous.
+    for effect in ["(assign (x) 1)", "(assign (x) (+ (x) 1))"] {
+        let a = durative("a", "2", "", &format!("(at end {effect})"));
+        task(&[a], "", "").check(
+            CONCURRENTLY,
+            &[
+                ("0: (a) [2]\n0: (a) [2]", "interference"),
+                ("0: (a) [2]\n0.0009: (a) [2]", "interference"),
+                ("0: (a) [2]\n0.001: (a) [2]", "valid"),
+            ],
+        );
+    }
+    // Adding the same, and deleting the same, is not interference; adding what the other one deletes is.
+    let a = durative("a", "2", "", "(at start (p)) (at end (not (p)))");
+    task(&[a], "", "(not (p))").check(
+        CONCURRENTLY,
+        &[
+            ("0: (a) [2]\n0: (a) [2]", "valid"),
+            ("0: (a) [2]\n1.9995: (a) [2]", "interference"),
+            ("0: (a) [2]\n1.999: (a) [2]", "valid"),
         ],
     );
     // They touch, and interfere.

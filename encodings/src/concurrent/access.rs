@@ -23,8 +23,6 @@ enum Access {
     HeldNumber(NumericId),
     /// A function was used with a design, until an end.
     Used(ObjectId, ObjectId),
-    /// An instance has ended.
-    Ended(u32),
     /// A function was used with a design for a moment.
     UsedAtOnce(ObjectId, ObjectId),
 }
@@ -117,11 +115,6 @@ impl Keys {
             own.apart.extend(others.iter().map(|(f, d)| Access::UsedAtOnce(*f, *d)));
         }
         self.resolve(&own).after
-    }
-
-    /// What the end of an instance marks, and its next start waits for.
-    pub(super) fn ended(&mut self, instance: u32) -> Key {
-        self.key(Access::Ended(instance))
     }
 
     /// What the end of an action marks, or an action that takes no time.

@@ -1,5 +1,9 @@
 //! What a search has found as an answer: the plan in names, or none.
 
+use std::collections::VecDeque;
+
+use rustc_hash::FxHashMap;
+
 use crate::concurrent::compile::Concurrent;
 use crate::concurrent::happening::Role;
 use crate::concurrent::record::Record;
@@ -34,17 +38,21 @@ pub(super) fn in_names(concurrent: &Concurrent, sequence: &Sequence) -> Plan {
     let violated: Vec<OperatorId> = last.iter().flat_map(|last| concurrent.violated(last)).collect();
     let happenings = sequence.happenings.iter().chain(&violated).map(|id| (*id, &[][..]));
     let (measured, rest) = measured(&concurrent.task, happenings);
-    let ends = |position: usize, end: OperatorId| {
-        let later = sequence.happenings.iter().zip(&measured).skip(position);
-        later.filter(|(id, _)| **id == end).map(|(_, added)| added.clone()).next().unwrap_or_default()
-    };
+    // Of the runs of an instance the first one ends first.
+    let mut ends: FxHashMap<OperatorId, VecDeque<_>> = FxHashMap::default();
+    for (id, added) in sequence.happenings.iter().zip(&measured) {
+        if let Role::End(_) = concurrent.happenings[id.index()].role {
+            ends.entry(*id).or_default().push_back(added);
+        }
+    }
     for (position, ((id, time), duration)) in sequence.happenings.iter().zip(times).zip(durations).enumerate()
     {
         let mut more = measured[position].clone();
         let end = match concurrent.happenings[id.index()].role {
             Role::Start(instance) => {
                 let instance = &concurrent.instances[instance as usize];
-                more += ends(position, instance.end);
+                let added = ends.get_mut(&instance.end).and_then(VecDeque::pop_front);
+                more += added.cloned().unwrap_or_default();
                 concurrent.task.operators[instance.end.index()].cost.constant
             }
             Role::Whole => 0,

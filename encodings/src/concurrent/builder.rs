@@ -139,8 +139,10 @@ impl<'a> Builder<'a> {
         if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
     }
 
-    /// Gives each way in which an instance can start and end a start and an end of its own.
-    pub(super) fn pair(&mut self, task: &mut Task) {
+    /// Gives each way in which an instance can start and end a start and an end of its own. Returns whether there are several: they are not
+    /// looked for under way together.
+    pub(super) fn pair(&mut self, task: &mut Task) -> bool {
+        let before = task.operators.len();
         for key in &self.order {
             let Some(halves) = self.instances.get_mut(key) else { continue };
             let mut copy = |own: OperatorId| {
@@ -157,6 +159,7 @@ impl<'a> Builder<'a> {
             }
             (halves.starts, halves.ends) = (starts, ends);
         }
+        task.operators.len() > before
     }
 
     /// The instances that can be executed, and which operators are their starts and ends.
@@ -212,6 +215,9 @@ impl<'a> Builder<'a> {
                 is_chosen,
                 designs,
                 joint,
+                most: 1,
+                under_way: None,
+                counts_by_end: false,
                 compressible: false,
             });
         }
@@ -366,7 +372,6 @@ fn join(
     let accesses = &mut happening.accesses;
     match happening.role {
         Role::Start(instance) => {
-            accesses.after.push((keys.ended(instance), 0));
             let instance = &mut instances[instance as usize];
             accesses.join(&keys.over_all(over_all));
             accesses.after.extend(keys.designs(&instance.designs));
@@ -376,7 +381,6 @@ fn join(
             }
         }
         Role::End(instance) => {
-            accesses.marks.push(keys.ended(instance));
             accesses.marks.extend(keys.over_all(over_all).marks);
             accesses.marks.extend(keys.used(&instances[instance as usize].designs, false));
         }

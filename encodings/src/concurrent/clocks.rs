@@ -47,7 +47,7 @@ pub(super) struct Clocks {
     /// When variables got their values, ascending by variable; those of the initial state have no entry.
     changed: Vec<(u32, Time)>,
     floats: Vec<Start>,
-    /// Ascending by instance.
+    /// Ascending by instance; of one instance in the order in which its runs have started, and end.
     opens: Vec<Open>,
     /// The time at which all must happen until each condition over all holds again.
     group: Option<(Float, Int)>,
@@ -106,8 +106,9 @@ impl Clocks {
         self.group.is_some()
     }
 
-    pub(super) fn is_open(&self, instance: u32) -> bool {
-        self.opens.binary_search_by_key(&instance, |open| open.instance).is_ok()
+    /// How many runs of an instance are under way.
+    pub(super) fn runs(&self, instance: u32) -> u32 {
+        dense(self.opens.iter().filter(|open| open.instance == instance).count())
     }
 
     /// The time of the last timed initial literals; negative before.
@@ -215,10 +216,9 @@ impl Clocks {
         Some(next)
     }
 
-    /// The end of an action under way will lie after accesses so far. None if no time is left for it.
+    /// The end of the action under way at a position will lie after accesses so far. None if no time is left for it.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
-    pub(super) fn expect_end(&mut self, instance: u32, after: &[(Key, Int)]) -> Option<()> {
-        let position = self.opens.binary_search_by_key(&instance, |open| open.instance).ok()?;
+    pub(super) fn expect_end(&mut self, position: usize, after: &[(Key, Int)]) -> Option<()> {
         let Open { float, offset, duration, .. } = self.opens[position];
         let end = offset + duration;
         let mut lower = Time::constant(0);
@@ -253,7 +253,7 @@ impl Clocks {
     }
 
     fn open(&mut self, (instance, duration): (u32, Int), float: Float, offset: Int) {
-        let position = self.opens.partition_point(|open| open.instance < instance);
+        let position = self.opens.partition_point(|open| open.instance <= instance);
         self.opens.insert(position, Open { instance, float, offset, duration, last: None });
     }
 
@@ -275,10 +275,14 @@ impl Clocks {
             self.set_changed(*variable, time.clone());
         }
         for open in &mut self.opens {
-            let starts = happening.kind == Kind::Start && open.instance == happening.instance;
-            if (starts && happening.joint) || (open.last.is_some() && (happening.touches)(open.instance)) {
+            if open.last.is_some() && (happening.touches)(open.instance) {
                 open.last = Some(time.clone());
             }
+        }
+        if happening.kind == Kind::Start && happening.joint {
+            let mut own = self.opens.iter_mut().rev();
+            let started = own.find(|open| open.instance == happening.instance);
+            started.expect("invariant: it has just started").last = Some(time.clone());
         }
         self.latest.put_off(time, 0);
     }

@@ -13,14 +13,15 @@ use crate::concurrent::grows::only_grows;
 use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::links::drop_links;
 use crate::concurrent::measure::Measure;
+use crate::concurrent::repeat::count_runs;
 use crate::concurrent::split::{Half, Split};
 use crate::concurrent::unit::{LIMIT as TIME_LIMIT, Unit};
 use crate::context::Context;
 use crate::ground::vocabulary::reached::Reached;
 use crate::lifted::Rational;
 use crate::limits::{Interrupted, Limits};
-use crate::number::Int;
-use crate::task::{OperatorId, State, Task};
+use crate::number::{Int, dense};
+use crate::task::{OperatorId, State, Task, VariableId};
 
 /// A ground task whose actions can overlap.
 #[derive(Debug, Clone)]
@@ -65,7 +66,7 @@ pub(super) fn compile(
     let mut builder = Builder::new(split, reached, &unlimited);
     let context = Context::new(&task, limits);
     builder.collect(context)?;
-    builder.pair(&mut task);
+    let has_cases = builder.pair(&mut task);
     let context = Context::new(&task, limits);
     let divisors = builder.divisors(context).map_err(one)?;
     let unit = Unit::new(&task, split, separation, &divisors).map_err(one)?;
@@ -84,8 +85,8 @@ pub(super) fn compile(
     }
     let chooses = instances.iter().any(|own| own.is_chosen);
     let is_whole = task.objective.rest.is_empty() || chooses && only_grows(&task, &instances);
-    let is_exact = split.is_exact && !builder.supposes() && is_whole;
-    let (happenings, keys) = builder.happenings(context, &roles, &mut instances).map_err(one)?;
+    let is_exact = split.is_exact && !builder.supposes() && !has_cases && is_whole;
+    let (mut happenings, keys) = builder.happenings(context, &roles, &mut instances).map_err(one)?;
     let mut events: Vec<(Int, OperatorId)> = Vec::new();
     for (role, id) in roles.iter().zip((0..).map(OperatorId)) {
         events.extend(if let Role::Timed(time) = role { Some((*time, id)) } else { None });
@@ -94,6 +95,8 @@ pub(super) fn compile(
     let violations = violations(&task);
     task.time_scale = unit.0;
     drop_links(&mut task, &instances);
+    count_runs(&task, &happenings, &mut instances, separation, limits)?;
+    let keys = keep_runs_apart(&mut task, &instances, &mut happenings, keys);
     let compressible = compressible(&task, &happenings, &instances, limits);
     for (own, compressible) in instances.iter_mut().zip(compressible?) {
         own.compressible = compressible;
@@ -118,10 +121,38 @@ pub(super) fn compile(
     Ok(concurrent)
 }
 
+/// Lets the next run of an instance wait for the end of the one before, unless several runs at a time can make a difference: of those no end says
+/// that the instance is not under way any more, and no end clears how long it takes. Returns how many kinds of access there are then.
+fn keep_runs_apart(
+    task: &mut Task,
+    instances: &[Instance],
+    happenings: &mut [Happening],
+    keys: usize,
+) -> usize {
+    let mut next = keys;
+    for own in instances {
+        if let Some(under_way) = own.under_way {
+            let end = &mut task.operators[own.end.index()];
+            end.effects.retain(|effect| effect.variable != under_way.variable);
+            let is_timer = |number| own.timer.is_some_and(|(timer, _)| timer == number);
+            end.numeric_effects.retain(|effect| !is_timer(effect.variable));
+        } else {
+            let ended = dense(next);
+            next = next.saturating_add(1);
+            happenings[own.start.index()].accesses.after.push((ended, 0));
+            happenings[own.end.index()].accesses.marks.push(ended);
+        }
+    }
+    next
+}
+
 impl Concurrent {
     /// Finds the variables that tell of accesses that they are past, and what happenings set.
     fn guard(&mut self, limits: &Limits) -> Result<(), Interrupted> {
         let mut common: Vec<Option<Vec<u32>>> = vec![None; self.guards.len()];
+        // An end may come before another run has begun that came before it in the sequence.
+        let under_way: FxHashSet<VariableId> =
+            self.instances.iter().filter_map(|own| Some(own.under_way?.variable)).collect();
         for pair in limits.watch(self.task.operators.iter().zip(&mut self.happenings)) {
             let (operator, happening) = pair?;
             let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
@@ -130,7 +161,7 @@ impl Concurrent {
             happening.sets.dedup();
             let facts = operator.condition.facts.iter().map(|fact| fact.variable);
             let facts: Vec<u32> = facts
-                .filter(|variable| variable.index() < self.task.basic)
+                .filter(|variable| variable.index() < self.task.basic && !under_way.contains(variable))
                 .map(|variable| variable.0)
                 .collect();
             // What happens by itself is put off by nothing: it bounds what was before, the change of a guard like any access.
@@ -164,6 +195,17 @@ impl Concurrent {
         let Some((timer, factor)) = instance.timer else { return Some(instance.duration) };
         let duration = after.numbers[timer.index()].checked_mul(factor)?;
         (self.separation..TIME_LIMIT).contains(&duration).then_some(duration)
+    }
+
+    /// An instance is not under way any more in a state after the end of its last run.
+    pub(super) fn cease(&self, instance: u32, state: &mut State) {
+        if let Some(fact) = self.instances[instance as usize].under_way {
+            // Of two values, the other one. What is derived does not depend on it.
+            state.values[fact.variable.index()] = u32::from(fact.value == 0);
+            if let Some((timer, _)) = self.instances[instance as usize].timer {
+                state.numbers[timer.index()] = 0;
+            }
+        }
     }
 
     /// Whether what must hold over all of an instance holds in a state.

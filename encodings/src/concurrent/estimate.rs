@@ -134,9 +134,11 @@ fn edges(concurrent: &Concurrent, variable: VariableId) -> Vec<Edge> {
                 let held = instance.over_all.map(|id| &task.operators[id.index()]);
                 let kept = held.and_then(|over_all| of(&over_all.condition.facts));
                 edges.push(match (of(&start.effects), from) {
-                    // The value that the start has set stays until the end: it is required all along, or nothing else sets it.
+                    // The value that the start has set stays until the end: it is required all along, or nothing else sets it, not even another run.
                     (Some(set), Some(from))
-                        if set == from && (kept == Some(set) || setters[set as usize] == 1) =>
+                        if set == from
+                            && (kept == Some(set)
+                                || instance.under_way.is_none() && setters[set as usize] == 1) =>
                     {
                         (Some(from), to, instance.duration)
                     }

@@ -8,6 +8,10 @@ use crate::number::Int;
 use crate::search::generator::OperatorIndex;
 use crate::task::{OperatorId, State};
 
+/// More runs of an instance at a time are not looked for: where so many can make a difference, and where no bound is known.
+const RUNS: u32 = 16;
+const UNBOUNDED_RUNS: u32 = 4;
+
 /// Where a sequence of happenings has led.
 #[derive(Debug, Clone)]
 pub(super) struct Situation {
@@ -24,7 +28,7 @@ pub(super) enum Nowhere {
     Impossible,
     /// Timed initial literals come first.
     TooLate,
-    /// Numbers do not fit their type.
+    /// Numbers do not fit their type, or runs of an instance are too many or of different length: it is left out.
     Unfit,
 }
 
@@ -51,8 +55,9 @@ impl<'a> Expansion<'a> {
     /// The happenings whose propositional condition holds: starts, and ends of what is under way.
     pub(super) fn candidates(&self, situation: &Situation) -> Vec<OperatorId> {
         let mut next = self.starts(&situation.state);
-        let opens = situation.clocks.opens().iter();
-        next.extend(opens.map(|open| self.concurrent.instances[open.instance as usize].end));
+        let mut opens: Vec<u32> = situation.clocks.opens().iter().map(|open| open.instance).collect();
+        opens.dedup();
+        next.extend(opens.into_iter().map(|open| self.concurrent.instances[open as usize].end));
         next
     }
 
@@ -93,7 +98,7 @@ impl<'a> Expansion<'a> {
         exact: bool,
     ) -> Result<(Situation, bool), Nowhere> {
         let started = self.step(situation, operator)?;
-        let Some(end) = self.compressed(&started, operator) else { return Ok((started, false)) };
+        let Some(end) = self.compressed(situation, &started, operator) else { return Ok((started, false)) };
         let Ok(ended) = self.step(&started, end) else { return Ok((started, false)) };
         // Were timed initial literals to come in between, the action could not be put off.
         let in_time =
@@ -101,10 +106,17 @@ impl<'a> Expansion<'a> {
         Ok(if in_time && !ended.clocks.unsettled() { (ended, true) } else { (started, false) })
     }
 
-    fn compressed(&self, started: &Situation, operator: OperatorId) -> Option<OperatorId> {
+    /// The end that comes right after a start. The first run ends first, so it is not that of another run.
+    fn compressed(
+        &self,
+        before: &Situation,
+        started: &Situation,
+        operator: OperatorId,
+    ) -> Option<OperatorId> {
         let Role::Start(instance) = self.concurrent.happenings[operator.index()].role else { return None };
+        let is_first = before.clocks.runs(instance) == 0;
         let instance = &self.concurrent.instances[instance as usize];
-        (instance.compressible && !started.clocks.unsettled()).then_some(instance.end)
+        (is_first && instance.compressible && !started.clocks.unsettled()).then_some(instance.end)
     }
 
     /// The situation after one happening.
@@ -123,14 +135,30 @@ impl<'a> Expansion<'a> {
             Role::Whole | Role::Timed(_) => (Kind::Whole, u32::MAX),
             Role::Never => return Err(Nowhere::Impossible),
         };
-        if kind == Kind::Start && clocks.is_open(instance) || self.clashes(clocks, happening) {
+        let own = concurrent.instances.get(instance as usize);
+        let counts_by_end = own.is_some_and(|own| own.counts_by_end);
+        let most = own.map_or(u32::MAX, |own| own.most);
+        if kind == Kind::Start && clocks.runs(instance) >= most || self.clashes(clocks, happening) {
             return Err(Nowhere::Impossible);
         }
-        let after = concurrent.task.successor(operator, state, &[]).ok_or(Nowhere::Unfit)?;
-        let open = clocks.opens().iter().map(|open| open.instance);
-        let going_on = open.filter(|open| kind != Kind::End || *open != instance);
-        let mut going_on = going_on.chain((kind == Kind::Start).then_some(instance));
-        let settled = going_on.all(|instance| concurrent.holds_over_all(instance, &after));
+        let looked_for = if most == u32::MAX { UNBOUNDED_RUNS } else { RUNS };
+        if kind == Kind::Start && clocks.runs(instance) >= looked_for {
+            return Err(Nowhere::Unfit);
+        }
+        let mut after = concurrent.task.successor(operator, state, &[]).ok_or(Nowhere::Unfit)?;
+        // Without such a run everything else is as it was.
+        if kind == Kind::End && counts_by_end && after == *state {
+            return Err(Nowhere::Impossible);
+        }
+        // Of the runs of an instance the first one ends first.
+        let runs = || clocks.opens().iter().map(|open| open.instance);
+        let ended = if kind == Kind::End { runs().position(|open| open == instance) } else { None };
+        let going_on = || (0..).zip(runs()).filter(|(position, _)| Some(*position) != ended);
+        if kind == Kind::End && going_on().all(|(_, open)| open != instance) {
+            concurrent.cease(instance, &mut after);
+        }
+        let mut all = going_on().map(|(_, open)| open).chain((kind == Kind::Start).then_some(instance));
+        let settled = all.all(|open| concurrent.holds_over_all(open, &after));
         let sets = happening.sets.iter().copied();
         let changes: Vec<u32> = sets
             .filter(|variable| state.values[*variable as usize] != after.values[*variable as usize])
@@ -139,9 +167,13 @@ impl<'a> Expansion<'a> {
             let Accesses { after, marks } = &happening.accesses;
             clocks.timed(&clocks::Event { time, after, marks, changes: &changes, settled })
         } else {
-            let own = concurrent.instances.get(instance as usize);
             let started = own.filter(|_| kind == Kind::Start);
             let duration = started.map_or(Some(0), |own| concurrent.duration(own, &after));
+            // The first run ends first only if all take as long.
+            let mut runs = clocks.opens().iter().filter(|open| open.instance == instance);
+            if started.is_some() && runs.any(|open| Some(open.duration) != duration) {
+                return Err(Nowhere::Unfit);
+            }
             clocks.after(&clocks::Happening {
                 kind,
                 instance,
@@ -155,11 +187,10 @@ impl<'a> Expansion<'a> {
             })
         };
         let mut clocks = clocks.ok_or(Nowhere::Impossible)?;
-        let opens: Vec<u32> = clocks.opens().iter().map(|open| open.instance).collect();
-        for instance in opens {
-            let own = &concurrent.instances[instance as usize];
+        for position in 0..clocks.opens().len() {
+            let own = &concurrent.instances[clocks.opens()[position].instance as usize];
             let after = &concurrent.happenings[own.end.index()].accesses.after;
-            clocks.expect_end(instance, after).ok_or(Nowhere::Impossible)?;
+            clocks.expect_end(position, after).ok_or(Nowhere::Impossible)?;
         }
         // Nothing can happen after what comes later in the sequence.
         if self.next_event(&clocks).is_some_and(|(time, _)| clocks.latest() > time) {

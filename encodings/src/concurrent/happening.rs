@@ -2,7 +2,7 @@
 
 use crate::concurrent::access::{Accesses, Designs};
 use crate::number::Int;
-use crate::task::{NumericId, OperatorId};
+use crate::task::{Fact, NumericId, OperatorId};
 
 /// What a happening is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -48,6 +48,12 @@ pub(super) struct Instance {
     pub(super) designs: Designs,
     /// What a condition over all reads that several happenings can keep up together; numbered as `Happening::writes`.
     pub(super) joint: Vec<u32>,
+    /// How many runs can be under way at a time so that it makes a difference.
+    pub(super) most: u32,
+    /// The fact that it is under way, if that is more than one.
+    pub(super) under_way: Option<Fact>,
+    /// Several runs at a time can make a difference, and one whose end changes nothing makes none.
+    pub(super) counts_by_end: bool,
     /// Whether its end can come right after its start in a sequence, and nothing is lost.
     pub(super) compressible: bool,
 }

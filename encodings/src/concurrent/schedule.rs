@@ -1,5 +1,7 @@
 //! A sequence of happenings to the earliest times at which they can take place.
 
+use std::collections::VecDeque;
+
 use rustc_hash::FxHashMap;
 
 use crate::concurrent::clocks::Key;
@@ -69,7 +71,8 @@ fn bounds(
 ) -> Vec<Bound> {
     let mut bounds = Vec::new();
     let mut marked: FxHashMap<Key, Vec<usize>> = FxHashMap::default();
-    let mut started: FxHashMap<u32, usize> = FxHashMap::default();
+    // Of the runs of an instance the first one ends first.
+    let mut started: FxHashMap<u32, VecDeque<usize>> = FxHashMap::default();
     // For actions under way with a joint condition over all: what has written it last.
     let mut joint: Vec<(u32, usize)> = Vec::new();
     let mut floor = 0;
@@ -89,7 +92,8 @@ fn bounds(
             bounds.extend([(index - 1, index, 0), (index, index - 1, 0)]);
         }
         if let Role::End(instance) = happening.role {
-            joint.retain(|(own, _)| *own != instance);
+            let first = joint.iter().position(|(own, _)| *own == instance);
+            first.map(|first| joint.remove(first));
         }
         for (instance, last) in &mut joint {
             if concurrent.touches(*id, *instance) {
@@ -99,13 +103,13 @@ fn bounds(
         }
         match happening.role {
             Role::Start(instance) => {
-                started.insert(instance, index);
+                started.entry(instance).or_default().push_back(index);
                 if !concurrent.instances[instance as usize].joint.is_empty() {
                     joint.push((instance, index));
                 }
             }
             Role::End(instance) => {
-                if let Some(start) = started.remove(&instance) {
+                if let Some(start) = started.get_mut(&instance).and_then(VecDeque::pop_front) {
                     let duration = durations[start];
                     bounds.extend([(start, index, duration), (index, start, -duration)]);
                 }

@@ -35,6 +35,9 @@ pub(super) enum Half {
     Judge,
 }
 
+/// What the names of atoms begin with that say what is under way: no name in a file has a parenthesis.
+pub(super) const UNDER_WAY: &str = "((running) ";
+
 /// Where a schema of the split task comes from.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Origin {
@@ -151,13 +154,7 @@ fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Ha
         return all;
     }
     let parameters: Vec<Term> = (0..dense(schema.parameters.len())).map(Term::Parameter).collect();
-    let mut symbol = |text: &str, running| {
-        let name = Name::new(&format!("{text} {}", schema.name));
-        let arity = parameters.len();
-        lifted.predicates.push(Predicate { name, arity, fluent: true, derived: false, running });
-        last_predicate(lifted)
-    };
-    let running = symbol("running", true);
+    let running = symbol(lifted, &format!("(running) {}", schema.name), parameters.len(), true);
     let later = [&schema.over_all, &schema.at_end].into_iter().flat_map(conjuncts);
     let settled: Vec<Formula> = later.filter(|conjunct| is_static(lifted, conjunct)).cloned().collect();
     let changing: Vec<&Formula> =
@@ -177,13 +174,7 @@ fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Ha
     let mut condition = vec![literal(running, &parameters), schema.at_end.clone()];
     condition.extend(timer.and_then(|timer| timer.is_set(schema)));
     if !changing.is_empty() {
-        let mut symbol = |text: &str| {
-            let name = Name::new(&format!("{text} {}", schema.name));
-            let arity = parameters.len();
-            lifted.predicates.push(Predicate { name, arity, fluent: true, derived: false, running: false });
-            last_predicate(lifted)
-        };
-        let held = symbol("held");
+        let held = symbol(lifted, &format!("held {}", schema.name), parameters.len(), false);
         let own = [literal(running, &parameters)].into_iter().chain(changing.into_iter().cloned()).collect();
         let change = effect(Change::Add(held, parameters.clone()));
         all.push((Half::OverAll, instantaneous(own, vec![change])));
@@ -242,7 +233,10 @@ fn timed(lifted: &Lifted, index: u32, event: &Event) -> Schema {
     }
 }
 
-/// The predicate that was declared last.
-fn last_predicate(lifted: &Lifted) -> PredicateId {
-    PredicateId(dense(lifted.predicates.len().saturating_sub(1)))
+/// A new predicate; `running` if it says what is under way.
+fn symbol(lifted: &mut Lifted, name: &str, arity: usize, running: bool) -> PredicateId {
+    let id = PredicateId(dense(lifted.predicates.len()));
+    let name = Name::new(name);
+    lifted.predicates.push(Predicate { name, arity, fluent: true, derived: false, running });
+    id
 }

@@ -46,7 +46,6 @@ pub(super) fn run<'e, 'p>(
             running.into_iter().partition(|running| running.end == time);
         while let Some((_, step)) = starts.pop_if(|(start, _)| *start == time) {
             let started = execution.begin(step, &time)?;
-            overlaps_not_with_itself(&started, &going_on)?;
             let part = started.first_part();
             execution.prefer(&started, ConditionTime::AtStart, &time)?;
             if part == Part::Whole {
@@ -82,26 +81,6 @@ pub(super) fn run<'e, 'p>(
         parts.keep_apart(execution, &time, &mut recent)?;
     }
     Ok(())
-}
-
-/// No action with the same arguments is in the midst of its execution.
-fn overlaps_not_with_itself(
-    started: &Running<'_, '_>,
-    running: &[Running<'_, '_>],
-) -> Result<(), Box<Violation>> {
-    let touches =
-        |other: &Running<'_, '_>| started.first_part() == Part::Whole && other.start == started.start;
-    let Some(other) =
-        running.iter().find(|other| other.instance.is_same(&started.instance) && !touches(other))
-    else {
-        return Ok(());
-    };
-    let (start, end) = (show_number(&started.start), show_number(&other.end));
-    let message = format!(
-        "it starts at {start}, before the same action with the same objects, step {}, ends at {end}",
-        other.step.number
-    );
-    Err(started.step.violation(&started.start, ViolationKind::Overlap, message))
 }
 
 /// The starts of all steps, the last one first.

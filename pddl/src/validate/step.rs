@@ -27,14 +27,6 @@ pub(super) struct Instance<'p> {
     pub(super) bindings: Bindings<'p>,
 }
 
-impl Instance<'_> {
-    /// Whether both are the same schema with the same objects.
-    pub(super) fn is_same(&self, other: &Self) -> bool {
-        let objects = |own: &Self| own.bindings.0.iter().map(|binding| binding.object).collect::<Vec<_>>();
-        std::ptr::eq(self.action, other.action) && objects(self) == objects(other)
-    }
-}
-
 impl Step<'_> {
     /// The step as written, without its times.
     pub(super) fn show(&self) -> String {

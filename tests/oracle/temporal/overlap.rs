@@ -6,13 +6,13 @@
 //! to one time were less than u apart, so no two of them interfere: they can be executed together, in any order, with the
 //! same result, and none of them changes what another one reads. (2) With events likewise: T <= t just if T <= floor(t) for T on the grid, so
 //! each happening has the same events before it. (3) The states after the groups of happenings are some of the states of before, and a
-//! state that now lies strictly between start and end of an action did so before: over-all conditions hold. (4) An action that did
-//! not overlap with itself does not, but it may touch. (5) The state in the end is the same, and the last end is not later. So rounding
+//! state that now lies strictly between start and end of an action did so before: over-all conditions hold. (4) The state in the end is the same, and the last end is not later. So rounding
 //! makes no plan invalid and none worse, if the metric does not reward time.
 //!
 //! A node of the search is a state, the running actions with what remains of each, and the time on the grid, which no longer
-//! matters after the last event. From one tick to the next any set of actions starts that do not interfere with each other, with what
-//! ends, and with the event.
+//! matters after the last event. From one tick to the next any actions start that do not interfere with each other, with what
+//! ends, and with the event, also such as are running. The same again at the same tick makes a difference only to what is added to a number or multiplied with it:
+//! otherwise both starts, and both ends, have the effects of one.
 
 use std::collections::HashMap;
 
@@ -20,7 +20,7 @@ use super::best::{Schedule, judged};
 use super::execute::{goal, value};
 use super::graph::{Graph, Way};
 use super::happening::{Change, End, Happening, Obstacle, State, World, fit};
-use super::model::{Body, Condition, Q, q};
+use super::model::{Body, Condition, Effect, Operation, Q, q};
 use super::reduce::Reduction;
 use crate::judge::Truth;
 
@@ -46,13 +46,9 @@ fn duration(world: &World, instance: usize, state: &State) -> Result<Q, Obstacle
 /// Executes a plan at its times: the value, or why it is none.
 pub fn execute(world: &World, plan: &[(usize, Q, Q)], separation: Q) -> Result<Q, Obstacle> {
     let mut times: Vec<(Q, usize, End)> = Vec::new();
-    for (number, (instance, start, length)) in plan.iter().enumerate() {
-        let clash = |(other, begin, lasts): &(usize, Q, Q)| {
-            let (end, other_end) = (*start + length, *begin + lasts);
-            other == instance && *start < other_end && *begin < end
-        };
-        if *start < q(0) || plan[..number].iter().any(clash) {
-            return Err(Obstacle::Blocked("an action overlaps with itself, or starts before 0"));
+    for (number, (_, start, length)) in plan.iter().enumerate() {
+        if *start < q(0) {
+            return Err(Obstacle::Blocked("an action starts before 0"));
         }
         if *length == q(0) {
             times.push((*start, number, End::Both));
@@ -104,7 +100,7 @@ pub fn execute(world: &World, plan: &[(usize, Q, Q)], separation: Q) -> Result<Q
     value(world, &state, last, plan.len())
 }
 
-/// How often an instance of no duration may start at one tick before the oracle gives up.
+/// How often an instance may start at one tick before the oracle gives up.
 const COPIES: usize = 3;
 
 /// State, running instances with their remaining ticks, tick.
@@ -219,10 +215,31 @@ impl Search<'_> {
         happening.changes.iter().any(|(at, change)| relative(change) && self.reduction.keeps(*at))
     }
 
+    /// Whether the end of an instance may change a number of the state by what it was before.
+    fn counts_at_end(&self, instance: usize) -> bool {
+        fn changed(effects: &[Effect], found: &mut Vec<usize>) {
+            for effect in effects {
+                match effect {
+                    Effect::Change(Operation::Assign, ..) | Effect::Add(_) | Effect::Delete(_) => {}
+                    Effect::Change(_, fluent, _) => found.push(fluent.function),
+                    Effect::When(_, parts) | Effect::Forall(_, parts) => changed(parts, found),
+                }
+            }
+        }
+        let mut found = Vec::new();
+        if let Body::Durative { end, .. } = &self.world.task.actions[self.world.instances[instance].0].body {
+            changed(&end.effects, &mut found);
+        }
+        found.iter().any(|function| {
+            let after = self.world.values.get(function + 1).copied();
+            let after = after.unwrap_or(self.world.initial.values.len());
+            (self.world.values[*function]..after).any(|at| self.reduction.keeps(at))
+        })
+    }
+
     /// Starts further instances, from a number on.
     fn choose(&mut self, from: usize, state: &State, first: usize, tick: &Tick) {
-        let running: Vec<usize> = tick.running.iter().map(|(instance, _)| *instance).collect();
-        for instance in (first..self.world.instances.len()).filter(|instance| !running.contains(instance)) {
+        for instance in first..self.world.instances.len() {
             let Ok(lasts) = duration(self.world, instance, state) else { continue };
             if lasts < q(0) {
                 continue;
@@ -238,11 +255,9 @@ impl Search<'_> {
                     if ticks > 0 {
                         more.running.push((instance, ticks));
                     }
-                    // The same again at the same time: it touches itself. That makes a difference to sums and products only.
-                    let again = more
-                        .happenings
-                        .last()
-                        .is_some_and(|it| ticks == 0 && !it.interferes(it) && self.counts(it));
+                    let counts =
+                        |it: &Happening| self.counts(it) || ticks > 0 && self.counts_at_end(instance);
+                    let again = more.happenings.last().is_some_and(|it| !it.interferes(it) && counts(it));
                     let copies = more.starts.iter().filter(|(other, _)| *other == instance).count();
                     self.open |= again && copies == COPIES;
                     let next = if again && copies < COPIES { instance } else { instance + 1 };

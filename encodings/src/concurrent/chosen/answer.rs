@@ -124,7 +124,7 @@ fn in_names(
     let task = &concurrent.task;
     let mut steps = Vec::new();
     let mut before = at(&Course::new(concurrent).measured(concurrent));
-    // By instance: the step that it is, and when it ends.
+    // By instance the step that it is, in the order of the starts.
     let mut open: Vec<(u32, usize)> = Vec::new();
     for passed in &course.passed {
         let operator = &task.operators[passed.operator.index()];
@@ -139,9 +139,9 @@ fn in_names(
             }
             Role::Whole => steps.push(step),
             Role::End(instance) => {
-                let position = open.iter().position(|(own, _)| *own == instance);
-                if let Some(position) = position {
-                    let (_, start) = open.swap_remove(position);
+                let mut runs = (0..open.len()).filter(|position| open[*position].0 == instance);
+                if let Some(position) = runs.nth(passed.run as usize) {
+                    let (_, start) = open.remove(position);
                     steps[start].3 += cost;
                 }
             }

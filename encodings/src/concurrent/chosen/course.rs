@@ -39,6 +39,8 @@ pub(super) struct Open {
     pub(super) instance: u32,
     /// When it ends.
     end: Affine,
+    /// What the number is that holds how long it takes, if one does: other runs of the instance have other ones.
+    number: Option<Affine>,
     /// The last happening that has written what its joint condition over all reads, if it has one.
     last: Option<Affine>,
 }
@@ -47,6 +49,8 @@ pub(super) struct Open {
 #[derive(Debug, Clone)]
 pub(super) struct Passed {
     pub(super) operator: OperatorId,
+    /// Of an end, which of the runs of its instance ends, in the order of their starts; 0 for others.
+    pub(super) run: u32,
     pub(super) time: Affine,
     /// Of a start, how long the action takes; 0 for others.
     pub(super) duration: Affine,
@@ -60,7 +64,7 @@ pub(super) struct Course {
     pub(super) values: Vec<u32>,
     /// The numbers of the task.
     pub(super) numbers: Vec<Affine>,
-    /// Ascending by instance.
+    /// Ascending by instance; of one instance in the order in which its runs have started.
     pub(super) opens: Vec<Open>,
     pub(super) passed: Vec<Passed>,
     /// What each chosen duration can be at least and at most, by the bounds that rest on nothing else; ascending by column.
@@ -112,19 +116,47 @@ impl Course {
         self.opens.iter().map(|open| open.instance)
     }
 
-    /// The sequence after a happening; none if it has no times and durations.
-    pub(super) fn after(&self, concurrent: &Concurrent, operator: OperatorId) -> Option<Self> {
+    /// How many runs of an instance are under way.
+    fn runs(&self, instance: u32) -> usize {
+        self.instances().filter(|open| *open == instance).count()
+    }
+
+    /// Where the runs of an instance lie among the actions under way.
+    fn position(&self, instance: u32, run: u32) -> Option<usize> {
+        let mut runs = (0..self.opens.len()).filter(|position| self.opens[*position].instance == instance);
+        runs.nth(run as usize)
+    }
+
+    /// What can happen but for starts: the ends of what is under way. Of runs that take as long the first one ends first.
+    pub(super) fn ends(&self, concurrent: &Concurrent) -> impl Iterator<Item = (OperatorId, u32)> {
+        let mut before: Option<(u32, u32)> = None;
+        let runs = self.instances().map(move |instance| {
+            let run = before.filter(|(own, _)| *own == instance).map_or(0, |(_, run)| run.saturating_add(1));
+            before = Some((instance, run));
+            (&concurrent.instances[instance as usize], run)
+        });
+        runs.filter(|(own, run)| *run == 0 || own.timer.is_some()).map(|(own, run)| (own.end, run))
+    }
+
+    /// The sequence after a happening, an end of the given run; none if it has no times and durations.
+    pub(super) fn after(&self, concurrent: &Concurrent, (operator, run): (OperatorId, u32)) -> Option<Self> {
         let role = concurrent.happenings[operator.index()].role;
-        if !self.admits(concurrent, operator, role) {
+        if !self.admits(concurrent, (operator, run), role) {
             return None;
         }
         let state = self.state(concurrent);
         let own = &concurrent.task.operators[operator.index()];
-        let values = concurrent.task.successor(own, &state, &[])?.values;
-        let mut next = Self { values, cost: self.cost.checked_add(own.cost.constant)?, ..self.clone() };
+        let mut after = concurrent.task.successor(own, &state, &[])?;
+        if let Role::End(instance) = role
+            && self.runs(instance) == 1
+        {
+            concurrent.cease(instance, &mut after);
+        }
+        let mut next =
+            Self { values: after.values, cost: self.cost.checked_add(own.cost.constant)?, ..self.clone() };
         let mut asked = Vec::new();
-        next.count(concurrent, operator, role, &mut asked)?;
-        next.pass(concurrent, operator, role, &mut asked)?;
+        next.count(concurrent, (operator, run), role, &mut asked)?;
+        next.pass(concurrent, (operator, run), role, &mut asked)?;
         next.keep_up(concurrent, operator, role, &mut asked)?;
         if !next.program.constrain(&asked) {
             return None;
@@ -138,7 +170,7 @@ impl Course {
     }
 
     /// Whether a happening can come next, but for numbers and times.
-    fn admits(&self, concurrent: &Concurrent, operator: OperatorId, role: Role) -> bool {
+    fn admits(&self, concurrent: &Concurrent, (operator, run): (OperatorId, u32), role: Role) -> bool {
         let designs = &concurrent.happenings[operator.index()].designs;
         let clashes = || {
             designs.iter().any(|(function, design)| {
@@ -146,10 +178,11 @@ impl Course {
                 used.any(|(own, other)| own == function && other != design)
             })
         };
-        let is_open = |instance| self.instances().any(|open| open == instance);
         let is_possible = match role {
-            Role::Start(instance) => !is_open(instance) && !clashes(),
-            Role::End(instance) => is_open(instance),
+            Role::Start(instance) => {
+                self.runs(instance) < concurrent.instances[instance as usize].most as usize && !clashes()
+            }
+            Role::End(instance) => self.position(instance, run).is_some(),
             Role::Whole => !clashes(),
             Role::Timed(_) => true,
             Role::Never => false,
@@ -162,11 +195,17 @@ impl Course {
     fn count(
         &mut self,
         concurrent: &Concurrent,
-        operator: OperatorId,
+        (operator, run): (OperatorId, u32),
         role: Role,
         asked: &mut Vec<Affine>,
     ) -> Option<()> {
         let own = &concurrent.task.operators[operator.index()];
+        let ending = if let Role::End(instance) = role { Some(instance) } else { None };
+        let timer = ending.and_then(|instance| concurrent.instances[instance as usize].timer);
+        if let (Some(instance), Some((number, _))) = (ending, timer) {
+            let ended = &self.opens[self.position(instance, run)?];
+            self.numbers[number.index()] = ended.number.clone()?;
+        }
         let column = duration_of(self.passed.len());
         let chosen = chosen(concurrent, role);
         if let Some((number, factor)) = chosen.and_then(|own| own.timer) {
@@ -182,6 +221,9 @@ impl Course {
             own.numeric_effects.iter().map(|effect| (effect.variable, self.value(&effect.value))).collect();
         for (variable, value) in changed {
             self.numbers[variable.index()] = value;
+        }
+        if let Some((number, _)) = timer {
+            self.numbers[number.index()] = Affine::default();
         }
         Some(())
     }
@@ -232,7 +274,7 @@ impl Course {
     fn pass(
         &mut self,
         concurrent: &Concurrent,
-        operator: OperatorId,
+        (operator, run): (OperatorId, u32),
         role: Role,
         asked: &mut Vec<Affine>,
     ) -> Option<()> {
@@ -241,7 +283,7 @@ impl Course {
         let time = match role {
             Role::Timed(time) => Affine::constant(rational(time)),
             Role::End(instance) => {
-                let open = self.opens.iter().position(|open| open.instance == instance)?;
+                let open = self.position(instance, run)?;
                 self.opens.remove(open).end
             }
             _ => Affine::column(time_of(position)),
@@ -256,8 +298,10 @@ impl Course {
                 &concurrent.happenings[concurrent.instances[instance as usize].end.index()].accesses.after;
             self.come_after(concurrent, &end, after, asked)?;
             let last = (!concurrent.instances[instance as usize].joint.is_empty()).then(|| time.clone());
-            let place = self.opens.partition_point(|open| open.instance < instance);
-            self.opens.insert(place, Open { instance, end, last });
+            let place = self.opens.partition_point(|open| open.instance <= instance);
+            let timer = concurrent.instances[instance as usize].timer;
+            let number = timer.map(|(number, _)| self.numbers[number.index()].clone());
+            self.opens.insert(place, Open { instance, end, number, last });
         } else if role == Role::Whole {
             asked.push(Affine::column(MAKESPAN).minus(&time));
         }
@@ -284,7 +328,7 @@ impl Course {
             }
         }
         let measured = self.measured(concurrent);
-        self.passed.push(Passed { operator, time, duration, measured });
+        self.passed.push(Passed { operator, run, time, duration, measured });
         Some(())
     }
 

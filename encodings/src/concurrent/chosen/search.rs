@@ -28,8 +28,8 @@ use crate::task::quantity::Linear;
 /// So many more times preferred happenings come first after each progress.
 const BOOST: i64 = 1_000;
 
-/// What was left before it, the least metric, the order, the sequence before, and the happening.
-type Entrance = Reverse<(u64, Rational, Reverse<u32>, u32, u32, OperatorId)>;
+/// What was left before it, the least metric, the order, the sequence before, and the happening with the run that it ends.
+type Entrance = Reverse<(u64, Rational, Reverse<u32>, u32, u32, (OperatorId, u32))>;
 
 /// Why the search came to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,7 +45,7 @@ pub(super) enum Outcome {
 /// What a sequence has to be new in.
 enum Kind<'a> {
     Greedy { guidance: Box<Guidance<'a>>, seen: FxHashMap<u64, Rational> },
-    Exhaustive { traces: Traces<'a>, seen: FxHashSet<Vec<OperatorId>> },
+    Exhaustive { traces: Traces<'a>, seen: FxHashSet<Vec<(OperatorId, u32)>> },
 }
 
 pub(super) struct Search<'a> {
@@ -156,16 +156,16 @@ impl<'a> Search<'a> {
             self.nearest = left;
             self.priorities[1] = self.priorities[1].saturating_sub(BOOST);
         }
-        let mut candidates = self.expansion.starts(&course.state(self.concurrent));
-        let open = course.instances().map(|instance| self.concurrent.instances[instance as usize].end);
-        candidates.extend(open);
+        let starts =
+            self.expansion.starts(&course.state(self.concurrent)).into_iter().map(|start| (start, 0));
+        let candidates: Vec<(OperatorId, u32)> = starts.chain(course.ends(self.concurrent)).collect();
         let own = Figures { expanded: 1, generated: candidates.len() as u64, evaluated: 0 };
         self.figures = self.figures.plus(own);
         let (id, depth) = (dense(self.nodes.len()), dense(course.passed.len()));
         for operator in candidates {
             self.order = self.order.wrapping_add(1);
             let entrance = Reverse((left, least.clone(), Reverse(depth), self.order, id, operator));
-            if preferred.binary_search(&operator).is_ok() {
+            if preferred.binary_search(&operator.0).is_ok() {
                 self.queues[1].push(entrance.clone());
             }
             self.queues[0].push(entrance);
@@ -186,7 +186,8 @@ impl<'a> Search<'a> {
     fn judge(&mut self, course: &Course, least: &Rational) -> Option<Guide> {
         match &mut self.kind {
             Kind::Exhaustive { traces, seen } => {
-                let sequence: Vec<_> = course.passed.iter().map(|passed| passed.operator).collect();
+                let sequence: Vec<_> =
+                    course.passed.iter().map(|passed| (passed.operator, passed.run)).collect();
                 let is_new = seen.insert(traces.first(&sequence));
                 is_new.then(|| Guide { left: 0, preferred: Vec::new() })
             }
@@ -209,7 +210,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    fn pop(&mut self) -> Option<(Rational, u32, OperatorId)> {
+    fn pop(&mut self) -> Option<(Rational, u32, (OperatorId, u32))> {
         let filled = (0..self.queues.len()).filter(|queue| !self.queues[*queue].is_empty());
         let queue = filled.min_by_key(|queue| self.priorities[*queue])?;
         self.priorities[queue] = self.priorities[queue].saturating_add(1);

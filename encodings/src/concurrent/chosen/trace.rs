@@ -1,7 +1,7 @@
 //! Sequences that differ only in the order of happenings which do not interfere are one: traces [1].
 //!
 //! Such sequences have the same state, and the same linear program but for the names of its columns. Of each trace the sequence is taken that is
-//! first in lexicographic order.
+//! first in lexicographic order. An end says which of the runs of its instance ends; these do not change their order.
 //!
 //! [1] A. Mazurkiewicz: Concurrent program schemes and their interpretations, DAIMI PB 78, Aarhus University, 1977.
 
@@ -24,14 +24,14 @@ impl<'a> Traces<'a> {
     }
 
     /// The first sequence of the trace.
-    pub(super) fn first(&mut self, sequence: &[OperatorId]) -> Vec<OperatorId> {
+    pub(super) fn first(&mut self, sequence: &[(OperatorId, u32)]) -> Vec<(OperatorId, u32)> {
         let mut left = sequence.to_vec();
         let mut first = Vec::with_capacity(left.len());
         while !left.is_empty() {
             let mut best: Option<usize> = None;
             for (position, id) in left.iter().enumerate() {
                 let is_less = best.is_none_or(|best| *id < left[best]);
-                if is_less && left[..position].iter().all(|before| !self.depend(*before, *id)) {
+                if is_less && left[..position].iter().all(|before| !self.depend(before.0, id.0)) {
                     best = Some(position);
                 }
             }

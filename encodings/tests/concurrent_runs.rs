@@ -1,0 +1,70 @@
+//! Actions that overlap with themselves: what is planned, and what is claimed of it.
+
+use crate::concurrent::{check, metric, parse, rational, solve, written};
+
+#[test]
+fn actions_overlap_with_themselves() {
+    let domain = |action: &str| {
+        format!(
+            "(define (domain d) (:requirements :durative-actions) (:predicates (ready) (p) (q) (r)) (:functions (x) (y))
+               {action})"
+        )
+    };
+    let problem = |goal: &str| {
+        format!("(define (problem p) (:domain d) (:init (= (x) 2) (= (y) 0) (ready)) (:goal (and {goal})))")
+    };
+    let react = |condition: &str, effect: &str| {
+        domain(&format!(
+            "(:durative-action react :parameters () :duration (= ?duration 5)
+               :condition (and {condition}) :effect (and {effect}))"
+        ))
+    };
+    // What is added counts twice, also at one time.
+    let own = react("", "(at end (increase (y) 1))");
+    let plan = ["0: (react) [5]", "0: (react) [5]", "0: (react) [5]"];
+    check("at one time", &own, &problem("(>= (y) 3)"), (1, 1000), Some(("5", &plan)));
+    // Starts that read what they change lie apart, and there is enough for two of them.
+    let own = react("(at start (>= (x) 1))", "(at start (decrease (x) 1)) (at end (increase (y) 1))");
+    let plan = ["0: (react) [5]", "0.001: (react) [5]"];
+    check("apart", &own, &problem("(>= (y) 2)"), (1, 1000), Some(("5.001", &plan)));
+    check("too little", &own, &problem("(>= (y) 3)"), (1, 1000), None);
+    // A second run cannot start: its start needs what the first one has taken.
+    let own =
+        react("(at start (ready))", "(at start (not (ready))) (at end (ready)) (at end (increase (y) 1))");
+    let plan = ["0: (react) [5]", "5.001: (react) [5]"];
+    check("taken", &own, &problem("(>= (y) 2)"), (1, 1000), Some(("10.001", &plan)));
+    // What an end brings about is used up, and the end of a run that started a little later brings it about again.
+    let own = domain(
+        "(:durative-action charge :parameters () :duration (= ?duration 10) :condition () :effect (at end (p)))
+         (:durative-action use :parameters () :duration (= ?duration 6)
+           :condition (at start (p)) :effect (and (at start (not (p))) (at end (q))))
+         (:durative-action spend :parameters () :duration (= ?duration 7)
+           :condition (at start (p)) :effect (and (at start (not (p))) (at end (r))))",
+    );
+    let plan = ["0: (charge) [10]", "0.002: (charge) [10]", "10.001: (spend) [7]", "10.003: (use) [6]"];
+    check("used up", &own, &problem("(q) (r)"), (1, 1000), Some(("17.001", &plan)));
+    // The light is on until the first run ends, and each run needs it all along: two of them start and end together, or not at all.
+    let own = domain(
+        "(:durative-action light :parameters () :duration (= ?duration 5)
+           :condition (over all (p)) :effect (and (at start (p)) (at end (not (p)))))
+         (:durative-action work :parameters () :duration (= ?duration 7) :condition (over all (p)) :effect (at end (q)))",
+    );
+    check("light", &own, &problem("(q)"), (1, 1000), None);
+}
+
+#[test]
+fn runs_whose_duration_the_state_decides() {
+    // The second run takes longer, for the number has grown: all the same it may start while the first one is under way.
+    let domain =
+        "(define (domain d) (:requirements :durative-actions) (:predicates (go)) (:functions (x) (y))
+      (:durative-action react :parameters () :duration (= ?duration (x))
+        :condition () :effect (and (at start (increase (y) 1))))
+      (:action grow :parameters () :precondition (go) :effect (and (not (go)) (increase (x) 2))))";
+    let problem = "(define (problem p) (:domain d) (:init (= (x) 5) (= (y) 0) (go)) (:goal (and (>= (y) 2) (= (x) 7))))";
+    let (domain, problem) = parse(domain, problem);
+    let separation = rational(1, 1000);
+    let solution = solve(&domain, &problem, &separation);
+    let plan = solution.plan.expect("a plan");
+    // Two runs at 0, and the number grows when they have begun.
+    assert_eq!(metric(&domain, &problem, &written(&plan), &separation), Ok(rational(5, 1)));
+}
