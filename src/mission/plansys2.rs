@@ -34,6 +34,9 @@ pub fn spaced(mission: &Mission, problem: &Problem, plan: Plan, reading: &Readin
             // What overlaps keeps its distance.
             if own.clone() + before.duration.to_rational() <= start {
                 moved + lasting(before) + instant()
+            } else if own == start && before.call() == plan.steps[next].call() {
+                // By its name and its time PlanSys2 knows an action.
+                moved + instant()
             } else {
                 moved + &start - own
             }
@@ -122,6 +125,9 @@ mod tests {
         let overlapping = [("long", 0, 5000), ("aside", 1000, 5000), ("short", 5000, 2000)];
         let spaced = "0.000: (long)  [5.000]\n1.000: (aside)  [5.000]\n5.001: (short)  [2.000]\n";
         check("", true, &overlapping, spaced);
+        let twice = [("long", 0, 5000), ("long", 0, 5000), ("short", 6000, 2000)];
+        let spaced = "0.000: (long)  [5.000]\n0.001: (long)  [5.000]\n6.000: (short)  [2.000]\n";
+        check("", true, &twice, spaced);
     }
 
     /// Something that holds from 5 to 7 leaves no time.
