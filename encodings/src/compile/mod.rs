@@ -3,10 +3,10 @@
 //! Each instance of a constraint gets atoms that remember what its automaton has to, and each action effects on them: a condition on
 //! the state *after* the action is regressed to the state before it (`regress`), so that no state is added to plans. What has to hold
 //! becomes a condition of actions and of the goal. Preferences are judged after the plan, by actions that are not shown (`judge`):
-//! each either is met, or costs what the metric says. Where actions overlap, they are looked up when the goal holds, and never happen (A. Gerevini et al.: Deterministic planning in the fifth international planning
+//! each either is met, or costs what the metric says (A. Gerevini et al.: Deterministic planning in the fifth international planning
 //! competition, Artificial Intelligence 173, 2009; regression after L. Bonassi et al.: On planning with qualitative
 //! state-trajectory constraints in PDDL3 by compiling them away, ICAPS 2021; preferences after E. Keyder, H. Geffner: Soft goals can be
-//! compiled away, JAIR 36, 2009).
+//! compiled away, JAIR 36, 2009). Where actions overlap, these actions never happen: their conditions are looked up in the last state.
 //!
 //! Names that are made up have a space, so that no file can mean them.
 

@@ -3,6 +3,7 @@
 use crate::concurrent::compile::Concurrent;
 use crate::concurrent::expansion::Situation;
 use crate::concurrent::schedule;
+use crate::concurrent::search::Sequence;
 use crate::number::Int;
 use crate::task::{OperatorId, State};
 
@@ -64,5 +65,16 @@ impl Concurrent {
             }
         }
         Ok(state)
+    }
+
+    /// A sequence that costs so much without what is violated, measured by its times, too; none if it does not keep what it has to.
+    pub(super) fn judge(&self, sequence: Sequence, cost: Int) -> Option<Sequence> {
+        if self.deadlines.is_empty() {
+            return Some(sequence);
+        }
+        let last = self.last_state(&sequence.happenings, &sequence.together).ok()?;
+        let makespan = sequence.value.1;
+        let total = self.measure.total(makespan, cost.checked_add(self.penalty(&last)?)?)?;
+        Some(Sequence { value: (total, makespan), ..sequence })
     }
 }

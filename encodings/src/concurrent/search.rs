@@ -35,19 +35,6 @@ pub(super) struct Sequence {
     pub(super) together: Vec<bool>,
 }
 
-impl Concurrent {
-    /// A sequence that costs so much without what is violated, measured by its times, too; none if it does not keep what it has to.
-    pub(super) fn judge(&self, sequence: Sequence, cost: Int) -> Option<Sequence> {
-        if self.deadlines.is_empty() {
-            return Some(sequence);
-        }
-        let last = self.last_state(&sequence.happenings, &sequence.together).ok()?;
-        let makespan = sequence.value.1;
-        let total = self.measure.total(makespan, cost.checked_add(self.penalty(&last)?)?)?;
-        Some(Sequence { value: (total, makespan), ..sequence })
-    }
-}
-
 impl Sequence {
     /// Tells the record of a better plan, and of what none can get below.
     pub(super) fn tell(&self, lower: Int, part: Part, record: &mut Record<'_>) {

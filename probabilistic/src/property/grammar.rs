@@ -149,18 +149,24 @@ fn probability(cursor: &mut Cursor<'_>, suffix: &str) -> Read<Property> {
     filtered(cursor, Property::Probability(question, path), place)
 }
 
+/// The reward structure that is asked for, `{"name"}`, if one is.
+fn reward_name(cursor: &mut Cursor<'_>) -> Read<Option<String>> {
+    if !cursor.take("{") {
+        return Ok(None);
+    }
+    let Kind::Quoted(text) = cursor.peek() else {
+        return Err(cursor.expected("the name of a reward structure in quotation marks"));
+    };
+    let name = text.clone();
+    cursor.advance();
+    cursor.need("}")?;
+    Ok(Some(name))
+}
+
 fn reward(cursor: &mut Cursor<'_>, suffix: &str) -> Read<Property> {
     let place = cursor.place();
     cursor.advance();
-    let mut name = None;
-    if cursor.take("{") {
-        let Kind::Quoted(text) = cursor.peek() else {
-            return Err(cursor.expected("the name of a reward structure in quotation marks"));
-        };
-        name = Some(text.clone());
-        cursor.advance();
-        cursor.need("}")?;
-    }
+    let name = reward_name(cursor)?;
     let question = question(cursor, suffix)?;
     cursor.need("[")?;
     let path = reward_path(cursor)?;
@@ -251,15 +257,7 @@ fn steps(cursor: &mut Cursor<'_>) -> Read<Option<Steps>> {
             return Err(cursor.expected("`rew{\"name\"}`"));
         }
         cursor.advance();
-        let mut name = None;
-        if cursor.take("{") {
-            let Kind::Quoted(text) = cursor.peek() else {
-                return Err(cursor.expected("the name of a reward structure in quotation marks"));
-            };
-            name = Some(text.clone());
-            cursor.advance();
-            cursor.need("}")?;
-        }
+        let name = reward_name(cursor)?;
         let found = one_sided(cursor, any_number)?;
         cursor.need("}")?;
         let found = found.ok_or_else(|| cursor.expected("a bound (`<=10`)"))?;
