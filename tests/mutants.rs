@@ -51,12 +51,13 @@ const SWITCH: &str = "METAPLAN_MUTANT";
 const LIBRARY: &str = "encodings/src/lib.rs";
 
 /// What is asked of each fault, in order: tests of `tests/oracle`, and how many tasks they judge.
-const ORACLES: [(&str, u32); 6] = [
+const ORACLES: [(&str, u32); 7] = [
     ("field::", 0),
     ("numbers::special::hundreds_of_designs", 0),
     ("temporal::actions_one_after_another", 4_000),
     ("temporal::actions_with_designs", 3_000),
     ("temporal::overlapping_actions", 1_500),
+    ("temporal::batteries_that_are_charged", 400),
     ("numbers::random_tasks_with_numbers", 1_500),
 ];
 

@@ -52,6 +52,54 @@ fn actions_overlap_with_themselves() {
     check("light", &own, &problem("(q)"), (1, 1000), None);
 }
 
+/// A battery that is charged, and actions that need it: `first` and then `second`, each of which takes one unit of it when it ends.
+#[test]
+fn what_is_charged_again_while_it_is_charged() {
+    let domain = |others: &str| {
+        let work = |name: &str, needs: &str, gives: &str| {
+            format!(
+                "(:durative-action {name} :parameters () :duration (= ?duration 1)
+                   :condition (and (at start (>= (battery) 1)) {needs})
+                   :effect (and (at end (decrease (battery) 1)) (at end ({gives}))))"
+            )
+        };
+        format!(
+            "(define (domain d) (:requirements :durative-actions :fluents) (:predicates (p) (q) (r)) (:functions (battery))
+               (:durative-action charge :parameters () :duration (= ?duration 10)
+                 :condition () :effect (at end (assign (battery) 1))) {} {} {} {others})",
+            work("first", "", "p"),
+            work("second", "(at start (p))", "q"),
+            work("third", "(at start (q))", "r"),
+        )
+    };
+    let problem = |goal: &str| {
+        format!(
+            "(define (problem p) (:domain d) (:init (= (battery) 0)) (:goal (and {goal})) (:metric minimize (total-time)))"
+        )
+    };
+    // Each one undoes once what an end has charged; three runs are under way at a time.
+    let plan = [
+        "0: (charge) [10]",
+        "1.002: (charge) [10]",
+        "2.004: (charge) [10]",
+        "10.001: (first) [1]",
+        "11.003: (second) [1]",
+        "12.005: (third) [1]",
+    ];
+    check("three", &domain(""), &problem("(r)"), (1, 1000), Some(("13.005", &plan)));
+    // One undoes it twice, since what it is good for is undone in between.
+    let undo = "(:durative-action undo :parameters () :duration (= ?duration 1)
+      :condition (at start (p)) :effect (and (at end (not (p))) (at end (r))))";
+    let plan = [
+        "0: (charge) [10]",
+        "1.002: (charge) [10]",
+        "10.001: (first) [1]",
+        "11.002: (undo) [1]",
+        "11.003: (first) [1]",
+    ];
+    check("twice", &domain(undo), &problem("(p) (r)"), (1, 1000), Some(("12.003", &plan)));
+}
+
 #[test]
 fn runs_whose_duration_the_state_decides() {
     // The second run takes longer, for the number has grown: all the same it may start while the first one is under way.

@@ -14,7 +14,7 @@ pub(super) const PAIRS: usize = 20_000_000;
 pub(super) struct Index<'a> {
     pub(super) task: &'a Task,
     pub(super) happenings: &'a [Happening],
-    instances: &'a [Instance],
+    pub(super) instances: &'a [Instance],
     pub(super) waiting: FxHashMap<Key, Vec<OperatorId>>,
     pub(super) marking: FxHashMap<Key, Vec<OperatorId>>,
     setting: Vec<Vec<OperatorId>>,

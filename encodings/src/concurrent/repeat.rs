@@ -4,14 +4,18 @@
 //! without changing anything, a plan is as good without it. Both are shown here by facts that hold as long as the action is under way; the arguments
 //! are in docs/decisions/runs-that-overlap.md.
 
+use std::collections::BTreeMap;
+
 use rustc_hash::FxHashSet;
 
+use crate::compile::is_hidden;
 use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::inside::{Index, Invariant, PAIRS};
 use crate::concurrent::split::UNDER_WAY;
 use crate::limits::{Interrupted, Limits};
 use crate::number::Int;
-use crate::task::{Fact, NumericId, Operator, OperatorId, Task, VariableId};
+use crate::search::{Asked, directions};
+use crate::task::{Fact, NumericEffect, NumericId, Operator, OperatorId, Task, VariableId};
 
 /// How often it is asked again what follows for others.
 const ROUNDS: usize = 2;
@@ -38,10 +42,10 @@ pub(super) fn count_runs(
             !own.under_way.is_some_and(is_alone) || index.excludes_itself(own, &mut left) == Some(true);
         own.most = if is_single { 1 } else { u32::MAX };
     }
-    let needed = needed(task);
+    let (needed, asked) = (needed(task), asked(task, &known));
     for _ in 0..ROUNDS {
         let most: Vec<u32> = instances.iter().map(|own| own.most).collect();
-        let known = Known { most: &most, separation, needed: &needed };
+        let known = Known { most: &most, separation, needed: &needed, asked: &asked };
         for own in limits.watch(&mut *instances) {
             let own = own?;
             if own.most > 1
@@ -54,7 +58,7 @@ pub(super) fn count_runs(
             break;
         }
     }
-    let known = Known { most: &[], separation, needed: &needed };
+    let known = Known { most: &[], separation, needed: &needed, asked: &[] };
     for own in instances {
         own.under_way = own.under_way.filter(|_| own.most > 1);
         own.counts_by_end =
@@ -81,6 +85,25 @@ struct Known<'k> {
     separation: Int,
     /// By variable, whether anything may need that its atoms are false.
     needed: &'k [bool],
+    /// By number, what is asked of it; of those that are not in the list nothing is known.
+    asked: &'k [Asked],
+}
+
+/// What an effect does to a number, if that does not depend on the state.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Change {
+    Sets(Int),
+    Adds(Int),
+}
+
+fn change(effect: &NumericEffect) -> Option<Change> {
+    let value = &effect.value;
+    let constant = value.quantity.tables.is_empty().then_some(value.quantity.constant)?;
+    match value.coefficients.as_slice() {
+        [] => Some(Change::Sets(constant)),
+        [(own, 1)] if *own == effect.variable => Some(Change::Adds(constant)),
+        _ => None,
+    }
 }
 
 impl Known<'_> {
@@ -89,6 +112,33 @@ impl Known<'_> {
         let is_wanted = |fact: &&Fact| fact.value == 0 || self.needed[fact.variable.index()];
         effects.iter().filter(is_wanted).copied().collect()
     }
+
+    /// Whether a number that changes by so much is no better for it, whatever it is.
+    fn is_no_better(&self, number: NumericId, by: Int) -> bool {
+        by == 0
+            || self.asked.get(number.index()).is_some_and(|asked| !if by < 0 { asked.down } else { asked.up })
+    }
+
+    /// Whether a plan is no worse without an effect on a number.
+    fn is_loss(&self, effect: &NumericEffect) -> bool {
+        matches!(change(effect), Some(Change::Adds(by)) if self.is_no_better(effect.variable, by))
+    }
+
+    /// Whether a number that an effect has set is not worse after another effect, so that to set it again does not make it better.
+    fn keeps(&self, other: &NumericEffect, value: Int) -> bool {
+        match change(other) {
+            Some(Change::Sets(next)) => self.is_no_better(other.variable, value.saturating_sub(next)),
+            Some(Change::Adds(by)) => self.is_no_better(other.variable, by.saturating_neg()),
+            None => false,
+        }
+    }
+}
+
+/// By number, what is asked of it. Nothing is said where more than conditions asks for numbers: durations, metrics, preferences and constraints on the way.
+fn asked(task: &Task, instances: &[Instance]) -> Vec<Asked> {
+    let is_judged = task.schema_names.iter().any(|name| is_hidden(name));
+    let is_timed = instances.iter().any(|own| own.is_chosen || own.timer.is_some());
+    if is_judged || is_timed || !task.objective.rest.is_empty() { Vec::new() } else { directions(task) }
 }
 
 /// By variable, whether anything may need that its atoms are false. Of a single atom nothing does that is required positively only.
@@ -117,6 +167,14 @@ fn needed(task: &Task) -> Vec<bool> {
         }
     }
     needed
+}
+
+/// What can happen while runs of an instance are under way.
+#[derive(Clone, Copy)]
+struct Inside<'i> {
+    own: &'i Instance,
+    invariant: &'i Invariant,
+    known: &'i Known<'i>,
 }
 
 impl Index<'_> {
@@ -179,8 +237,16 @@ impl Index<'_> {
     /// How many runs at a time can make a difference; none if that is not known, or takes too long to find out.
     fn most(&self, own: &Instance, known: &Known<'_>, left: &mut usize) -> Option<u32> {
         let [start, end] = [own.start, own.end].map(|id| &self.task.operators[id.index()]);
-        if own.is_chosen || ![start, end].into_iter().all(is_plain) || !assigns_constants(own, end) {
+        if own.is_chosen || ![start, end].into_iter().all(is_plain) {
             return None;
+        }
+        let mut numbers = Vec::new();
+        for effect in end.numeric_effects.iter().filter(|effect| !is_timer(own, effect.variable)) {
+            match change(effect) {
+                Some(Change::Sets(value)) => numbers.push((effect.variable, value)),
+                _ if known.is_loss(effect) => {}
+                _ => return None,
+            }
         }
         let alone = self.invariant(own, true, left)?;
         if !self.lasts_as_long(own, start, &alone) {
@@ -204,16 +270,14 @@ impl Index<'_> {
                 return None;
             }
         }
-        let numbers = end.numeric_effects.iter().map(|effect| effect.variable);
-        let numbers: Vec<NumericId> = numbers.filter(|number| !is_timer(own, *number)).collect();
         let set = known.wanted(&starts);
+        let inside = Inside { own, invariant: &invariant, known };
         let mut all: Int = 1;
         for (facts, numbers) in [(&set, &[][..]), (&wanted, &numbers)] {
-            let facts = facts.iter().filter(|fact| !hidden.contains(&fact.variable)).copied();
-            for id in self.undoing(own, &invariant, (facts.collect(), numbers), left)? {
-                let times = self.times(id, own, known)?;
-                all = all.saturating_add(times);
-            }
+            let facts: Vec<Fact> =
+                facts.iter().filter(|fact| !hidden.contains(&fact.variable)).copied().collect();
+            let undoing = self.undoing(inside, (&facts, numbers), left)?;
+            all = all.saturating_add(self.times_together(inside, undoing, left)?);
         }
         // Ends of earlier runs undo what starts have set: then it is known only that two runs, the first of all that overlap, need not do so.
         let is_cut = set.iter().any(|fact| clashes(*fact, &ends) && !hidden.contains(&fact.variable));
@@ -223,22 +287,79 @@ impl Index<'_> {
     /// The happenings of others that undo effects while a run is under way.
     fn undoing(
         &self,
-        own: &Instance,
-        invariant: &Invariant,
-        (facts, numbers): (Vec<Fact>, &[NumericId]),
+        Inside { own, invariant, known }: Inside<'_>,
+        (facts, numbers): (&[Fact], &[(NumericId, Int)]),
         left: &mut usize,
     ) -> Option<FxHashSet<OperatorId>> {
         let mut all = FxHashSet::default();
         for fact in facts {
             *left = left.checked_sub(self.setting(own, fact.variable).count())?;
-            all.extend(self.setting(own, fact.variable).filter(|id| self.changes(*id, fact)));
+            all.extend(self.setting(own, fact.variable).filter(|id| self.changes(*id, *fact)));
         }
-        for number in numbers {
+        for (number, value) in numbers {
             *left = left.checked_sub(self.changing(own, *number).count())?;
-            all.extend(self.changing(own, *number));
+            all.extend(self.changing(own, *number).filter(|id| {
+                let mut effects = self.task.operators[id.index()].numeric_effects.iter();
+                effects.any(|effect| effect.variable == *number && !known.keeps(effect, *value))
+            }));
         }
         all.retain(|id| !self.is_outside(invariant, own, *id));
         Some(all)
+    }
+
+    /// How often happenings can take place in less time than a run takes, all of them together; none if there is no such bound. Of those that are good for the
+    /// same facts only, the first one makes a difference, and one after each happening that undoes it: a plan is no worse without the others.
+    fn times_together(
+        &self,
+        inside: Inside<'_>,
+        happenings: FxHashSet<OperatorId>,
+        left: &mut usize,
+    ) -> Option<Int> {
+        let mut all: Int = 0;
+        let mut groups: BTreeMap<Vec<Fact>, Option<Int>> = BTreeMap::new();
+        for id in happenings {
+            let times = self.times(id, inside.own, inside.known);
+            if let Some(facts) = self.purpose(id, inside.known) {
+                let sum = groups.entry(facts).or_insert(Some(0));
+                *sum = sum.zip(times).map(|(sum, times)| sum.saturating_add(times));
+            } else {
+                all = all.saturating_add(times?);
+            }
+        }
+        for (facts, times) in groups {
+            let undoing = self.undoing(inside, (&facts, &[]), left)?;
+            let again = undoing.into_iter().try_fold(1, |sum: Int, id| {
+                Some(sum.saturating_add(self.times(id, inside.own, inside.known)?))
+            });
+            all = all.saturating_add(match (times, again) {
+                (Some(times), Some(again)) => times.min(again),
+                (times, again) => times.or(again)?,
+            });
+        }
+        Some(all)
+    }
+
+    /// The facts that a run is good for whose end a happening is; none if it is good for anything else.
+    fn purpose(&self, id: OperatorId, known: &Known<'_>) -> Option<Vec<Fact>> {
+        let Role::End(instance) = self.happenings[id.index()].role else { return None };
+        let other = &self.instances[instance as usize];
+        let [start, end] = [other.start, other.end].map(|id| &self.task.operators[id.index()]);
+        let wanted = |operator: &Operator| -> Vec<Fact> {
+            // One of two values only says that it is under way.
+            let is_own = |fact: &Fact| {
+                let is_alone = self.task.variables[fact.variable.index()].values.len() == 2;
+                is_alone && other.under_way.is_some_and(|own| own.variable == fact.variable)
+            };
+            known.wanted(&operator.effects).into_iter().filter(|fact| !is_own(fact)).collect()
+        };
+        let is_good_for_facts = !other.is_chosen
+            && [start, end].into_iter().all(is_plain)
+            && wanted(start).is_empty()
+            && [start, end]
+                .into_iter()
+                .flat_map(|operator| &operator.numeric_effects)
+                .all(|effect| is_timer(other, effect.variable) || known.is_loss(effect));
+        is_good_for_facts.then(|| wanted(end))
     }
 
     /// How often a happening can take place in less time than a run takes, at most; none if there is no such bound, or the time is not known.

@@ -16,7 +16,7 @@ pub(crate) mod successors;
 pub(crate) mod ties;
 
 pub(crate) use astar::{Found, Space};
-pub(crate) use directions::is_monotone;
+pub(crate) use directions::{Asked, directions, is_monotone};
 pub(crate) use estimate::Estimate;
 pub(crate) use explore::{Duo, STATE_LIMIT, closed_labels, search, search_from, search_states};
 pub(crate) use figures::Figures;

@@ -1,5 +1,6 @@
 //! Generator A: everything temporal and logical, one after another and overlapping.
 
+mod battery;
 pub mod best;
 mod evaluate;
 pub mod execute;
@@ -26,6 +27,7 @@ use model::{Measure, Q, Task, big};
 /// How many nodes the oracle visits before it gives up.
 const CAP: usize = 400;
 const OVERLAP_CAP: usize = 300;
+const BATTERY_CAP: usize = 3000;
 
 /// The oracle's terms for a plan.
 fn known(world: &World, steps: &[Step]) -> Result<Vec<(usize, Q, Q)>, String> {
@@ -88,10 +90,15 @@ fn case(name: &str, seed: u64, unit: Option<Q>) -> Case {
 }
 
 fn case_of(name: String, task: Task, unit: Option<Q>) -> Case {
+    case_up_to(if unit.is_none() { CAP } else { OVERLAP_CAP }, name, task, unit)
+}
+
+/// A task with its truth, as far as so many nodes show it.
+fn case_up_to(cap: usize, name: String, task: Task, unit: Option<Q>) -> Case {
     let world = World::new(task);
     let truth = match unit {
-        None => best::best(&world, CAP),
-        Some(unit) => overlap::best(&world, unit, OVERLAP_CAP),
+        None => best::best(&world, cap),
+        Some(unit) => overlap::best(&world, unit, cap),
     };
     Case {
         name,
@@ -120,6 +127,15 @@ fn actions_with_designs() {
 #[test]
 fn overlapping_actions() {
     run(300, |seed| vec![case("overlap", seed, Some(concurrent_unit(seed)))]).finish();
+}
+
+#[test]
+fn batteries_that_are_charged() {
+    let case = |seed| {
+        let unit = concurrent_unit(seed);
+        vec![case_up_to(BATTERY_CAP, format!("battery-{seed}"), battery::make(seed, unit), Some(unit))]
+    };
+    run(200, case).finish();
 }
 
 /// The kinds of failures of a task.

@@ -1,0 +1,96 @@
+//! Tiny random tasks with a battery that is charged, also again while it is charged, and that work empties: how many runs of an action at a time make a
+//! difference depends on what others undo.
+
+use super::make::{LEVEL, none};
+use super::model::{
+    Action, Atom, Body, Comparison, Condition, Effect, Expression, Fluent, Measure, Operation, Part, Q, Task,
+    q,
+};
+
+const ATOMS: usize = 3;
+
+fn level() -> Fluent {
+    Fluent { function: LEVEL, terms: Vec::new() }
+}
+
+fn atom(random: &mut fastrand::Rng) -> Atom {
+    Atom { predicate: random.usize(..ATOMS), terms: Vec::new() }
+}
+
+fn at_least(value: i64) -> Condition {
+    Condition::Compare(Comparison::AtLeast, Expression::Fluent(level()), Expression::Number(q(value)))
+}
+
+fn change(operation: Operation, value: i64) -> Effect {
+    Effect::Change(operation, level(), Expression::Number(q(value)))
+}
+
+fn durative(name: String, length: Q, start: Part, end: Vec<Effect>) -> Action {
+    let end = Part { condition: none(), effects: end };
+    let body = Body::Durative { duration: Expression::Number(length), start, over_all: none(), end };
+    Action { name, parameters: Vec::new(), body }
+}
+
+/// What charges: at its end, the battery is as full as that, or fuller by that much.
+fn charge(random: &mut fastrand::Rng, number: usize, unit: Q) -> Action {
+    let operation = if random.u8(..10) < 8 { Operation::Assign } else { Operation::Increase };
+    let condition = if random.u8(..10) < 7 { none() } else { Condition::Atom(atom(random)) };
+    let length = unit * q(random.i64(2..8));
+    let effects = vec![change(operation, random.i64(1..4))];
+    durative(format!("charge{number}"), length, Part { condition, effects: Vec::new() }, effects)
+}
+
+/// What needs the battery, and mostly empties it at its end.
+fn work(random: &mut fastrand::Rng, number: usize, unit: Q) -> Action {
+    let mut conditions = vec![at_least(random.i64(0..3))];
+    if random.bool() {
+        conditions.push(Condition::Atom(atom(random)));
+    }
+    if random.u8(..10) < 1 {
+        let full = Expression::Number(q(2));
+        conditions.push(Condition::Compare(Comparison::AtMost, Expression::Fluent(level()), full));
+    }
+    let takes = change(Operation::Decrease, random.i64(1..3));
+    let (mut start, mut end) = (Vec::new(), vec![Effect::Add(atom(random))]);
+    if random.u8(..10) < 7 {
+        end.push(takes)
+    } else {
+        start.push(takes)
+    }
+    if random.u8(..10) < 2 {
+        let deleted = Effect::Delete(atom(random));
+        if random.bool() { end.push(deleted) } else { start.push(deleted) }
+    }
+    let start = Part { condition: Condition::All(conditions), effects: start };
+    durative(format!("work{number}"), unit * q(random.i64(1..4)), start, end)
+}
+
+/// A task from a seed, whose durations are multiples of a unit of time.
+pub fn make(seed: u64, unit: Q) -> Task {
+    let random = &mut fastrand::Rng::with_seed(seed);
+    let mut actions: Vec<Action> =
+        (0..random.usize(1..3)).map(|number| charge(random, number, unit)).collect();
+    actions.extend((0..random.usize(1..4)).map(|number| work(random, number, unit)));
+    let events = if random.u8(..10) < 2 {
+        vec![(unit * q(random.i64(1..12)), vec![(random.bool(), atom(random))])]
+    } else {
+        Vec::new()
+    };
+    let mut goal: Vec<_> = (0..random.usize(1..3)).map(|_| Condition::Atom(atom(random))).collect();
+    if random.u8(..10) < 3 {
+        goal.push(at_least(random.i64(1..3)));
+    }
+    Task {
+        types: 1,
+        objects: vec![0],
+        predicates: (0..ATOMS).map(|name| (format!("p{name}"), 0)).collect(),
+        functions: vec![("level".to_owned(), 0)],
+        axioms: Vec::new(),
+        actions,
+        atoms: if random.bool() { vec![atom(random)] } else { Vec::new() },
+        values: vec![(level(), q(random.i64(0..3)))],
+        events,
+        goal: Condition::All(goal),
+        measure: Measure::Time,
+    }
+}
