@@ -50,15 +50,25 @@ const SWITCH: &str = "METAPLAN_MUTANT";
 /// Where the switch is.
 const LIBRARY: &str = "encodings/src/lib.rs";
 
-/// What is asked of each fault, in order: tests of `tests/oracle`, and how many tasks they judge.
-const ORACLES: [(&str, u32); 7] = [
-    ("field::", 0),
-    ("numbers::special::hundreds_of_designs", 0),
-    ("temporal::actions_one_after_another", 4_000),
-    ("temporal::actions_with_designs", 3_000),
-    ("temporal::overlapping_actions", 1_500),
-    ("temporal::batteries_that_are_charged", 400),
-    ("numbers::random_tasks_with_numbers", 1_500),
+/// A program of tests.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Tests {
+    /// `tests/oracle`.
+    Oracle,
+    /// What stands beside the code of the planner, for what only larger tasks come to.
+    Unit,
+}
+
+/// What is asked of each fault, in order: tests, and how many tasks they judge.
+const ORACLES: [(Tests, &str, u32); 8] = [
+    (Tests::Oracle, "field::", 0),
+    (Tests::Unit, "search::stubborn::", 0),
+    (Tests::Oracle, "numbers::special::hundreds_of_designs", 0),
+    (Tests::Oracle, "temporal::actions_one_after_another", 4_000),
+    (Tests::Oracle, "temporal::actions_with_designs", 3_000),
+    (Tests::Oracle, "temporal::overlapping_actions", 1_500),
+    (Tests::Oracle, "temporal::batteries_that_are_charged", 400),
+    (Tests::Oracle, "numbers::random_tasks_with_numbers", 1_500),
 ];
 
 /// A planner that does not come to an end is wrong, too.
@@ -163,19 +173,15 @@ fn mutated(mutants: &[Mutant]) -> PathBuf {
     home
 }
 
-/// Compiles the oracles of a workspace.
-fn compiled(home: &Path) -> PathBuf {
+/// Compiles tests of a workspace.
+fn compiled(home: &Path, tests: Tests) -> PathBuf {
+    let (target, name): (&[&str], _) = match tests {
+        Tests::Oracle => (&["--test", "oracle"], "oracle"),
+        Tests::Unit => (&["--package", "metaplan-encodings", "--lib"], "metaplan_encodings"),
+    };
     let output = Command::new(env!("CARGO"))
-        .args([
-            "test",
-            "--release",
-            "--offline",
-            "--test",
-            "oracle",
-            "--no-run",
-            "--message-format",
-            "json-render-diagnostics",
-        ])
+        .args(["test", "--release", "--offline", "--no-run", "--message-format", "json-render-diagnostics"])
+        .args(target)
         .current_dir(home)
         .env("CARGO_TARGET_DIR", home.with_file_name("mutants-target"))
         .env("RUSTFLAGS", "--cap-lints allow")
@@ -185,15 +191,21 @@ fn compiled(home: &Path) -> PathBuf {
     assert!(output.status.success(), "the faults do not compile");
     let text = String::from_utf8_lossy(&output.stdout);
     let last = text.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
-    let programs = last.filter(|line| line["target"]["name"] == "oracle");
+    let programs = last.filter(|line| line["target"]["name"] == name);
     let mut programs = programs.filter_map(|line| line["executable"].as_str().map(PathBuf::from));
     let program = programs.next_back();
     program.expect("a program")
 }
 
 /// Whether an oracle is content with the planner when a fault is on.
-fn is_content(program: &Path, home: &Path, fault: usize, (test, tasks): (&str, u32)) -> bool {
-    let mut command = Command::new(program);
+fn is_content(
+    programs: &[(Tests, PathBuf)],
+    home: &Path,
+    fault: usize,
+    (tests, test, tasks): (Tests, &str, u32),
+) -> bool {
+    let program = programs.iter().find(|(own, _)| *own == tests);
+    let mut command = Command::new(&program.expect("it is compiled").1);
     command.arg(test).current_dir(home).env(SWITCH, fault.to_string()).env("ORACLE_STOP", "1");
     if tasks > 0 {
         command.env("ORACLE_TASKS", tasks.to_string());
@@ -234,9 +246,9 @@ fn every_member_is_copied() {
 fn every_fault_is_noticed() {
     let mutants = mutants();
     let home = mutated(&mutants);
-    let program = compiled(&home);
+    let programs = [Tests::Oracle, Tests::Unit].map(|tests| (tests, compiled(&home, tests)));
     for oracle in ORACLES {
-        assert!(is_content(&program, &home, 0, oracle), "{} fails without a fault", oracle.0);
+        assert!(is_content(&programs, &home, 0, oracle), "{} fails without a fault", oracle.1);
     }
     let mut missed = Vec::new();
     let chosen: Option<Vec<usize>> = std::env::var("MUTANTS")
@@ -245,8 +257,8 @@ fn every_fault_is_noticed() {
     let is_chosen = |number: &usize| chosen.as_ref().is_none_or(|chosen| chosen.contains(number));
     for (mutant, number) in mutants.iter().zip(1..).filter(|(_, number)| is_chosen(number)) {
         let started = Instant::now();
-        let noticed = ORACLES.iter().find(|oracle| !is_content(&program, &home, number, **oracle));
-        let by = noticed.map_or("NOBODY", |(test, _)| test);
+        let noticed = ORACLES.iter().find(|oracle| !is_content(&programs, &home, number, **oracle));
+        let by = noticed.map_or("NOBODY", |(_, test, _)| test);
         println!("{number:>3}. {}: noticed by {by} after {:.0?}", mutant.name, started.elapsed());
         if noticed.is_none() {
             missed.push(mutant.name.as_str());

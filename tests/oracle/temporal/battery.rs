@@ -65,18 +65,47 @@ fn work(random: &mut fastrand::Rng, number: usize, unit: Q) -> Action {
     durative(format!("work{number}"), unit * q(random.i64(1..4)), start, end)
 }
 
+/// Work after work, each of which needs what the one before brings about, and all that is charged at once.
+fn chain(random: &mut fastrand::Rng, length: usize, unit: Q) -> Vec<Action> {
+    let full = random.i64(1..3);
+    let nothing = Part { condition: none(), effects: Vec::new() };
+    let charged = vec![change(Operation::Assign, full)];
+    let mut actions = vec![durative("charge".into(), unit * q(random.i64(3..9)), nothing, charged)];
+    for number in 0..length {
+        let atom = |predicate| Atom { predicate, terms: Vec::new() };
+        let before = number.checked_sub(1).map(|before| Condition::Atom(atom(before)));
+        let condition = Condition::All([at_least(full)].into_iter().chain(before).collect());
+        let takes = change(Operation::Decrease, random.i64(1..=full));
+        let (mut start, mut end) = (Vec::new(), vec![Effect::Add(atom(number))]);
+        if random.u8(..10) < 8 {
+            end.push(takes)
+        } else {
+            start.push(takes)
+        }
+        let length = unit * q(random.i64(1..3));
+        actions.push(durative(format!("chain{number}"), length, Part { condition, effects: start }, end));
+    }
+    actions
+}
+
 /// A task from a seed, whose durations are multiples of a unit of time.
 pub fn make(seed: u64, unit: Q) -> Task {
     let random = &mut fastrand::Rng::with_seed(seed);
-    let mut actions: Vec<Action> =
-        (0..random.usize(1..3)).map(|number| charge(random, number, unit)).collect();
-    actions.extend((0..random.usize(1..4)).map(|number| work(random, number, unit)));
+    let length = if random.u8(..10) < 6 { random.usize(2..=ATOMS) } else { 0 };
+    let mut actions = if length > 0 { chain(random, length, unit) } else { Vec::new() };
+    let [charges, works] =
+        if length > 0 { [0..1, 0..2] } else { [1..3, 1..4] }.map(|range| random.usize(range));
+    actions.extend((0..charges).map(|number| charge(random, number, unit)));
+    actions.extend((0..works).map(|number| work(random, number, unit)));
     let events = if random.u8(..10) < 2 {
         vec![(unit * q(random.i64(1..12)), vec![(random.bool(), atom(random))])]
     } else {
         Vec::new()
     };
     let mut goal: Vec<_> = (0..random.usize(1..3)).map(|_| Condition::Atom(atom(random))).collect();
+    if let Some(predicate) = length.checked_sub(1) {
+        goal = vec![Condition::Atom(Atom { predicate, terms: Vec::new() })];
+    }
     if random.u8(..10) < 3 {
         goal.push(at_least(random.i64(1..3)));
     }
@@ -87,8 +116,8 @@ pub fn make(seed: u64, unit: Q) -> Task {
         functions: vec![("level".to_owned(), 0)],
         axioms: Vec::new(),
         actions,
-        atoms: if random.bool() { vec![atom(random)] } else { Vec::new() },
-        values: vec![(level(), q(random.i64(0..3)))],
+        atoms: if length == 0 && random.bool() { vec![atom(random)] } else { Vec::new() },
+        values: vec![(level(), q(random.i64(0..if length > 0 { 2 } else { 3 })))],
         events,
         goal: Condition::All(goal),
         measure: Measure::Time,
