@@ -62,7 +62,7 @@ enum Tests {
 /// What is asked of each fault, in order: tests, and how many tasks they judge.
 const ORACLES: [(Tests, &str, u32); 8] = [
     (Tests::Oracle, "field::", 0),
-    (Tests::Unit, "search::stubborn::", 0),
+    (Tests::Unit, "search::", 0),
     (Tests::Oracle, "numbers::special::hundreds_of_designs", 0),
     (Tests::Oracle, "temporal::actions_one_after_another", 4_000),
     (Tests::Oracle, "temporal::actions_with_designs", 3_000),

@@ -33,6 +33,10 @@ fn actions_overlap_with_themselves() {
         react("(at start (ready))", "(at start (not (ready))) (at end (ready)) (at end (increase (y) 1))");
     let plan = ["0: (react) [5]", "5.001: (react) [5]"];
     check("taken", &own, &problem("(>= (y) 2)"), (1, 1000), Some(("10.001", &plan)));
+    // All runs begin before one ends.
+    let own = react("(at start (ready))", "(at end (not (ready))) (at end (increase (y) 1))");
+    let plan = ["0: (react) [5]", "0: (react) [5]", "0: (react) [5]"];
+    check("before the first end", &own, &problem("(>= (y) 3)"), (1, 1000), Some(("5", &plan)));
     // What an end brings about is used up, and the end of a run that started a little later brings it about again.
     let own = domain(
         "(:durative-action charge :parameters () :duration (= ?duration 10) :condition () :effect (at end (p)))

@@ -11,6 +11,7 @@ use crate::concurrent::compress::compressible;
 use crate::concurrent::deadline::Deadline;
 use crate::concurrent::grows::only_grows;
 use crate::concurrent::happening::{Happening, Instance, Role};
+use crate::concurrent::kept::Kept;
 use crate::concurrent::links::drop_links;
 use crate::concurrent::measure::Measure;
 use crate::concurrent::repeat::count_runs;
@@ -49,6 +50,8 @@ pub struct Concurrent {
     pub(super) separation: Int,
     /// The same with durations that are as short as they may be, where the planner chooses some, and if that can be planned with.
     pub(super) shortest: Option<Box<Self>>,
+    /// The files, if actions one after another may be planned as well.
+    pub(super) kept: Option<Kept>,
 }
 
 /// Makes happenings of a split ground task.
@@ -116,6 +119,7 @@ pub(super) fn compile(
         is_whole,
         separation,
         shortest: None,
+        kept: None,
     };
     concurrent.guard(limits)?;
     Ok(concurrent)

@@ -32,7 +32,7 @@ const OVERHEAD: usize = size_of::<Node>() + 80;
 
 /// A happening, and whether it takes place at the time of the one before.
 type Link = (OperatorId, bool);
-type Links = SmallVec<[Link; 2]>;
+pub(super) type Links = SmallVec<[Link; 2]>;
 
 /// What the search goes through.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -47,7 +47,7 @@ pub(super) enum Mode {
 
 impl Mode {
     /// What follows a situation by a happening. Timed initial literals that come before it come first.
-    fn happen(
+    pub(super) fn happen(
         self,
         concurrent: &Concurrent,
         expansion: &Expansion<'_>,

@@ -23,6 +23,7 @@ mod guidance;
 mod happening;
 mod inside;
 mod judge;
+mod kept;
 mod links;
 mod measure;
 mod record;
@@ -37,6 +38,7 @@ mod time;
 mod timer;
 mod turns;
 mod unit;
+mod whole;
 
 use std::time::Instant;
 
@@ -45,7 +47,7 @@ use num_traits::Signed;
 use tracing::info_span;
 
 use crate::bounds::Bounds;
-use crate::compile::{Compiled, Course, compile as compile_away, is_hidden};
+use crate::compile::{Compiled, Course, compile as compile_away, is_hidden, is_needed};
 use crate::context::Context;
 use crate::error::{Error, Errors, File, Place};
 use crate::ground::{Generality, GroundConfig, ground_lifted};
@@ -60,6 +62,7 @@ pub use compile::Concurrent;
 
 use answer::{ended, in_names};
 use deadline::Deadline;
+use kept::Kept;
 use record::Record;
 use search::Ended;
 use turns::take_turns;
@@ -88,7 +91,10 @@ pub fn ground_concurrent(
     let config = config.clone().with_objectives(plain.objectives.to_vec());
     let mut task = ground_plain((&plain.domain, &plain.problem, &config, &separation))?;
     let shortest = task.shortest.take().map(|shortest| Box::new(shortest.judged_by(&plain)));
-    Ok(Concurrent { shortest, ..task.judged_by(&plain) })
+    let is_plain = plain.deadlines.is_empty() && plain.objectives.is_empty();
+    let is_plain = is_plain && !is_needed(domain, problem);
+    let kept = if is_plain { Kept::new(domain, problem, &config) } else { None };
+    Ok(Concurrent { shortest, kept, ..task.judged_by(&plain) })
 }
 
 impl Concurrent {

@@ -135,7 +135,15 @@ impl<'a> Search<'a> {
             record.rise(Rational::from_integer(self.known(value.0)));
             looked_at += self.expand(id, &situation, value.0);
         }
-        self.left_out.map_or(Ended::Exhausted, Ended::Stopped)
+        self.left_out.filter(|lower| self.may_be_better(*lower)).map_or(Ended::Exhausted, Ended::Stopped)
+    }
+
+    /// Whether something that was left out, of which nothing has a lower metric than this, may be better than the incumbent: as good, and over sooner, if
+    /// the metric is not the time.
+    fn may_be_better(&self, lower: Int) -> bool {
+        let is_time = || self.concurrent.task.operators.iter().all(|operator| operator.cost.is_zero());
+        let value = self.incumbent.as_ref().map(|incumbent| incumbent.value.0);
+        value.is_none_or(|value| lower < value || lower == value && !is_time())
     }
 
     /// Whether there is nothing left to expand.

@@ -13,6 +13,7 @@ use crate::concurrent::guidance::Guidance;
 use crate::concurrent::record::Record;
 use crate::concurrent::relaxed::Relaxed;
 use crate::concurrent::search::{Ended, Search, Sequence};
+use crate::concurrent::whole::{Seeker, Whole};
 use crate::limits::Limits;
 use crate::number::{Int, Rational};
 use crate::plan::solution::Part;
@@ -49,11 +50,20 @@ pub(super) fn take_turns(
     let differs = concurrent.instances.iter().any(|instance| !instance.compressible);
     let mut greedy = vec![begin(Mode::Overlapping)];
     greedy.extend(differs.then(|| begin(Mode::Sequential)));
+    let whole = if differs { Whole::new(concurrent, limits) } else { None };
+    let mut seeker = whole.as_ref().map(|own| Seeker::new(own, limits));
     let mut share = 1_usize;
     for _ in 0..rounds {
         let is_over = exact.is_over() || is_best(concurrent, &exact, root);
         if is_over || limits.reached() || (greedy.is_empty() && exact.is_full(limits)) {
             break;
+        }
+        seeker = seeker.filter(|_| exact.incumbent.is_none());
+        if let Some(seeker) = &mut seeker {
+            let _span = info_span!("satisfice").entered();
+            exact.incumbent = seeker.run((concurrent, &expansion), share, &mut record.statistics);
+            let incumbent = exact.incumbent.iter();
+            incumbent.for_each(|sequence| sequence.tell(exact.lower(), Part::Satisficing, record));
         }
         for position in (0..greedy.len()).rev() {
             let _span = info_span!("greedy").entered();

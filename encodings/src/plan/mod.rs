@@ -9,4 +9,4 @@ pub(crate) mod transitions;
 mod verdict;
 
 pub use names::{Exact, NotANumber, Plan, Step};
-pub(crate) use names::{decode, measured, metric, resolve};
+pub(crate) use names::{arguments, decode, measured, metric, resolve};

@@ -293,7 +293,7 @@ fn argument<N>(task: &Task<N>, operator: &Operator<N>, choice: &[u32], argument:
     task.object_names[resolve(task, operator, choice, argument).index()].clone()
 }
 
-fn arguments<N>(task: &Task<N>, operator: &Operator<N>, choice: &[u32]) -> Vec<String> {
+pub(crate) fn arguments<N>(task: &Task<N>, operator: &Operator<N>, choice: &[u32]) -> Vec<String> {
     operator.arguments.iter().map(|a| argument(task, operator, choice, *a)).collect()
 }
 

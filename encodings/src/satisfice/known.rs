@@ -9,10 +9,13 @@ use crate::satisfice::explore::Explorer;
 use crate::satisfice::landmarks::Landmarks;
 use crate::satisfice::relaxation::Relaxation;
 use crate::satisfice::status::Status;
-use crate::search::is_monotone;
 use crate::search::successors::undominated;
+use crate::search::{Pairs, is_monotone};
 use crate::task::number::TaskNumber;
 use crate::task::{OperatorId, State, Task};
+
+/// The price of an operator that no plan needs.
+pub(super) const USELESS: u32 = 1 << 20;
 
 /// An operator with a combination of its designs, and what it costs.
 struct Step<N> {
@@ -27,6 +30,8 @@ pub(super) struct Known<'a, N> {
     pub(super) relaxation: Relaxation<N>,
     pub(super) explorer: Explorer,
     pub(super) status: Status,
+    /// What pairs of facts tell, once it was worked out.
+    pub(super) pairs: Option<Pairs>,
     steps: Vec<Step<N>>,
     /// For each operator the number of its first step; then the number of all.
     first: Vec<u32>,
@@ -48,7 +53,7 @@ impl<'a, N: TaskNumber> Known<'a, N> {
         let relaxation = Relaxation::new(task, limits)?;
         let explorer = Explorer::new(&relaxation, task.operators.len());
         let status = Status::new(Landmarks::new(task, &relaxation, limits)?, &relaxation);
-        Ok(Some(Self { task, relaxation, explorer, status, steps, first }))
+        Ok(Some(Self { task, relaxation, explorer, status, pairs: None, steps, first }))
     }
 
     /// What it takes to look at a state, about, in nodes and propositions.

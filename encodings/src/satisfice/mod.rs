@@ -21,10 +21,11 @@ mod store;
 use crate::context::Context;
 use crate::limits::{Interrupted, Limits};
 use crate::plan::ground::GroundPlan;
-use crate::search::Figures;
+use crate::search::{Figures, Pairs};
+use crate::task::OperatorId;
 use crate::task::number::TaskNumber;
 
-use known::Known;
+use known::{Known, USELESS};
 use search::{Outcome, Search, Weight};
 
 /// The searches in their order: whether costs count, and how.
@@ -39,6 +40,9 @@ const PHASES: [(bool, Weight); 6] = [
 
 /// A search may take this part of the words that bytes are left for; then the next one has its turn.
 const PART: usize = 16;
+
+/// Who has looked at so many states without a plan looks for pairs of facts that lead nowhere.
+const LATE: u64 = 3_000;
 
 /// What came of going on for a while.
 pub(crate) enum Advance<N> {
@@ -58,6 +62,8 @@ pub(crate) struct Satisficer<'a, N> {
     limits: &'a Limits,
     phase: usize,
     search: Option<Search<N>>,
+    /// Whether it was tried to tell dead ends by pairs of facts.
+    knows_pairs: bool,
     pub(crate) figures: Figures,
 }
 
@@ -65,7 +71,14 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
     /// None if an operator has too many combinations of designs.
     pub(crate) fn new(context: Context<'a, N>) -> Result<Option<Self>, Interrupted> {
         let Some(known) = Known::new(context)? else { return Ok(None) };
-        Ok(Some(Self { known, limits: context.limits, phase: 0, search: None, figures: Figures::default() }))
+        Ok(Some(Self {
+            known,
+            limits: context.limits,
+            phase: 0,
+            search: None,
+            knows_pairs: false,
+            figures: Figures::default(),
+        }))
     }
 
     /// How often it has begun anew.
@@ -77,11 +90,25 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
     /// task.
     pub(crate) fn run(&mut self, limit: Option<&N>, work: u64) -> Result<Advance<N>, Interrupted> {
         let Some((priced, weight)) = PHASES.get(self.phase).copied() else { return Ok(Advance::Ended) };
+        if !self.knows_pairs && self.figures.evaluated >= LATE {
+            self.knows_pairs = true;
+            self.known.pairs = Pairs::new(self.known.task, self.limits)?;
+            // Estimates do not count on what is of no use any more.
+            self.search = None;
+        }
         let search = match &mut self.search {
             Some(search) => search,
             none => {
-                let prices =
+                let mut prices =
                     if priced { self.known.prices() } else { vec![1; self.known.task.operators.len()] };
+                if let Some(pairs) = &self.known.pairs {
+                    let ids = OperatorId::all(prices.len());
+                    prices
+                        .iter_mut()
+                        .zip(ids)
+                        .filter(|(_, id)| pairs.is_useless(*id))
+                        .for_each(|(price, _)| *price = USELESS);
+                }
                 none.insert(Search::new(&mut self.known, weight, prices))
             }
         };

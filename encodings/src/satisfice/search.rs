@@ -9,7 +9,7 @@
 
 use crate::limits::{Interrupted, Limits, Pulse};
 use crate::plan::ground::{GroundPlan, GroundStep, cost};
-use crate::satisfice::known::Known;
+use crate::satisfice::known::{Known, USELESS};
 use crate::satisfice::open::Open;
 use crate::satisfice::store::Store;
 use crate::search::Figures;
@@ -67,8 +67,9 @@ pub(super) struct Search<N> {
 impl<N: TaskNumber> Search<N> {
     pub(super) fn new(known: &mut Known<'_, N>, weight: Weight, prices: Vec<u32>) -> Self {
         let estimates = if known.status.is_empty() { 1 } else { 2 };
-        let sum: u64 = prices.iter().map(|price| u64::from(*price)).sum();
-        let mean = sum.checked_div(prices.len() as u64).unwrap_or(1);
+        let useful = prices.iter().filter(|price| **price < USELESS);
+        let sum: u64 = useful.clone().map(|price| u64::from(*price)).sum();
+        let mean = sum.checked_div(useful.count() as u64).unwrap_or(1);
         let mut search = Self {
             mean: u32::try_from(mean).unwrap_or(u32::MAX).max(1),
             weight,
@@ -111,6 +112,9 @@ impl<N: TaskNumber> Search<N> {
             work = work.saturating_sub(STEP_WORK);
             figures.generated = figures.generated.saturating_add(1);
             let (operator, choice, cost) = known.step(step);
+            if known.pairs.as_ref().is_some_and(|pairs| pairs.is_useless(operator)) {
+                continue;
+            }
             let (total, price) = {
                 let parent = &self.nodes[parent as usize];
                 let Some(total) = parent.cost.plus(cost).filter(N::is_moderate) else {
@@ -129,6 +133,9 @@ impl<N: TaskNumber> Search<N> {
                 self.incomplete = true;
                 continue;
             };
+            if known.pairs.as_ref().is_some_and(|pairs| pairs.is_dead(&before.values, &state.values)) {
+                continue;
+            }
             let (id, is_new) = self.store.insert(&state);
             if !is_new && (self.weight == Weight::Greedy || total >= self.nodes[id as usize].cost) {
                 continue;

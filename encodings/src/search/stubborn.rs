@@ -289,7 +289,7 @@ impl Choosing {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use std::cmp::Reverse;
     use std::collections::BinaryHeap;
     use std::fmt::Write as _;
@@ -308,10 +308,10 @@ mod tests {
     const STATES: usize = 3_000;
 
     /// What can be done in a state: operators with where they lead and what they cost.
-    type Steps = Vec<(OperatorId, usize, Int)>;
+    pub(in crate::search) type Steps = Vec<(OperatorId, usize, Int)>;
 
     /// All states that can be reached; none if those are too many.
-    fn reachable(task: &Task) -> Option<(Vec<State>, Vec<Steps>)> {
+    pub(in crate::search) fn reachable(task: &Task) -> Option<(Vec<State>, Vec<Steps>)> {
         let mut known = FxHashMap::from_iter([(task.initial.clone(), 0)]);
         let (mut states, mut steps): (Vec<State>, Vec<Steps>) = (vec![task.initial.clone()], Vec::new());
         while let Some(state) = states.get(steps.len()).cloned() {
@@ -335,7 +335,11 @@ mod tests {
     }
 
     /// The cost and the steps of a cheapest plan with fewest steps from each state, backwards by Dijkstra's algorithm.
-    fn to_go(task: &Task, states: &[State], steps: &[Steps]) -> Vec<Option<(Int, u32)>> {
+    pub(in crate::search) fn to_go(
+        task: &Task,
+        states: &[State],
+        steps: &[Steps],
+    ) -> Vec<Option<(Int, u32)>> {
         let mut before: Vec<Vec<(usize, Int)>> = vec![Vec::new(); states.len()];
         for (from, own) in steps.iter().enumerate() {
             for (_, to, cost) in own {
@@ -387,7 +391,7 @@ mod tests {
     }
 
     /// A task whose operators require, set, and ask for whatever it happens to be; mostly of things of their own.
-    fn switches(seed: u64) -> (String, String) {
+    pub(in crate::search) fn switches(seed: u64) -> (String, String) {
         let mut random = Random(seed);
         let mut below = move |limit: i64| random.below(limit.unsigned_abs());
         let count = 5;

@@ -88,13 +88,34 @@ fn chain(random: &mut fastrand::Rng, length: usize, unit: Q) -> Vec<Action> {
     actions
 }
 
+/// What can begin only until it ends for the first time, and adds something each time: all runs begin before one ends.
+fn tank(random: &mut fastrand::Rng, unit: Q) -> Action {
+    let open = Atom { predicate: 0, terms: Vec::new() };
+    let mut effects = vec![Effect::Delete(open.clone())];
+    let adds = change(Operation::Increase, 1);
+    let begins = if random.bool() {
+        effects.push(adds);
+        Vec::new()
+    } else {
+        vec![adds]
+    };
+    let start = Part { condition: Condition::Atom(open), effects: begins };
+    durative("fill".into(), unit * q(random.i64(2..6)), start, effects)
+}
+
 /// A task from a seed, whose durations are multiples of a unit of time.
 pub fn make(seed: u64, unit: Q) -> Task {
     let random = &mut fastrand::Rng::with_seed(seed);
-    let length = if random.u8(..10) < 6 { random.usize(2..=ATOMS) } else { 0 };
-    let mut actions = if length > 0 { chain(random, length, unit) } else { Vec::new() };
-    let [charges, works] =
-        if length > 0 { [0..1, 0..2] } else { [1..3, 1..4] }.map(|range| random.usize(range));
+    let kind = random.u8(..10);
+    let length = if kind < 5 { random.usize(2..=ATOMS) } else { 0 };
+    let is_tank = (5..7).contains(&kind);
+    let mut actions = match kind {
+        0..5 => chain(random, length, unit),
+        5..7 => vec![tank(random, unit)],
+        _ => Vec::new(),
+    };
+    let ranges = if kind < 7 { [0..1, 0..2] } else { [1..3, 1..4] };
+    let [charges, works] = ranges.map(|range| random.usize(range));
     actions.extend((0..charges).map(|number| charge(random, number, unit)));
     actions.extend((0..works).map(|number| work(random, number, unit)));
     let events = if random.u8(..10) < 2 {
@@ -106,7 +127,9 @@ pub fn make(seed: u64, unit: Q) -> Task {
     if let Some(predicate) = length.checked_sub(1) {
         goal = vec![Condition::Atom(Atom { predicate, terms: Vec::new() })];
     }
-    if random.u8(..10) < 3 {
+    if is_tank {
+        goal = vec![at_least(random.i64(2..4))];
+    } else if random.u8(..10) < 3 {
         goal.push(at_least(random.i64(1..3)));
     }
     Task {
@@ -116,7 +139,12 @@ pub fn make(seed: u64, unit: Q) -> Task {
         functions: vec![("level".to_owned(), 0)],
         axioms: Vec::new(),
         actions,
-        atoms: if length == 0 && random.bool() { vec![atom(random)] } else { Vec::new() },
+        atoms: match kind {
+            0..5 => Vec::new(),
+            5..7 => vec![Atom { predicate: 0, terms: Vec::new() }],
+            _ if random.bool() => vec![atom(random)],
+            _ => Vec::new(),
+        },
         values: vec![(level(), q(random.i64(0..if length > 0 { 2 } else { 3 })))],
         events,
         goal: Condition::All(goal),

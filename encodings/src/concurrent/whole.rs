@@ -1,0 +1,168 @@
+//! A plan of actions one after another, and then at the earliest times: the first plan of a task that does not ask for overlap.
+//!
+//! Without timed initial literals, such plans are those of the task that is planned for where actions do not overlap. The searches for that have more to go
+//! by: fewer variables with more values, landmarks, pairs of facts that lead nowhere, objects that are interchangeable. What they find is executed
+//! like any sequence, and its times overlap where they can.
+
+use rustc_hash::FxHashMap;
+
+use crate::bounds::Bounds;
+use crate::concurrent::compile::Concurrent;
+use crate::concurrent::expansion::{Expansion, Situation};
+use crate::concurrent::greedy::{Links, Mode};
+use crate::concurrent::happening::Role;
+use crate::concurrent::search::Sequence;
+use crate::context::Context;
+use crate::ground::{GroundConfig, ground};
+use crate::limits::Limits;
+use crate::number::Int;
+use crate::plan::arguments;
+use crate::plan::ground::GroundPlan;
+use crate::plan::solution::Statistics;
+use crate::satisfice::{Advance, Satisficer};
+use crate::search::{Duo, Found, Prepared, Space};
+use crate::task::{Operator, OperatorId, Task};
+
+/// Tasks with more operators are not ground twice.
+const OPERATORS: usize = 100_000;
+
+/// What the search by estimates goes through in a share of work, in nodes and propositions, and how many states the other one stores.
+const WORK: u64 = 5_000_000;
+const STATES: usize = 20_000;
+/// That one ends with so many states.
+const MOST_STATES: usize = 1_000_000;
+
+/// A name of an action, and its arguments.
+type Call = (String, Vec<String>);
+
+/// The task of actions one after another.
+pub(super) struct Whole {
+    task: Task,
+    /// The happenings with which an action begins.
+    begins: FxHashMap<Call, Vec<OperatorId>>,
+    bounds: Option<Bounds>,
+    prepared: Option<Prepared>,
+}
+
+impl Whole {
+    /// None if there is no such task, or if it is large.
+    pub(super) fn new(concurrent: &Concurrent, limits: &Limits) -> Option<Self> {
+        let split = &concurrent.task;
+        if split.operators.len() > OPERATORS {
+            return None;
+        }
+        let (domain, problem, config) = concurrent.kept.as_ref()?.files();
+        let config = GroundConfig { limits: limits.clone(), ..config.clone() };
+        let task = ground(domain, problem, &config).ok().filter(|task| task.unreachable.is_none())?;
+        let mut begins: FxHashMap<Call, Vec<OperatorId>> = FxHashMap::default();
+        for ((operator, happening), id) in
+            split.operators.iter().zip(&concurrent.happenings).zip((0..).map(OperatorId))
+        {
+            if matches!(happening.role, Role::Start(_) | Role::Whole) {
+                begins.entry(call(split, operator, &[])).or_default().push(id);
+            }
+        }
+        let context = Context::new(&task, limits);
+        let (bounds, prepared) = (Bounds::new(context).ok(), Prepared::new(context).ok().flatten());
+        Some(Self { task, begins, bounds, prepared })
+    }
+
+    /// The sequence of a plan; none if it cannot be executed, or if its metric does not fit.
+    fn sequence(
+        &self,
+        concurrent: &Concurrent,
+        expansion: &Expansion<'_>,
+        plan: &GroundPlan,
+    ) -> Option<Sequence> {
+        let mut situation = expansion.root();
+        let mut links = Links::new();
+        for step in &plan.steps {
+            let operator = &self.task.operators[step.operator.index()];
+            let begins = self.begins.get(&call(&self.task, operator, &step.choice))?;
+            let mut executed = begins.iter().filter_map(|begin| {
+                let mut own = Links::new();
+                let mut happen = |situation: &Situation, id| {
+                    Mode::Sequential.happen(concurrent, expansion, situation, id, &mut own)
+                };
+                let mut next = happen(&situation, *begin)?;
+                if !next.clocks.opens().is_empty() {
+                    next = happen(&next, concurrent.end_of(*begin))?;
+                }
+                Some((next, own))
+            });
+            let (next, own) = executed.next()?;
+            links.extend(own);
+            situation = next;
+        }
+        let value = concurrent.value(&situation).filter(|_| expansion.is_goal(&situation))?;
+        let (happenings, together) = links.into_iter().unzip();
+        concurrent.judge(Sequence { value, happenings, together }, situation.cost)
+    }
+}
+
+fn call(task: &Task, operator: &Operator, choice: &[u32]) -> Call {
+    (task.schema_names[operator.schema as usize].clone(), arguments(task, operator, choice))
+}
+
+/// Searches for a plan of actions one after another: by estimates, and for a best one, which is quicker where estimates lead astray.
+pub(super) struct Seeker<'w> {
+    whole: &'w Whole,
+    limits: &'w Limits,
+    satisficer: Option<Satisficer<'w, Int>>,
+    exact: Option<Duo<'w, Int, Bounds>>,
+    /// How many states the latter may store by now.
+    stored: usize,
+}
+
+impl<'w> Seeker<'w> {
+    pub(super) fn new(whole: &'w Whole, limits: &'w Limits) -> Self {
+        let context = Context::new(&whole.task, limits);
+        let parts = whole.bounds.as_ref().zip(whole.prepared.as_ref());
+        let space = parts.map(|(bounds, prepared)| Space { context, bounds, prepared, orbits: None });
+        let exact = space.map(|space| Duo::new(space, &whole.task.initial));
+        Self { whole, limits, satisficer: Satisficer::new(context).ok().flatten(), exact, stored: 0 }
+    }
+
+    /// Goes on for so many shares of work: a plan whose sequence can be executed.
+    pub(super) fn run(
+        &mut self,
+        (concurrent, expansion): (&Concurrent, &Expansion<'_>),
+        share: usize,
+        statistics: &mut Statistics,
+    ) -> Option<Sequence> {
+        let executed = |plan| self.whole.sequence(concurrent, expansion, plan);
+        if let Some(exact) = &mut self.exact {
+            self.stored = self.stored.saturating_add(STATES.saturating_mul(share));
+            let before = exact.figures();
+            let found = exact.run(self.stored, &mut |_, _| {});
+            exact.figures().add_to(before, statistics);
+            let plan = match &found {
+                Some(Found::Optimal(plan)) => Some(plan.clone()),
+                Some(Found::Unknown(plan)) => plan.clone(),
+                Some(Found::None) => None,
+                None => exact.best_plan(),
+            };
+            if found.is_some() || self.stored > MOST_STATES {
+                self.exact = None;
+            }
+            if let Some(sequence) = plan.as_ref().and_then(executed) {
+                return Some(sequence);
+            }
+        }
+        if self.limits.reached() {
+            return None;
+        }
+        let satisficer = self.satisficer.as_mut()?;
+        let before = satisficer.figures;
+        let advance = satisficer.run(None, WORK.saturating_mul(share as u64));
+        satisficer.figures.add_to(before, statistics);
+        match advance {
+            Ok(Advance::Plan(plan)) => self.whole.sequence(concurrent, expansion, &plan),
+            Ok(Advance::Paused) => None,
+            Ok(Advance::Unsolvable | Advance::Ended) | Err(_) => {
+                self.satisficer = None;
+                None
+            }
+        }
+    }
+}
