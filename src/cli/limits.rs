@@ -61,6 +61,9 @@ impl Guard {
             }
         }
         let interrupt = self.limits.interrupt();
+        // The soft limit on processor time; the hard one ends the program.
+        #[cfg(unix)]
+        let _ = signal_hook::flag::register(signal_hook::consts::SIGXCPU, Arc::clone(&interrupt));
         // A second handler cannot be there; if the platform refuses one, Ctrl-C ends the program as usual. Who presses it
         // again does not want the best plan so far, either.
         let _ = ctrlc::set_handler(move || {

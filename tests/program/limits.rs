@@ -65,6 +65,58 @@ fn a_signal_ends_the_program_while_it_reads() {
     }
 }
 
+/// A round trip through so many places, whose best order takes long to prove.
+#[cfg(unix)]
+fn round_trip(places: u32) -> (String, String) {
+    use std::fmt::Write as _;
+    let domain = "(define (domain trip) (:requirements :action-costs) (:predicates (at ?p) (seen ?p)) (:functions (far ?a ?b) (total-cost))
+        (:action go :parameters (?a ?b) :precondition (at ?a)
+          :effect (and (not (at ?a)) (at ?b) (seen ?b) (increase (total-cost) (far ?a ?b)))))";
+    let (mut objects, mut init, mut goal) = (String::new(), String::new(), String::new());
+    let place = |number: u32| (number * 37 % 101, number * 59 % 97);
+    for one in 0..places {
+        let _ = write!(objects, " p{one}");
+        let _ = write!(goal, " (seen p{one})");
+        for other in (0..places).filter(|other| *other != one) {
+            let ((x, y), (u, v)) = (place(one), place(other));
+            let far = x.abs_diff(u) + y.abs_diff(v);
+            let _ = write!(init, " (= (far p{one} p{other}) {far})");
+        }
+    }
+    let problem = format!(
+        "(define (problem p) (:domain trip) (:objects{objects}) (:init (at p0) (= (total-cost) 0){init})
+           (:goal (and{goal} (at p0))) (:metric minimize (total-cost)))"
+    );
+    (domain.to_owned(), problem)
+}
+
+/// The best plan so far is the answer where the soft limit on processor time is reached.
+#[cfg(unix)]
+#[test]
+fn the_processor_time_that_a_shell_allows_is_a_limit() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let (domain, problem) = round_trip(24);
+    std::fs::write(directory.path().join("domain.pddl"), domain).expect("a file");
+    std::fs::write(directory.path().join("problem.pddl"), problem).expect("a file");
+    let mut child = Command::new("sh")
+        .args([
+            "-c",
+            "ulimit -St 2 && exec \"$0\" plan domain.pddl problem.pddl --format json --time-limit 60",
+        ])
+        .arg(env!("CARGO_BIN_EXE_metaplan"))
+        .current_dir(directory.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("a shell");
+    let status = wait(&mut child).expect("it ends in 20 seconds");
+    let mut output = String::new();
+    std::io::Read::read_to_string(&mut child.stdout.take().expect("a pipe"), &mut output).expect("text");
+    let answer: Value =
+        serde_json::from_str(&output).unwrap_or_else(|error| panic!("{error}: {status} {output}"));
+    assert_eq!((status.code(), &answer["status"]), (Some(1), &json!("feasible")), "{output}");
+}
+
 #[test]
 fn the_time_limit_covers_reading() {
     let mut child = start(&["plan", "-", "encodings/ugv/problem.pddl", "--time-limit", "0.3"]);
