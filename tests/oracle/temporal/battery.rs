@@ -53,9 +53,9 @@ fn work(random: &mut fastrand::Rng, number: usize, unit: Q) -> Action {
     let takes = change(Operation::Decrease, random.i64(1..3));
     let (mut start, mut end) = (Vec::new(), vec![Effect::Add(atom(random))]);
     if random.u8(..10) < 7 {
-        end.push(takes)
+        end.push(takes);
     } else {
-        start.push(takes)
+        start.push(takes);
     }
     if random.u8(..10) < 2 {
         let deleted = Effect::Delete(atom(random));
@@ -78,9 +78,9 @@ fn chain(random: &mut fastrand::Rng, length: usize, unit: Q) -> Vec<Action> {
         let takes = change(Operation::Decrease, random.i64(1..=full));
         let (mut start, mut end) = (Vec::new(), vec![Effect::Add(atom(number))]);
         if random.u8(..10) < 8 {
-            end.push(takes)
+            end.push(takes);
         } else {
-            start.push(takes)
+            start.push(takes);
         }
         let length = unit * q(random.i64(1..3));
         actions.push(durative(format!("chain{number}"), length, Part { condition, effects: start }, end));
