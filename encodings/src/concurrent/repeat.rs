@@ -328,8 +328,15 @@ impl Index<'_> {
         }
         for (facts, times) in groups {
             let undoing = self.undoing(inside, (&facts, &[]), left)?;
-            let again = undoing.into_iter().try_fold(1, |sum: Int, id| {
-                Some(sum.saturating_add(self.times(id, inside.own, inside.known)?))
+            // Runs of the instance itself may be any number.
+            let is_undone = facts
+                .iter()
+                .any(|fact| [inside.own.start, inside.own.end].iter().any(|id| self.changes(*id, *fact)));
+            let undoing = if is_undone { None } else { Some(undoing) };
+            let again = undoing.and_then(|undoing| {
+                undoing.into_iter().try_fold(1, |sum: Int, id| {
+                    Some(sum.saturating_add(self.times(id, inside.own, inside.known)?))
+                })
             });
             all = all.saturating_add(match (times, again) {
                 (Some(times), Some(again)) => times.min(again),
@@ -457,8 +464,48 @@ fn is_timer(own: &Instance, number: NumericId) -> bool {
 
 /// Whether an end sets numbers to what they are after another end, too.
 fn assigns_constants(own: &Instance, end: &Operator) -> bool {
-    end.numeric_effects.iter().all(|effect| {
-        is_timer(own, effect.variable)
-            || effect.value.coefficients.is_empty() && effect.value.quantity.tables.is_empty()
-    })
+    let is_set = |effect: &NumericEffect| matches!(change(effect), Some(Change::Sets(_)));
+    end.numeric_effects.iter().all(|effect| is_timer(own, effect.variable) || is_set(effect))
+}
+
+#[cfg(test)]
+mod tests {
+    use num_rational::BigRational;
+    use pddl::{Source, read};
+
+    use crate::concurrent::ground_concurrent;
+    use crate::ground::GroundConfig;
+
+    /// How many runs of `charge` at a time can make a difference. It also does `more`; `pump` needs it, and is good for `p`, which others need to be either way.
+    fn charges(more: &str) -> u32 {
+        let domain = format!(
+            "(define (domain d) (:requirements :durative-actions :fluents) (:predicates (p) (q) (r)) (:functions (battery))
+               (:durative-action charge :parameters () :duration (= ?duration 10)
+                 :condition () :effect (and (at end (assign (battery) 1)) {more}))
+               (:durative-action pump :parameters () :duration (= ?duration 1) :condition (at start (>= (battery) 1))
+                 :effect (and (at end (p)) (at end (decrease (battery) 1))))
+               (:durative-action full :parameters () :duration (= ?duration 1) :condition (at start (p)) :effect (at end (q)))
+               (:durative-action empty :parameters () :duration (= ?duration 1)
+                 :condition (and (at start (not (p))) (at start (q))) :effect (at end (r))))"
+        );
+        let problem = "(define (problem p) (:domain d) (:init (= (battery) 0)) (:goal (and (q) (r) (p))) (:metric minimize (total-time)))";
+        let (domain, problem, _) =
+            read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
+        let separation = BigRational::new(1.into(), 1000.into());
+        let task =
+            ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation).expect("a task");
+        let name = |own: &super::Instance| {
+            let schema = task.task.operators[own.start.index()].schema;
+            task.task.schema_names[schema as usize].as_str()
+        };
+        let charge = task.instances.iter().find(|own| name(own) == "charge").expect("an instance");
+        charge.most
+    }
+
+    #[test]
+    fn what_is_good_for_one_fact_undoes_once_unless_the_runs_undo_it_themselves() {
+        assert_eq!(charges(""), 2);
+        // Each end lets the pump make a difference again: no bound is known.
+        assert_eq!(charges("(at end (not (p)))"), u32::MAX);
+    }
 }
