@@ -38,6 +38,7 @@ mod time;
 mod timer;
 mod turns;
 mod unit;
+mod wanted;
 mod whole;
 
 use std::time::Instant;

@@ -141,7 +141,8 @@ impl<'a> Search<'a> {
     /// Whether something that was left out, of which nothing has a lower metric than this, may be better than the incumbent: as good, and over sooner, if
     /// the metric is not the time.
     fn may_be_better(&self, lower: Int) -> bool {
-        let is_time = || self.concurrent.task.operators.iter().all(|operator| operator.cost.is_zero());
+        let Concurrent { task, measure, .. } = self.concurrent;
+        let is_time = || measure.time > 0 && task.operators.iter().all(|operator| operator.cost.is_zero());
         let value = self.incumbent.as_ref().map(|incumbent| incumbent.value.0);
         value.is_none_or(|value| lower < value || lower == value && !is_time())
     }
