@@ -113,6 +113,11 @@ impl<'a> Guidance<'a> {
                 self.improve(relaxed.numeric[position].proposition, 0, None);
             }
         }
+        for [conjunction, first, second] in &relaxed.conjunctions {
+            if self.costs[*first as usize] == 0 && self.costs[*second as usize] == 0 {
+                self.improve(*conjunction, 0, None);
+            }
+        }
         for rule in &relaxed.free {
             self.fire(*rule);
         }

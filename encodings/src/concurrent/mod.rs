@@ -22,6 +22,7 @@ mod grows;
 mod guidance;
 mod happening;
 mod inside;
+mod irreplaceable;
 mod judge;
 mod kept;
 mod links;

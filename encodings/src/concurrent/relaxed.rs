@@ -12,23 +12,43 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::concurrent::compile::Concurrent;
 use crate::concurrent::happening::Role;
+use crate::concurrent::irreplaceable::{Conjunction, Scope, conjoin};
 use crate::lists::Lists;
 use crate::number::{Int, dense};
 use crate::task::quantity::{Linear, NumericId};
-use crate::task::{Condition, Fact, Literal, Operator, OperatorId, Task};
+use crate::task::{Condition, Fact, Literal, Operator, OperatorId, Task, Variable};
 
 /// A fact, a clause, or a numeric condition.
 pub(super) type Proposition = u32;
 
 /// From what is required to what is brought about.
 #[derive(Debug, Clone, Default)]
-struct Rule {
+pub(super) struct Rule {
     /// Ascending.
-    needs: Vec<Proposition>,
-    adds: Vec<Proposition>,
+    pub(super) needs: Vec<Proposition>,
+    pub(super) adds: Vec<Proposition>,
+    /// All that it is sure to set.
+    pub(super) sets: Vec<Proposition>,
     raises: Vec<Raise>,
     weight: u32,
     origin: Option<OperatorId>,
+}
+
+impl Rule {
+    /// The same where another fact holds before and after it. `numbers` are the conjunctions of that fact by what they say besides.
+    pub(super) fn with(
+        &self,
+        fact: Proposition,
+        needs: &[Proposition],
+        numbers: &FxHashMap<Proposition, Proposition>,
+    ) -> Self {
+        let mut needs: Vec<_> = needs.iter().map(|need| *numbers.get(need).unwrap_or(need)).collect();
+        needs.push(fact);
+        needs.sort_unstable();
+        needs.dedup();
+        let adds = self.adds.iter().filter_map(|add| numbers.get(add)).copied().collect();
+        Self { needs, adds, weight: self.weight, origin: self.origin, ..Self::default() }
+    }
 }
 
 /// A numeric condition by position, and how much a rule adds to it; none if that depends on the state.
@@ -68,6 +88,7 @@ pub(super) struct Relaxed {
     pub(super) ends: Vec<u32>,
     /// The values that derived variables have unless a rule gives them another one.
     pub(super) defaults: Vec<Proposition>,
+    pub(super) conjunctions: Vec<Conjunction>,
 }
 
 /// Collects rules.
@@ -102,8 +123,9 @@ impl Relaxed {
             let adds = vec![maker.fact(rule.head)];
             maker.rules.push(Rule { needs, adds, ..Rule::default() });
         }
-        let goal = maker.needs(&task.goal);
+        let mut goal = maker.needs(&task.goal);
         maker.raise(task);
+        let conjunctions = maker.conjoin(concurrent, &mut goal);
         let derived = task.variables.iter().enumerate().skip(task.basic);
         let defaults = derived.map(|(variable, own)| maker.last(variable, own.values.len())).collect();
         let Maker { first, propositions, rules, numeric, .. } = maker;
@@ -128,6 +150,7 @@ impl Relaxed {
             goal,
             ends,
             defaults,
+            conjunctions,
         }
     }
 }
@@ -232,8 +255,8 @@ impl<'a> Maker<'a> {
                 u32::from(!own.compressible)
             }
         };
-        let adds = operator.effects.iter().map(|fact| self.fact(*fact)).collect();
-        let rule = Rule { needs, adds, raises: Vec::new(), weight, origin: Some(id) };
+        let adds: Vec<_> = operator.effects.iter().map(|fact| self.fact(*fact)).collect();
+        let rule = Rule { needs, sets: adds.clone(), adds, raises: Vec::new(), weight, origin: Some(id) };
         let mut conditional = Vec::new();
         for effect in &operator.conditional {
             let own: Vec<_> =
@@ -241,11 +264,25 @@ impl<'a> Maker<'a> {
             let mut needs = [&rule.needs[..], &own].concat();
             needs.sort_unstable();
             needs.dedup();
-            let adds = effect.effects.iter().map(|fact| self.fact(*fact)).collect();
-            conditional.push(Rule { needs, adds, ..rule.clone() });
+            let adds: Vec<_> = effect.effects.iter().map(|fact| self.fact(*fact)).collect();
+            let sets = [&rule.sets[..], &adds].concat();
+            conditional.push(Rule { needs, adds, sets, ..rule.clone() });
         }
         self.rules.push(rule);
         self.rules.extend(conditional);
+    }
+
+    /// Adds conjunctions of facts that nothing brings back.
+    fn conjoin(&mut self, concurrent: &Concurrent, goal: &mut Vec<Proposition>) -> Vec<Conjunction> {
+        let ends = |first: Proposition, own: &Variable| first.saturating_add(dense(own.values.len()));
+        let all = self.first.iter().zip(&self.task.variables).map(|(first, own)| *first..ends(*first, own));
+        let mut variables: Vec<_> = all.take(self.task.basic).collect();
+        // That nothing is under way any more is not among the effects.
+        for fact in concurrent.instances.iter().filter_map(|own| own.under_way) {
+            variables[fact.variable.index()].start = variables[fact.variable.index()].end;
+        }
+        let Self { rules, propositions, .. } = self;
+        conjoin(&mut Scope { rules, goal, variables: &variables, propositions })
     }
 
     /// Notes which rules raise which numeric conditions.

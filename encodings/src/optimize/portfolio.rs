@@ -30,6 +30,8 @@ const CLAUSES: usize = 50;
 const STATES: u64 = 4;
 /// The allowances of formulas and of the search for some plan are halved so often at most.
 const LEAST: u32 = 3;
+/// A plan that costs more than this ratio times the lower bound is likely to have better ones that are easier to find than a proof.
+const NEAR: (Int, Int) = (3, 2);
 
 /// What is left to be tried, and what is known.
 struct Portfolio<'r, 'a> {
@@ -161,9 +163,10 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         let limit = self.best.as_ref().map(|plan| plan.cost);
         // A plan is worth more than a better one, and who finds none has less the next time, as long as there is hope for a proof.
         let has_hope = self.exact.as_ref().is_some_and(Duo::has_hope);
+        let is_near = |cost: Int| cost.saturating_mul(NEAR.1) <= self.lower.saturating_mul(NEAR.0);
         let (twice, halved) = match limit {
             None => (1, 0),
-            Some(_) => (0, if has_hope { self.satisficer_share } else { 0 }),
+            Some(cost) => (0, if has_hope && is_near(cost) { self.satisficer_share } else { 0 }),
         };
         self.satisficer_share = self.satisficer_share.saturating_add(1).min(LEAST);
         let before = satisficer.figures;

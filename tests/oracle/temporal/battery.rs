@@ -103,18 +103,52 @@ fn tank(random: &mut fastrand::Rng, unit: Q) -> Action {
     durative("fill".into(), unit * q(random.i64(2..6)), start, effects)
 }
 
+/// A pump that needs the battery, and stages, each of which needs the one before, with what the pump brings there or gone in turns. All that is
+/// charged at once, and what charges lets that out: how many runs are worth while depends on what they undo themselves.
+fn vent(random: &mut fastrand::Rng, stages: usize, unit: Q) -> Vec<Action> {
+    let atom = |predicate| Atom { predicate, terms: Vec::new() };
+    let full = random.i64(1..3);
+    let (water, nothing) = (atom(0), Part { condition: none(), effects: Vec::new() });
+    let (mut charged, mut pumped) = (vec![change(Operation::Assign, full)], vec![Effect::Add(water.clone())]);
+    if random.u8(..10) < 8 {
+        charged.push(Effect::Delete(water.clone()));
+    }
+    if random.u8(..10) < 8 {
+        pumped.push(change(Operation::Decrease, full));
+    }
+    let needs = Part { condition: at_least(full), effects: Vec::new() };
+    let mut actions = vec![
+        durative("charge".into(), unit * q(random.i64(4..9)), nothing, charged),
+        durative("pump".into(), unit * q(random.i64(1..3)), needs, pumped),
+    ];
+    for stage in 1..=stages {
+        let there = Condition::Atom(water.clone());
+        let mut conditions = vec![if stage % 2 == 1 { there } else { Condition::Not(Box::new(there)) }];
+        conditions.extend((stage > 1).then(|| Condition::Atom(atom(stage - 1))));
+        let start = Part { condition: Condition::All(conditions), effects: Vec::new() };
+        actions.push(durative(format!("stage{stage}"), unit, start, vec![Effect::Add(atom(stage))]));
+    }
+    actions
+}
+
 /// A task from a seed, whose durations are multiples of a unit of time.
 pub fn make(seed: u64, unit: Q) -> Task {
     let random = &mut fastrand::Rng::with_seed(seed);
-    let kind = random.u8(..10);
+    let kind = random.u8(..12);
     let length = if kind < 5 { random.usize(2..=ATOMS) } else { 0 };
+    let stages = if kind < 10 { 0 } else { random.usize(2..=4) };
     let is_tank = (5..7).contains(&kind);
     let mut actions = match kind {
         0..5 => chain(random, length, unit),
         5..7 => vec![tank(random, unit)],
-        _ => Vec::new(),
+        7..10 => Vec::new(),
+        _ => vent(random, stages, unit),
     };
-    let ranges = if kind < 7 { [0..1, 0..2] } else { [1..3, 1..4] };
+    let ranges = match kind {
+        0..7 => [0..1, 0..2],
+        7..10 => [1..3, 1..4],
+        _ => [0..1, 0..1],
+    };
     let [charges, works] = ranges.map(|range| random.usize(range));
     actions.extend((0..charges).map(|number| charge(random, number, unit)));
     actions.extend((0..works).map(|number| work(random, number, unit)));
@@ -127,7 +161,11 @@ pub fn make(seed: u64, unit: Q) -> Task {
     if let Some(predicate) = length.checked_sub(1) {
         goal = vec![Condition::Atom(Atom { predicate, terms: Vec::new() })];
     }
-    if is_tank {
+    if stages > 0 {
+        let water = Condition::Atom(Atom { predicate: 0, terms: Vec::new() });
+        goal = vec![Condition::Atom(Atom { predicate: stages, terms: Vec::new() })];
+        goal.push(if random.bool() { water } else { Condition::Not(Box::new(water)) });
+    } else if is_tank {
         goal = vec![at_least(random.i64(2..4))];
     } else if random.u8(..10) < 3 {
         goal.push(at_least(random.i64(1..3)));
@@ -135,17 +173,18 @@ pub fn make(seed: u64, unit: Q) -> Task {
     Task {
         types: 1,
         objects: vec![0],
-        predicates: (0..ATOMS).map(|name| (format!("p{name}"), 0)).collect(),
+        predicates: (0..ATOMS.max(stages + 1)).map(|name| (format!("p{name}"), 0)).collect(),
         functions: vec![("level".to_owned(), 0)],
         axioms: Vec::new(),
         actions,
         atoms: match kind {
             0..5 => Vec::new(),
             5..7 => vec![Atom { predicate: 0, terms: Vec::new() }],
+            10.. => Vec::new(),
             _ if random.bool() => vec![atom(random)],
             _ => Vec::new(),
         },
-        values: vec![(level(), q(random.i64(0..if length > 0 { 2 } else { 3 })))],
+        values: vec![(level(), q(random.i64(0..if length + stages > 0 { 2 } else { 3 })))],
         events,
         goal: Condition::All(goal),
         measure: Measure::Time,
