@@ -104,45 +104,59 @@ fn tank(random: &mut fastrand::Rng, unit: Q) -> Action {
 }
 
 /// A pump that needs the battery, and stages, each of which needs the one before, with what the pump brings there or gone in turns. All that is
-/// charged at once, and what charges lets that out: how many runs are worth while depends on what they undo themselves.
-fn vent(random: &mut fastrand::Rng, stages: usize, unit: Q) -> Vec<Action> {
+/// charged at once, mostly until it is charged for the first time, and what charges lets the water out: how many runs are worth while depends on what they undo themselves.
+fn vent(random: &mut fastrand::Rng, (stages, length): (usize, i64), unit: Q) -> Vec<Action> {
     let atom = |predicate| Atom { predicate, terms: Vec::new() };
     let full = random.i64(1..3);
-    let (water, nothing) = (atom(0), Part { condition: none(), effects: Vec::new() });
+    let (water, current) = (atom(0), Condition::Atom(atom(stages + 1)));
+    let begin = Part { condition: current, effects: Vec::new() };
     let (mut charged, mut pumped) = (vec![change(Operation::Assign, full)], vec![Effect::Add(water.clone())]);
-    if random.u8(..10) < 8 {
+    if random.u8(..10) < 9 {
+        charged.push(Effect::Delete(atom(stages + 1)));
+    }
+    if random.u8(..10) < 9 {
         charged.push(Effect::Delete(water.clone()));
     }
-    if random.u8(..10) < 8 {
+    if random.u8(..10) < 9 {
         pumped.push(change(Operation::Decrease, full));
     }
     let needs = Part { condition: at_least(full), effects: Vec::new() };
     let mut actions = vec![
-        durative("charge".into(), unit * q(random.i64(4..9)), nothing, charged),
-        durative("pump".into(), unit * q(random.i64(1..3)), needs, pumped),
+        durative("charge".into(), unit * q(length), begin, charged),
+        durative("pump".into(), unit * q(if random.u8(..10) < 8 { 1 } else { 2 }), needs, pumped),
     ];
     for stage in 1..=stages {
         let there = Condition::Atom(water.clone());
         let mut conditions = vec![if stage % 2 == 1 { there } else { Condition::Not(Box::new(there)) }];
         conditions.extend((stage > 1).then(|| Condition::Atom(atom(stage - 1))));
-        let start = Part { condition: Condition::All(conditions), effects: Vec::new() };
-        actions.push(durative(format!("stage{stage}"), unit, start, vec![Effect::Add(atom(stage))]));
+        let all = Part { condition: Condition::All(conditions), effects: vec![Effect::Add(atom(stage))] };
+        let (name, body) = (format!("stage{stage}"), Body::Instantaneous(all));
+        actions.push(Action { name, parameters: Vec::new(), body });
     }
     actions
 }
 
-/// A task from a seed, whose durations are multiples of a unit of time.
-pub fn make(seed: u64, unit: Q) -> Task {
+/// Nodes that the oracle visits before it gives up, also where runs undo what others bring, and many of them begin.
+const CAP: usize = 3000;
+const VENT_CAP: usize = 200_000;
+
+/// A task from a seed, whose durations are multiples of a unit of time, and how many nodes its oracle visits before it gives up.
+pub fn make(seed: u64, unit: Q) -> (Task, usize) {
     let random = &mut fastrand::Rng::with_seed(seed);
-    let kind = random.u8(..12);
+    let kind = random.u8(..21) / 2;
     let length = if kind < 5 { random.usize(2..=ATOMS) } else { 0 };
-    let stages = if kind < 10 { 0 } else { random.usize(2..=4) };
+    let stages = match kind {
+        0..10 => 0,
+        _ if random.u8(..10) < 3 => 2,
+        _ => 3,
+    };
+    let charging = random.i64(9..11);
     let is_tank = (5..7).contains(&kind);
     let mut actions = match kind {
         0..5 => chain(random, length, unit),
         5..7 => vec![tank(random, unit)],
         7..10 => Vec::new(),
-        _ => vent(random, stages, unit),
+        _ => vent(random, (stages, charging), unit),
     };
     let ranges = match kind {
         0..7 => [0..1, 0..2],
@@ -152,7 +166,7 @@ pub fn make(seed: u64, unit: Q) -> Task {
     let [charges, works] = ranges.map(|range| random.usize(range));
     actions.extend((0..charges).map(|number| charge(random, number, unit)));
     actions.extend((0..works).map(|number| work(random, number, unit)));
-    let events = if random.u8(..10) < 2 {
+    let events = if stages == 0 && random.u8(..10) < 2 {
         vec![(unit * q(random.i64(1..12)), vec![(random.bool(), atom(random))])]
     } else {
         Vec::new()
@@ -164,29 +178,37 @@ pub fn make(seed: u64, unit: Q) -> Task {
     if stages > 0 {
         let water = Condition::Atom(Atom { predicate: 0, terms: Vec::new() });
         goal = vec![Condition::Atom(Atom { predicate: stages, terms: Vec::new() })];
-        goal.push(if random.bool() { water } else { Condition::Not(Box::new(water)) });
+        goal.push(if random.u8(..10) < 3 { water } else { Condition::Not(Box::new(water)) });
     } else if is_tank {
         goal = vec![at_least(random.i64(2..4))];
     } else if random.u8(..10) < 3 {
         goal.push(at_least(random.i64(1..3)));
     }
-    Task {
+    let fullest = if stages > 0 {
+        1
+    } else if length > 0 {
+        2
+    } else {
+        3
+    };
+    let task = Task {
         types: 1,
         objects: vec![0],
-        predicates: (0..ATOMS.max(stages + 1)).map(|name| (format!("p{name}"), 0)).collect(),
+        predicates: (0..ATOMS.max(stages + 2)).map(|name| (format!("p{name}"), 0)).collect(),
         functions: vec![("level".to_owned(), 0)],
         axioms: Vec::new(),
         actions,
         atoms: match kind {
             0..5 => Vec::new(),
             5..7 => vec![Atom { predicate: 0, terms: Vec::new() }],
-            10.. => Vec::new(),
+            10.. => vec![Atom { predicate: stages + 1, terms: Vec::new() }],
             _ if random.bool() => vec![atom(random)],
             _ => Vec::new(),
         },
-        values: vec![(level(), q(random.i64(0..if length + stages > 0 { 2 } else { 3 })))],
+        values: vec![(level(), q(random.i64(0..fullest)))],
         events,
         goal: Condition::All(goal),
         measure: Measure::Time,
-    }
+    };
+    (task, if stages > 0 { VENT_CAP } else { CAP })
 }

@@ -27,7 +27,6 @@ use model::{Measure, Q, Task, big};
 /// How many nodes the oracle visits before it gives up.
 const CAP: usize = 400;
 const OVERLAP_CAP: usize = 300;
-const BATTERY_CAP: usize = 3000;
 
 /// The oracle's terms for a plan.
 fn known(world: &World, steps: &[Step]) -> Result<Vec<(usize, Q, Q)>, String> {
@@ -133,7 +132,8 @@ fn overlapping_actions() {
 fn batteries_that_are_charged() {
     let case = |seed| {
         let unit = concurrent_unit(seed);
-        vec![case_up_to(BATTERY_CAP, format!("battery-{seed}"), battery::make(seed, unit), Some(unit))]
+        let (task, cap) = battery::make(seed, unit);
+        vec![case_up_to(cap, format!("battery-{seed}"), task, Some(unit))]
     };
     run(200, case).finish();
 }
