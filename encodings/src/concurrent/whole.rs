@@ -4,6 +4,8 @@
 //! by: fewer variables with more values, landmarks, pairs of facts that lead nowhere, objects that are interchangeable. What they find is executed
 //! like any sequence, and its times overlap where they can.
 
+use std::cell::OnceCell;
+
 use rustc_hash::FxHashMap;
 
 use crate::bounds::Bounds;
@@ -40,8 +42,8 @@ pub(super) struct Whole {
     task: Task,
     /// The happenings with which an action begins.
     begins: FxHashMap<Call, Vec<OperatorId>>,
-    bounds: Option<Bounds>,
-    prepared: Option<Prepared>,
+    /// What the search for a best plan goes by, from its first turn on.
+    parts: OnceCell<Option<(Bounds, Prepared)>>,
 }
 
 impl Whole {
@@ -62,9 +64,14 @@ impl Whole {
                 begins.entry(call(split, operator, &[])).or_default().push(id);
             }
         }
-        let context = Context::new(&task, limits);
-        let (bounds, prepared) = (Bounds::new(context).ok(), Prepared::new(context).ok().flatten());
-        Some(Self { task, begins, bounds, prepared })
+        Some(Self { task, begins, parts: OnceCell::new() })
+    }
+
+    fn space<'w>(&'w self, limits: &'w Limits) -> Option<Space<'w, Int, Bounds>> {
+        let context = Context::new(&self.task, limits);
+        let make = || Bounds::new(context).ok().zip(Prepared::new(context).ok().flatten());
+        let (bounds, prepared) = self.parts.get_or_init(make).as_ref()?;
+        Some(Space { context, bounds, prepared, orbits: None })
     }
 
     /// The sequence of a plan; none if it cannot be executed, or if its metric does not fit.
@@ -109,49 +116,46 @@ pub(super) struct Seeker<'w> {
     whole: &'w Whole,
     limits: &'w Limits,
     satisficer: Option<Satisficer<'w, Int>>,
-    exact: Option<Duo<'w, Int, Bounds>>,
+    exact: Exact<'w>,
     /// How many states the latter may store by now.
     stored: usize,
 }
 
+enum Exact<'w> {
+    /// Its bounds may take longer than a plan.
+    Later,
+    Begun(Box<Duo<'w, Int, Bounds>>),
+    Over,
+}
+
 impl<'w> Seeker<'w> {
     pub(super) fn new(whole: &'w Whole, limits: &'w Limits) -> Self {
-        let context = Context::new(&whole.task, limits);
-        let parts = whole.bounds.as_ref().zip(whole.prepared.as_ref());
-        let space = parts.map(|(bounds, prepared)| Space { context, bounds, prepared, orbits: None });
-        let exact = space.map(|space| Duo::new(space, &whole.task.initial));
-        Self { whole, limits, satisficer: Satisficer::new(context).ok().flatten(), exact, stored: 0 }
+        let satisficer = Satisficer::new(Context::new(&whole.task, limits)).ok().flatten();
+        Self { whole, limits, satisficer, exact: Exact::Later, stored: 0 }
     }
 
     /// Goes on for so many shares of work: a plan whose sequence can be executed.
     pub(super) fn run(
         &mut self,
-        (concurrent, expansion): (&Concurrent, &Expansion<'_>),
+        of: (&Concurrent, &Expansion<'_>),
         share: usize,
         statistics: &mut Statistics,
     ) -> Option<Sequence> {
-        let executed = |plan| self.whole.sequence(concurrent, expansion, plan);
-        if let Some(exact) = &mut self.exact {
-            self.stored = self.stored.saturating_add(STATES.saturating_mul(share));
-            let before = exact.figures();
-            let found = exact.run(self.stored, &mut |_, _| {});
-            exact.figures().add_to(before, statistics);
-            let plan = match &found {
-                Some(Found::Optimal(plan)) => Some(plan.clone()),
-                Some(Found::Unknown(plan)) => plan.clone(),
-                Some(Found::None) => None,
-                None => exact.best_plan(),
-            };
-            if found.is_some() || self.stored > MOST_STATES {
-                self.exact = None;
-            }
-            if let Some(sequence) = plan.as_ref().and_then(executed) {
-                return Some(sequence);
-            }
+        if let Some(sequence) = self.estimate(of, share, statistics) {
+            return Some(sequence);
         }
         if self.limits.reached() {
             return None;
         }
+        self.search(of, share, statistics)
+    }
+
+    fn estimate(
+        &mut self,
+        (concurrent, expansion): (&Concurrent, &Expansion<'_>),
+        share: usize,
+        statistics: &mut Statistics,
+    ) -> Option<Sequence> {
         let satisficer = self.satisficer.as_mut()?;
         let before = satisficer.figures;
         let advance = satisficer.run(None, WORK.saturating_mul(share as u64));
@@ -164,5 +168,33 @@ impl<'w> Seeker<'w> {
                 None
             }
         }
+    }
+
+    fn search(
+        &mut self,
+        (concurrent, expansion): (&Concurrent, &Expansion<'_>),
+        share: usize,
+        statistics: &mut Statistics,
+    ) -> Option<Sequence> {
+        if matches!(self.exact, Exact::Later) {
+            let space = self.whole.space(self.limits);
+            let begin = |space| Exact::Begun(Box::new(Duo::new(space, &self.whole.task.initial)));
+            self.exact = space.map_or(Exact::Over, begin);
+        }
+        let Exact::Begun(exact) = &mut self.exact else { return None };
+        self.stored = self.stored.saturating_add(STATES.saturating_mul(share));
+        let before = exact.figures();
+        let found = exact.run(self.stored, &mut |_, _| {});
+        exact.figures().add_to(before, statistics);
+        let plan = match &found {
+            Some(Found::Optimal(plan)) => Some(plan.clone()),
+            Some(Found::Unknown(plan)) => plan.clone(),
+            Some(Found::None) => None,
+            None => exact.best_plan(),
+        };
+        if found.is_some() || self.stored > MOST_STATES {
+            self.exact = Exact::Over;
+        }
+        plan.and_then(|plan| self.whole.sequence(concurrent, expansion, &plan))
     }
 }
