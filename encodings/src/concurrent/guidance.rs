@@ -10,7 +10,8 @@
 use std::cmp::Reverse;
 
 use crate::concurrent::expansion::Situation;
-use crate::concurrent::relaxed::{Proposition, Relaxed};
+use crate::concurrent::relaxed::Relaxed;
+use crate::concurrent::rule::Proposition;
 use crate::number::Int;
 use crate::satisfice::queue::Queue;
 use crate::task::OperatorId;

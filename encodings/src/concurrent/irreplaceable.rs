@@ -8,7 +8,7 @@
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use crate::concurrent::relaxed::{Proposition, Rule};
+use crate::concurrent::rule::{Proposition, Rule};
 use crate::lists::Lists;
 use crate::number::dense;
 

@@ -30,6 +30,7 @@ mod measure;
 mod record;
 mod relaxed;
 mod repeat;
+mod rule;
 mod schedule;
 mod search;
 mod split;

@@ -13,46 +13,11 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use crate::concurrent::compile::Concurrent;
 use crate::concurrent::happening::Role;
 use crate::concurrent::irreplaceable::{Conjunction, Scope, conjoin};
+use crate::concurrent::rule::{Proposition, Raise, Rule};
 use crate::lists::Lists;
 use crate::number::{Int, dense};
 use crate::task::quantity::{Linear, NumericId};
 use crate::task::{Condition, Fact, Literal, Operator, OperatorId, Task, Variable};
-
-/// A fact, a clause, or a numeric condition.
-pub(super) type Proposition = u32;
-
-/// From what is required to what is brought about.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Rule {
-    /// Ascending.
-    pub(super) needs: Vec<Proposition>,
-    pub(super) adds: Vec<Proposition>,
-    /// All that it is sure to set.
-    pub(super) sets: Vec<Proposition>,
-    raises: Vec<Raise>,
-    weight: u32,
-    origin: Option<OperatorId>,
-}
-
-impl Rule {
-    /// The same where another fact holds before and after it. `numbers` are the conjunctions of that fact by what they say besides.
-    pub(super) fn with(
-        &self,
-        fact: Proposition,
-        needs: &[Proposition],
-        numbers: &FxHashMap<Proposition, Proposition>,
-    ) -> Self {
-        let mut needs: Vec<_> = needs.iter().map(|need| *numbers.get(need).unwrap_or(need)).collect();
-        needs.push(fact);
-        needs.sort_unstable();
-        needs.dedup();
-        let adds = self.adds.iter().filter_map(|add| numbers.get(add)).copied().collect();
-        Self { needs, adds, weight: self.weight, origin: self.origin, ..Self::default() }
-    }
-}
-
-/// A numeric condition by position, and how much a rule adds to it; none if that depends on the state.
-type Raise = (u32, Option<Int>);
 
 /// A linear expression that must be at least 0.
 #[derive(Debug, Clone)]
