@@ -33,10 +33,10 @@ pub(super) struct Scope<'a> {
 /// Which rules have which propositions.
 struct Index {
     /// What rules need, and then the goal.
-    needs: Vec<Vec<Proposition>>,
+    needs: Lists,
     adding: Lists,
     needing: Lists,
-    /// By variable: the rules that set it.
+    /// By variable: the rules that set it, ascending.
     setting: Vec<Vec<u32>>,
 }
 
@@ -55,9 +55,8 @@ pub(super) fn conjoin(scope: &mut Scope<'_>) -> Vec<Conjunction> {
                 continue;
             }
             // All that set the variable, set it to another value.
-            let deleting: FxHashSet<u32> = setting.iter().copied().collect();
-            let together = index.together(fact, &deleting, scope, &mut looks);
-            let is_open = |rule: &u32| !deleting.contains(rule);
+            let together = index.together(fact, setting, scope, &mut looks);
+            let is_open = |rule: &u32| setting.binary_search(rule).is_err();
             let mut rules: Vec<u32> =
                 together.iter().flat_map(|own| index.adding.of(*own)).copied().filter(is_open).collect();
             rules.sort_unstable();
@@ -72,14 +71,14 @@ pub(super) fn conjoin(scope: &mut Scope<'_>) -> Vec<Conjunction> {
             *scope.propositions += dense(together.len());
             conjunctions.extend(together.iter().map(|own| [numbers[own], fact, *own]));
             for rule in rules {
-                let copy = scope.rules[rule as usize].with(fact, &index.needs[rule as usize], &numbers);
+                let copy = scope.rules[rule as usize].with(fact, index.needs.of(rule), &numbers);
                 scope.rules.push(copy);
             }
             for rule in index.needing.of(fact) {
                 let needs = scope.rules[..count].get_mut(*rule as usize).map(|rule| &mut rule.needs);
                 let needs = needs.unwrap_or(scope.goal);
                 needs.retain(|need| !numbers.contains_key(need));
-                needs.extend(index.needs[*rule as usize].iter().filter_map(|need| numbers.get(need)));
+                needs.extend(index.needs.of(*rule).iter().filter_map(|need| numbers.get(need)));
                 needs.sort_unstable();
             }
         }
@@ -104,29 +103,29 @@ impl Index {
         }
         needs.push(scope.goal);
         let (adding, needing) = (adds.inverse(propositions), needs.inverse(propositions));
-        Self { needs: needs.iter().map(<[u32]>::to_vec).collect(), adding, needing, setting }
+        Self { needs, adding, needing, setting }
     }
 
     /// What is needed together with a fact, itself or for something that is, and may come from a rule that deletes the fact, ascending.
     fn together(
         &self,
         fact: Proposition,
-        deleting: &FxHashSet<u32>,
+        deleting: &[u32],
         scope: &Scope<'_>,
         looks: &mut usize,
     ) -> Vec<Proposition> {
         let rules = &scope.rules;
         let mut needed = FxHashSet::default();
         let mut stack: Vec<Proposition> =
-            self.needing.of(fact).iter().flat_map(|rule| &self.needs[*rule as usize]).copied().collect();
+            self.needing.of(fact).iter().flat_map(|rule| self.needs.of(*rule)).copied().collect();
         while let Some(own) = stack.pop() {
             if own == fact || !needed.insert(own) {
                 continue;
             }
-            let open = self.adding.of(own).iter().filter(|rule| !deleting.contains(rule));
+            let open = self.adding.of(own).iter().filter(|rule| deleting.binary_search(rule).is_err());
             for rule in open {
                 *looks = looks.saturating_sub(1);
-                stack.extend(&self.needs[*rule as usize]);
+                stack.extend(self.needs.of(*rule));
             }
             if *looks == 0 {
                 return Vec::new();

@@ -64,8 +64,6 @@ pub(crate) struct Satisficer<'a, N> {
     search: Option<Search<N>>,
     /// Whether it was tried to tell dead ends by pairs of facts.
     knows_pairs: bool,
-    /// Whether all operators cost the same.
-    is_uniform: bool,
     pub(crate) figures: Figures,
 }
 
@@ -73,9 +71,7 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
     /// None if an operator has too many combinations of designs.
     pub(crate) fn new(context: Context<'a, N>) -> Result<Option<Self>, Interrupted> {
         let Some(known) = Known::new(context)? else { return Ok(None) };
-        let prices = known.prices();
         Ok(Some(Self {
-            is_uniform: prices.iter().all(|price| Some(price) == prices.first()),
             known,
             limits: context.limits,
             phase: 0,
@@ -140,7 +136,11 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
     fn next(&mut self) {
         self.phase = self.phase.saturating_add(1);
         // A greedy search by costs is the one before where all cost the same.
-        if self.is_uniform && PHASES.get(self.phase) == Some(&(true, Weight::Greedy)) {
+        let is_uniform = || {
+            let prices = self.known.prices();
+            prices.iter().all(|price| Some(price) == prices.first())
+        };
+        if PHASES.get(self.phase) == Some(&(true, Weight::Greedy)) && is_uniform() {
             self.phase = self.phase.saturating_add(1);
         }
         self.search = None;
