@@ -1,6 +1,5 @@
 //! The whole, end to end: the program run as its users run it.
 
-mod book;
 mod browser;
 mod certificate;
 mod certificate_numbers;

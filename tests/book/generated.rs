@@ -1,12 +1,14 @@
-//! Parts of the book that are made of what they are about, between `<!-- generated: NAME -->` and `<!-- end of NAME -->`.
-//! A part that is out of date fails here; with `METAPLAN_BLESS=1` it is written anew.
+//! Parts of the book that are generated, between `<!-- generated: NAME -->` and `<!-- end of NAME -->`. A part that is out of date fails;
+//! `METAPLAN_BLESS=1` rewrites it.
 
 use std::fmt::Write as _;
+use std::sync::Mutex;
 
+use libtest_mimic::{Failed, Trial};
 use metaplan::codes;
 
-use super::{formats, help};
 use crate::common::{metaplan, root};
+use crate::{formats, help, is_blessing};
 
 /// A page, the name of a part of it, and what makes that.
 type Part = (&'static str, &'static str, fn() -> String);
@@ -22,40 +24,53 @@ const PARTS: [Part; 8] = [
     ("docs/reference/tomasys.md", "values", || terms("owl:DatatypeProperty")),
 ];
 
-#[test]
-fn generated_parts_are_up_to_date() {
-    let mut stale = Vec::new();
-    for (page, name, make) in PARTS {
-        let path = root().join(page);
-        let text = std::fs::read_to_string(&path).expect("a page");
-        let (begin, end) = (format!("<!-- generated: {name} -->\n"), format!("<!-- end of {name} -->"));
-        let (before, rest) = text.split_once(&begin).unwrap_or_else(|| panic!("{page} has no part {name}"));
-        let (shown, after) = rest.split_once(&end).unwrap_or_else(|| panic!("{page}: {name} has no end"));
-        let made = format!("\n{}\n", make());
-        if shown == made {
-            continue;
-        }
-        if std::env::var_os("METAPLAN_BLESS").is_some() {
-            std::fs::write(&path, format!("{before}{begin}{made}{end}{after}")).expect("the page is written");
-        }
-        stale.push(format!("{page}: {name}"));
+/// One test for each part, and one for the picture of the tutorial.
+pub fn trials() -> Vec<Trial> {
+    let mut trials: Vec<Trial> = PARTS
+        .into_iter()
+        .map(|(page, name, make)| {
+            Trial::test(format!("{page} ({name})"), move || check(page, name, &make())).with_kind("generated")
+        })
+        .collect();
+    trials.push(Trial::test("docs/pictures/warehouse-timeline.svg", check_picture).with_kind("generated"));
+    trials
+}
+
+/// Compares a generated part of a page with what it is generated from.
+fn check(page: &str, name: &str, content: &str) -> Result<(), Failed> {
+    // Several parts stand in one page, and each of them rewrites the whole page.
+    static WRITING: Mutex<()> = Mutex::new(());
+    let _guard = WRITING.lock();
+    let path = root().join(page);
+    let text = std::fs::read_to_string(&path).expect("a page");
+    let (begin, end) = (format!("<!-- generated: {name} -->\n"), format!("<!-- end of {name} -->"));
+    let (before, rest) = text.split_once(&begin).ok_or_else(|| format!("{page} has no part {name}"))?;
+    let (shown, after) = rest.split_once(&end).ok_or_else(|| format!("{page}: {name} has no end"))?;
+    let content = format!("\n{content}\n");
+    if shown == content {
+        return Ok(());
     }
-    assert!(stale.is_empty(), "out of date (METAPLAN_BLESS=1 writes them): {stale:?}");
+    if is_blessing() {
+        std::fs::write(&path, format!("{before}{begin}{content}{end}{after}")).expect("the page is written");
+    }
+    Err("out of date; METAPLAN_BLESS=1 rewrites it".into())
 }
 
 /// The picture of the tutorial is what the program draws.
-#[test]
-fn the_picture_of_the_tutorial_is_drawn_by_the_program() {
+fn check_picture() -> Result<(), Failed> {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("plan.svg").display().to_string();
     let outcome = metaplan(&["plan", "missions/templates/warehouse/mission.toml", "--svg", &file]);
     assert_eq!(outcome.status, 0, "{outcome:?}");
     let drawn = std::fs::read_to_string(&file).expect("a picture");
     let path = root().join("docs/pictures/warehouse-timeline.svg");
-    if std::env::var_os("METAPLAN_BLESS").is_some() {
+    if std::fs::read_to_string(&path).is_ok_and(|shown| shown == drawn) {
+        return Ok(());
+    }
+    if is_blessing() {
         std::fs::write(&path, &drawn).expect("the picture is written");
     }
-    assert!(std::fs::read_to_string(path).is_ok_and(|shown| shown == drawn), "it is another picture");
+    Err("out of date; METAPLAN_BLESS=1 redraws it".into())
 }
 
 /// All codes, by their first letter.

@@ -1,0 +1,169 @@
+//! The README and the book: every block of every page is run as a reader would run it, or compared with the file that it shows.
+//!
+//! Each page is one test, run in a shell in a fresh copy of the project, with `metaplan` and `metaplan-verify` in the path. By default these
+//! are the programs that cargo has built for the tests; with `METAPLAN_PROGRAMS=DIR` in the environment they are those of `cargo install`
+//! in that directory, as `.ci/newcomer` has it.
+//!
+//! The fence of a block, and the comment before the block, say how it is checked:
+//!
+//! | block | is checked how |
+//! |---|---|
+//! | `console` | A session: a line `$ COMMAND`, then its output, standard error included. `[..]` matches anything within a line, a line `...` any lines. A status other than 0 must be shown by `$ echo $?`. |
+//! | `sh` | A script, which must succeed; its output is not shown. For commands of several lines, so that they can be pasted. |
+//! | `rust` | A doctest, see `src/lib.rs`. |
+//! | `text` | Not at all: output of earlier commands, or a drawing. |
+//! | any, after `<!-- file: PATH -->` | It must be a part of that file, line by line. |
+//! | `console`, `sh`, after `<!-- needs: NAME, … -->` | As above, where each of these programs is in the path and each of the [`page::Fixture`]s is there. `METAPLAN_BOOK_REQUIRES=NAME,…` makes it an error that one of these is missing. |
+//! | `console`, after `<!-- input ends after: SECONDS -->` | As above; the standard input of its last command stays open for that time. |
+//! | any, after `<!-- not run: REASON -->` | Not at all. The reason names the CI stage or the test that runs it, if there is one. |
+//!
+//! `METAPLAN_BLESS=1` in the environment writes the output that differs into the pages. Elided parts stay elided where they still match.
+
+mod formats;
+mod generated;
+mod help;
+mod page;
+mod session;
+
+#[path = "../program/common.rs"]
+#[allow(dead_code, reason = "the other tests of programs use the rest")]
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use libtest_mimic::{Arguments, Failed, Trial};
+
+use common::root;
+use page::{Block, Kind};
+use session::Session;
+
+fn main() -> ExitCode {
+    let arguments = Arguments::from_args();
+    let mut trials = generated::trials();
+    let pages: Vec<Page> = pages().into_iter().map(Page::read).collect();
+    trials.push(Trial::test("pages with commands", {
+        let count = pages.iter().filter(|page| page.has_commands()).count();
+        move || {
+            if count > 20 { Ok(()) } else { Err(Failed::from(format!("only {count} pages have commands"))) }
+        }
+    }));
+    trials.extend(pages.into_iter().map(Page::trial));
+    libtest_mimic::run(&arguments, trials).exit_code()
+}
+
+/// The README, the book, and the pages of other packages whose programs are built with these tests.
+fn pages() -> Vec<String> {
+    let mut pages = vec!["README.md".to_owned(), "verify/README.md".to_owned()];
+    let mut folders = vec![PathBuf::from("docs")];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(root().join(&folder)).expect("a folder") {
+            let entry = entry.expect("an entry");
+            let path = folder.join(entry.file_name());
+            if entry.path().is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "md") {
+                pages.push(path.display().to_string().replace('\\', "/"));
+            }
+        }
+    }
+    pages.sort();
+    pages
+}
+
+/// Returns `true` if `METAPLAN_BLESS` asks for pages to be rewritten.
+fn is_blessing() -> bool {
+    std::env::var_os("METAPLAN_BLESS").is_some()
+}
+
+struct Page {
+    /// Path from the root of the project, with `/`.
+    path: String,
+    text: String,
+    blocks: Vec<Block>,
+}
+
+impl Page {
+    fn read(path: String) -> Self {
+        let text = std::fs::read_to_string(root().join(&path)).expect("a page");
+        let blocks = page::blocks(&text);
+        Self { path, text, blocks }
+    }
+
+    fn has_commands(&self) -> bool {
+        self.blocks.iter().any(|block| matches!(block.kind, Kind::Console | Kind::Script))
+    }
+
+    /// The test of this page. Its kind, which the runner prints, lists what is missing for some of the blocks.
+    fn trial(self) -> Trial {
+        let mut missing: Vec<String> = self.blocks.iter().flat_map(Block::missing).collect();
+        missing.sort();
+        missing.dedup();
+        let kind = if missing.is_empty() { String::new() } else { format!("without {}", missing.join(", ")) };
+        Trial::test(self.path.clone(), move || self.check()).with_kind(kind)
+    }
+
+    fn check(&self) -> Result<(), Failed> {
+        let mut faults: Vec<String> = Vec::new();
+        let mut commands: Vec<&Block> = Vec::new();
+        for block in &self.blocks {
+            let missing: Vec<String> = block.missing().filter(|name| page::is_required(name)).collect();
+            let fault = match &block.kind {
+                Kind::Console | Kind::Script if !missing.is_empty() => {
+                    format!("{} is not there, and METAPLAN_BOOK_REQUIRES has it", missing.join(", "))
+                }
+                Kind::Console | Kind::Script => {
+                    if block.missing().next().is_none() {
+                        commands.push(block);
+                    }
+                    continue;
+                }
+                Kind::File(file) if !is_part_of(&block.text, file) => format!("this is not a part of {file}"),
+                Kind::Rust if !self.is_doctest() => {
+                    "the library does not include the page as a doctest".to_owned()
+                }
+                Kind::Unknown(fence) => format!("`{fence}` is neither run nor a part of a file"),
+                Kind::File(_) | Kind::Rust | Kind::Text | Kind::NotRun => continue,
+            };
+            faults.push(format!("{}:{}: {fault}", self.path, block.line));
+        }
+        faults.extend(self.run(&commands));
+        if faults.is_empty() { Ok(()) } else { Err(Failed::from(faults.join("\n"))) }
+    }
+
+    /// Runs blocks in their order in one session. Returns the differences from what the page shows.
+    fn run(&self, blocks: &[&Block]) -> Vec<String> {
+        if blocks.is_empty() || !Session::is_possible() {
+            return Vec::new();
+        }
+        let mut blessed = self.text.clone();
+        let mut faults = Vec::new();
+        for (block, outcome) in blocks.iter().zip(Session::new().run(blocks)) {
+            faults.extend(
+                outcome.faults.into_iter().map(|fault| format!("{}:{}: {fault}", self.path, block.line)),
+            );
+            if outcome.text != block.text {
+                blessed = blessed.replacen(&block.text, &outcome.text, 1);
+            }
+        }
+        if is_blessing() && blessed != self.text {
+            std::fs::write(root().join(&self.path), blessed).expect("the page is written");
+        }
+        faults
+    }
+
+    /// Returns `true` if a library includes this page, so that cargo runs its Rust blocks.
+    fn is_doctest(&self) -> bool {
+        let (library, page) = match self.path.strip_prefix("verify/") {
+            Some(page) => ("verify/src/lib.rs", page),
+            None => ("src/lib.rs", self.path.as_str()),
+        };
+        let library = std::fs::read_to_string(root().join(library)).expect("a library");
+        library.contains(&format!("include_str!(\"../{page}\")"))
+    }
+}
+
+fn is_part_of(lines: &str, file: &str) -> bool {
+    let whole = std::fs::read_to_string(root().join(Path::new(file))).unwrap_or_default();
+    format!("\n{whole}").contains(&format!("\n{lines}"))
+}

@@ -1,0 +1,122 @@
+//! The fenced blocks of a page, with what the comment before each block says of it.
+
+use std::path::{Path, PathBuf};
+
+use pulldown_cmark::{CodeBlockKind, Event, Options, Parser, Tag, TagEnd};
+
+use crate::common::root;
+
+/// How a block is checked.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Kind {
+    Console,
+    Script,
+    File(String),
+    Rust,
+    Text,
+    NotRun,
+    Unknown(String),
+}
+
+#[derive(Debug)]
+pub struct Block {
+    /// Line of the opening fence, from 1.
+    pub line: usize,
+    pub kind: Kind,
+    pub text: String,
+    /// Programs and fixtures without which the block is not run.
+    pub needs: Vec<String>,
+    /// Seconds for which the standard input of the last command stays open.
+    pub input_ends_after: Option<u32>,
+}
+
+impl Block {
+    /// Returns what the block needs and this machine does not have.
+    pub fn missing(&self) -> impl Iterator<Item = String> {
+        self.needs.iter().filter(|name| !is_available(name)).cloned()
+    }
+}
+
+/// Files that readers of a page have and this project must not ship. They are copied into the session's directory.
+pub struct Fixture {
+    pub name: &'static str,
+    /// Source below the directory of shared data, and target in the session's directory.
+    pub files: [(&'static str, &'static str); 4],
+}
+
+pub const FIXTURES: [Fixture; 1] = [Fixture {
+    name: "PLANTA's files",
+    files: [
+        ("real/pddl/suave_planta/suave_domain_extended.pddl", "suave_domain_extended.pddl"),
+        ("real/pddl/suave_planta/suave_problem_extended.pddl", "suave_problem_extended.pddl"),
+        ("real/owl/suave_planta/suave_extended.owl", "suave_extended.owl"),
+        ("real/owl/pddl_tomasys", "pddl_tomasys"),
+    ],
+}];
+
+/// The directory of shared data, beside the project.
+pub fn shared() -> PathBuf {
+    root().join("../shared")
+}
+
+fn is_available(name: &str) -> bool {
+    if let Some(fixture) = FIXTURES.iter().find(|fixture| fixture.name == name) {
+        return fixture.files.iter().all(|(source, _)| shared().join(source).exists());
+    }
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    std::env::split_paths(&path).any(|folder| Path::new(&folder).join(name).is_file())
+}
+
+/// Returns `true` if `METAPLAN_BOOK_REQUIRES` lists this name.
+pub fn is_required(name: &str) -> bool {
+    let required = std::env::var("METAPLAN_BOOK_REQUIRES").unwrap_or_default();
+    required.split(',').any(|required| required.trim() == name)
+}
+
+pub fn blocks(page: &str) -> Vec<Block> {
+    let mut blocks: Vec<Block> = Vec::new();
+    let (mut comment, mut is_inside) = (String::new(), false);
+    for (event, range) in Parser::new_ext(page, Options::ENABLE_TABLES).into_offset_iter() {
+        match event {
+            Event::Start(Tag::CodeBlock(CodeBlockKind::Fenced(fence))) => {
+                let line = page[..range.start].matches('\n').count() + 1;
+                blocks.push(block(line, &fence, &comment));
+                is_inside = true;
+            }
+            Event::End(TagEnd::CodeBlock) => {
+                is_inside = false;
+                comment.clear();
+            }
+            Event::Text(text) if is_inside => blocks.last_mut().expect("a block has begun").text += &text,
+            Event::Html(text) => comment += &text,
+            Event::End(TagEnd::HtmlBlock) => {}
+            _ => comment.clear(),
+        }
+    }
+    blocks
+}
+
+/// An empty block with this fence, after this comment.
+fn block(line: usize, fence: &str, comment: &str) -> Block {
+    let mark = |name: &str| {
+        let rest = comment.trim().strip_prefix("<!--")?.trim_start().strip_prefix(name)?;
+        Some(rest.trim().trim_end_matches("-->").trim().to_owned())
+    };
+    let kind = if let Some(file) = mark("file:") {
+        Kind::File(file)
+    } else if mark("not run:").is_some() {
+        Kind::NotRun
+    } else {
+        match fence {
+            "console" => Kind::Console,
+            "sh" => Kind::Script,
+            "rust" => Kind::Rust,
+            "text" => Kind::Text,
+            other => Kind::Unknown(other.to_owned()),
+        }
+    };
+    let names = mark("needs:").unwrap_or_default();
+    let needs = names.split(',').map(|name| name.trim().to_owned()).filter(|name| !name.is_empty()).collect();
+    let input_ends_after = mark("input ends after:").map(|seconds| seconds.parse().expect("seconds"));
+    Block { line, kind, text: String::new(), needs, input_ends_after }
+}

@@ -1,0 +1,186 @@
+//! The shell in which the commands of a page are run.
+//!
+//! All commands of a page become one script, so that directories, variables and the status of the last command carry over as they do at a
+//! prompt. After each command the script prints a separator with the command's status.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+
+use snapbox::{Assert, IntoData as _};
+use tempfile::TempDir;
+
+use crate::common::{copy_folder, root, verifier, without_progress};
+use crate::page::{Block, FIXTURES, Kind, shared};
+
+/// A character that no program prints: it stands before and after each status.
+const SEPARATOR: char = '\u{1e}';
+
+pub struct Session {
+    /// A copy of the project below a temporary directory.
+    directory: TempDir,
+    /// The variable `PATH`.
+    path: String,
+}
+
+/// A command with the output that the page shows for it.
+struct Step {
+    command: String,
+    shown: String,
+}
+
+/// A block after it was run.
+pub struct Outcome {
+    /// The block with the output that its commands printed.
+    pub text: String,
+    pub faults: Vec<String>,
+}
+
+impl Session {
+    /// Returns `true` if this machine has a shell of Unix.
+    pub fn is_possible() -> bool {
+        cfg!(unix) && Command::new("sh").args(["-c", "true"]).status().is_ok()
+    }
+
+    pub fn new() -> Self {
+        let directory = tempfile::tempdir().expect("a directory");
+        copy_project(&directory);
+        let programs = match std::env::var_os("METAPLAN_PROGRAMS") {
+            Some(directory) => PathBuf::from(directory),
+            None => verifier().parent().expect("a folder").to_owned(),
+        };
+        let path = format!("{}:{}", programs.display(), std::env::var("PATH").unwrap_or_default());
+        Self { directory, path }
+    }
+
+    /// Runs blocks one after another. Returns an outcome for each block.
+    pub fn run(&self, blocks: &[&Block]) -> Vec<Outcome> {
+        for fixture in FIXTURES
+            .iter()
+            .filter(|fixture| blocks.iter().any(|block| block.needs.iter().any(|name| name == fixture.name)))
+        {
+            for (source, target) in fixture.files {
+                let (source, target) = (shared().join(source), self.place().join(target));
+                if source.is_dir() {
+                    copy_folder(&source, &target);
+                } else {
+                    std::fs::copy(source, target).expect("a copy");
+                }
+            }
+        }
+        let steps: Vec<Vec<Step>> = blocks.iter().map(|block| steps(block)).collect();
+        let mut script = String::from("exec 2>&1\n");
+        for (block, steps) in blocks.iter().zip(&steps) {
+            for (number, step) in steps.iter().enumerate() {
+                let is_last = number + 1 == steps.len();
+                let command = &step.command;
+                let _ = match block.input_ends_after.filter(|_| is_last) {
+                    Some(seconds) => write!(script, "sleep {seconds} | {command}"),
+                    None => write!(script, "{command}"),
+                };
+                // The status of this command is what the next one finds in `$?`.
+                script +=
+                    "\nstatus_of_step=$?; printf '\\036%s\\036' $status_of_step; (exit $status_of_step)\n";
+            }
+        }
+        let output = self.shell(&script);
+        let mut parts = output.split(SEPARATOR);
+        let mut results = std::iter::from_fn(|| Some((parts.next()?, parts.next()?.parse::<i32>().ok()?)));
+        let mut outcomes = Vec::new();
+        for (block, steps) in blocks.iter().zip(&steps) {
+            outcomes.push(compare(block, steps, &mut results));
+        }
+        outcomes
+    }
+
+    fn place(&self) -> PathBuf {
+        self.directory.path().join("metaplan")
+    }
+
+    /// Returns everything that a script prints.
+    fn shell(&self, script: &str) -> String {
+        let file = self.directory.path().join("script");
+        std::fs::write(&file, script).expect("the script is written");
+        let mut shell = Command::new("sh");
+        shell.arg(file).current_dir(self.place()).env("PATH", &self.path).env_remove("CLICOLOR_FORCE");
+        // Independent of the language of the machine, and of a repository around the temporary directory.
+        shell.env("LC_ALL", "C").env("GIT_CEILING_DIRECTORIES", std::env::temp_dir());
+        let output = shell.stdin(Stdio::null()).output().expect("the shell runs");
+        String::from_utf8(output.stdout).expect("UTF-8")
+    }
+}
+
+/// Compares the results of a block's commands, which are the next ones, with what the block shows.
+fn compare<'a>(block: &Block, steps: &[Step], results: &mut impl Iterator<Item = (&'a str, i32)>) -> Outcome {
+    let (mut text, mut faults) = (String::new(), Vec::new());
+    if steps.is_empty() {
+        faults.push("no line begins with `$ `".to_owned());
+    }
+    for (number, step) in steps.iter().enumerate() {
+        let Some((output, status)) = results.next() else {
+            faults.push(format!("`{}`: the shell ended before", step.command));
+            continue;
+        };
+        let output = without_progress(output);
+        let shows_status = steps.get(number + 1).is_some_and(|next| next.command == "echo $?");
+        if status != 0 && !shows_status {
+            let unshown = if block.kind == Kind::Script { &*output } else { "the page does not show that" };
+            faults.push(format!("`{}` ends with status {status}: {unshown}", step.command));
+        }
+        if block.kind == Kind::Script {
+            continue;
+        }
+        let assert = Assert::new().normalize_paths(false);
+        let (actual, expected) = (output.into_data(), step.shown.as_str().into_data());
+        let _ = writeln!(text, "$ {}", step.command);
+        text += &assert.normalize(actual.clone(), expected.clone()).0.render().expect("a text");
+        if let Err(error) = assert.try_eq(Some(&step.command), actual, expected) {
+            faults.push(error.to_string());
+        }
+    }
+    if block.kind == Kind::Script {
+        text.clone_from(&block.text);
+    }
+    Outcome { text, faults }
+}
+
+/// Copies the files of the project that git would copy; without git, those that the commands of pages may use.
+fn copy_project(directory: &TempDir) {
+    let place = directory.path().join("metaplan");
+    let mut git = Command::new("git");
+    git.args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"]).current_dir(root());
+    let files = git.output().ok().filter(|output| output.status.success());
+    let Some(files) = files else {
+        for folder in ["missions", "encodings", "ontology", "rules", "docs", "ros"] {
+            copy_folder(&root().join(folder), &place.join(folder));
+        }
+        return;
+    };
+    let names = String::from_utf8(files.stdout).expect("UTF-8");
+    for name in names.split('\0').filter(|name| !name.is_empty()) {
+        let (source, target) = (root().join(name), place.join(name));
+        // A file that was removed and not yet committed is still listed.
+        if source.is_file() {
+            std::fs::create_dir_all(target.parent().expect("a parent")).expect("a folder");
+            std::fs::copy(source, target).expect("a copy");
+        }
+    }
+}
+
+fn steps(block: &Block) -> Vec<Step> {
+    if block.kind == Kind::Script {
+        return vec![Step { command: block.text.trim_end().to_owned(), shown: String::new() }];
+    }
+    let mut steps: Vec<Step> = Vec::new();
+    for line in block.text.lines() {
+        match (line.strip_prefix("$ "), steps.last_mut()) {
+            (Some(command), _) => steps.push(Step { command: command.to_owned(), shown: String::new() }),
+            (None, Some(step)) => {
+                step.shown += line;
+                step.shown.push('\n');
+            }
+            (None, None) => {}
+        }
+    }
+    steps
+}
