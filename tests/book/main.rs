@@ -48,6 +48,9 @@ fn main() -> ExitCode {
             if count > 20 { Ok(()) } else { Err(Failed::from(format!("only {count} pages have commands"))) }
         }
     }));
+    let in_order =
+        Trial::test("all pages in one clone", pages_in_one_clone).with_kind("in the order of SUMMARY.md");
+    trials.push(in_order.with_ignored_flag(true));
     trials.extend(pages.into_iter().map(Page::trial));
     libtest_mimic::run(&arguments, trials).exit_code()
 }
@@ -71,6 +74,22 @@ fn pages() -> Vec<String> {
     pages
 }
 
+/// Runs the pages of the book one after another in one copy of the project, as somebody does who reads the whole book.
+fn pages_in_one_clone() -> Result<(), Failed> {
+    let summary = std::fs::read_to_string(root().join("docs/SUMMARY.md")).expect("the summary");
+    let links = summary.lines().filter_map(|line| line.split_once("](")?.1.split_once(')'));
+    let session = Session::new();
+    let mut faults = Vec::new();
+    for (link, _) in links {
+        let page = Page::read(format!("docs/{link}"));
+        let blocks: Vec<&Block> = page.blocks.iter().filter(|block| block.is_run()).collect();
+        if !blocks.is_empty() {
+            faults.extend(page.run(&session, &blocks));
+        }
+    }
+    if faults.is_empty() { Ok(()) } else { Err(Failed::from(faults.join("\n"))) }
+}
+
 /// Returns `true` if `METAPLAN_BLESS` asks for pages to be rewritten.
 fn is_blessing() -> bool {
     std::env::var_os("METAPLAN_BLESS").is_some()
@@ -91,7 +110,7 @@ impl Page {
     }
 
     fn has_commands(&self) -> bool {
-        self.blocks.iter().any(|block| matches!(block.kind, Kind::Console | Kind::Script))
+        self.blocks.iter().any(Block::has_commands)
     }
 
     /// The test of this page. Its kind, which the runner prints, lists what is missing for some of the blocks.
@@ -105,40 +124,33 @@ impl Page {
 
     fn check(&self) -> Result<(), Failed> {
         let mut faults: Vec<String> = Vec::new();
-        let mut commands: Vec<&Block> = Vec::new();
         for block in &self.blocks {
             let missing: Vec<String> = block.missing().filter(|name| page::is_required(name)).collect();
             let fault = match &block.kind {
                 Kind::Console | Kind::Script if !missing.is_empty() => {
                     format!("{} is not there, and METAPLAN_BOOK_REQUIRES has it", missing.join(", "))
                 }
-                Kind::Console | Kind::Script => {
-                    if block.missing().next().is_none() {
-                        commands.push(block);
-                    }
-                    continue;
-                }
                 Kind::File(file) if !is_part_of(&block.text, file) => format!("this is not a part of {file}"),
                 Kind::Rust if !self.is_doctest() => {
                     "the library does not include the page as a doctest".to_owned()
                 }
                 Kind::Unknown(fence) => format!("`{fence}` is neither run nor a part of a file"),
-                Kind::File(_) | Kind::Rust | Kind::Text | Kind::NotRun => continue,
+                _ => continue,
             };
             faults.push(format!("{}:{}: {fault}", self.path, block.line));
         }
-        faults.extend(self.run(&commands));
+        let blocks: Vec<&Block> = self.blocks.iter().filter(|block| block.is_run()).collect();
+        if !blocks.is_empty() && Session::is_possible() {
+            faults.extend(self.run(&Session::new(), &blocks));
+        }
         if faults.is_empty() { Ok(()) } else { Err(Failed::from(faults.join("\n"))) }
     }
 
     /// Runs blocks in their order in one session. Returns the differences from what the page shows.
-    fn run(&self, blocks: &[&Block]) -> Vec<String> {
-        if blocks.is_empty() || !Session::is_possible() {
-            return Vec::new();
-        }
+    fn run(&self, session: &Session, blocks: &[&Block]) -> Vec<String> {
         let mut blessed = self.text.clone();
         let mut faults = Vec::new();
-        for (block, outcome) in blocks.iter().zip(Session::new().run(blocks)) {
+        for (block, outcome) in blocks.iter().zip(session.run(blocks)) {
             faults.extend(
                 outcome.faults.into_iter().map(|fault| format!("{}:{}: {fault}", self.path, block.line)),
             );

@@ -31,6 +31,15 @@ pub struct Block {
 }
 
 impl Block {
+    pub fn has_commands(&self) -> bool {
+        matches!(self.kind, Kind::Console | Kind::Script)
+    }
+
+    /// Returns `true` if this machine can run the block.
+    pub fn is_run(&self) -> bool {
+        self.has_commands() && self.missing().next().is_none()
+    }
+
     /// Returns what the block needs and this machine does not have.
     pub fn missing(&self) -> impl Iterator<Item = String> {
         self.needs.iter().filter(|name| !is_available(name)).cloned()
