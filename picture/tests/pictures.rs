@@ -246,6 +246,7 @@ fn sheet(name: &str) -> Sheet {
         name: format!("{name}group"),
         values: vec![(1.0, name.to_owned()); 40],
         mean: Some((1.0, 0.5)),
+        nothing: String::new(),
     };
     Sheet {
         name: name.to_owned(),
