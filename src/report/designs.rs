@@ -115,7 +115,7 @@ fn reports(knowledge: &Knowledge, derivation: &Derivation) -> Vec<Fact> {
     let measurements = knowledge.view().measurements();
     let symbols = knowledge.engine().symbols();
     let name = |symbol| match symbols.value(symbol) {
-        Value::Name(name) => Some(name),
+        Value::Name(name) => Some(&**name),
         Value::Literal(_) => None,
     };
     let is_report = |fact: &Fact| match name(fact.predicate).map(local_name) {
