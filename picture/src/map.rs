@@ -293,7 +293,7 @@ fn room(
 ) -> Option<Point> {
     let beside = [(x + reach, y), (x - reach - width, y)];
     let across = [y - reach - LINE / 2.0, y + reach + LINE / 2.0];
-    let above = across.into_iter().flat_map(|y| [(x - width / 2.0, y), (x + 3.0, y), (x - width - 3.0, y)]);
+    let above = across.into_iter().flat_map(|y| [(x - width / 2.0, y), (x + 7.0, y), (x - width - 7.0, y)]);
     let places = beside.into_iter().chain(above).map(|(left, middle)| {
         (left - 1.0, middle - LINE / 2.0 - 1.0, left + width + 1.0, middle + LINE / 2.0 + 1.0)
     });

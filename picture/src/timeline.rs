@@ -63,6 +63,12 @@ pub(crate) fn timeline(plan: &Plan, palette: &Palette, span: &Span, canvas: Canv
         tops.push(bottom);
         bottom += lane.height() + GAP;
     }
+    // Lines of changes leave out names between lanes.
+    let marked: Vec<(f64, f64)> = if canvas.has_names_above {
+        lanes.iter().zip(&tops).map(|(lane, top)| (*top, top + lane.height())).collect()
+    } else {
+        vec![(TOP, bottom)]
+    };
     let changes = plan.steps.iter().map(|step| step.reconfigured.len()).sum::<usize>();
     let title = format!("{} steps, {changes} reconfigurations", plan.steps.len());
     let description = lanes.iter().map(|lane| lane.name).collect::<Vec<_>>().join(", ");
@@ -74,7 +80,9 @@ pub(crate) fn timeline(plan: &Plan, palette: &Palette, span: &Span, canvas: Canv
         }
         @for (index, step) in plan.steps.iter().enumerate().filter(|(_, step)| !step.reconfigured.is_empty()) {
             @let x = px(frame.scale.at(step.start));
-            line class="change" x1=(x) x2=(x) y1=(px(TOP + canvas.name_height())) y2=(px(bottom)) data-step=(index + 1) {}
+            @for (top, bottom) in &marked {
+                line class="change" x1=(x) x2=(x) y1=(px(*top)) y2=(px(*bottom)) data-step=(index + 1) {}
+            }
         }
     };
     Picture { width: frame.width, height: bottom + 24.0, title, description, body }
@@ -84,7 +92,8 @@ pub(crate) fn timeline(plan: &Plan, palette: &Palette, span: &Span, canvas: Canv
 fn lanes<'p>(plan: &'p Plan, frame: &Frame) -> Vec<Lane<'p>> {
     let place = |step: &Step| {
         let from = frame.scale.at(step.start);
-        (from, frame.scale.at(step.end).max(from + LEAST))
+        // A short step keeps its place by the scale, so that steps one after another stay in one row.
+        (from, if step.end > step.start { frame.scale.at(step.end) } else { from + LEAST })
     };
     let mut functions: BTreeMap<&str, Vec<Bar<'p>>> = BTreeMap::new();
     let mut actions = Vec::new();
@@ -131,9 +140,9 @@ fn draw_bar(bar: &Bar<'_>, top: f64, (class, is_action): (&str, bool), about: &s
     let room = bar.to - bar.from - margin - 3.0;
     let number = (bar.step + 1).to_string();
     let mut text = fit(bar.text, room);
-    // A stump of a name says less than the number of the step, which map and table have, too.
-    if is_action && text != bar.text && text.chars().count() < SHORTEST {
-        text = if width(&number) <= room + SLACK { number } else { String::new() };
+    // A stump of a name says less than the number of the step, which map and table have, too, or than the colour of a design.
+    if text != bar.text && text.chars().count() < SHORTEST {
+        text = if is_action && width(&number) <= room + SLACK { number } else { String::new() };
     }
     let margin = if is_action && text.chars().count() < SHORTEST { margin - SLACK / 2.0 } else { margin };
     html! {

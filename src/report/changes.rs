@@ -199,7 +199,10 @@ mod tests {
             &[there, back, there, back],
             &[there, there, there],
             [of("4"), of("3")],
-            &["The plan costs 3 now, 4 before.", "2 of 3 steps are also in the plan before, which has 4 steps."],
+            &[
+                "The plan costs 3 now, 4 before.",
+                "2 of 3 steps are also in the plan before, which has 4 steps.",
+            ],
         );
         check(
             &[there],
@@ -223,6 +226,11 @@ mod tests {
         check(&[there], &[], [of("4"), Cost::NotFound], &["No plan was found now. The plan before costs 4."]);
         check(&[], &[there], [Cost::NoPlan, of("4")], &["The plan costs 4 now. Before, there was no plan."]);
         check(&[], &[], [Cost::NoPlan, Cost::NoPlan], &["There is no plan now, and there was none before."]);
-        check(&[], &[], [Cost::NoPlan, Cost::NotFound], &["No plan was found now, and there was none before."]);
+        check(
+            &[],
+            &[],
+            [Cost::NoPlan, Cost::NotFound],
+            &["No plan was found now, and there was none before."],
+        );
     }
 }

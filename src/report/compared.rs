@@ -178,8 +178,10 @@ fn distribution(
         });
         let values: Vec<(f64, String)> = values.collect();
         let all: Vec<f64> = values.iter().map(|(value, _)| *value).collect();
-        let mean = Sample::of(&all)
-            .map(|sample| (sample.mean, if sample.count > 1 { sample.half_width } else { 0.0 }));
+        let mean = Sample::of(&all).map(|sample| {
+            let half_width = if sample.count > 1 { sample.half_width } else { 0.0 };
+            (hundredths(sample.mean), hundredths(half_width))
+        });
         let nothing = nothing(own(runs, *strategy).count());
         Group { name: strategy.name().to_owned(), values, mean, nothing }
     };
@@ -210,9 +212,13 @@ fn mean(sample: &Sample) -> String {
     }
 }
 
-/// A simulated figure, which chance makes inexact: two decimals.
+/// A simulated figure, which chance makes inexact, with two decimals.
 fn rounded(value: f64) -> String {
-    ((value * 100.0).round() / 100.0).to_string()
+    hundredths(value).to_string()
+}
+
+fn hundredths(value: f64) -> f64 {
+    (value * 100.0).round() / 100.0
 }
 
 /// Six decimals at most.

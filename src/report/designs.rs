@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use ontology::tomasys::{Component, FunctionDesign, Measurement, Requirement};
-use picture::{Design, Reason, Step};
 use ontology::vocab::local_name;
+use picture::{Design, Reason, Step};
 use rules::{Delta, Derivation, Fact, Reason as Why, Symbols, Value};
 
 use crate::knowledge::Knowledge;
@@ -81,7 +81,10 @@ pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> V
     let causes = causes(knowledge, design);
     let trees = causes.iter().map(|derivation| tree(derivation, 0, symbols, &mut BTreeSet::new()));
     let all = (causes.len() > 1).then(|| Reason {
-        text: format!("{} causes rule it out, and all of them have to go before it is available:", causes.len()),
+        text: format!(
+            "{} causes rule it out, and all of them have to go before it is available:",
+            causes.len()
+        ),
         supports: Vec::new(),
     });
     all.into_iter().chain(trees).collect()
@@ -120,9 +123,11 @@ fn reports(knowledge: &Knowledge, derivation: &Derivation) -> Vec<Fact> {
     };
     let is_report = |fact: &Fact| match name(fact.predicate).map(local_name) {
         Some("c_status") => true,
-        Some("hasValue") => fact.arguments.first().and_then(|subject| name(*subject)).is_some_and(|subject| {
-            measurements.iter().any(|measured| measured.individual.iri == subject)
-        }),
+        Some("hasValue") => fact
+            .arguments
+            .first()
+            .and_then(|subject| name(*subject))
+            .is_some_and(|subject| measurements.iter().any(|measured| measured.individual.iri == subject)),
         _ => false,
     };
     let stated = derivation.steps.iter().filter(|step| matches!(step.reason, Why::Asserted));

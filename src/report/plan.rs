@@ -46,7 +46,10 @@ fn sentence(solution: &Solution) -> String {
     let said = solution.verdict();
     match cost {
         Some(cost) => format!("{cost}{}: {said}.", bound.unwrap_or_default()),
-        None => format!("No plan is shown: {said}."),
+        None => {
+            let (first, rest) = said.split_at(said.chars().next().map_or(0, char::len_utf8));
+            format!("{}{rest}.", first.to_uppercase())
+        }
     }
 }
 
