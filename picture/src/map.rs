@@ -39,6 +39,8 @@ const LOOP: f64 = 10.0;
 const SAME: f64 = 2.0;
 /// The margin that a loop needs.
 const LOOP_MARGIN: f64 = 58.0;
+/// The distance of names that have no room near their place.
+const FARTHER: f64 = 9.0;
 /// The length of a dash, where steps with several configurations take one way.
 const DASH: f64 = 9.0;
 
@@ -291,10 +293,14 @@ fn room(
     (limits, lines): (Taken, &[Line]),
     taken: &mut Vec<Taken>,
 ) -> Option<Point> {
-    let beside = [(x + reach, y), (x - reach - width, y)];
-    let across = [y - reach - LINE / 2.0, y + reach + LINE / 2.0];
-    let above = across.into_iter().flat_map(|y| [(x - width / 2.0, y), (x + 7.0, y), (x - width - 7.0, y)]);
-    let places = beside.into_iter().chain(above).map(|(left, middle)| {
+    // Farther away only where a line would cross a name that is near.
+    let places = [reach, reach + FARTHER].into_iter().flat_map(|reach| {
+        let beside = [(x + reach, y), (x - reach - width, y)];
+        let across = [y - reach - LINE / 2.0, y + reach + LINE / 2.0].into_iter();
+        let across = across.flat_map(move |y| [x - width / 2.0, x + 7.0, x - width - 7.0].map(|x| (x, y)));
+        beside.into_iter().chain(across)
+    });
+    let places = places.map(|(left, middle)| {
         (left - 1.0, middle - LINE / 2.0 - 1.0, left + width + 1.0, middle + LINE / 2.0 + 1.0)
     });
     choose(places, (limits, lines), taken)

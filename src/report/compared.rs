@@ -153,12 +153,9 @@ fn accomplished(done: usize, all: usize) -> String {
     }
 }
 
-/// Why a strategy has no costs, by the number of its missions.
+/// Why a strategy with this number of missions has no costs; short enough for a telephone.
 fn none_accomplished(missions: usize) -> String {
-    match missions {
-        1 => "its mission was not accomplished".to_owned(),
-        _ => format!("none of its {missions} missions was accomplished"),
-    }
+    format!("0 of {missions} accomplished")
 }
 
 fn own(runs: &[Run], strategy: Strategy) -> impl Iterator<Item = &Run> {
