@@ -199,7 +199,7 @@ fn number(
     let reach = outwards.0.abs() * half_width + outwards.1.abs() * half_height + SIDE + 1.0;
     let offsets = sides.iter().flat_map(|side| {
         [0.0, 6.0, 12.0, 20.0].into_iter().flat_map(move |more| {
-            [0.0, 6.0, 12.0, -5.0, 20.0, 28.0].map(|shift| (side * (reach + more), shift))
+            [0.0, 6.0, 12.0, -6.0, 20.0, -12.0, 28.0, -18.0].map(|shift| (side * (reach + more), shift))
         })
     });
     let centres = offsets.map(|(across, shift)| {

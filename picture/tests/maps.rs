@@ -163,6 +163,9 @@ fn numbers_stand_at_the_arrow_of_their_direction() {
     check_all("to and fro", &cross, &moves, &["fd_a"]);
     check_all("places without positions", &unknown, &moves, &["fd_a"]);
     check_all("several configurations", &cross, &moves, &["fd_a", "fd_b", "fd_c"]);
+    let star = known(&[(0.0, 0.0), (4.0, 0.0), (8.0, 3.0), (8.0, -3.0), (12.0, 0.0)]);
+    let bed = |bed: usize| [(0, 1), (1, bed), (bed, 1), (1, 0)];
+    check_all("a star", &star, &[bed(2), bed(3), bed(4)].concat(), &["fd_a"]);
     // One short way among long ones, in any direction.
     for turn in 0..16 {
         let (sin, cos) = (f64::from(turn) * std::f64::consts::PI / 8.0).sin_cos();

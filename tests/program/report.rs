@@ -84,7 +84,7 @@ fn before_and_after_stand_side_by_side_with_the_reasons() {
 #[test]
 fn no_plan_is_said_in_plain_words() {
     let outcome = metaplan(&["report", "missions/ugv.toml", "--set", "battery=1"]);
-    assert_eq!(outcome.status, 1, "{}", outcome.stderr);
+    assert_eq!(outcome.status, 10, "{}", outcome.stderr);
     assert!(outcome.stdout.contains("<p>There is no plan now. The plan before costs 408.</p>"));
     for text in ["nothing: there is none", "0 of 0", "none now"] {
         assert!(!outcome.stdout.contains(text), "{text}");
