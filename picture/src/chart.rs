@@ -14,8 +14,7 @@ const TOP: f64 = 10.0;
 pub(crate) fn curve(plan: &Plan, curve: &Curve, span: &Span, canvas: Canvas) -> Picture {
     let frame = Frame::of(plan, span, canvas);
     let top = TOP + canvas.name_height();
-    let values = curve.points.iter().map(|(_, value)| *value);
-    let scale = vertical(top, values.chain(curve.bounds.iter().map(|bound| bound.value)));
+    let scale = vertical(top, span.values(&curve.name));
     let mut points: Vec<(f64, f64)> = Vec::new();
     for (at, value) in &curve.points {
         let (x, y) = (frame.scale.at(*at), scale.at(*value));
@@ -66,7 +65,7 @@ pub(crate) fn curve(plan: &Plan, curve: &Curve, span: &Span, canvas: Canvas) -> 
 pub(crate) fn search(search: &[Progress], canvas: Canvas) -> Picture {
     let (left, right) = (canvas.left, canvas.width - RIGHT);
     let costs = search.iter().filter_map(|moment| moment.cost);
-    let scale = vertical(TOP, costs.chain(search.iter().map(|moment| moment.lower_bound)));
+    let scale = vertical(TOP, range(costs.chain(search.iter().map(|moment| moment.lower_bound))));
     let last = search.len().saturating_sub(1).max(1);
     let along = Scale::new((0.0, last as f64), (left, right));
     let line = |value: &dyn Fn(&Progress) -> Option<f64>| {
@@ -104,9 +103,8 @@ pub(crate) fn search(search: &[Progress], canvas: Canvas) -> Picture {
     Picture { width: canvas.width, height: TOP + HEIGHT + 26.0, title, description, body }
 }
 
-/// A scale for these values, larger ones higher.
-fn vertical(top: f64, values: impl Iterator<Item = f64>) -> Scale {
-    let (low, high) = range(values);
+/// A scale for a range of values, larger ones higher.
+fn vertical(top: f64, (low, high): (f64, f64)) -> Scale {
     let margin = (high - low) * 0.05;
     Scale::new((low - margin, high + margin), (top + HEIGHT, top))
 }

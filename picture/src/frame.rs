@@ -1,9 +1,11 @@
 //! The frame of pictures: how wide they are, where names of rows stand, and the axis from left to right.
 
+use std::collections::BTreeMap;
+
 use maud::{Markup, html};
 
 use crate::data::{Axis, Plan};
-use crate::scale::{Scale, number, px, width};
+use crate::scale::{Scale, number, px, range, width};
 
 /// The margin at the right.
 pub(crate) const RIGHT: f64 = 16.0;
@@ -78,6 +80,8 @@ pub(crate) struct Span {
     steps: usize,
     /// The latest end.
     until: f64,
+    /// The least and the greatest value of each number, bounds included.
+    values: BTreeMap<String, (f64, f64)>,
 }
 
 impl Span {
@@ -85,8 +89,25 @@ impl Span {
         Self {
             steps: plans.iter().map(|plan| plan.steps.len()).max().unwrap_or_default(),
             until: plans.iter().map(|plan| end(plan)).fold(0.0, f64::max),
+            values: values(plans),
         }
     }
+
+    /// The range of a number in all plans.
+    pub(crate) fn values(&self, name: &str) -> (f64, f64) {
+        self.values.get(name).copied().unwrap_or((0.0, 1.0))
+    }
+}
+
+/// The range of each number of some plans.
+fn values(plans: &[&Plan]) -> BTreeMap<String, (f64, f64)> {
+    let mut all: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    for curve in plans.iter().flat_map(|plan| &plan.curves) {
+        let values = curve.points.iter().map(|(_, value)| *value);
+        let values = values.chain(curve.bounds.iter().map(|bound| bound.value));
+        all.entry(curve.name.clone()).or_default().extend(values);
+    }
+    all.into_iter().map(|(name, values)| (name, range(values))).collect()
 }
 
 /// Where a plan ends on its axis.

@@ -307,6 +307,16 @@ fn before_and_after_share_one_axis() {
     let (before, after) = (ticks("before"), ticks("after"));
     assert_eq!(before.len(), 2, "a timeline and a number");
     assert_eq!(before, after, "the same numbers at the same places");
+    // The number falls to 98 in one plan and to 86 in the other: both are drawn on the range of both.
+    let values = |plan: &str| -> Vec<String> {
+        let section = page.split(&format!("data-plan=\"{plan}\"")).nth(1).expect("a plan");
+        let picture = section.split("number-1-1-title").nth(2).and_then(|rest| rest.split("</svg>").next());
+        let ends = picture.expect("a picture").split("text-anchor=\"end\">").skip(1);
+        let texts = ends.filter_map(|rest| rest.split('<').next());
+        texts.filter(|text| text.parse::<f64>().is_ok()).map(str::to_owned).collect()
+    };
+    assert!(values("before").len() > 2, "{:?}", values("before"));
+    assert_eq!(values("before"), values("after"), "one scale upwards");
     assert!(before[0] == before[1], "one axis for timeline and numbers");
     let last = after[0].last().expect("ticks");
     assert_eq!(last.0, "800", "of 840");

@@ -161,7 +161,7 @@ fn page(
         (name, _) => name.to_owned(),
     };
     let compared = before.as_ref().map(|(old, was)| {
-        changes((&old.mission, &was.plan), (&setup.mission, &answer.plan), [was.cost(), answer.cost()])
+        changes((&old.mission, &was.plan), (&setup.mission, &answer.plan), &[was.cost(), answer.cost()])
     });
     Report {
         name,

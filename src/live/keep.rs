@@ -36,11 +36,12 @@ pub(super) fn design_key(design: &str) -> String {
 pub(super) fn keys(answer: &str) -> Vec<String> {
     let Ok(about) = serde_json::from_str::<About>(answer) else { return Vec::new() };
     match about.answer.as_ref() {
-        // A plan that is found, lost or kept: lines on all three are repeated in their order, since the cost of a kept plan is in the first.
-        kind @ ("plan_found" | "plan_none" | "plan_kept") => vec![kind.to_owned()],
         "request_action" | "goal_reached" => vec!["action".to_owned()],
         "suspend_action" | "resume_action" | "cancel_action" => vec!["suspension".to_owned()],
-        kind @ ("ready" | "contradicted" | "unconcluded") => vec![kind.to_owned()],
+        // A plan that is found, lost or kept: lines on all three are repeated in their order, since the cost of a kept plan is in the first.
+        kind @ ("plan_found" | "plan_none" | "plan_kept" | "ready" | "contradicted" | "unconcluded") => {
+            vec![kind.to_owned()]
+        }
         "reconfigure" => about.function.map(|function| format!("function {function}")).into_iter().collect(),
         "inferred" => {
             let designs = about.designs.iter().map(|own| design_key(&own.design));

@@ -24,7 +24,7 @@ pub enum Cost {
 }
 
 /// From causes to effects: what is reported, what the task is, which designs that makes available, and what the plan costs.
-pub fn changes(before: (&Mission, &Plan), after: (&Mission, &Plan), costs: [Cost; 2]) -> Vec<Change> {
+pub fn changes(before: (&Mission, &Plan), after: (&Mission, &Plan), costs: &[Cost; 2]) -> Vec<Change> {
     let mut changes = Vec::new();
     let mut say = |text: String| changes.push(Change { text, because: Vec::new() });
     differences(&components(before.0), &components(after.0), UNSAID).into_iter().for_each(&mut say);
@@ -120,8 +120,8 @@ fn designs(before: &Mission, after: &Mission) -> Vec<Change> {
 }
 
 /// How the plans differ.
-fn plans(before: &Plan, after: &Plan, costs: [Cost; 2]) -> Vec<String> {
-    let text = match &costs {
+fn plans(before: &Plan, after: &Plan, costs: &[Cost; 2]) -> Vec<String> {
+    let text = match costs {
         [Cost::Of(old), Cost::Of(new)] => return both(before, after, [old, new]),
         [Cost::Of(old), Cost::NoPlan] => format!("There is no plan now. The plan before costs {old}."),
         [Cost::Of(old), Cost::NotFound] => format!("No plan was found now. The plan before costs {old}."),
@@ -158,7 +158,7 @@ fn both(before: &Plan, after: &Plan, [old_cost, new_cost]: [&str; 2]) -> Vec<Str
     texts
 }
 
-/// How many steps of a plan are also in the plan before, each as often as it is in both.
+/// How many actions of a plan are also in the plan before, each as often as it is in both; with which designs, does not count here.
 fn kept(before: &Plan, after: &Plan) -> String {
     let mut old: Vec<&str> = before.steps.iter().map(|step| step.label.as_str()).collect();
     let in_both = after.steps.iter().filter(|step| {
@@ -166,14 +166,12 @@ fn kept(before: &Plan, after: &Plan) -> String {
         found.map(|position| old.swap_remove(position)).is_some()
     });
     let (kept, new, old) = (in_both.count(), after.steps.len(), before.steps.len());
-    let plural = |count: usize| if count == 1 { "1 step".to_owned() } else { format!("{count} steps") };
-    match new {
-        0 => format!("The plan has no steps now; it had {} before.", plural(old)),
-        _ => {
-            let are = if kept == 1 || new == 1 { "is" } else { "are" };
-            format!("{kept} of {} {are} also in the plan before, which has {}.", plural(new), plural(old))
-        }
+    let plural = |count: usize| if count == 1 { "1 action".to_owned() } else { format!("{count} actions") };
+    if new == 0 {
+        return format!("The plan has no actions now; it had {} before.", plural(old));
     }
+    let are = if kept == 1 || new == 1 { "is" } else { "are" };
+    format!("{kept} of {} {are} also in the plan before, which has {}.", plural(new), plural(old))
 }
 
 #[cfg(test)]
@@ -187,7 +185,7 @@ mod tests {
         Plan { steps: steps.collect(), ..Plan::default() }
     }
 
-    fn check(before: &[&str], after: &[&str], costs: [Cost; 2], expected: &[&str]) {
+    fn check(before: &[&str], after: &[&str], costs: &[Cost; 2], expected: &[&str]) {
         assert_eq!(plans(&plan(before), &plan(after), costs), expected, "{before:?} {after:?}");
     }
 
@@ -198,38 +196,49 @@ mod tests {
         check(
             &[there, back, there, back],
             &[there, there, there],
-            [of("4"), of("3")],
+            &[of("4"), of("3")],
             &[
                 "The plan costs 3 now, 4 before.",
-                "2 of 3 steps are also in the plan before, which has 4 steps.",
+                "2 of 3 actions are also in the plan before, which has 4 actions.",
             ],
         );
         check(
             &[there],
             &[there, back],
-            [of("4"), of("4")],
-            &["The plan costs 4, as before.", "1 of 2 steps is also in the plan before, which has 1 step."],
+            &[of("4"), of("4")],
+            &[
+                "The plan costs 4, as before.",
+                "1 of 2 actions is also in the plan before, which has 1 action.",
+            ],
         );
         check(
             &[back],
             &[there],
-            [of("1"), of("2")],
-            &["The plan costs 2 now, 1 before.", "0 of 1 step is also in the plan before, which has 1 step."],
+            &[of("1"), of("2")],
+            &[
+                "The plan costs 2 now, 1 before.",
+                "0 of 1 action is also in the plan before, which has 1 action.",
+            ],
         );
         check(
             &[back],
             &[],
-            [of("1"), of("0")],
-            &["The plan costs 0 now, 1 before.", "The plan has no steps now; it had 1 step before."],
+            &[of("1"), of("0")],
+            &["The plan costs 0 now, 1 before.", "The plan has no actions now; it had 1 action before."],
         );
-        check(&[there], &[], [of("4"), Cost::NoPlan], &["There is no plan now. The plan before costs 4."]);
-        check(&[there], &[], [of("4"), Cost::NotFound], &["No plan was found now. The plan before costs 4."]);
-        check(&[], &[there], [Cost::NoPlan, of("4")], &["The plan costs 4 now. Before, there was no plan."]);
-        check(&[], &[], [Cost::NoPlan, Cost::NoPlan], &["There is no plan now, and there was none before."]);
+        check(&[there], &[], &[of("4"), Cost::NoPlan], &["There is no plan now. The plan before costs 4."]);
+        check(
+            &[there],
+            &[],
+            &[of("4"), Cost::NotFound],
+            &["No plan was found now. The plan before costs 4."],
+        );
+        check(&[], &[there], &[Cost::NoPlan, of("4")], &["The plan costs 4 now. Before, there was no plan."]);
+        check(&[], &[], &[Cost::NoPlan, Cost::NoPlan], &["There is no plan now, and there was none before."]);
         check(
             &[],
             &[],
-            [Cost::NoPlan, Cost::NotFound],
+            &[Cost::NoPlan, Cost::NotFound],
             &["No plan was found now, and there was none before."],
         );
     }

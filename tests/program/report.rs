@@ -140,11 +140,9 @@ fn simulations_that_fail_say_so_and_figures_are_rounded() {
         std::fs::read_to_string(&file).expect("a page")
     };
     let failed = simulated("missions/ugv.toml", "kinect_at_wp2", &["none"]);
-    for text in [
-        "None of the 3 missions was accomplished.",
-        ">0 of 3 accomplished<",
-        "<td>none accomplished</td>",
-    ] {
+    for text in
+        ["None of the 3 missions was accomplished.", ">0 of 3 accomplished<", "<td>none accomplished</td>"]
+    {
         assert!(failed.contains(text), "{text}");
     }
     let mixed = simulated("missions/ugv.toml", "kinect_comes_and_goes", &[]);
