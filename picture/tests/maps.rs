@@ -237,7 +237,7 @@ fn no_number_of_a_random_walk_stands_at_another_arrow() {
         let positions: Vec<Option<Point>> =
             (0..count).map(|_| Some((random(12) as f64, random(8) as f64))).collect();
         let mut at = 0;
-        let moves: Vec<(usize, usize)> = (0..1 + random(20))
+        let moves: Vec<(usize, usize)> = (0..=random(19))
             .map(|_| {
                 let from = at;
                 at = random(count);

@@ -126,7 +126,8 @@ fn ways_to_and_fro_and_the_later_half_of_a_plan_can_be_seen() {
     let mut expected: Vec<String> = ways.into_values().map(|steps| steps.join(",")).collect();
     let shown = alone["numbers"].as_array().expect("numbers").iter();
     let mut shown: Vec<String> = shown.filter_map(Value::as_str).map(str::to_owned).collect();
-    (shown.sort(), expected.sort());
+    shown.sort();
+    expected.sort();
     assert_eq!(shown, expected);
     let pair = check(&browser, "beside each other", &page(&[GREENHOUSE, "--scenario", "gusts"]));
     let axis = pair["axis"].as_array().expect("numbers of the axis");

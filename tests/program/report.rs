@@ -134,7 +134,7 @@ fn simulations_that_fail_say_so_and_figures_are_rounded() {
     let simulated = |mission: &str, scenario: &str, strategies: &[&str]| {
         let mut all =
             vec!["simulate", mission, "--scenario", scenario, "--runs", "3", "--report", &file, "-q"];
-        strategies.iter().for_each(|name| all.extend(["--strategy", name]));
+        all.extend(strategies.iter().flat_map(|name| ["--strategy", *name]));
         let outcome = metaplan(&all);
         assert_eq!(outcome.status, 0, "{outcome:?}");
         std::fs::read_to_string(&file).expect("a page")
@@ -399,7 +399,8 @@ fn pictures_of_all_answers_are_files() {
             let mut points: Vec<&str> =
                 document.descendants().filter_map(|node| node.attribute("data-point")).collect();
             let all = points.len();
-            (points.sort_unstable(), points.dedup());
+            points.sort_unstable();
+            points.dedup();
             assert_eq!(points.len(), all, "{file}: each point has a name of its own");
         }
     }
