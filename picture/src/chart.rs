@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use crate::data::{Curve, Plan, Progress};
-use crate::frame::{Frame, LEFT, RIGHT, Room};
+use crate::frame::{Canvas, Frame, RIGHT, Span};
 use crate::scale::{Scale, compact, fit, number, px, range};
 use crate::svg::Picture;
 
@@ -11,10 +11,10 @@ const HEIGHT: f64 = 110.0;
 const TOP: f64 = 10.0;
 
 /// Draws one number over a plan.
-pub(crate) fn curve(plan: &Plan, curve: &Curve, room: &Room) -> Picture {
-    let frame = Frame::of(plan, room);
-    let values = curve.points.iter().map(|(_, value)| *value);
-    let scale = vertical(values.chain(curve.bounds.iter().map(|bound| bound.value)));
+pub(crate) fn curve(plan: &Plan, curve: &Curve, span: &Span, canvas: Canvas) -> Picture {
+    let frame = Frame::of(plan, span, canvas);
+    let top = TOP + canvas.name_height();
+    let scale = vertical(top, span.values(&curve.name));
     let mut points: Vec<(f64, f64)> = Vec::new();
     for (at, value) in &curve.points {
         let (x, y) = (frame.scale.at(*at), scale.at(*value));
@@ -35,11 +35,14 @@ pub(crate) fn curve(plan: &Plan, curve: &Curve, room: &Room) -> Picture {
     let description =
         format!("{} values, {} bounds that conditions set", curve.points.len(), curve.bounds.len());
     let body = html! {
-        (frame.axis(TOP, TOP + HEIGHT))
-        (values_axis(&scale, frame.width))
-        text class="label" x=(px(LEFT - 58.0)) y=(px(TOP + HEIGHT / 2.0 + 4.0)) text-anchor="end" {
+        (frame.axis(top, top + HEIGHT))
+        (values_axis(&scale, (canvas.left, frame.width - RIGHT)))
+        @let place = canvas.name_place(top, top + HEIGHT / 2.0 + 4.0);
+        // The numbers of the axis stand between a name at the left and the curve.
+        @let aside = if canvas.has_names_above { 0.0 } else { 48.0 };
+        text class="label" x=(px(place.x - aside)) y=(px(place.y)) text-anchor=(place.anchor) {
             title { (curve.name) }
-            (fit(&curve.name, LEFT - 60.0))
+            (fit(&curve.name, place.room - aside))
         }
         @for bound in &curve.bounds {
             @let (from, to, y) = (frame.scale.at(bound.from), frame.scale.at(bound.to), scale.at(bound.value));
@@ -55,16 +58,16 @@ pub(crate) fn curve(plan: &Plan, curve: &Curve, room: &Room) -> Picture {
             }
         }
     };
-    Picture { width: frame.width, height: TOP + HEIGHT + 24.0, title, description, body }
+    Picture { width: frame.width, height: top + HEIGHT + 24.0, title, description, body }
 }
 
 /// Draws how a search went, by its messages: times differ from run to run, and what was found does not.
-pub(crate) fn search(search: &[Progress], room: f64) -> Picture {
-    let width = LEFT + room + RIGHT;
+pub(crate) fn search(search: &[Progress], canvas: Canvas) -> Picture {
+    let (left, right) = (canvas.left, canvas.width - RIGHT);
     let costs = search.iter().filter_map(|moment| moment.cost);
-    let scale = vertical(costs.chain(search.iter().map(|moment| moment.lower_bound)));
+    let scale = vertical(TOP, range(costs.chain(search.iter().map(|moment| moment.lower_bound))));
     let last = search.len().saturating_sub(1).max(1);
-    let along = Scale::new((0.0, last as f64), (LEFT, LEFT + room));
+    let along = Scale::new((0.0, last as f64), (left, right));
     let line = |value: &dyn Fn(&Progress) -> Option<f64>| {
         let mut text = String::new();
         let mut before = None;
@@ -81,7 +84,7 @@ pub(crate) fn search(search: &[Progress], room: f64) -> Picture {
         "The cost of the best plan falls, the lower bound rises; where they meet, the plan is optimal."
             .to_owned();
     let body = html! {
-        (values_axis(&scale, width))
+        (values_axis(&scale, (left, right)))
         path class="cost" d=(line(&|moment| moment.cost)) {}
         path class="least" d=(line(&|moment| Some(moment.lower_bound))) {}
         @for (index, moment) in search.iter().enumerate() {
@@ -94,26 +97,25 @@ pub(crate) fn search(search: &[Progress], room: f64) -> Picture {
                 }
             }
         }
-        text class="label cost" x=(px(LEFT)) y=(px(TOP + HEIGHT + 19.0)) { "● cost of the best plan" }
-        text class="label least" x=(px(LEFT + 240.0)) y=(px(TOP + HEIGHT + 19.0)) { "● lower bound" }
+        text class="label cost" x=(px(left)) y=(px(TOP + HEIGHT + 19.0)) { "● cost of the best plan" }
+        text class="label least" x=(px(left + 168.0)) y=(px(TOP + HEIGHT + 19.0)) { "● lower bound" }
     };
-    Picture { width, height: TOP + HEIGHT + 26.0, title, description, body }
+    Picture { width: canvas.width, height: TOP + HEIGHT + 26.0, title, description, body }
 }
 
-/// A scale for these values, larger ones higher.
-fn vertical(values: impl Iterator<Item = f64>) -> Scale {
-    let (low, high) = range(values);
+/// A scale for a range of values, larger ones higher.
+fn vertical(top: f64, (low, high): (f64, f64)) -> Scale {
     let margin = (high - low) * 0.05;
-    Scale::new((low - margin, high + margin), (TOP + HEIGHT, TOP))
+    Scale::new((low - margin, high + margin), (top + HEIGHT, top))
 }
 
-fn values_axis(scale: &Scale, width: f64) -> Markup {
+fn values_axis(scale: &Scale, (left, right): (f64, f64)) -> Markup {
     html! {
         g class="axis" {
             @for tick in scale.ticks(4) {
                 @let y = scale.at(tick);
-                line class="grid" x1=(px(LEFT)) x2=(px(width - RIGHT)) y1=(px(y)) y2=(px(y)) {}
-                text x=(px(LEFT - 6.0)) y=(px(y + 4.0)) text-anchor="end" { (compact(tick)) }
+                line class="grid" x1=(px(left)) x2=(px(right)) y1=(px(y)) y2=(px(y)) {}
+                text x=(px(left - 6.0)) y=(px(y + 4.0)) text-anchor="end" { (compact(tick)) }
             }
         }
     }

@@ -1,36 +1,113 @@
-//! What the pictures over a plan share: their width, the axis from left to right, and its labels.
+//! The frame of pictures: how wide they are, where names of rows stand, and the axis from left to right.
+
+use std::collections::BTreeMap;
 
 use maud::{Markup, html};
 
 use crate::data::{Axis, Plan};
-use crate::scale::{Scale, number, px, width};
+use crate::scale::{Scale, number, px, range, width};
 
-/// Where what is drawn begins, in pixels: before it stand labels.
-pub(crate) const LEFT: f64 = 170.0;
-/// What stays free at the right.
+/// The margin at the right.
 pub(crate) const RIGHT: f64 = 16.0;
 /// The greatest width of what is drawn.
 const WIDEST: f64 = 16_000.0;
-/// How wide what is drawn is at least: in a file, in a page, and beside another one in a page.
-pub(crate) const FILE: f64 = 640.0;
-pub(crate) const PAGE: f64 = 960.0;
-pub(crate) const HALF: f64 = 380.0;
-/// So many pixels for a step, if there is room.
-const STEP: f64 = 60.0;
+/// The height of a name above its row.
+const NAME: f64 = 14.0;
 
-/// What plans that stand beside each other share: how wide they are drawn, and what their axes run to.
-pub(crate) struct Room {
-    inner: f64,
-    until: f64,
+/// The paper of a picture. All lengths are in pixels.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Canvas {
+    /// The width of the picture, if it does not have to be wider.
+    pub(crate) width: f64,
+    /// Where what is drawn begins: the numbers of axes are left of it.
+    pub(crate) left: f64,
+    /// Names of rows stand above them in place of left of them, which leaves more of the width.
+    pub(crate) has_names_above: bool,
+    /// The least width of a step of a plan.
+    pub(crate) step: f64,
+    /// The least distance of neighbouring places of a map.
+    pub(crate) apart: f64,
 }
 
-impl Room {
-    /// Room for some plans, at least so wide.
-    pub(crate) fn of(plans: &[&Plan], least: f64) -> Self {
-        let steps = plans.iter().map(|plan| plan.steps.len()).max().unwrap_or_default();
-        let inner = (steps as f64 * STEP).max(least).min(WIDEST.max(least));
-        Self { inner, until: plans.iter().map(|plan| end(plan)).fold(0.0, f64::max) }
+/// A picture in a file of its own.
+pub(crate) const FILE: Canvas =
+    Canvas { width: 826.0, left: 170.0, has_names_above: false, step: 60.0, apart: 46.0 };
+/// Pictures in a page, the widest first: the first that fits its column is shown. `page.css` has the same widths.
+pub(crate) const PAGE: [Canvas; 3] = [WIDE, COLUMN, TELEPHONE];
+/// Pictures of two plans beside each other in a page.
+pub(crate) const PAIR: [Canvas; 2] = [COLUMN, TELEPHONE];
+/// The whole width of a page.
+const WIDE: Canvas = Canvas { width: 1146.0, left: 170.0, has_names_above: false, step: 4.0, apart: 20.0 };
+/// Half of that.
+const COLUMN: Canvas = Canvas { width: 560.0, left: 60.0, has_names_above: true, step: 4.0, apart: 20.0 };
+/// A telephone held upright.
+const TELEPHONE: Canvas = Canvas { width: 328.0, left: 60.0, has_names_above: true, step: 4.0, apart: 20.0 };
+
+impl Canvas {
+    /// The width between the margins.
+    pub(crate) fn inner(&self) -> f64 {
+        self.width - self.left - RIGHT
     }
+
+    /// The height that a name above its row takes.
+    pub(crate) fn name_height(&self) -> f64 {
+        if self.has_names_above { NAME } else { 0.0 }
+    }
+
+    /// Where the name of a row stands: its end left of the row, whose base line is given, or its start above the row.
+    pub(crate) fn name_place(&self, top: f64, base: f64) -> NamePlace {
+        if self.has_names_above {
+            NamePlace { x: self.left, y: top - 4.0, anchor: "start", room: self.inner() }
+        } else {
+            NamePlace { x: self.left - 10.0, y: base, anchor: "end", room: self.left - 14.0 }
+        }
+    }
+}
+
+/// A place for the name of a row.
+pub(crate) struct NamePlace {
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+    /// Which end of the text is there.
+    pub(crate) anchor: &'static str,
+    /// The width of the longest name.
+    pub(crate) room: f64,
+}
+
+/// What the axes of plans beside each other share, so that one scale serves all of them.
+pub(crate) struct Span {
+    /// The number of steps of the plan that has most.
+    steps: usize,
+    /// The latest end.
+    until: f64,
+    /// The least and the greatest value of each number, bounds included.
+    values: BTreeMap<String, (f64, f64)>,
+}
+
+impl Span {
+    pub(crate) fn of(plans: &[&Plan]) -> Self {
+        Self {
+            steps: plans.iter().map(|plan| plan.steps.len()).max().unwrap_or_default(),
+            until: plans.iter().map(|plan| end(plan)).fold(0.0, f64::max),
+            values: values(plans),
+        }
+    }
+
+    /// The range of a number in all plans.
+    pub(crate) fn values(&self, name: &str) -> (f64, f64) {
+        self.values.get(name).copied().unwrap_or((0.0, 1.0))
+    }
+}
+
+/// The range of each number of some plans.
+fn values(plans: &[&Plan]) -> BTreeMap<String, (f64, f64)> {
+    let mut all: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    for curve in plans.iter().flat_map(|plan| &plan.curves) {
+        let values = curve.points.iter().map(|(_, value)| *value);
+        let values = values.chain(curve.bounds.iter().map(|bound| bound.value));
+        all.entry(curve.name.clone()).or_default().extend(values);
+    }
+    all.into_iter().map(|(name, values)| (name, range(values))).collect()
 }
 
 /// Where a plan ends on its axis.
@@ -40,6 +117,7 @@ fn end(plan: &Plan) -> f64 {
 
 /// The axis of a plan.
 pub(crate) struct Frame {
+    pub(crate) canvas: Canvas,
     pub(crate) scale: Scale,
     /// Where the plan ends.
     pub(crate) end: f64,
@@ -51,27 +129,29 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    pub(crate) fn of(plan: &Plan, room: &Room) -> Self {
+    pub(crate) fn of(plan: &Plan, span: &Span, canvas: Canvas) -> Self {
         let label = match plan.axis {
             Axis::Time => "time",
             Axis::Steps => "step",
         };
-        let scale = Scale::new((0.0, room.until), (LEFT, LEFT + room.inner));
-        Self { scale, end: end(plan), until: room.until, width: LEFT + room.inner + RIGHT, label }
+        let inner = (span.steps as f64 * canvas.step).min(WIDEST).max(canvas.inner());
+        let scale = Scale::new((0.0, span.until), (canvas.left, canvas.left + inner));
+        let width = canvas.left + inner + RIGHT;
+        Self { canvas, scale, end: end(plan), until: span.until, width, label }
     }
 
     /// The axis below everything, with lines up to `top`.
     pub(crate) fn axis(&self, top: f64, bottom: f64) -> Markup {
         let widest = width(&number(self.until)) + 24.0;
-        let most = ((self.width - LEFT - RIGHT) / widest.max(60.0)) as usize;
+        let most = ((self.width - self.canvas.left - RIGHT) / widest.max(60.0)) as usize;
         html! {
             g class="axis" {
                 @for tick in self.scale.ticks(most.clamp(2, 200)) {
-                    @let x = px(self.scale.at(tick));
-                    line class="grid" x1=(x) x2=(x) y1=(px(top)) y2=(px(bottom)) {}
-                    text x=(x) y=(px(bottom + 15.0)) text-anchor="middle" { (number(tick)) }
+                    @let (x, text) = (self.scale.at(tick), number(tick));
+                    line class="grid" x1=(px(x)) x2=(px(x)) y1=(px(top)) y2=(px(bottom)) {}
+                    text x=(px(x.min(self.width - width(&text) / 2.0))) y=(px(bottom + 15.0)) text-anchor="middle" { (text) }
                 }
-                text x=(px(LEFT - 20.0)) y=(px(bottom + 15.0)) text-anchor="end" { (self.label) }
+                text x=(px(self.canvas.left - 20.0)) y=(px(bottom + 15.0)) text-anchor="end" { (self.label) }
             }
         }
     }

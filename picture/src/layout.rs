@@ -143,9 +143,43 @@ fn turned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     turned
 }
 
+/// Moves points that are at one position, or nearer to each other than `same`, to a ring around it, at least `apart` from each other. All other points stay
+/// where they are.
+pub(crate) fn spread(points: &mut [(f64, f64)], same: f64, apart: f64) {
+    let mut groups: Vec<((f64, f64), Vec<usize>)> = Vec::new();
+    for (index, (x, y)) in points.iter().enumerate() {
+        match groups.iter_mut().find(|((gx, gy), _)| (gx - x).hypot(gy - y) < same) {
+            Some((_, group)) => group.push(index),
+            None => groups.push(((*x, *y), vec![index])),
+        }
+    }
+    for ((x, y), group) in groups.iter().filter(|(_, group)| group.len() > 1) {
+        let part = std::f64::consts::PI / group.len() as f64;
+        let radius = apart / 2.0 / part.sin();
+        for (index, number) in group.iter().zip(0..) {
+            let (sin, cos) = (2.0 * part * f64::from(number) + std::f64::consts::PI).sin_cos();
+            points[*index] = (x + radius * cos, y + radius * sin);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::layout;
+    use super::{layout, spread};
+
+    #[test]
+    fn points_at_one_position_are_spread_and_others_stay() {
+        let mut points = vec![(0.0, 0.0), (100.0, 0.0), (0.0, 0.0), (3.0, 0.0), (0.0, 0.0), (0.0, 0.0)];
+        spread(&mut points, 4.0, 18.0);
+        assert_eq!(points[1], (100.0, 0.0));
+        for one in 0..points.len() {
+            for other in 0..one {
+                let (a, b) = (points[one], points[other]);
+                assert!((a.0 - b.0).hypot(a.1 - b.1) > 17.9, "{one} {other}: {points:?}");
+            }
+            assert!(points[one].0.hypot(points[one].1) < 60.0 || one == 1, "{points:?}");
+        }
+    }
 
     /// The ways of a grid.
     fn grid(side: usize) -> Vec<(usize, usize)> {

@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 use maud::{Markup, html};
 
 use crate::data::{Happening, Kind, Log};
-use crate::frame::{LEFT, RIGHT};
+use crate::frame::{Canvas, PAGE, RIGHT};
 use crate::page::{page, reasons, shown, table};
 use crate::scale::{Scale, number, px, width};
 use crate::svg::Picture;
 
-/// How wide the axis is, in pixels.
-const ACROSS: f64 = 960.0;
+/// The names of lanes are no wider than this, in pixels.
+const NAMES: f64 = 90.0;
 /// The height of a lane.
 const LANE: f64 = 24.0;
 const TOP: f64 = 6.0;
@@ -31,7 +31,7 @@ impl Log {
             ul { @for part in &self.parts { li { (part) } } }
             @for message in &self.messages { p class="bad" { (message) } }
             h2 { "What happened" }
-            (shown(&self.picture(), "log"))
+            (shown("log", &PAGE, &|canvas| self.picture(canvas)))
             p class="dim" { "A mark may stand for several happenings that lie close together; the list has each of them." }
             h2 { "One after another" }
             @let listed: Vec<&Happening> = self.listed();
@@ -48,7 +48,7 @@ impl Log {
 
     /// The picture of the page as a file.
     pub fn svg(&self) -> String {
-        self.picture().file()
+        self.picture(PAGE[0]).file()
     }
 
     /// What stands in the list, in the order of time.
@@ -63,12 +63,13 @@ impl Log {
         chosen.into_iter().map(|index| &self.happenings[index]).collect()
     }
 
-    fn picture(&self) -> Picture {
+    fn picture(&self, canvas: Canvas) -> Picture {
         let last = self.happenings.last().map_or(0.0, |own| own.time);
-        let scale = Scale::new((0.0, last), (LEFT, LEFT + ACROSS));
+        let (left, right) = (canvas.left.max(NAMES), canvas.width - RIGHT);
+        let scale = Scale::new((0.0, last), (left, right));
         let lanes = Kind::ALL.map(|kind| (kind, self.marks(kind, &scale)));
         let bottom = TOP + LANE * lanes.len() as f64;
-        let ticks = scale.ticks((ACROSS / (width(&number(last)) + 24.0).max(60.0)) as usize);
+        let ticks = scale.ticks(((right - left) / (width(&number(last)) + 24.0).max(60.0)) as usize);
         let body = html! {
             g class="axis" {
                 @for tick in ticks {
@@ -76,15 +77,15 @@ impl Log {
                     line class="grid" x1=(x) x2=(x) y1=(px(TOP)) y2=(px(bottom)) {}
                     text x=(x) y=(px(bottom + 15.0)) text-anchor="middle" { (number(tick)) }
                 }
-                text x=(px(LEFT - 20.0)) y=(px(bottom + 15.0)) text-anchor="end" { "seconds" }
+                text x=(px(left - 20.0)) y=(px(bottom + 15.0)) text-anchor="end" { "seconds" }
             }
             @for ((kind, marks), lane) in lanes.iter().zip(0..) {
-                (draw(*kind, marks, TOP + LANE * f64::from(lane)))
+                (draw(*kind, marks, (left, right), TOP + LANE * f64::from(lane)))
             }
         };
         let title = format!("{} happenings in {} seconds", self.happenings.len(), number(last));
         let description = "A lane for each kind of happening. The list says the same.".to_owned();
-        Picture { width: LEFT + ACROSS + RIGHT, height: bottom + 24.0, title, description, body }
+        Picture { width: canvas.width, height: bottom + 24.0, title, description, body }
     }
 
     /// The happenings of a kind by where they are drawn.
@@ -97,11 +98,11 @@ impl Log {
     }
 }
 
-fn draw(kind: Kind, marks: &BTreeMap<i64, Vec<&Happening>>, top: f64) -> Markup {
+fn draw(kind: Kind, marks: &BTreeMap<i64, Vec<&Happening>>, (left, right): (f64, f64), top: f64) -> Markup {
     html! {
         g class="lane" data-lane=(kind.name()) {
-            rect class="track" x=(px(LEFT)) y=(px(top + 1.0)) width=(px(ACROSS)) height=(px(LANE - 2.0)) {}
-            text class="label" x=(px(LEFT - 10.0)) y=(px(top + 16.0)) text-anchor="end" { (kind.name()) }
+            rect class="track" x=(px(left)) y=(px(top + 1.0)) width=(px(right - left)) height=(px(LANE - 2.0)) {}
+            text class="label" x=(px(left - 10.0)) y=(px(top + 16.0)) text-anchor="end" { (kind.name()) }
             @for (place, own) in marks {
                 g class="bar" {
                     title { (titled(own)) }

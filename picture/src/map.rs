@@ -1,60 +1,99 @@
 //! The places of a mission, the ways between them, and the way that a plan takes, coloured by configuration.
+//!
+//! Ways there and back lie beside each other, each with an arrow and, at the outer side of the arrow, the numbers of its steps.
 
 use std::collections::BTreeMap;
 
 use maud::{Markup, html};
 
 use crate::data::{Map, Plan};
-use crate::layout::layout;
+use crate::frame::Canvas;
+use crate::layout::{layout, spread};
 use crate::palette::{Palette, configuration};
 use crate::scale::{px, range, width};
 use crate::svg::Picture;
 
-/// The greatest width of a map without its margins, and the least height.
-const WIDTH: f64 = 780.0;
-const LEAST_HEIGHT: f64 = 60.0;
+/// The margins at the sides of a map, which hold names of places: of the width, and at most.
 const MARGIN: f64 = 70.0;
-/// Two places that are next to each other lie so far apart at least, if the map is not too large for that.
-const APART: f64 = 46.0;
+const MARGIN_PART: f64 = 0.12;
+/// The margins above and below.
+const UPPER_MARGIN: f64 = 35.0;
+/// The least height of a map without its margins, and the greatest one that it is scaled to.
+const LEAST_HEIGHT: f64 = 60.0;
+const HEIGHT: f64 = 420.0;
+/// Neighbouring places do not lie further apart than this, so that small maps stay small.
+const FARTHEST: f64 = 130.0;
 const LARGEST: f64 = 4_000.0;
 /// The radius of a place.
 const RADIUS: f64 = 7.0;
 /// The height of a label.
 const LINE: f64 = 13.0;
+/// The distance of a move from the middle of its way: there and back lie on different sides.
+const ASIDE: f64 = 2.5;
+/// An arrow from its middle to its tip and to its sides.
+const TIP: f64 = 7.0;
+const SIDE: f64 = 6.0;
+/// The radius of the loop of a move that ends where it begins.
+const LOOP: f64 = 10.0;
+/// Places that are drawn nearer to each other than this are at one position.
+const SAME: f64 = 2.0;
+/// The margin that a loop needs.
+const LOOP_MARGIN: f64 = 58.0;
+/// The distance of names that have no room near their place.
+const FARTHER: f64 = 9.0;
+/// The length of a dash, where steps with several configurations take one way.
+const DASH: f64 = 9.0;
+
+type Point = (f64, f64);
 
 /// A rectangle that is taken: left, top, right, bottom.
 type Taken = (f64, f64, f64, f64);
 
 /// From one point to another.
-type Line = ((f64, f64), (f64, f64));
+type Line = (Point, Point);
+
+/// All moves of a plan from one place to another.
+struct Leg {
+    from: usize,
+    to: usize,
+    /// From 1.
+    steps: Vec<usize>,
+    /// The configuration of each step.
+    names: Vec<String>,
+    shape: Shape,
+}
+
+/// How a leg is drawn: a line, or a loop around `centre`, with an arrow on it.
+struct Shape {
+    line: Line,
+    centre: Option<Point>,
+    arrow: Point,
+    /// The direction of the arrow, of length 1.
+    along: Point,
+    /// The direction to the outer side, of length 1.
+    outwards: Point,
+}
 
 /// Draws a map with a plan's way.
-pub(crate) fn map(plan: &Plan, map: &Map, palette: &Palette) -> Picture {
-    let (points, drawing_width, drawing_height) = pixels(map);
-    let legs = legs(plan);
-    let mut taken: Vec<Taken> = points
-        .iter()
-        .map(|(x, y)| (x - RADIUS - 2.0, y - RADIUS - 2.0, x + RADIUS + 2.0, y + RADIUS + 2.0))
-        .collect();
-    let lines: Vec<Line> = map.ways.iter().map(|(one, other)| (points[*one], points[*other])).collect();
-    let limits = (2.0, 2.0, drawing_width - 2.0, drawing_height - 2.0);
-    // Places that matter most get their labels first.
-    let mut order: Vec<usize> = (0..points.len()).collect();
-    let is_used = |place: usize| legs.keys().any(|(from, to)| *from == place || *to == place);
-    let used: Vec<bool> = (0..points.len()).map(is_used).collect();
-    order.sort_by_key(|place| {
-        (!map.places[*place].is_start && !map.places[*place].is_goal, !used[*place], *place)
-    });
-    let mut labels: Vec<Option<(f64, f64)>> = vec![None; points.len()];
-    for place in order {
-        let ring = if map.places[place].is_start || map.places[place].is_goal { 4.0 } else { 0.0 };
-        let size = (RADIUS + 5.0 + ring, width(&map.places[place].name));
-        labels[place] = room(points[place], size, (limits, &lines), &mut taken);
-    }
-    let moves: usize = legs.values().map(|(steps, _)| steps.len()).sum();
+pub(crate) fn map(plan: &Plan, map: &Map, palette: &Palette, canvas: Canvas) -> Picture {
+    let has_loops = plan.steps.iter().any(|step| step.way.is_some_and(|(from, to)| from == to));
+    let (points, drawn_width, drawn_height) = pixels(map, canvas, has_loops);
+    let legs = legs(plan, map, &points);
+    let limits = (2.0, 2.0, drawn_width - 2.0, drawn_height - 2.0);
+    let ways = map.ways.iter().map(|(one, other)| (points[*one], points[*other]));
+    let lines: Vec<Line> = ways.chain(legs.iter().map(|leg| leg.shape.line)).collect();
+    let square = |(x, y): Point, half: f64| (x - half, y - half, x + half, y + half);
+    let dots = points.iter().map(|point| square(*point, RADIUS + 2.0));
+    let loops = legs.iter().filter_map(|leg| leg.shape.centre).map(|centre| square(centre, LOOP));
+    let arrows = legs.iter().map(|leg| square(leg.shape.arrow, SIDE));
+    let mut taken: Vec<Taken> = dots.chain(loops).chain(arrows).collect();
+    // Numbers have fewer places to stand than names, so that they come first.
+    let numbers: Vec<_> = legs.iter().map(|leg| number(leg, &legs, (limits, &lines), &mut taken)).collect();
+    let labels = names(map, &points, &legs, (limits, &lines), &mut taken);
+    let moves: usize = legs.iter().map(|leg| leg.steps.len()).sum();
     let title =
         format!("{} places, {} ways, and the {moves} moves of the plan", map.places.len(), map.ways.len());
-    let description = "A thick line is taken by the plan, in the colour of the configuration; its number is the step. A ring is \
+    let description = "A thick line is taken by the plan, in the colour of the configuration; the number at its arrow is the step. A ring is \
                        where it begins, a double ring where it is to end. The table of steps says the same."
         .to_owned();
     let body = html! {
@@ -62,9 +101,7 @@ pub(crate) fn map(plan: &Plan, map: &Map, palette: &Palette) -> Picture {
             @let ((x1, y1), (x2, y2)) = (points[*one], points[*other]);
             line class="way" data-way={ (map.places[*one].name) " " (map.places[*other].name) } x1=(px(x1)) y1=(px(y1)) x2=(px(x2)) y2=(px(y2)) {}
         }
-        @for ((from, to), (steps, name)) in &legs {
-            (leg((points[*from], points[*to]), steps, &palette.class(name), ((limits, &lines), &mut taken), &about(map, *from, *to, name)))
-        }
+        @for (leg, number) in legs.iter().zip(&numbers) { (draw_leg(leg, map, palette, *number)) }
         @for (index, place) in map.places.iter().enumerate() {
             @let (x, y) = points[index];
             g class="place" data-place=(place.name) {
@@ -78,59 +115,172 @@ pub(crate) fn map(plan: &Plan, map: &Map, palette: &Palette) -> Picture {
             }
         }
     };
-    Picture { width: drawing_width, height: drawing_height, title, description, body }
+    Picture { width: drawn_width, height: drawn_height, title, description, body }
 }
 
-/// For each pair of places the steps, from 1, that lead from the one to the other, and the configuration of the last.
-fn legs(plan: &Plan) -> BTreeMap<(usize, usize), (Vec<usize>, String)> {
-    let mut legs: BTreeMap<(usize, usize), (Vec<usize>, String)> = BTreeMap::new();
+/// The moves of a plan, one leg for each pair of places, in the order of the pairs.
+fn legs(plan: &Plan, map: &Map, points: &[Point]) -> Vec<Leg> {
+    let mut moves: BTreeMap<(usize, usize), (Vec<usize>, Vec<String>)> = BTreeMap::new();
     for (step, number) in plan.steps.iter().zip(1..) {
         if let Some(way) = step.way {
-            let leg = legs.entry(way).or_default();
-            leg.0.push(number);
-            leg.1 = configuration(step);
+            let (steps, names) = moves.entry(way).or_default();
+            steps.push(number);
+            names.push(configuration(step));
         }
     }
-    legs
+    let legs = moves.into_iter().map(|((from, to), (steps, names))| {
+        let shape = if from == to {
+            let neighbours =
+                map.ways.iter().filter_map(|(one, other)| match (*one == from, *other == from) {
+                    (true, false) => Some(points[*other]),
+                    (false, true) => Some(points[*one]),
+                    _ => None,
+                });
+            looped(points[from], &neighbours.collect::<Vec<_>>())
+        } else {
+            straight(points[from], points[to])
+        };
+        Leg { from, to, steps, names, shape }
+    });
+    legs.collect()
 }
 
-fn about(map: &Map, from: usize, to: usize, configuration: &str) -> String {
-    format!("from {} to {}: {configuration}", map.places[from].name, map.places[to].name)
-}
-
-/// Draws a move, with an arrow and the number of its first step beside it, if there is room.
-fn leg(
-    ((x1, y1), (x2, y2)): ((f64, f64), (f64, f64)),
-    steps: &[usize],
-    class: &str,
-    (free, taken): ((Taken, &[Line]), &mut Vec<Taken>),
-    about: &str,
-) -> Markup {
+/// A move between two points, on the right-hand side of its way.
+fn straight((x1, y1): Point, (x2, y2): Point) -> Shape {
     let length = (x2 - x1).hypot(y2 - y1).max(1e-6);
-    let (dx, dy) = ((x2 - x1) / length, (y2 - y1) / length);
-    // Ways there and back lie beside each other.
-    let (sx, sy) = (-dy * 2.5, dx * 2.5);
-    let (x, y) = (x1 + (x2 - x1) * 0.62 + sx, y1 + (y2 - y1) * 0.62 + sy);
-    let numbers: Vec<String> = steps.iter().take(3).map(ToString::to_string).collect();
-    let text = numbers.join(",") + if steps.len() > 3 { "…" } else { "" };
-    let middle = (x1 + (x2 - x1) * 0.38 + sx, y1 + (y2 - y1) * 0.38 + sy);
-    let label = room(middle, (RADIUS + 5.0, width(&text)), free, taken);
+    let along = ((x2 - x1) / length, (y2 - y1) / length);
+    let outwards = (-along.1, along.0);
+    let (sx, sy) = (outwards.0 * ASIDE, outwards.1 * ASIDE);
+    // Beyond the middle, so that the arrow of the way back is somewhere else, on short ways, too.
+    let part = (0.5 + TIP / length).clamp(0.62, 0.75);
+    let arrow = (x1 + (x2 - x1) * part + sx, y1 + (y2 - y1) * part + sy);
+    Shape { line: ((x1 + sx, y1 + sy), (x2 + sx, y2 + sy)), centre: None, arrow, along, outwards }
+}
+
+/// A move that ends where it begins: a loop at a side of the place without ways, above or below it if possible, where its numbers need least
+/// room.
+fn looped((x, y): Point, neighbours: &[Point]) -> Shape {
+    let diagonal = std::f64::consts::FRAC_1_SQRT_2;
+    let upright = [(0.0, -1.0), (0.0, 1.0)];
+    let slanted = [-diagonal, diagonal].map(|dy| [-diagonal, diagonal].map(|dx| (dx, dy))).concat();
+    let directions = upright.into_iter().chain(slanted).chain([(-1.0, 0.0), (1.0, 0.0)]);
+    let nearness = |(dx, dy): Point| {
+        let parts = neighbours
+            .iter()
+            .map(|(nx, ny)| ((nx - x) * dx + (ny - y) * dy) / (nx - x).hypot(ny - y).max(1e-6));
+        // What is at a right angle or more is far enough.
+        parts.fold(0.0, f64::max)
+    };
+    let best = directions.min_by(|one, other| nearness(*one).total_cmp(&nearness(*other)));
+    let (dx, dy) = best.unwrap_or((0.0, -1.0));
+    let centre = (x + dx * (RADIUS + LOOP), y + dy * (RADIUS + LOOP));
+    let arrow = (centre.0 + dx * LOOP, centre.1 + dy * LOOP);
+    Shape { line: (centre, arrow), centre: Some(centre), arrow, along: (-dy, dx), outwards: (dx, dy) }
+}
+
+/// The numbers of a leg, as text.
+fn numbers(leg: &Leg) -> String {
+    let numbers: Vec<String> = leg.steps.iter().take(3).map(ToString::to_string).collect();
+    numbers.join(",") + if leg.steps.len() > 3 { "…" } else { "" }
+}
+
+/// Where the numbers of a leg stand, as the left end of their base line: nearer to its own arrow than to all others, without touching what is
+/// there, and if possible no line. The place is taken then.
+fn number(
+    leg: &Leg,
+    legs: &[Leg],
+    (limits, lines): (Taken, &[Line]),
+    taken: &mut Vec<Taken>,
+) -> Option<Point> {
+    let Shape { arrow, along, outwards, .. } = leg.shape;
+    let (half_width, half_height) = (width(&numbers(leg)) / 2.0 + 1.0, LINE / 2.0 + 1.0);
+    let is_one_way = !legs.iter().any(|other| (other.from, other.to) == (leg.to, leg.from));
+    let sides: &[f64] = if is_one_way && leg.from != leg.to { &[1.0, -1.0] } else { &[1.0] };
+    let reach = outwards.0.abs() * half_width + outwards.1.abs() * half_height + SIDE + 1.0;
+    let offsets = sides.iter().flat_map(|side| {
+        [0.0, 6.0, 12.0, 20.0].into_iter().flat_map(move |more| {
+            [0.0, 6.0, 12.0, -6.0, 20.0, -12.0, 28.0, -18.0].map(|shift| (side * (reach + more), shift))
+        })
+    });
+    let centres = offsets.map(|(across, shift)| {
+        (arrow.0 + outwards.0 * across + along.0 * shift, arrow.1 + outwards.1 * across + along.1 * shift)
+    });
+    let is_own = |(x, y): &Point| {
+        let distance = |shape: &Shape| (shape.arrow.0 - x).hypot(shape.arrow.1 - y);
+        let own = distance(&leg.shape);
+        legs.iter().all(|other| std::ptr::eq(other, leg) || own + 1.0 < distance(&other.shape))
+    };
+    let places = centres
+        .filter(is_own)
+        .map(|(x, y)| (x - half_width, y - half_height, x + half_width, y + half_height));
+    let own = leg.shape.line;
+    let others: Vec<Line> = lines.iter().copied().filter(|line| *line != own).collect();
+    choose(places, (limits, &others), taken)
+}
+
+/// The names of places: those that matter most come first.
+fn names(
+    map: &Map,
+    points: &[Point],
+    legs: &[Leg],
+    free: (Taken, &[Line]),
+    taken: &mut Vec<Taken>,
+) -> Vec<Option<Point>> {
+    let is_end = |place: usize| map.places[place].is_start || map.places[place].is_goal;
+    let mut used = vec![false; points.len()];
+    for leg in legs {
+        (used[leg.from], used[leg.to]) = (true, true);
+    }
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    order.sort_by_key(|place| (!is_end(*place), !used[*place], *place));
+    let mut labels = vec![None; points.len()];
+    for place in order {
+        let ring = if is_end(place) { 4.0 } else { 0.0 };
+        let size = (RADIUS + 5.0 + ring, width(&map.places[place].name));
+        labels[place] = room(points[place], size, free, taken);
+    }
+    labels
+}
+
+/// Draws a leg: a line, in dashes of several colours where its steps have several configurations, the arrow, and the numbers.
+fn draw_leg(leg: &Leg, map: &Map, palette: &Palette, number: Option<Point>) -> Markup {
+    let mut names: Vec<&String> = Vec::new();
+    for name in leg.names.iter().filter(|name| !name.is_empty()) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    let (from, to) = (&map.places[leg.from].name, &map.places[leg.to].name);
+    let about = leg.steps.iter().zip(&leg.names);
+    let about: Vec<String> =
+        about.map(|(step, name)| format!("step {step}, from {from} to {to}: {name}")).collect();
+    let steps: Vec<String> = leg.steps.iter().map(ToString::to_string).collect();
+    let dash = format!("{} {}", px(DASH), px(DASH * names.len().saturating_sub(1) as f64));
+    let last = names.last().map_or_else(String::new, |name| (*name).clone());
+    let Shape { line: ((x1, y1), (x2, y2)), centre, arrow: (x, y), along: (dx, dy), .. } = leg.shape;
     let arrow = format!(
         "M{} {}L{} {}L{} {}Z",
-        px(x + dx * 7.0),
-        px(y + dy * 7.0),
-        px(x - dx * 4.0 - dy * 6.0),
-        px(y - dy * 4.0 + dx * 6.0),
-        px(x - dx * 4.0 + dy * 6.0),
-        px(y - dy * 4.0 - dx * 6.0),
+        px(x + dx * TIP),
+        px(y + dy * TIP),
+        px(x - dx * 4.0 - dy * SIDE),
+        px(y - dy * 4.0 + dx * SIDE),
+        px(x - dx * 4.0 + dy * SIDE),
+        px(y - dy * 4.0 - dx * SIDE),
     );
-    let all: Vec<String> = steps.iter().map(ToString::to_string).collect();
     html! {
-        g class={ "leg " (class) } data-step=(all.join(" ")) {
-            title { "step " (all.join(", ")) ", " (about) }
-            line x1=(px(x1 + sx)) y1=(px(y1 + sy)) x2=(px(x2 + sx)) y2=(px(y2 + sy)) {}
+        g class={ "leg " (palette.class(&last)) } data-step=(steps.join(" ")) data-from=(from) data-to=(to) {
+            title { (about.join("\n")) }
+            @if let Some((x, y)) = centre {
+                circle class="loop" cx=(px(x)) cy=(px(y)) r=(px(LOOP)) {}
+            } @else if names.len() < 2 {
+                line x1=(px(x1)) y1=(px(y1)) x2=(px(x2)) y2=(px(y2)) {}
+            } @else {
+                @for (index, name) in names.iter().enumerate() {
+                    line class=(palette.class(name)) stroke-dasharray=(dash) stroke-dashoffset=(px(-DASH * index as f64)) x1=(px(x1)) y1=(px(y1)) x2=(px(x2)) y2=(px(y2)) {}
+                }
+            }
             path d=(arrow) {}
-            @if let Some((x, y)) = label { text x=(px(x)) y=(px(y)) { (text) } }
+            @if let Some((x, y)) = number { text x=(px(x)) y=(px(y)) { (numbers(leg)) } }
         }
     }
 }
@@ -138,17 +288,31 @@ fn leg(
 /// Where a text of this width can stand beside a point without touching what is there, and if possible no line: the left end of its base
 /// line. `reach` is how far the point itself goes. The room is taken then.
 fn room(
-    (x, y): (f64, f64),
+    (x, y): Point,
     (reach, width): (f64, f64),
     (limits, lines): (Taken, &[Line]),
     taken: &mut Vec<Taken>,
-) -> Option<(f64, f64)> {
-    let beside = [(x + reach, y), (x - reach - width, y)];
-    let across = [y - reach - LINE / 2.0, y + reach + LINE / 2.0];
-    let above = across.into_iter().flat_map(|y| [(x - width / 2.0, y), (x + 3.0, y), (x - width - 3.0, y)]);
-    let places = beside.into_iter().chain(above).map(|(left, middle)| {
+) -> Option<Point> {
+    // Farther away only where a line would cross a name that is near.
+    let places = [reach, reach + FARTHER].into_iter().flat_map(|reach| {
+        let beside = [(x + reach, y), (x - reach - width, y)];
+        let across = [y - reach - LINE / 2.0, y + reach + LINE / 2.0].into_iter();
+        let across = across.flat_map(move |y| [x - width / 2.0, x + 7.0, x - width - 7.0].map(|x| (x, y)));
+        beside.into_iter().chain(across)
+    });
+    let places = places.map(|(left, middle)| {
         (left - 1.0, middle - LINE / 2.0 - 1.0, left + width + 1.0, middle + LINE / 2.0 + 1.0)
     });
+    choose(places, (limits, lines), taken)
+}
+
+/// The left end of the base line of a text in the first of these rectangles that is free, and if possible crossed by no line. The rectangle is
+/// taken then.
+fn choose(
+    places: impl Iterator<Item = Taken>,
+    (limits, lines): (Taken, &[Line]),
+    taken: &mut Vec<Taken>,
+) -> Option<Point> {
     let is_free = |wanted: &Taken| {
         let inside =
             wanted.0 >= limits.0 && wanted.1 >= limits.1 && wanted.2 <= limits.2 && wanted.3 <= limits.3;
@@ -183,8 +347,8 @@ fn crosses(((x1, y1), (x2, y2)): Line, (left, top, right, bottom): Taken) -> boo
 }
 
 /// Where the places are drawn, and how wide and high the picture is.
-fn pixels(map: &Map) -> (Vec<(f64, f64)>, f64, f64) {
-    let known: Option<Vec<(f64, f64)>> = map.places.iter().map(|place| place.position).collect();
+fn pixels(map: &Map, canvas: Canvas, has_loops: bool) -> (Vec<Point>, f64, f64) {
+    let known: Option<Vec<Point>> = map.places.iter().map(|place| place.position).collect();
     let points = known.unwrap_or_else(|| layout(map.places.len(), &map.ways));
     let ((left, right), (low, high)) = (range(points.iter().map(|p| p.0)), range(points.iter().map(|p| p.1)));
     let (across, upwards) = ((right - left).max(1e-9), (high - low).max(1e-9));
@@ -192,15 +356,21 @@ fn pixels(map: &Map) -> (Vec<(f64, f64)>, f64, f64) {
         .ways
         .iter()
         .map(|(one, other)| (points[*one].0 - points[*other].0).hypot(points[*one].1 - points[*other].1));
-    let mut lengths: Vec<f64> = lengths.filter(|length| *length > 0.0).collect();
+    // Ways between places at one position do not count: these are spread.
+    let shortest = across.max(upwards) * SAME / LARGEST;
+    let mut lengths: Vec<f64> = lengths.filter(|length| *length > shortest).collect();
     lengths.sort_by(f64::total_cmp);
     // The shortest ways but for a few decide.
     let shortest = lengths.get(lengths.len() / 20).copied().unwrap_or(across);
-    let widest = WIDTH / across;
-    let least = (APART / shortest).min(LARGEST / across.max(upwards));
-    let scale = widest.min(420.0 / upwards).max(least).min(130.0 / shortest).max(1e-9);
+    let least_margin = if has_loops { LOOP_MARGIN } else { 0.0 };
+    let margin = (canvas.width * MARGIN_PART).min(MARGIN).max(least_margin);
+    let upper = UPPER_MARGIN.max(least_margin);
+    let widest = (canvas.width - 2.0 * margin) / across;
+    let least = (canvas.apart / shortest).min(LARGEST / across.max(upwards));
+    let scale = widest.min(HEIGHT / upwards).max(least).min(FARTHEST / shortest).max(1e-9);
     let height = (upwards * scale).max(if map.places.len() > 1 { 0.0 } else { LEAST_HEIGHT });
-    let place = |(x, y): &(f64, f64)| (MARGIN + (x - left) * scale, MARGIN / 2.0 + (high - y) * scale);
-    let drawn: Vec<(f64, f64)> = points.iter().map(place).collect();
-    (drawn, across * scale + 2.0 * MARGIN, height + MARGIN)
+    let place = |(x, y): &Point| (margin + (x - left) * scale, upper + (high - y) * scale);
+    let mut drawn: Vec<Point> = points.iter().map(place).collect();
+    spread(&mut drawn, SAME, 2.0 * RADIUS + 4.0);
+    (drawn, across * scale + 2.0 * margin, height + 2.0 * upper)
 }

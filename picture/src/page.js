@@ -12,3 +12,11 @@ const mark = (event, on) => {
 };
 document.addEventListener("mouseover", event => mark(event, true));
 document.addEventListener("mouseout", event => mark(event, false));
+// Long pictures over the same axis are scrolled together.
+const AXES = "[data-picture*=timeline], [data-picture*=number]";
+document.addEventListener("scroll", event => {
+  const own = event.target;
+  if (!own.matches?.(AXES)) return;
+  const all = (own.closest(".pair") ?? own.closest("[data-plan]"))?.querySelectorAll(AXES) ?? [];
+  for (const other of all) if (other.scrollLeft !== own.scrollLeft) other.scrollLeft = own.scrollLeft;
+}, true);

@@ -3,6 +3,7 @@
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use crate::data::Reason;
+use crate::frame::{Canvas, PAGE};
 use crate::svg::{Picture, clean};
 
 /// The style of pages and of the pictures in them.
@@ -10,7 +11,10 @@ pub const STYLE: &str = concat!(include_str!("picture.css"), include_str!("page.
 /// The only script; a page is whole without it.
 const SCRIPT: &str = include_str!("page.js");
 /// Its digest: browsers run no other script in a page.
-const DIGEST: &str = "sha256-yEykJWcSva2UhKwr0DwJEadJ93sDtyfamJ/HHfWhRYY=";
+const DIGEST: &str = "sha256-fZ3YNffJKRqSukU6Y8OoyeJ/9kokzwiOieJxn4wpNoc=";
+
+/// Classes of pictures by the columns that they are shown in, in the order of [`PAGE`].
+const COLUMNS: [&str; 3] = ["in-wide", "in-half", "in-narrow"];
 
 /// How deep derivations unfold.
 const DEPTH: usize = 24;
@@ -48,10 +52,36 @@ pub(crate) fn page(title: &str, description: &str, body: &Markup) -> String {
     clean(&page.into_string()) + "\n"
 }
 
-/// A picture that may be wider than the screen: it is scrolled by itself, also by keyboard.
-pub(crate) fn shown(picture: &Picture, name: &str) -> Markup {
+/// A picture in a page: drawn for each of these canvases, the widest first, and shown on the widest that fits its column. A picture that
+/// outgrows its canvas, such as the timeline of a thousand steps, is scrolled, also by keyboard, and is not drawn for narrower ones.
+pub(crate) fn shown(name: &str, canvases: &[Canvas], draw: &dyn Fn(Canvas) -> Picture) -> Markup {
+    let mut drawn: Vec<(f64, Picture)> = Vec::new();
+    for canvas in canvases {
+        let picture = draw(*canvas);
+        let is_long = picture.width > canvas.width;
+        drawn.push((canvas.width, picture));
+        if is_long {
+            break;
+        }
+    }
+    let fits = |column: f64| drawn.iter().position(|(width, _)| *width <= column);
+    // The column that each canvas of a page is made for, and the picture that is shown in it.
+    let columns = PAGE.iter().zip(COLUMNS);
+    let columns = columns.map(|(canvas, class)| (fits(canvas.width).unwrap_or(drawn.len() - 1), class));
+    let columns: Vec<(usize, &str)> = columns.collect();
+    let classes = |number: usize| {
+        let own = columns.iter().filter(|(shown, _)| *shown == number).map(|(_, class)| *class);
+        own.collect::<Vec<_>>().join(" ")
+    };
     html! {
-        div class="scroll" tabindex="0" role="group" aria-label=(picture.title) { (picture.inline(name)) }
+        @if let Some((_, first)) = drawn.first() {
+            div class="scroll drawn" data-picture=(name) tabindex="0" role="group" aria-label=(first.title) {
+                @for (number, (width, picture)) in drawn.iter().enumerate() {
+                    @let long = if picture.width > *width { " long" } else { "" };
+                    (picture.inline(&format!("{name}-{}", number + 1), &format!("{}{long}", classes(number))))
+                }
+            }
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use crate::chart::{curve, search};
 use crate::data::{Checked, Design, Plan, Report, Step};
-use crate::frame::{FILE, HALF, PAGE, Room};
+use crate::frame::{Canvas, FILE, PAGE, PAIR, Span};
 use crate::map::map;
 use crate::page::{page, reasons, shown, table};
 use crate::palette::{Palette, configuration};
@@ -22,10 +22,10 @@ impl Report {
             p class="verdict" { (self.plan.verdict) }
             @if let Some(before) = &self.before {
                 (changes(self))
-                @let rooms = rooms(before, &self.plan);
+                @let spans = spans(before, &self.plan);
                 div class="pair" {
-                    section data-plan="before" aria-label="before" { h2 { "Before" } p { (before.verdict) } (plan(before, "before", &palette, (&rooms[0], HALF))) }
-                    section data-plan="after" aria-label="after" { h2 { "After" } p { (self.plan.verdict) } (plan(&self.plan, "after", &palette, (&rooms[1], HALF))) }
+                    section data-plan="before" aria-label="before" { h2 { "Before" } p { (before.verdict) } (plan(before, "before", &palette, (&spans[0], &PAIR))) }
+                    section data-plan="after" aria-label="after" { h2 { "After" } p { (self.plan.verdict) } (plan(&self.plan, "after", &palette, (&spans[1], &PAIR))) }
                 }
             } @else {
                 section data-plan="plan" aria-label="plan" { h2 { "Plan" } (alone(&self.plan, "plan", &palette)) }
@@ -53,7 +53,7 @@ impl Report {
 impl Plan {
     /// The timeline as a file.
     pub fn svg(&self) -> String {
-        timeline(self, &Palette::of(&[self]), &Room::of(&[self], FILE)).file()
+        timeline(self, &Palette::of(&[self]), &Span::of(&[self]), FILE).file()
     }
 
     /// The plan as a part of somebody else's page, which has the style [`crate::STYLE`].
@@ -67,37 +67,38 @@ impl Plan {
 }
 
 fn plan_pictures(plan: &Plan, prefix: &str, palette: &Palette) -> Vec<(String, String)> {
-    let room = Room::of(&[plan], FILE);
-    let mut files = vec![(format!("{prefix}timeline.svg"), timeline(plan, palette, &room).file())];
+    let span = Span::of(&[plan]);
+    let mut files = vec![(format!("{prefix}timeline.svg"), timeline(plan, palette, &span, FILE).file())];
     for (own, number) in plan.curves.iter().zip(1..) {
-        files.push((format!("{prefix}number-{number}.svg"), curve(plan, own, &room).file()));
+        files.push((format!("{prefix}number-{number}.svg"), curve(plan, own, &span, FILE).file()));
     }
-    files.extend(plan.map.iter().map(|own| (format!("{prefix}map.svg"), map(plan, own, palette).file())));
+    let maps = plan.map.iter().map(|own| map(plan, own, palette, FILE).file());
+    files.extend(maps.map(|text| (format!("{prefix}map.svg"), text)));
     if plan.search.len() > 1 {
         files.push((format!("{prefix}search.svg"), search(&plan.search, FILE).file()));
     }
     files
 }
 
-/// Room for two plans beside each other, with one scale where they have the same axis.
-fn rooms(before: &Plan, after: &Plan) -> [Room; 2] {
+/// The axes of two plans beside each other: one scale, where both have the same kind of axis.
+fn spans(before: &Plan, after: &Plan) -> [Span; 2] {
     let both = [before, after];
-    both.map(|own| if before.axis == after.axis { Room::of(&both, HALF) } else { Room::of(&[own], HALF) })
+    both.map(|own| if before.axis == after.axis { Span::of(&both) } else { Span::of(&[own]) })
 }
 
 /// All about a plan that has the page for itself; `name` tells it from others there.
 pub(crate) fn alone(own: &Plan, name: &str, palette: &Palette) -> Markup {
-    plan(own, name, palette, (&Room::of(&[own], PAGE), PAGE))
+    plan(own, name, palette, (&Span::of(&[own]), &PAGE))
 }
 
-/// All about a plan; the search takes the width `least`.
-fn plan(plan: &Plan, name: &str, palette: &Palette, (room, least): (&Room, f64)) -> Markup {
+/// All about a plan, drawn on these canvases.
+fn plan(plan: &Plan, name: &str, palette: &Palette, (span, canvases): (&Span, &[Canvas])) -> Markup {
     html! {
         @if plan.steps.is_empty() {
             p { "There is no action to show." }
         } @else {
             h3 { "Timeline" }
-            (shown(&timeline(plan, palette, room), &format!("{name}-timeline")))
+            (shown(&format!("{name}-timeline"), canvases, &|canvas| timeline(plan, palette, span, canvas)))
             (legend(plan, palette))
             details {
                 summary { "Steps as a table" }
@@ -107,12 +108,12 @@ fn plan(plan: &Plan, name: &str, palette: &Palette, (room, least): (&Room, f64))
                 h3 { "Numbers" }
                 p class="dim" { "Dashes are what conditions demand." }
                 @for (own, number) in plan.curves.iter().zip(1..) {
-                    (shown(&curve(plan, own, room), &format!("{name}-number-{number}")))
+                    (shown(&format!("{name}-number-{number}"), canvases, &|canvas| curve(plan, own, span, canvas)))
                 }
             }
             @if let Some(own) = &plan.map {
                 h3 { "Map" }
-                (shown(&map(plan, own, palette), &format!("{name}-map")))
+                (shown(&format!("{name}-map"), canvases, &|canvas| map(plan, own, palette, canvas)))
                 @if own.places.iter().any(|place| place.position.is_none()) {
                     p class="dim" { "The mission has no coordinates: places are laid out by the ways between them." }
                 }
@@ -123,7 +124,7 @@ fn plan(plan: &Plan, name: &str, palette: &Palette, (room, least): (&Room, f64))
             @if let [only] = &plan.search[..] {
                 p { "The planner knew at once: " (only.text) "." }
             } @else {
-                (shown(&search(&plan.search, least), &format!("{name}-search")))
+                (shown(&format!("{name}-search"), canvases, &|canvas| search(&plan.search, canvas)))
                 details {
                     summary { "Search as a list" }
                     ol { @for moment in &plan.search { li { (moment.text) } } }

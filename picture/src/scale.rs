@@ -24,7 +24,10 @@ impl Scale {
 
     /// Round numbers in the range, at most about so many, ascending.
     pub(crate) fn ticks(&self, most: usize) -> Vec<f64> {
-        let step = round_step((self.from.1 - self.from.0) / most.max(1) as f64);
+        if most == 0 {
+            return Vec::new();
+        }
+        let step = round_step((self.from.1 - self.from.0) / most as f64);
         let (first, last) = ((self.from.0 / step).ceil(), (self.from.1 / step + 1e-9).floor());
         let count = if last >= first { (last - first) as usize + 1 } else { 0 };
         (0..count.min(1000)).map(|index| (first + index as f64) * step).collect()

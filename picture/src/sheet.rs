@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use maud::{Markup, html};
 
 use crate::data::{Group, Part, Plan, Points, Rows, Sheet};
-use crate::frame::{FILE, LEFT, PAGE, RIGHT};
+use crate::frame::{Canvas, FILE, PAGE, RIGHT};
 use crate::page::{page, reasons, shown, table};
 use crate::palette::Palette;
 use crate::report::alone;
@@ -68,8 +68,8 @@ fn drawn(part: &Part, number: i32, palette: &Palette) -> Markup {
                     }
                 }
             },
-            Part::Points(own) => { (shown(&points(own, PAGE), &name)) },
-            Part::Rows(own) => { (shown(&rows(own, PAGE), &name)) },
+            Part::Points(own) => { (shown(&name, &PAGE, &|canvas| points(own, canvas))) },
+            Part::Rows(own) => { (shown(&name, &PAGE, &|canvas| rows(own, canvas))) },
             Part::Table(title, header, lines) => {
                 (table(title, &header.iter().map(String::as_str).collect::<Vec<_>>(), &html! {
                     @for line in lines { tr { @for cell in line { td { (cell) } } } }
@@ -94,10 +94,10 @@ fn scale(values: impl Iterator<Item = f64>, to: (f64, f64)) -> Scale {
     Scale::new((low - margin, high + margin), to)
 }
 
-fn points(own: &Points, room: f64) -> Picture {
-    let (right, bottom) = (LEFT + room, TOP + HEIGHT);
+fn points(own: &Points, canvas: Canvas) -> Picture {
+    let (left, right, bottom) = (canvas.left, canvas.width - RIGHT, TOP + HEIGHT);
     let across =
-        scale(own.points.iter().map(|own| own.2).chain(own.line.iter().map(|own| own.0)), (LEFT, right));
+        scale(own.points.iter().map(|own| own.2).chain(own.line.iter().map(|own| own.0)), (left, right));
     let upwards =
         scale(own.points.iter().map(|own| own.3).chain(own.line.iter().map(|own| own.1)), (bottom, TOP));
     let line: Vec<String> =
@@ -110,18 +110,19 @@ fn points(own: &Points, room: f64) -> Picture {
     let mut taken: Vec<(f64, f64, f64)> = Vec::new();
     let body = html! {
         g class="axis" {
-            @for tick in across.ticks(8) {
+            @for tick in across.ticks(ticks(canvas)) {
                 @let x = px(across.at(tick));
                 line class="grid" x1=(x) x2=(x) y1=(px(TOP)) y2=(px(bottom)) {}
                 text x=(x) y=(px(bottom + 15.0)) text-anchor="middle" { (compact(tick)) }
             }
             @for tick in upwards.ticks(6) {
                 @let y = upwards.at(tick);
-                line class="grid" x1=(px(LEFT)) x2=(px(right)) y1=(px(y)) y2=(px(y)) {}
-                text x=(px(LEFT - 6.0)) y=(px(y + 4.0)) text-anchor="end" { (compact(tick)) }
+                line class="grid" x1=(px(left)) x2=(px(right)) y1=(px(y)) y2=(px(y)) {}
+                text x=(px(left - 6.0)) y=(px(y + 4.0)) text-anchor="end" { (compact(tick)) }
             }
-            text x=(px(right)) y=(px(bottom + 32.0)) text-anchor="end" { (own.axes[0]) " →" }
-            text x=(px(LEFT)) y="12" { "↑ " (own.axes[1]) }
+            text x=(px(right)) y=(px(bottom + 32.0)) text-anchor="end" { (fit(&own.axes[0], right - 20.0)) " →" }
+            @let start = if canvas.has_names_above { 4.0 } else { left };
+            text x=(px(start)) y="12" { "↑ " (fit(&own.axes[1], right - start - 20.0)) }
         }
         @if !line.is_empty() { path class="curve" d={ "M" (line.join("L")) } {} }
         @for (short, about, x, y) in &own.points {
@@ -161,27 +162,36 @@ fn label(
     Some((left, place, text))
 }
 
-fn rows(own: &Rows, room: f64) -> Picture {
+/// The number of ticks of an axis that there is room for.
+fn ticks(canvas: Canvas) -> usize {
+    (canvas.inner() / 75.0).min(8.0) as usize
+}
+
+fn rows(own: &Rows, canvas: Canvas) -> Picture {
+    let (left, right, row) = (canvas.left, canvas.width - RIGHT, ROW + canvas.name_height());
     let values = own.groups.iter().flat_map(|group| {
         let ends = group.mean.iter().flat_map(|(mean, half)| [mean - half, mean + half]);
         group.values.iter().map(|(value, _)| *value).chain(ends)
     });
-    let across = scale(values, (LEFT, LEFT + room));
-    let bottom = ROW * own.groups.len() as f64 + 6.0;
+    let across = scale(values, (left, right));
+    let has_values = own.groups.iter().any(|group| !group.values.is_empty());
+    let bottom = row * own.groups.len() as f64 + 6.0;
     let body = html! {
         g class="axis" {
-            @for tick in across.ticks(8) {
+            @for tick in across.ticks(if has_values { ticks(canvas) } else { 0 }) {
                 @let x = px(across.at(tick));
                 line class="grid" x1=(x) x2=(x) y1="6" y2=(px(bottom)) {}
                 text x=(x) y=(px(bottom + 15.0)) text-anchor="middle" { (compact(tick)) }
             }
-            text x=(px(LEFT + room)) y=(px(bottom + 32.0)) text-anchor="end" { (own.axis) }
+            text x=(px(right)) y=(px(bottom + 32.0)) text-anchor="end" { (fit(&own.axis, right - 4.0)) }
         }
-        @for (Group { name, values, mean }, row) in own.groups.iter().zip(0..) {
-            @let base = 6.0 + ROW * f64::from(row) + ROW - 12.0;
+        @for (Group { name, values, mean, nothing }, lane) in own.groups.iter().zip(0..) {
+            @let base = 6.0 + row * f64::from(lane) + row - 12.0;
+            @let place = canvas.name_place(base - HIGHEST, base - 8.0);
             g class="lane" data-group=(name) {
-                text class="label" x=(px(LEFT - 10.0)) y=(px(base - 8.0)) text-anchor="end" { (fit(name, LEFT - 14.0)) }
-                line class="grid" x1=(px(LEFT)) x2=(px(LEFT + room)) y1=(px(base + 6.0)) y2=(px(base + 6.0)) {}
+                text class="label" x=(px(place.x)) y=(px(place.y)) text-anchor=(place.anchor) { (fit(name, place.room)) }
+                @if values.is_empty() { text class="nothing" x=(px(left + 4.0)) y=(px(base - 4.0)) { (fit(nothing, right - left)) } }
+                line class="grid" x1=(px(left)) x2=(px(right)) y1=(px(base + 6.0)) y2=(px(base + 6.0)) {}
                 @for ((value, about), height) in values.iter().zip(heights(values, &across)) {
                     circle class="point" cx=(px(across.at(*value))) cy=(px(base - height)) r="2.5" { title { (about) } }
                 }
@@ -196,7 +206,7 @@ fn rows(own: &Rows, room: f64) -> Picture {
         }
     };
     let description = "A dot is a run, the diamond the mean with its interval of 95 percent.".to_owned();
-    Picture { width: LEFT + room + RIGHT, height: bottom + 40.0, title: own.title.clone(), description, body }
+    Picture { width: canvas.width, height: bottom + 40.0, title: own.title.clone(), description, body }
 }
 
 /// How high each value is drawn, in pixels, so that values that are near stand above each other.

@@ -19,11 +19,11 @@ pub(crate) struct Picture {
 }
 
 impl Picture {
-    /// The picture in a page; `name` tells it from all others there.
-    pub(crate) fn inline(&self, name: &str) -> Markup {
+    /// The picture in a page; `name` tells it from all others there, and `classes` say in which columns it is shown.
+    pub(crate) fn inline(&self, name: &str, classes: &str) -> Markup {
         let (title, description) = (format!("{name}-title"), format!("{name}-description"));
         html! {
-            svg class="picture" role="img" aria-labelledby={ (title) " " (description) }
+            svg class={ "picture " (classes) } role="img" aria-labelledby={ (title) " " (description) }
                 width=(px(self.width)) height=(px(self.height)) viewBox={ "0 0 " (px(self.width)) " " (px(self.height)) } {
                 title id=(title) { (self.title) }
                 desc id=(description) { (self.description) }

@@ -9,11 +9,21 @@ use crate::scale::number;
 const LEAST: usize = 60;
 /// A step has at least so many columns.
 const COLUMN: usize = 4;
+/// A step has at least so many columns in a picture that is not to scale, the mark of its beginning included.
+const NARROW: usize = 7;
+/// A picture has at most so many bands below each other: more are no overview.
+const BANDS: usize = 6;
 /// Names of lanes are shortened to this.
 const NAME: usize = 24;
 
+/// From which column to which a step is drawn; steps of one line.
+type Columns = Vec<(usize, (usize, usize))>;
+
 impl Plan {
-    /// The plan drawn in so many columns; none where they are too few, or where actions overlap.
+    /// The plan drawn in this number of columns; none where they are too few, where actions overlap, or where it takes too many lines.
+    ///
+    /// Steps are as wide as they are long where each has room for that. Otherwise short ones are wider, and a plan of many steps
+    /// continues below; the numbers of the axis are right in any case.
     ///
     /// Names are as they are given: whoever writes them to a terminal makes them visible first.
     pub fn text(&self, columns: usize) -> Option<String> {
@@ -25,40 +35,77 @@ impl Plan {
         }
         let label = lanes.keys().map(|name| length(name)).max().unwrap_or(0).clamp("actions".len(), NAME);
         let room = columns.checked_sub(label + 2).filter(|_| columns >= LEAST)?;
-        let places = self.places(room)?;
-        let mut lines = Vec::new();
         let actions: Vec<(usize, &str)> =
             self.steps.iter().map(|step| step.label.as_str()).enumerate().collect();
-        let mut line = |name: &str, bars: &[(usize, &str)]| {
-            lines.push(format!("{:>label$}  {}\n", short(name, label), self.bars(name, bars, &places)));
-        };
-        line("actions", &actions);
-        for (function, bars) in &lanes {
-            line(function, bars);
-        }
         let axis = match self.axis {
             Axis::Time => "time",
             Axis::Steps => "step",
         };
-        lines.push(format!("{axis:>label$}  {}\n", self.ticks(&places, room)));
-        Some(lines.concat())
+        let band = |places: Columns| {
+            let line = |name: &str, bars: &[(usize, &str)]| {
+                format!("{:>label$}  {}\n", short(name, label), self.bars(name, bars, &places))
+            };
+            let functions = lanes.iter().map(|(function, bars)| line(function, bars));
+            let ticks = format!("{axis:>label$}  {}\n", self.ticks(&places, room));
+            std::iter::once(line("actions", &actions)).chain(functions).chain([ticks]).collect::<String>()
+        };
+        let bands: Vec<String> = self.bands(room)?.into_iter().map(band).collect();
+        Some(bands.join("\n"))
     }
 
-    /// From which column to which each step is drawn.
-    fn places(&self, room: usize) -> Option<Vec<(usize, usize)>> {
+    /// The columns of the steps: one line, or several where they need more room. None for plans that lines cannot show.
+    fn bands(&self, room: usize) -> Option<Vec<Columns>> {
+        let starts = self.steps.iter().skip(1).map(|step| step.start);
+        let is_sequence = self.steps.iter().zip(starts).all(|(step, next)| step.end <= next + 1e-9);
+        let count = self.steps.len();
+        if count == 0 || !is_sequence {
+            return None;
+        }
+        if let Some(places) = self.to_scale(room) {
+            return Some(vec![places.into_iter().enumerate().collect()]);
+        }
+        let bands = (count * NARROW).div_ceil(room);
+        (bands <= BANDS).then(|| {
+            let (size, mut band) = (count.div_ceil(bands), Vec::new());
+            for first in (0..count).step_by(size) {
+                band.push(self.widened(first..(first + size).min(count), room));
+            }
+            band
+        })
+    }
+
+    /// From which column to which each step is drawn by one scale; none where that leaves too little room for some.
+    fn to_scale(&self, room: usize) -> Option<Vec<(usize, usize)>> {
         let end = self.steps.iter().map(|step| step.end).fold(0.0, f64::max);
         let column = |at: f64| if end > 0.0 { (at / end * room as f64).round() as usize } else { 0 };
         let places: Vec<_> = self.steps.iter().map(|step| (column(step.start), column(step.end))).collect();
         let is_wide = places.iter().all(|(from, to)| *to >= from + COLUMN);
-        let is_sequence = places.windows(2).all(|pair| pair[0].1 <= pair[1].0);
-        (!places.is_empty() && is_wide && is_sequence).then_some(places)
+        is_wide.then_some(places)
     }
 
-    fn bars(&self, lane: &str, bars: &[(usize, &str)], places: &[(usize, usize)]) -> String {
+    /// Steps side by side, each with the least room, and the remaining room by their durations.
+    fn widened(&self, steps: std::ops::Range<usize>, room: usize) -> Columns {
+        let duration = |index: usize| (self.steps[index].end - self.steps[index].start).max(0.0);
+        let all: f64 = steps.clone().map(duration).sum();
+        let left = room.saturating_sub(steps.len() * NARROW) as f64;
+        let (mut places, mut passed) = (Vec::new(), 0.0);
+        let column = |number: usize, passed: f64| {
+            number * NARROW + if all > 0.0 { (passed / all * left).floor() as usize } else { 0 }
+        };
+        for (number, index) in steps.enumerate() {
+            let from = column(number, passed);
+            passed += duration(index);
+            places.push((index, (from, column(number + 1, passed))));
+        }
+        places
+    }
+
+    fn bars(&self, lane: &str, bars: &[(usize, &str)], places: &Columns) -> String {
         let mut line = String::new();
         let mut column = 0;
+        let place = |step: usize| places.iter().find(|(index, _)| *index == step).map(|(_, place)| *place);
         for (index, name) in bars {
-            let (from, to) = places[*index];
+            let Some((from, to)) = place(*index) else { continue };
             line += &" ".repeat(from - column);
             let step: &Step = &self.steps[*index];
             let first =
@@ -73,14 +120,16 @@ impl Plan {
     }
 
     /// Where steps begin, and where the last one ends.
-    fn ticks(&self, places: &[(usize, usize)], room: usize) -> String {
-        let last = self.steps.last().zip(places.last()).map(|(step, (_, to))| (*to, step.end));
-        let marks = self.steps.iter().zip(places).map(|(step, (from, _))| (*from, step.start)).chain(last);
+    fn ticks(&self, places: &Columns, room: usize) -> String {
+        let last = places.last().map(|(index, (_, to))| (*to, self.steps[*index].end));
+        let marks = places.iter().map(|(index, (from, _))| (*from, self.steps[*index].start)).chain(last);
         let mut line = String::new();
         for (column, value) in marks {
             let text = number(value);
             let free = length(&line) + usize::from(!line.is_empty());
-            if column >= free && column + length(&text) <= room + text.len() {
+            // The last number ends where the picture does.
+            let column = column.min(room.saturating_sub(length(&text)));
+            if column >= free {
                 line += &" ".repeat(column - length(&line));
                 line += &text;
             }

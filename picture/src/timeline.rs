@@ -5,10 +5,10 @@ use std::collections::BTreeMap;
 use maud::{Markup, html};
 
 use crate::data::{Plan, Step};
-use crate::frame::{Frame, LEFT, Room};
+use crate::frame::{Canvas, Frame, Span};
 use crate::lanes::rows;
 use crate::palette::Palette;
-use crate::scale::{fit, px};
+use crate::scale::{fit, px, width};
 use crate::svg::{Picture, alternative};
 
 /// The height of a row, and of the bars in it.
@@ -20,6 +20,10 @@ const GAP: f64 = 8.0;
 const TOP: f64 = 6.0;
 /// What takes no time is drawn so wide.
 const LEAST: f64 = 3.0;
+/// A shortened name has at least so many characters, the ellipsis included.
+const SHORTEST: usize = 5;
+/// Numbers may come nearer to the ends of a bar than names, by so many pixels in all.
+const SLACK: f64 = 5.0;
 
 /// A bar of a lane.
 struct Bar<'p> {
@@ -49,27 +53,36 @@ impl<'p> Lane<'p> {
 }
 
 /// Draws a plan.
-pub(crate) fn timeline(plan: &Plan, palette: &Palette, room: &Room) -> Picture {
-    let frame = Frame::of(plan, room);
+pub(crate) fn timeline(plan: &Plan, palette: &Palette, span: &Span, canvas: Canvas) -> Picture {
+    let frame = Frame::of(plan, span, canvas);
     let lanes = lanes(plan, &frame);
     let mut tops = Vec::new();
     let mut bottom = TOP;
     for lane in &lanes {
+        bottom += canvas.name_height();
         tops.push(bottom);
         bottom += lane.height() + GAP;
     }
+    // Lines of changes leave out names between lanes.
+    let marked: Vec<(f64, f64)> = if canvas.has_names_above {
+        lanes.iter().zip(&tops).map(|(lane, top)| (*top, top + lane.height())).collect()
+    } else {
+        vec![(TOP, bottom)]
+    };
     let changes = plan.steps.iter().map(|step| step.reconfigured.len()).sum::<usize>();
     let title = format!("{} steps, {changes} reconfigurations", plan.steps.len());
     let description = lanes.iter().map(|lane| lane.name).collect::<Vec<_>>().join(", ");
     let description = format!("A lane for each of: {description}. The table of steps says the same.");
     let body = html! {
-        (frame.axis(TOP, bottom))
-        @for (lane, top) in lanes.iter().zip(&tops) {
-            (draw_lane(lane, *top, (plan, palette), &frame))
+        (frame.axis(TOP + canvas.name_height(), bottom))
+        @for ((lane, top), number) in lanes.iter().zip(&tops).zip(0..) {
+            (draw_lane(lane, (*top, number == 0), (plan, palette), &frame))
         }
         @for (index, step) in plan.steps.iter().enumerate().filter(|(_, step)| !step.reconfigured.is_empty()) {
             @let x = px(frame.scale.at(step.start));
-            line class="change" x1=(x) x2=(x) y1=(px(TOP)) y2=(px(bottom)) data-step=(index + 1) {}
+            @for (top, bottom) in &marked {
+                line class="change" x1=(x) x2=(x) y1=(px(*top)) y2=(px(*bottom)) data-step=(index + 1) {}
+            }
         }
     };
     Picture { width: frame.width, height: bottom + 24.0, title, description, body }
@@ -79,7 +92,8 @@ pub(crate) fn timeline(plan: &Plan, palette: &Palette, room: &Room) -> Picture {
 fn lanes<'p>(plan: &'p Plan, frame: &Frame) -> Vec<Lane<'p>> {
     let place = |step: &Step| {
         let from = frame.scale.at(step.start);
-        (from, frame.scale.at(step.end).max(from + LEAST))
+        // A short step keeps its place by the scale, so that steps one after another stay in one row.
+        (from, if step.end > step.start { frame.scale.at(step.end) } else { from + LEAST })
     };
     let mut functions: BTreeMap<&str, Vec<Bar<'p>>> = BTreeMap::new();
     let mut actions = Vec::new();
@@ -96,30 +110,41 @@ fn lanes<'p>(plan: &'p Plan, frame: &Frame) -> Vec<Lane<'p>> {
     std::iter::once(Lane::new("actions", actions)).chain(functions).collect()
 }
 
-fn draw_lane(lane: &Lane<'_>, top: f64, (plan, palette): (&Plan, &Palette), frame: &Frame) -> Markup {
-    let is_action = lane.name == "actions" && top <= TOP;
-    let middle = top + lane.height() / 2.0 + 4.0;
+fn draw_lane(
+    lane: &Lane<'_>,
+    (top, is_action): (f64, bool),
+    (plan, palette): (&Plan, &Palette),
+    frame: &Frame,
+) -> Markup {
+    let left = frame.canvas.left;
+    let place = frame.canvas.name_place(top, top + lane.height() / 2.0 + 4.0);
     html! {
         g class="lane" data-lane=(lane.name) {
-            rect class="track" x=(px(LEFT)) y=(px(top)) width=(px(frame.scale.at(frame.end) - LEFT)) height=(px(lane.height())) {}
-            text class="label" x=(px(LEFT - 10.0)) y=(px(middle)) text-anchor="end" {
+            rect class="track" x=(px(left)) y=(px(top)) width=(px(frame.scale.at(frame.end) - left)) height=(px(lane.height())) {}
+            text class="label" x=(px(place.x)) y=(px(place.y)) text-anchor=(place.anchor) {
                 title { (lane.name) }
-                (fit(lane.name, LEFT - 14.0))
+                (fit(lane.name, place.room))
             }
             @for (bar, row) in lane.bars.iter().zip(&lane.rows) {
                 @let step = &plan.steps[bar.step];
                 @let class = if is_action { "action".to_owned() } else { palette.class(bar.text) };
-                (draw_bar(bar, top + ROW * *row as f64, &class, &about(bar, step, lane.name, is_action)))
+                (draw_bar(bar, top + ROW * *row as f64, (&class, is_action), &about(bar, step, lane.name, is_action)))
             }
         }
     }
 }
 
-fn draw_bar(bar: &Bar<'_>, top: f64, class: &str, about: &str) -> Markup {
+fn draw_bar(bar: &Bar<'_>, top: f64, (class, is_action): (&str, bool), about: &str) -> Markup {
     let y = top + (ROW - BAR) / 2.0;
     let margin = if bar.is_changed { 14.0 } else { 5.0 };
     let room = bar.to - bar.from - margin - 3.0;
-    let text = fit(bar.text, room);
+    let number = (bar.step + 1).to_string();
+    let mut text = fit(bar.text, room);
+    // A stump of a name says less than the number of the step, which map and table have, too, or than the colour of a design.
+    if text != bar.text && text.chars().count() < SHORTEST {
+        text = if is_action && width(&number) <= room + SLACK { number } else { String::new() };
+    }
+    let margin = if is_action && text.chars().count() < SHORTEST { margin - SLACK / 2.0 } else { margin };
     html! {
         g class="bar" data-step=(bar.step + 1) {
             title { (about) }

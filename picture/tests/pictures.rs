@@ -189,11 +189,185 @@ fn a_terminal_shows_the_lanes() {
     let expected = "\
 actions  ▕move p0············▕move p1············▕move p2···········▕move p3············
     f_1  ▕fd_0···············▕fd_0···············▕fd_0··············◆fd_1···············
-   time  0                   1                   2                  3                   4
+   time  0                   1                   2                  3                  4
 ";
     assert_eq!(plan.text(88).as_deref(), Some(expected));
     assert_eq!(plan.text(59), None);
     assert_eq!(Plan::default().text(100), None);
+}
+
+/// Steps that are too short for one scale are wider, and many steps take several lines; none is longer than the terminal is wide.
+#[test]
+fn terminals_of_any_width_hold_the_picture() {
+    let mut night = plan(16, "");
+    let mut now = 0.0;
+    for (step, index) in night.steps.iter_mut().zip(0..) {
+        step.start = now;
+        now += if index == 6 { 90.0 } else { 4.5 };
+        step.end = now;
+    }
+    for columns in 60..140 {
+        let text = night.text(columns).expect("a picture");
+        let widest = text.lines().map(|line| line.chars().count()).max();
+        assert!(widest <= Some(columns), "{columns}:\n{text}");
+        for index in 0..16 {
+            assert!(text.contains("move"), "{text}");
+            let start = &night.steps[index].start.to_string();
+            assert!(text.split_whitespace().any(|word| word == start), "{columns}: {start}:\n{text}");
+        }
+        assert_eq!(text.matches('◆').count(), 5, "{text}");
+    }
+    assert_eq!(plan(200, "").text(80), None, "more than an overview");
+}
+
+/// The drawings of a page that a column of this width shows: how wide they are, and whether they are scrolled.
+fn shown(page: &str, column: f64) -> Vec<(String, f64, bool)> {
+    let class = match column {
+        wide if wide >= 1146.0 => "in-wide",
+        half if half >= 560.0 => "in-half",
+        _ => "in-narrow",
+    };
+    let attribute = |tag: &str, name: &str| {
+        let value = tag.split(&format!("{name}=\"")).nth(1).and_then(|rest| rest.split('"').next());
+        value.unwrap_or_default().to_owned()
+    };
+    let tags = page.split("<svg ").skip(1).map(|rest| rest.split('>').next().unwrap_or_default());
+    let shown = tags.filter(|tag| attribute(tag, "class").split(' ').any(|own| own == class));
+    let drawing = |tag: &str| {
+        let width = attribute(tag, "width").parse().expect("a width");
+        (attribute(tag, "aria-labelledby"), width, attribute(tag, "class").contains("long"))
+    };
+    shown.map(drawing).collect()
+}
+
+/// Each column shows each picture once, and no picture of an ordinary plan is wider than its column.
+#[test]
+fn pictures_fit_their_column() {
+    let alone = Report { before: None, ..report(20, "") };
+    for (page, columns, pictures) in [
+        (report(20, "").html(), &[592.0, 560.0, 368.0, 328.0][..], 8),
+        (alone.html(), &[1216.0, 1146.0, 800.0, 560.0, 368.0, 328.0], 4),
+        (sheet("x").html(), &[1216.0, 800.0, 368.0], 6),
+        (log(50, "").html(), &[1216.0, 800.0, 368.0], 1),
+    ] {
+        for column in columns {
+            let drawn = shown(&page, *column);
+            assert_eq!(drawn.len(), pictures, "{column}: {drawn:?}");
+            for (name, width, is_long) in drawn {
+                assert!(width <= *column && !is_long, "{column}: {name} is {width} wide");
+            }
+        }
+    }
+}
+
+/// A plan of very many steps is scrolled, and drawn once for all columns that are too narrow.
+#[test]
+fn long_plans_are_scrolled() {
+    let page = Report { before: None, ..report(1000, "") }.html();
+    for column in [1216.0, 800.0, 368.0] {
+        let drawn = shown(&page, column);
+        let timeline = drawn.iter().find(|(name, ..)| name.contains("timeline")).expect("a timeline");
+        assert!(timeline.1 > 4000.0 && timeline.2, "{column}: {timeline:?}");
+    }
+    assert_eq!(page.matches("-timeline-1-title").count(), 2, "an id, and who refers to it");
+    assert_eq!(page.matches("-timeline-2-title").count(), 0);
+}
+
+/// Plans beside each other have one axis: the same time is at the same place, and the later half of the longer one is shown.
+#[test]
+fn before_and_after_share_one_axis() {
+    let mut report = report(14, "");
+    for (step, index) in report.plan.steps.iter_mut().zip(0..) {
+        (step.start, step.end) = (f64::from(index) * 60.0, f64::from(index + 1) * 60.0);
+    }
+    let page = report.html();
+    let ticks = |plan: &str| -> Vec<Vec<(String, String)>> {
+        let section = page.split(&format!("data-plan=\"{plan}\"")).nth(1).expect("a plan");
+        let section = section.split("</section>").next().unwrap_or_default();
+        let pictures = section.split("<svg ").skip(1);
+        let pictures = pictures.filter(|text| {
+            let tag = text.split('>').next().unwrap_or_default();
+            tag.contains("in-half") && (tag.contains("timeline") || tag.contains("number"))
+        });
+        let axis = |text: &str| -> Vec<(String, String)> {
+            let document = format!("<svg {}</svg>", text.split("</svg>").next().unwrap_or_default());
+            let document = Document::parse(&document).expect("XML");
+            let texts = document.descendants().filter(|node| node.attribute("text-anchor") == Some("middle"));
+            texts
+                .map(|node| {
+                    (
+                        node.text().unwrap_or_default().to_owned(),
+                        node.attribute("x").unwrap_or_default().to_owned(),
+                    )
+                })
+                .collect()
+        };
+        pictures.map(axis).collect()
+    };
+    let (before, after) = (ticks("before"), ticks("after"));
+    assert_eq!(before.len(), 2, "a timeline and a number");
+    assert_eq!(before, after, "the same numbers at the same places");
+    // The number falls to 98 in one plan and to 86 in the other: both are drawn on the range of both.
+    let values = |plan: &str| -> Vec<String> {
+        let section = page.split(&format!("data-plan=\"{plan}\"")).nth(1).expect("a plan");
+        let picture = section.split("number-1-1-title").nth(2).and_then(|rest| rest.split("</svg>").next());
+        let ends = picture.expect("a picture").split("text-anchor=\"end\">").skip(1);
+        let texts = ends.filter_map(|rest| rest.split('<').next());
+        texts.filter(|text| text.parse::<f64>().is_ok()).map(str::to_owned).collect()
+    };
+    assert!(values("before").len() > 2, "{:?}", values("before"));
+    assert_eq!(values("before"), values("after"), "one scale upwards");
+    assert!(before[0] == before[1], "one axis for timeline and numbers");
+    let last = after[0].last().expect("ticks");
+    assert_eq!(last.0, "800", "of 840");
+    assert!(last.1.parse::<f64>().is_ok_and(|x| x < 560.0), "{last:?}");
+}
+
+/// A bar too short for a name has the number of its step, which the map has, too.
+#[test]
+fn short_bars_have_the_number_of_their_step() {
+    let mut plan = plan(30, "");
+    plan.steps[29].end = 300.0;
+    let text = plan.svg();
+    let document = Document::parse(&text).expect("XML");
+    let lane = document.descendants().find(|node| node.attribute("data-lane") == Some("actions"));
+    let bars = lane.expect("a lane").children().filter(|node| node.attribute("class") == Some("bar"));
+    let texts = bars.map(|bar| {
+        let step = bar.attribute("data-step").unwrap_or_default().to_owned();
+        (
+            step,
+            bar.children()
+                .find(|child| child.tag_name().name() == "text")
+                .and_then(|text| text.text().map(str::to_owned)),
+        )
+    });
+    for (step, text) in texts {
+        let is_known = text.as_ref().is_none_or(|text| *text == step || text.starts_with("move"));
+        assert!(is_known, "{step}: {text:?}");
+    }
+    let narrow = Report { before: None, plan: plan.clone(), ..Report::default() }.html();
+    assert!(narrow.contains(">30<") || narrow.contains("move p29"), "the long one is named");
+}
+
+/// A group without values says why, and has no axis that would mean nothing.
+#[test]
+fn nothing_is_said_in_words() {
+    let group = |values: Vec<(f64, String)>| Group {
+        name: "greedy".to_owned(),
+        values,
+        mean: None,
+        nothing: "none of its 20 missions was accomplished".to_owned(),
+    };
+    let page = |groups: Vec<Group>| {
+        let rows = Rows { title: "cost".to_owned(), axis: "cost".to_owned(), groups };
+        Sheet { parts: vec![Part::Rows(rows)], ..Sheet::default() }
+    };
+    let empty = page(vec![group(Vec::new())]);
+    let picture = &empty.pictures()[0].1;
+    assert!(picture.contains(">none of its 20 missions was accomplished<"), "{picture}");
+    assert!(!picture.contains("text-anchor=\"middle\""), "no numbers: {picture}");
+    let some = page(vec![group(Vec::new()), group(vec![(1.0, String::new())])]);
+    assert_eq!(some.pictures()[0].1.matches("none of its 20").count(), 1);
 }
 
 /// A journal of so many events, each tenth with a decision.
@@ -246,6 +420,7 @@ fn sheet(name: &str) -> Sheet {
         name: format!("{name}group"),
         values: vec![(1.0, name.to_owned()); 40],
         mean: Some((1.0, 0.5)),
+        nothing: String::new(),
     };
     Sheet {
         name: name.to_owned(),

@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
-use encodings::{Limits, Solution};
+use encodings::{Limits, Solution, Status};
 use metaplan::certificate::{Verification, Verifier};
 use metaplan::journal::JournalReport;
 use metaplan::message::Message;
 use metaplan::mission::Mission;
 use metaplan::picture::{Checked, Plan, Report};
 use metaplan::planner::Planner;
-use metaplan::report::{Positions, changes, log_picture};
+use metaplan::report::{Cost, Positions, changes, log_picture};
 use metaplan::setup::Setup;
 use metaplan::visible::visible;
 use num_rational::BigRational;
@@ -140,11 +140,12 @@ impl Answer {
         Ok(Self { solution: planned.solution, plan })
     }
 
-    fn cost(&self) -> String {
-        self.solution
-            .plan
-            .as_ref()
-            .map_or_else(|| "nothing: there is none".to_owned(), |plan| plan.cost.to_string())
+    fn cost(&self) -> Cost {
+        match (&self.solution.plan, self.solution.status) {
+            (Some(plan), _) => Cost::Of(plan.cost.to_string()),
+            (None, Status::Unsolvable) => Cost::NoPlan,
+            (None, _) => Cost::NotFound,
+        }
     }
 }
 
@@ -160,9 +161,7 @@ fn page(
         (name, _) => name.to_owned(),
     };
     let compared = before.as_ref().map(|(old, was)| {
-        let costs = [was.cost(), answer.cost()];
-        let costs = [costs[0].as_str(), costs[1].as_str()];
-        changes((&old.mission, &was.plan), (&setup.mission, &answer.plan), costs)
+        changes((&old.mission, &was.plan), (&setup.mission, &answer.plan), &[was.cost(), answer.cost()])
     });
     Report {
         name,

@@ -146,7 +146,7 @@ enum Said {
     Heard(u64, String),
     Answer(String),
     Known(Vec<DesignChange>),
-    Planned(Option<u64>),
+    Planned { exists: bool, under_way: Option<u64> },
 }
 
 impl Said {
@@ -154,7 +154,7 @@ impl Said {
     fn bytes(&self) -> usize {
         match self {
             Self::Heard(_, text) | Self::Answer(text) => text.len(),
-            Self::Known(_) | Self::Planned(_) => 0,
+            Self::Known(_) | Self::Planned { .. } => 0,
         }
     }
 }
@@ -184,9 +184,9 @@ impl Mouth {
         self.say(Said::Known(designs));
     }
 
-    /// That there is another plan to be seen, or none any more; with the number of the action under way.
-    pub(super) fn planned(&self, under_way: Option<u64>) {
-        self.say(Said::Planned(under_way));
+    /// Whether there is a plan to be seen now; with the number of the action under way.
+    pub(super) fn planned(&self, exists: bool, under_way: Option<u64>) {
+        self.say(Said::Planned { exists, under_way });
     }
 
     /// That there will be no more. This waits until what was said before is known.
@@ -224,8 +224,8 @@ fn listen(hub: &Hub, received: &Receiver<Option<(f64, Said)>>, behind: &Behind) 
                 let keys = designs.iter().map(|own| design_key(&own.design)).collect();
                 hub.take(json!({"at": at, "known": designs}).to_string().into(), keys);
             }
-            Said::Planned(under_way) => {
-                let line = json!({"at": at, "planned": {"under_way": under_way}});
+            Said::Planned { exists, under_way } => {
+                let line = json!({"at": at, "planned": {"exists": exists, "under_way": under_way}});
                 hub.take(line.to_string().into(), vec!["planned".to_owned()]);
             }
             Said::Answer(answer) => {

@@ -36,9 +36,12 @@ pub(super) fn design_key(design: &str) -> String {
 pub(super) fn keys(answer: &str) -> Vec<String> {
     let Ok(about) = serde_json::from_str::<About>(answer) else { return Vec::new() };
     match about.answer.as_ref() {
-        "plan_found" | "plan_none" => vec!["plan".to_owned()],
         "request_action" | "goal_reached" => vec!["action".to_owned()],
-        kind @ ("ready" | "contradicted" | "unconcluded") => vec![kind.to_owned()],
+        "suspend_action" | "resume_action" | "cancel_action" => vec!["suspension".to_owned()],
+        // A plan that is found, lost or kept: lines on all three are repeated in their order, since the cost of a kept plan is in the first.
+        kind @ ("plan_found" | "plan_none" | "plan_kept" | "ready" | "contradicted" | "unconcluded") => {
+            vec![kind.to_owned()]
+        }
         "reconfigure" => about.function.map(|function| format!("function {function}")).into_iter().collect(),
         "inferred" => {
             let designs = about.designs.iter().map(|own| design_key(&own.design));
@@ -58,8 +61,12 @@ mod tests {
     fn answers_are_the_last_word_on_something() {
         let check = |answer: &str, expected: &[&str]| assert_eq!(keys(answer), expected, "{answer}");
         check(r#"{"answer":"ready"}"#, &["ready"]);
-        check(r#"{"answer":"plan_found","cost":1,"steps":[]}"#, &["plan"]);
-        check(r#"{"answer":"plan_none","status":"unsolvable"}"#, &["plan"]);
+        check(r#"{"answer":"plan_found","cost":1,"steps":[]}"#, &["plan_found"]);
+        check(r#"{"answer":"plan_none","status":"unsolvable"}"#, &["plan_none"]);
+        check(r#"{"answer":"plan_kept","because":"x"}"#, &["plan_kept"]);
+        for kind in ["suspend_action", "resume_action", "cancel_action"] {
+            check(&format!(r#"{{"answer":"{kind}","action":1}}"#), &["suspension"]);
+        }
         check(r#"{"answer":"reconfigure","function":"f \"x\"","from":null,"to":"d"}"#, &["function f \"x\""]);
         check(
             r#"{"answer":"inferred","designs":[{"design":"a","available":true}],"objectives":[{"objective":"o"}]}"#,

@@ -104,8 +104,9 @@ impl Live {
     /// Takes another plan, or that there is none any more. This never waits, and nothing is drawn before somebody looks.
     pub fn planned(&self, outlook: Option<Outlook>) {
         let under_way = outlook.as_ref().filter(|own| own.is_under_way).map(|own| own.first);
+        let exists = outlook.is_some();
         self.house.canvas.take(outlook);
-        self.mouth.planned(under_way);
+        self.mouth.planned(exists, under_way);
     }
 
     /// Ends the run for those who look, who are given a moment to see the end.

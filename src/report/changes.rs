@@ -12,8 +12,19 @@ use crate::report::designs::because;
 /// What a component's or an attribute's state is called where nobody says any.
 const UNSAID: &str = "not said";
 
-/// From causes to effects: what is reported, what the task is, which designs that makes available, and what the plan comes to.
-pub fn changes(before: (&Mission, &Plan), after: (&Mission, &Plan), costs: [&str; 2]) -> Vec<Change> {
+/// The cost of a plan, or why there is none.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Cost {
+    /// The metric, as text.
+    Of(String),
+    /// It is proved that there is no plan.
+    NoPlan,
+    /// No plan was found, within limits.
+    NotFound,
+}
+
+/// From causes to effects: what is reported, what the task is, which designs that makes available, and what the plan costs.
+pub fn changes(before: (&Mission, &Plan), after: (&Mission, &Plan), costs: &[Cost; 2]) -> Vec<Change> {
     let mut changes = Vec::new();
     let mut say = |text: String| changes.push(Change { text, because: Vec::new() });
     differences(&components(before.0), &components(after.0), UNSAID).into_iter().for_each(&mut say);
@@ -109,30 +120,126 @@ fn designs(before: &Mission, after: &Mission) -> Vec<Change> {
 }
 
 /// How the plans differ.
-fn plans(before: &Plan, after: &Plan, [old_cost, new_cost]: [&str; 2]) -> Vec<String> {
+fn plans(before: &Plan, after: &Plan, costs: &[Cost; 2]) -> Vec<String> {
+    let text = match costs {
+        [Cost::Of(old), Cost::Of(new)] => return both(before, after, [old, new]),
+        [Cost::Of(old), Cost::NoPlan] => format!("There is no plan now. The plan before costs {old}."),
+        [Cost::Of(old), Cost::NotFound] => format!("No plan was found now. The plan before costs {old}."),
+        [Cost::NoPlan, Cost::Of(new)] => format!("The plan costs {new} now. Before, there was no plan."),
+        [Cost::NotFound, Cost::Of(new)] => format!("The plan costs {new} now. Before, no plan was found."),
+        [Cost::NoPlan, Cost::NoPlan] => "There is no plan now, and there was none before.".to_owned(),
+        [_, Cost::NoPlan] => "There is no plan now, and none was found before.".to_owned(),
+        [Cost::NoPlan, _] => "No plan was found now, and there was none before.".to_owned(),
+        [Cost::NotFound, Cost::NotFound] => "No plan was found, now or before.".to_owned(),
+    };
+    vec![text]
+}
+
+/// How two plans with these costs differ.
+fn both(before: &Plan, after: &Plan, [old_cost, new_cost]: [&str; 2]) -> Vec<String> {
     let mut texts = Vec::new();
     if old_cost == new_cost {
         texts.push(format!("The plan costs {new_cost}, as before."));
     } else {
         texts.push(format!("The plan costs {new_cost} now, {old_cost} before."));
     }
-    let used = |plan: &Plan| -> BTreeMap<String, BTreeSet<String>> {
+    let used = |plan: &Plan| -> BTreeMap<String, String> {
         let mut used: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
         for (function, design) in plan.steps.iter().flat_map(|step| &step.configuration) {
             used.entry(function.clone()).or_default().insert(design.clone());
         }
-        used
-    };
-    let words = |used: BTreeMap<String, BTreeSet<String>>| -> BTreeMap<String, String> {
         let join = |designs: BTreeSet<String>| designs.into_iter().collect::<Vec<_>>().join(", ");
         used.into_iter()
             .map(|(function, designs)| (format!("Designs of {function}"), join(designs)))
             .collect()
     };
-    texts.extend(differences(&words(used(before)), &words(used(after)), "none"));
-    let actions = |plan: &Plan| plan.steps.iter().map(|step| step.label.clone()).collect::<Vec<_>>();
-    let (old, new) = (actions(before), actions(after));
-    let kept = new.iter().filter(|action| old.contains(action)).count();
-    texts.push(format!("{kept} of {} steps do what a step of the {} before did.", new.len(), old.len()));
+    texts.extend(differences(&used(before), &used(after), "none"));
+    texts.push(kept(before, after));
     texts
+}
+
+/// How many actions of a plan are also in the plan before, each as often as it is in both; with which designs, does not count here.
+fn kept(before: &Plan, after: &Plan) -> String {
+    let mut old: Vec<&str> = before.steps.iter().map(|step| step.label.as_str()).collect();
+    let in_both = after.steps.iter().filter(|step| {
+        let found = old.iter().position(|label| *label == step.label);
+        found.map(|position| old.swap_remove(position)).is_some()
+    });
+    let (kept, new, old) = (in_both.count(), after.steps.len(), before.steps.len());
+    let plural = |count: usize| if count == 1 { "1 action".to_owned() } else { format!("{count} actions") };
+    if new == 0 {
+        return format!("The plan has no actions now; it had {} before.", plural(old));
+    }
+    let are = if kept == 1 || new == 1 { "is" } else { "are" };
+    format!("{kept} of {} {are} also in the plan before, which has {}.", plural(new), plural(old))
+}
+
+#[cfg(test)]
+mod tests {
+    use picture::{Plan, Step};
+
+    use super::{Cost, plans};
+
+    fn plan(labels: &[&str]) -> Plan {
+        let steps = labels.iter().map(|label| Step { label: (*label).to_owned(), ..Step::default() });
+        Plan { steps: steps.collect(), ..Plan::default() }
+    }
+
+    fn check(before: &[&str], after: &[&str], costs: &[Cost; 2], expected: &[&str]) {
+        assert_eq!(plans(&plan(before), &plan(after), costs), expected, "{before:?} {after:?}");
+    }
+
+    #[test]
+    fn plans_are_compared_in_plain_words() {
+        let of = |cost: &str| Cost::Of(cost.to_owned());
+        let (there, back) = ("go a b", "go b a");
+        check(
+            &[there, back, there, back],
+            &[there, there, there],
+            &[of("4"), of("3")],
+            &[
+                "The plan costs 3 now, 4 before.",
+                "2 of 3 actions are also in the plan before, which has 4 actions.",
+            ],
+        );
+        check(
+            &[there],
+            &[there, back],
+            &[of("4"), of("4")],
+            &[
+                "The plan costs 4, as before.",
+                "1 of 2 actions is also in the plan before, which has 1 action.",
+            ],
+        );
+        check(
+            &[back],
+            &[there],
+            &[of("1"), of("2")],
+            &[
+                "The plan costs 2 now, 1 before.",
+                "0 of 1 action is also in the plan before, which has 1 action.",
+            ],
+        );
+        check(
+            &[back],
+            &[],
+            &[of("1"), of("0")],
+            &["The plan costs 0 now, 1 before.", "The plan has no actions now; it had 1 action before."],
+        );
+        check(&[there], &[], &[of("4"), Cost::NoPlan], &["There is no plan now. The plan before costs 4."]);
+        check(
+            &[there],
+            &[],
+            &[of("4"), Cost::NotFound],
+            &["No plan was found now. The plan before costs 4."],
+        );
+        check(&[], &[there], &[Cost::NoPlan, of("4")], &["The plan costs 4 now. Before, there was no plan."]);
+        check(&[], &[], &[Cost::NoPlan, Cost::NoPlan], &["There is no plan now, and there was none before."]);
+        check(
+            &[],
+            &[],
+            &[Cost::NoPlan, Cost::NotFound],
+            &["No plan was found now, and there was none before."],
+        );
+    }
 }

@@ -1,5 +1,7 @@
 //! Plans beside probabilistic policies, and ways of control beside the loop, to what is drawn of them.
 
+use std::collections::BTreeMap;
+
 use picture::{Change, Group, Part, Points, Reason, Rows, Sheet};
 
 use crate::answers::{MEASURES, Pair, Row};
@@ -26,13 +28,27 @@ pub fn comparison_sheet(mission: &str, comparisons: &[(Option<Pair>, Comparison)
     }
 }
 
-/// Time and the probability of a success without collision: the front, and each candidate with a finite time.
+/// Names for rows or points of these kinds: the kind, with a number where there are several of it: `a1`, `a2`, `b`.
+fn labels<'k>(kinds: &[(&'k Option<Pair>, &'k str)]) -> Vec<String> {
+    let mut seen: BTreeMap<&(&Option<Pair>, &str), usize> = BTreeMap::new();
+    let label = |kind| {
+        let number = seen.entry(kind).or_default();
+        *number += 1;
+        let is_only = kinds.iter().filter(|other| *other == kind).count() == 1;
+        if is_only { kind.1.to_owned() } else { format!("{}{number}", kind.1) }
+    };
+    kinds.iter().map(label).collect()
+}
+
+/// Time and the probability of a success without collision: the front, and each candidate with a finite time. A point is called as its row in
+/// the table of all measures.
 fn front(comparison: &Comparison) -> Points {
-    let points = comparison.candidates.iter().filter_map(|own| {
+    let kinds: Vec<String> = comparison.candidates.iter().map(|own| own.kind.to_string()).collect();
+    let kinds: Vec<(&Option<Pair>, &str)> = kinds.iter().map(|kind| (&None, kind.as_str())).collect();
+    let points = comparison.candidates.iter().zip(labels(&kinds)).filter_map(|(own, label)| {
         let (time, success) = (own.measures.time?, own.measures.no_collision);
-        let about =
-            format!("{} {}: time {}, probability {}", own.kind, own.name, shown(time), shown(success));
-        Some((own.kind.to_string(), about, time, success))
+        let about = format!("{label}, {}: time {}, probability {}", own.name, shown(time), shown(success));
+        Some((label, about, time, success))
     });
     Points {
         title: "time, and the probability of success without collision".to_owned(),
@@ -84,16 +100,17 @@ fn prices(comparison: &Comparison) -> Vec<Change> {
 }
 
 fn table(rows: &[Row]) -> Part {
-    let header = ["kind", "candidate"].into_iter().chain(MEASURES).map(|name| name.replace('_', " "));
-    let line = |row: &Row| {
+    let kinds: Vec<(&Option<Pair>, &str)> = rows.iter().map(|row| (&row.pair, row.kind.as_str())).collect();
+    let header = ["point", "candidate"].into_iter().chain(MEASURES).map(|name| name.replace('_', " "));
+    let line = |(row, label): (&Row, String)| {
         let name = match &row.pair {
             Some((start, goal)) => format!("{start}-{goal}: {}", row.name),
             None => row.name.clone(),
         };
         let values = row.values.iter().map(|value| value.map_or_else(|| "–".to_owned(), shown));
-        [row.kind.clone(), name].into_iter().chain(values).collect()
+        [label, name].into_iter().chain(values).collect()
     };
-    Part::Table("measures".to_owned(), header.collect(), rows.iter().map(line).collect())
+    Part::Table("measures".to_owned(), header.collect(), rows.iter().zip(labels(&kinds)).map(line).collect())
 }
 
 /// What is drawn of simulated missions: how costs, reactions and reconfigurations are distributed over the seeds.
@@ -102,11 +119,16 @@ pub fn simulation_sheet(mission: &str, scenario: &str, strategies: &[Strategy], 
     let changes = |run: &Run| Some(run.reconfigurations as f64);
     let parts = vec![
         Part::Heading("Cost of accomplished missions".to_owned()),
-        distribution(strategies, runs, "cost", &cost),
+        distribution(strategies, runs, ("cost", &none_accomplished), &cost),
         Part::Heading("Reaction".to_owned()),
-        distribution(strategies, runs, "reaction, in the domain's time unit", &Run::mean_reaction),
+        distribution(
+            strategies,
+            runs,
+            ("reaction, in the domain's time unit", &|_| "there was nothing to react to".to_owned()),
+            &Run::mean_reaction,
+        ),
         Part::Heading("Reconfigurations".to_owned()),
-        distribution(strategies, runs, "reconfigurations", &changes),
+        distribution(strategies, runs, ("reconfigurations", &|_| String::new()), &changes),
         Part::Heading("Figures".to_owned()),
         figures(strategies, runs),
     ];
@@ -114,9 +136,26 @@ pub fn simulation_sheet(mission: &str, scenario: &str, strategies: &[Strategy], 
     Sheet {
         name: format!("{mission}: {scenario}, simulated"),
         description: "A dot is a mission, the diamond the mean with its interval of 95 percent.".to_owned(),
-        verdict: format!("{done} of {} missions were accomplished.", runs.len()),
+        verdict: accomplished(done, runs.len()),
         parts,
     }
+}
+
+/// How many of some missions reached their goal, in a sentence.
+fn accomplished(done: usize, all: usize) -> String {
+    match (done, all) {
+        (0, 1) => "The mission was not accomplished.".to_owned(),
+        (1, 1) => "The mission was accomplished.".to_owned(),
+        (0, _) => format!("None of the {all} missions was accomplished."),
+        _ if done == all => format!("All {all} missions were accomplished."),
+        (1, _) => format!("1 of {all} missions was accomplished."),
+        _ => format!("{done} of {all} missions were accomplished."),
+    }
+}
+
+/// Why a strategy with this number of missions has no costs; short enough for a telephone.
+fn none_accomplished(missions: usize) -> String {
+    format!("0 of {missions} accomplished")
 }
 
 fn own(runs: &[Run], strategy: Strategy) -> impl Iterator<Item = &Run> {
@@ -126,30 +165,33 @@ fn own(runs: &[Run], strategy: Strategy) -> impl Iterator<Item = &Run> {
 fn distribution(
     strategies: &[Strategy],
     runs: &[Run],
-    name: &str,
+    (name, nothing): (&str, &dyn Fn(usize) -> String),
     figure: &dyn Fn(&Run) -> Option<f64>,
 ) -> Part {
     let group = |strategy: &Strategy| {
         let values = own(runs, *strategy).filter_map(|run| {
             let value = figure(run)?;
-            Some((value, format!("{}, seed {}: {}", strategy.name(), run.seed, shown(value))))
+            Some((value, format!("{}, seed {}: {}", strategy.name(), run.seed, rounded(value))))
         });
         let values: Vec<(f64, String)> = values.collect();
         let all: Vec<f64> = values.iter().map(|(value, _)| *value).collect();
-        let mean = Sample::of(&all)
-            .map(|sample| (sample.mean, if sample.count > 1 { sample.half_width } else { 0.0 }));
-        Group { name: strategy.name().to_owned(), values, mean }
+        let mean = Sample::of(&all).map(|sample| {
+            let half_width = if sample.count > 1 { sample.half_width } else { 0.0 };
+            (hundredths(sample.mean), hundredths(half_width))
+        });
+        let nothing = nothing(own(runs, *strategy).count());
+        Group { name: strategy.name().to_owned(), values, mean, nothing }
     };
     let groups = strategies.iter().map(group).collect();
     Part::Rows(Rows { title: format!("{name} by strategy"), axis: name.to_owned(), groups })
 }
 
 fn figures(strategies: &[Strategy], runs: &[Run]) -> Part {
-    let header = ["strategy", "missions", "accomplished", "cost, if accomplished", "failed actions"];
+    let header = ["strategy", "missions", "accomplished", "mean cost, if accomplished", "failed actions"];
     let line = |strategy: &Strategy| {
         let costs: Vec<f64> =
             own(runs, *strategy).filter(|run| run.accomplished).map(|run| run.cost).collect();
-        let cost = Sample::of(&costs).map_or_else(|| "–".to_owned(), |sample| shown(sample.mean));
+        let cost = Sample::of(&costs).map_or_else(|| "none accomplished".to_owned(), |sample| mean(&sample));
         let failed: usize = own(runs, *strategy).map(|run| run.failed).sum();
         let counts = [own(runs, *strategy).count(), costs.len()].map(|count| count.to_string());
         let [missions, accomplished] = counts;
@@ -157,6 +199,23 @@ fn figures(strategies: &[Strategy], runs: &[Run]) -> Part {
     };
     let header = header.map(str::to_owned).to_vec();
     Part::Table("figures".to_owned(), header, strategies.iter().map(line).collect())
+}
+
+/// A mean, with half the width of its interval where there are several values.
+fn mean(sample: &Sample) -> String {
+    match sample.count {
+        1 => rounded(sample.mean),
+        _ => format!("{} ± {}", rounded(sample.mean), rounded(sample.half_width)),
+    }
+}
+
+/// A simulated figure, which chance makes inexact, with two decimals.
+fn rounded(value: f64) -> String {
+    hundredths(value).to_string()
+}
+
+fn hundredths(value: f64) -> f64 {
+    (value * 100.0).round() / 100.0
 }
 
 /// Six decimals at most.

@@ -34,7 +34,7 @@ pub(super) fn map(scene: Scene<'_>, plan: &Plan, steps: &mut [Step]) -> Option<M
         let mut ways = moving.movements.iter().filter(|movement| *movement.action == Name::new(&own.action));
         step.way = ways.find_map(|movement| {
             let at = |parameter: usize| number.get(&Name::new(own.arguments.get(parameter)?)).copied();
-            Some((at(movement.parameters.0)?, at(movement.parameters.1)?)).filter(|(from, to)| from != to)
+            Some((at(movement.parameters.0)?, at(movement.parameters.1)?))
         });
     }
     let predicates: BTreeSet<&Name> = moving.movements.iter().map(|movement| movement.predicate).collect();

@@ -14,7 +14,7 @@ mod plan;
 mod positions;
 mod seen;
 
-pub use changes::changes;
+pub use changes::{Cost, changes};
 pub use compared::{comparison_sheet, simulation_sheet};
 pub use designs::designs;
 pub use front::front_sheet;

@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use encodings::Plan;
+use num_rational::BigRational;
 use pddl::ast::Name;
-use pddl::validate::{Course, CourseMoment, NumberBound, PlanStep, PlanText, course};
+use pddl::validate::{Course, CourseMoment, NumberBound, PlanStep, PlanText, course, metric_after};
 use picture::{Axis, Bound, Curve, Step};
 
 use crate::number;
@@ -25,20 +26,47 @@ pub(super) fn curves(scene: Scene<'_>, plan: &Plan, steps: &[Step], axis: Axis) 
     let text = PlanText { steps: text.collect() };
     // The validator has executed the plan.
     let course = course(scene.domain, scene.problem, &text).unwrap_or_default();
-    std::iter::once(cost(plan, steps)).chain(numbers(&course, steps, axis)).collect()
+    let points = metric(scene, plan, &course, axis).unwrap_or_else(|| spent(plan, steps, axis));
+    let cost = Curve { name: "cost".to_owned(), points, bounds: Vec::new() };
+    std::iter::once(cost).chain(numbers(&course, steps, axis)).collect()
 }
 
-/// What the plan has cost after each step.
-fn cost(plan: &Plan, steps: &[Step]) -> Curve {
-    let spent = plan.steps.iter().map(|step| step.cost.to_f64());
-    let mut sum = plan.cost.to_f64() - spent.clone().sum::<f64>();
-    let mut points = vec![(0.0, sum)];
-    for (step, cost) in steps.iter().zip(spent) {
-        sum += cost;
-        points.push((step.end, sum));
+/// The metric of the problem if the plan ended after each start and end of an action; none where that is undefined or does not lead to the cost of
+/// the plan, such as for the remainder of a mission, whose cost does not count what was spent before.
+fn metric(scene: Scene<'_>, plan: &Plan, course: &Course, axis: Axis) -> Option<Vec<(f64, f64)>> {
+    let first = metric_after(scene.domain, scene.problem, &BigRational::default())?;
+    let mut points = vec![(0.0, number::to_f64(&first))];
+    for moment in &course.moments {
+        set(&mut points, place(moment, axis), number::to_f64(moment.metric.as_ref()?));
     }
-    points.sort_by(|left, right| left.0.total_cmp(&right.0));
-    Curve { name: "cost".to_owned(), points, bounds: Vec::new() }
+    let (last, cost) = (points.last()?.1, plan.cost.to_f64());
+    ((last - cost).abs() <= 1e-6 * cost.abs().max(1.0)).then_some(points)
+}
+
+/// What the plan has cost after each step. What belongs to no step is spent evenly over time where actions overlap, since the makespan
+/// does not add up from steps, and before the first step otherwise.
+fn spent(plan: &Plan, steps: &[Step], axis: Axis) -> Vec<(f64, f64)> {
+    let costs = plan.steps.iter().map(|step| step.cost.to_f64());
+    let other = plan.cost.to_f64() - costs.clone().sum::<f64>();
+    let overlaps = axis == Axis::Time && steps.windows(2).any(|pair| pair[1].start < pair[0].end);
+    let last = steps.iter().map(|step| step.end).fold(0.0, f64::max);
+    let other = |at: f64| if overlaps && last > 0.0 { other * at / last } else { other };
+    let mut ends: Vec<(f64, f64)> = steps.iter().map(|step| step.end).zip(costs).collect();
+    ends.sort_by(|left, right| left.0.total_cmp(&right.0));
+    let (mut sum, mut points) = (0.0, vec![(0.0, other(0.0))]);
+    for (end, cost) in ends {
+        sum += cost;
+        set(&mut points, end, sum + other(end));
+    }
+    points
+}
+
+/// Adds the value from a place on; the last value at one place counts.
+fn set(points: &mut Vec<(f64, f64)>, at: f64, value: f64) {
+    match points.last_mut() {
+        Some(last) if last.0 >= at => last.1 = value,
+        _ => points.push((at, value)),
+    }
 }
 
 fn numbers(course: &Course, steps: &[Step], axis: Axis) -> Vec<Curve> {
@@ -52,11 +80,7 @@ fn numbers(course: &Course, steps: &[Step], axis: Axis) -> Vec<Curve> {
         let at = place(moment, axis);
         for (name, value) in &moment.values {
             let curve = curves.entry(name).or_insert_with(|| Curve { name: bare(name), ..Curve::default() });
-            let value = number::to_f64(value);
-            match curve.points.last_mut() {
-                Some(last) if last.0 >= at => last.1 = value,
-                _ => curve.points.push((at, value)),
-            }
+            set(&mut curve.points, at, number::to_f64(value));
         }
         let Some(step) = steps.get(moment.step) else { continue };
         for bound in &moment.bounds {

@@ -44,10 +44,11 @@ fn sentence(solution: &Solution) -> String {
     let bound = solution.lower_bound.as_ref().filter(|_| solution.status != Status::Optimal);
     let bound = bound.filter(|_| cost.is_some()).map(|bound| format!(", lower bound {bound}"));
     let said = solution.verdict();
-    match cost {
-        Some(cost) => format!("{cost}{}: {said}.", bound.unwrap_or_default()),
-        None => format!("No plan is shown: {said}."),
+    if let Some(cost) = cost {
+        return format!("{cost}{}: {said}.", bound.unwrap_or_default());
     }
+    let (first, rest) = said.split_at(said.chars().next().map_or(0, char::len_utf8));
+    format!("{}{rest}.", first.to_uppercase())
 }
 
 /// Time, unless actions that take none follow each other.

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::common::{metaplan, metaplan_in, root};
 use crate::live::Run;
@@ -13,6 +13,9 @@ use crate::live::Run;
 const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
 /// A desktop, and a telephone.
 const WIDTHS: [u32; 2] = [1280, 400];
+
+/// A mission with two functions and a tank: the robot goes to and fro, and recharges.
+const GREENHOUSE: &str = "tests/program/greenhouse/mission.toml";
 
 /// What a page is asked in the browser, from a page around it that is as wide as the screen should be.
 const QUESTIONS: &str = include_str!("browser.js");
@@ -89,7 +92,9 @@ fn page(arguments: &[&str]) -> String {
 #[test]
 fn pages_of_plans_work_in_a_browser() {
     let Some(browser) = browser() else { return };
-    let missions: [&[&str]; 5] = [
+    let missions: [&[&str]; 7] = [
+        &[GREENHOUSE],
+        &[GREENHOUSE, "--scenario", "gusts"],
         &["missions/ugv.toml"],
         &["missions/ugv.toml", "--scenario", "kinect_failure"],
         &["missions/ugv_plain.toml", "--scenario", "bright_sun"],
@@ -101,6 +106,33 @@ fn pages_of_plans_work_in_a_browser() {
         assert!(found["unfolding"].as_u64() > Some(1), "{arguments:?}: {found}");
         assert!(found["pictures"].as_u64() > Some(1), "{arguments:?}: {found}");
     }
+}
+
+/// Ways there and back have the numbers of all their steps, each at its own arrow, as `check` has seen at both widths; the whole of both plans is
+/// on one axis.
+#[test]
+fn ways_to_and_fro_and_the_later_half_of_a_plan_can_be_seen() {
+    let Some(browser) = browser() else { return };
+    let alone = check(&browser, "to and fro", &page(&[GREENHOUSE]));
+    let steps = metaplan(&["plan", GREENHOUSE, "--format", "json"]).json();
+    let steps = steps["steps"].as_array().expect("steps").iter().zip(1..);
+    let mut ways: std::collections::BTreeMap<String, Vec<String>> = std::collections::BTreeMap::new();
+    for (step, number) in steps.filter(|(step, _)| step["action"] == "go") {
+        let way = step["arguments"].as_array().expect("arguments").iter().filter_map(Value::as_str);
+        let places = way.filter(|word| !word.starts_with('f')).collect::<Vec<_>>().join(" ");
+        ways.entry(places).or_default().push(number.to_string());
+    }
+    assert!(ways.len() == 8 && ways.values().any(|steps| steps.len() == 3), "{ways:?}");
+    let mut expected: Vec<String> = ways.into_values().map(|steps| steps.join(",")).collect();
+    let shown = alone["numbers"].as_array().expect("numbers").iter();
+    let mut shown: Vec<String> = shown.filter_map(Value::as_str).map(str::to_owned).collect();
+    shown.sort();
+    expected.sort();
+    assert_eq!(shown, expected);
+    let pair = check(&browser, "beside each other", &page(&[GREENHOUSE, "--scenario", "gusts"]));
+    let axis = pair["axis"].as_array().expect("numbers of the axis");
+    let last = axis.last().and_then(Value::as_str).and_then(|text| text.split(' ').next()).expect("a number");
+    assert!(last.parse::<f64>().is_ok_and(|last| last > 293.0 * 0.6), "of 293: {pair}");
 }
 
 /// Pages of fronts, comparisons, simulations and journals.
@@ -135,14 +167,14 @@ fn other_pages_work_in_a_browser() {
 }
 
 /// A run as it was seen, in one page: its style, its script, and what it gets from the program.
-fn seen(run: &Run, lines: &[String]) -> String {
+fn seen(run: &Run, lines: &[String], has_ended: bool) -> String {
     let get = |path: &str| run.get(path, "").1;
     let text = |text: String| Value::String(text).to_string().replace('<', "\\u003c");
     let messages = lines.iter().map(|line| text(line.clone())).collect::<Vec<_>>().join(",");
     let stand_in = format!(
         "const PLAN = {}, LINES = [{messages}]; self.fetch = async () => ({{ ok: true, text: async () => PLAN }}); \
          self.EventSource = class {{ constructor() {{ this.heard = {{}}; queueMicrotask(() => {{ this.heard.begin({{}}); \
-         LINES.forEach(data => this.heard.message({{ data }})); }}); }} addEventListener(name, own) {{ this.heard[name] = own; }} close() {{}} }};",
+         LINES.forEach(data => this.heard.message({{ data }})); if ({has_ended}) this.heard.end({{}}); }}); }} addEventListener(name, own) {{ this.heard[name] = own; }} close() {{}} }};",
         text(get("/plan"))
     );
     let page = get("/");
@@ -176,7 +208,7 @@ fn the_page_of_a_run_works_in_a_browser() {
     let lines = events.until(is_last);
     // The first says that it begins.
     let lines: Vec<String> = lines.iter().skip(1).map(Value::to_string).collect();
-    let page = seen(&run, &lines);
+    let page = seen(&run, &lines, false);
     let found = check(&browser, "a run", &page);
     // The plan of after the failure: from wp2 over wp3 and wp6 to wp9, one lane for actions and one for designs.
     assert_eq!(found["pictures"], 5, "timeline, cost, two numbers of the battery, map: {found}");
@@ -187,16 +219,81 @@ fn the_page_of_a_run_works_in_a_browser() {
     run.end();
 }
 
+/// The headline says that there is no plan as long as there is none, and no longer: as it happens, for who comes later, when most lines are gone,
+/// and at the end.
+#[test]
+fn a_run_that_has_a_plan_again_says_so() {
+    let Some(browser) = browser() else { return };
+    let status = |component: &str, status: &str| {
+        json!({"event": "component_status", "component": component, "status": status}).to_string()
+    };
+    let mut run = Run::begin(&["--serve=0"]);
+    let mut events = run.events();
+    let mut lines: Vec<String> = Vec::new();
+    let mut until = |line: usize| {
+        let is_last = |news: &Value| news["said"]["answer"] == "handled" && news["said"]["line"] == line;
+        // The first line says that it begins.
+        lines.extend(events.until(is_last).iter().filter(|news| *news != &json!({})).map(Value::to_string));
+        lines.clone()
+    };
+    let is = |run: &Run, lines: &[String], has_ended: bool, status: &str, about: &str| {
+        let found = check(&browser, status, &seen(run, lines, has_ended));
+        assert_eq!((&found["status"], &found["about"]), (&json!(status), &json!(about)), "{found}");
+    };
+    let started = json!({"event": "action_started", "action": 1}).to_string();
+    let lost = ["c_kinect", "c_lidar", "c_camera"].map(|component| status(component, "FALSE"));
+    run.tell([started].into_iter().chain(lost), 4);
+    let told = until(4);
+    is(&run, &told, false, "There is no plan", "There is no plan: no plan reaches the goal");
+    run.tell([status("c_lidar", "RECOVERED")], 5);
+    let told = until(5);
+    let (action, cost) = ("Action 1: move wp1 wp2", "Cost 516, proved optimal.");
+    is(&run, &told, false, action, cost);
+    is(&run, &told, true, &format!("{action} (the run has ended)"), cost);
+    let notes = (0..2500).map(|_| json!({"event": "note", "text": "x"}).to_string());
+    run.tell(notes, 2505);
+    // What was heard first is forgotten; who comes now is told how things are.
+    let mut late: Vec<String> = Vec::new();
+    for _ in 0..50 {
+        let is_last = |news: &Value| news["said"]["answer"] == "handled" && news["said"]["line"] == 2505;
+        let seen = run.events().before_the_end(is_last).unwrap_or_default();
+        late = seen.iter().filter(|news| *news != &json!({})).map(Value::to_string).collect();
+        if !late.is_empty() && !late.iter().any(|line| line.contains("c_camera") && line.contains("heard")) {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(100));
+    }
+    assert!(late.iter().any(|line| line.contains("plan_none")) && late.len() < 4000, "{} lines", late.len());
+    is(&run, &late, false, action, cost);
+    run.end();
+}
+
 /// What is wrong is found.
 #[test]
 fn questions_have_answers() {
     let Some(browser) = browser() else { return };
     let good = page(&["missions/ugv.toml"]);
+    let paired = page(&["missions/ugv.toml", "--scenario", "kinect_failure"]);
     let around = |page: &str| {
         let page = page.to_owned();
         let browser = browser.clone();
         std::panic::catch_unwind(move || check(&browser, "made wrong", &page)).is_err()
     };
+    assert!(!around(&good) && !around(&paired), "nothing is wrong with pages as they are");
+    assert!(around(&good.replace(" in-narrow", "")), "no drawing for a telephone");
+    assert!(around(&good.replace("max-width: 100%", "min-width: 700px")), "a picture that is cut");
+    assert!(
+        around(&paired.replacen(
+            "</section>",
+            "<style>.pair [data-plan=after] .axis { transform: translateX(9px) }</style></section>",
+            1
+        )),
+        "two axes"
+    );
+    assert!(
+        around(&good.replace("<style>", "<style>.leg text { transform: translate(60px, 60px) }")),
+        "numbers elsewhere"
+    );
     assert!(around(&good.replace("<main>", "<main><script>alert(1)</script>")), "a script that is not ours");
     assert!(
         around(&good.replace("<main>", "<main><p style=\"margin-bottom:-3rem\">on top</p>")),

@@ -143,7 +143,7 @@ impl Events {
     }
 
     /// All up to one that has something; none if the page ends before.
-    fn before_the_end(&mut self, is_last: impl Fn(&Value) -> bool) -> Option<Vec<Value>> {
+    pub fn before_the_end(&mut self, is_last: impl Fn(&Value) -> bool) -> Option<Vec<Value>> {
         let mut all = Vec::new();
         loop {
             let (_, data) = self.next()?;
@@ -210,7 +210,10 @@ fn the_plan_can_be_seen() {
     run.handled(0);
     let mut events = run.events();
     let planned = |news: &Value| news.get("planned").is_some();
-    assert_eq!(events.until(planned).pop().expect("a line")["planned"], json!({"under_way": 1}));
+    assert_eq!(
+        events.until(planned).pop().expect("a line")["planned"],
+        json!({"exists": true, "under_way": 1})
+    );
     let (head, plan) = run.get("/plan", "");
     assert!(head.contains("Content-Type: text/html; charset=utf-8"), "{head}");
     assert!(plan.starts_with("<div id=\"drawn\" data-first=\"1\">"), "{plan}");
@@ -230,7 +233,10 @@ fn the_plan_can_be_seen() {
         r#"{"event":"component_status","component":"c_kinect","status":"FALSE"}"#,
     ];
     run.tell(told.map(str::to_owned), 2);
-    assert_eq!(events.until(planned).pop().expect("a line")["planned"], json!({"under_way": 1}));
+    assert_eq!(
+        events.until(planned).pop().expect("a line")["planned"],
+        json!({"exists": true, "under_way": 1})
+    );
     let (_, changed) = run.get("/plan", "");
     assert!(changed.contains("fd_amcl_lidar") && !changed.contains("fd_amcl_kinect"), "{changed}");
     run.end();

@@ -7,6 +7,8 @@ use serde_json::Value;
 
 use crate::common::{copy_of_mission, edit, metaplan, metaplan_in, root};
 
+/// Drawings of each picture of a page, for columns of different widths; two beside another plan.
+const DRAWINGS: usize = 3;
 /// What a page may take, in bytes.
 const LARGEST: usize = 500_000;
 
@@ -29,19 +31,19 @@ fn the_page_has_all_that_the_answer_has() {
         let file = format!("missions/{mission}.toml");
         let page = page(&[&file]);
         assert!(page.len() <= LARGEST, "{mission}: {} bytes", page.len());
-        assert_eq!(page.matches("data-place=").count(), places, "{mission}");
+        assert_eq!(page.matches("data-place=").count(), DRAWINGS * places, "{mission}");
         let answer = metaplan(&["plan", &file, "--format", "json"]).json();
         let steps = answer["steps"].as_array().expect("steps");
         let mut marks = 0;
         for (step, number) in steps.iter().zip(1..) {
             assert!(count(&page, "data-step", &number.to_string()) >= 2, "{mission}: step {number}");
             for (function, design) in step["configuration"].as_object().expect("a configuration") {
-                assert_eq!(count(&page, "data-lane", function), 1, "{mission}: {function}");
+                assert_eq!(count(&page, "data-lane", function), DRAWINGS, "{mission}: {function}");
                 assert!(page.contains(design.as_str().expect("a name")), "{mission}: {design}");
             }
             marks += step["reconfigured"].as_array().map_or(0, Vec::len);
         }
-        assert_eq!(page.matches("data-mark=").count(), marks, "{mission}");
+        assert_eq!(page.matches("data-mark=").count(), DRAWINGS * marks, "{mission}");
         let reason = metaplan(&[
             "reason",
             &format!("ontology/kb/{}.ttl", mission.trim_end_matches("_plain")),
@@ -75,6 +77,80 @@ fn before_and_after_stand_side_by_side_with_the_reasons() {
         "data-plan=\"after\"",
     ] {
         assert!(page.contains(text), "{text}");
+    }
+}
+
+/// Where there is no plan, what is compared says so, and nothing about a plan that is not there.
+#[test]
+fn no_plan_is_said_in_plain_words() {
+    let outcome = metaplan(&["report", "missions/ugv.toml", "--set", "battery=1"]);
+    assert_eq!(outcome.status, 10, "{}", outcome.stderr);
+    assert!(outcome.stdout.contains("<p>There is no plan now. The plan before costs 408.</p>"));
+    for text in ["nothing: there is none", "0 of 0", "none now"] {
+        assert!(!outcome.stdout.contains(text), "{text}");
+    }
+}
+
+/// A design that several things rule out: all of them are there, and that one alone is not enough.
+#[test]
+fn all_causes_of_a_lost_design_are_listed() {
+    let sentence = "2 causes rule it out, and all of them have to go before it is available:";
+    let kinect = "c_status(c_kinect, &quot;FALSE&quot;) is stated";
+    let sun = "hasValue(obs_ambient_light, &quot;0.9&quot;^^decimal) is stated";
+    let check = |situation: &[&str], has_kinect: bool, has_sun: bool| {
+        let all: Vec<&str> = ["missions/ugv.toml"].iter().chain(situation).copied().collect();
+        let page = page(&all);
+        let row = page.split("data-design=\"fd_amcl_kinect\"").nth(1).expect("a design");
+        let row = row.split("</tr>").next().unwrap_or_default();
+        assert_eq!(row.contains(kinect), has_kinect, "{situation:?}: {row}");
+        assert_eq!(row.contains(sun), has_sun, "{situation:?}: {row}");
+        assert_eq!(row.contains(sentence), has_kinect && has_sun, "{situation:?}: {row}");
+        let changes = page.split("id=\"changes\"").nth(1).and_then(|rest| rest.split("</section>").next());
+        assert_eq!(changes.expect("changes").contains(sentence), has_kinect && has_sun, "{situation:?}");
+    };
+    check(&["--fail", "c_kinect"], true, false);
+    check(&["--set", "ambient_light=0.9"], false, true);
+    check(&["--fail", "c_kinect", "--set", "ambient_light=0.9"], true, true);
+}
+
+/// The values of a curve in a picture: when, and what.
+fn values(picture: &str) -> Vec<(f64, f64)> {
+    let document = Document::parse(picture).expect("XML");
+    let points = document.descendants().filter(|node| node.attribute("class") == Some("point"));
+    let value = |node: roxmltree::Node<'_, '_>| {
+        let text = node.children().find_map(|child| child.text().map(str::to_owned)).expect("a title");
+        let (value, at) =
+            text.split_once(" = ").and_then(|(_, rest)| rest.split_once(" at ")).expect("a value");
+        (at.parse().expect("a time"), value.parse().expect("a value"))
+    };
+    points.map(value).collect()
+}
+
+/// A page about simulated missions, and what it says of costs.
+#[test]
+fn simulations_that_fail_say_so_and_figures_are_rounded() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("page.html").display().to_string();
+    let simulated = |mission: &str, scenario: &str, strategies: &[&str]| {
+        let mut all =
+            vec!["simulate", mission, "--scenario", scenario, "--runs", "3", "--report", &file, "-q"];
+        all.extend(strategies.iter().flat_map(|name| ["--strategy", *name]));
+        let outcome = metaplan(&all);
+        assert_eq!(outcome.status, 0, "{outcome:?}");
+        std::fs::read_to_string(&file).expect("a page")
+    };
+    let failed = simulated("missions/ugv.toml", "kinect_at_wp2", &["none"]);
+    for text in
+        ["None of the 3 missions was accomplished.", ">0 of 3 accomplished<", "<td>none accomplished</td>"]
+    {
+        assert!(failed.contains(text), "{text}");
+    }
+    let mixed = simulated("missions/ugv.toml", "kinect_comes_and_goes", &[]);
+    for page in [failed, mixed] {
+        let page = page.split("<main>").nth(1).and_then(|rest| rest.split("</main>").next()).expect("a page");
+        let numbers = page.split(|own: char| !(own.is_ascii_digit() || own == '.'));
+        let long = numbers.filter(|own| own.split_once('.').is_some_and(|(_, decimals)| decimals.len() > 2));
+        assert_eq!(long.collect::<Vec<_>>(), [""; 0], "no figure is that exact");
     }
 }
 
@@ -213,7 +289,7 @@ fn plans_are_drawn_for_papers_and_terminals() {
     assert_eq!(lanes, ["actions", "f_localization"]);
     let expected = "       actions  ▕move wp1 wp2········▕move_with_obstacles…▕move wp5 wp8········▕move wp8 wp9········\n\
                     f_localization  ▕fd_amcl_kinect······▕fd_amcl_kinect······▕fd_amcl_kinect······▕fd_amcl_kinect······\n          \
-                    time  0                    1                    2                    3                    4\n";
+                    time  0                    1                    2                    3                   4\n";
     assert!(outcome.stdout.starts_with(expected), "{}", outcome.stdout);
     let plain = metaplan(&arguments[..2]);
     assert!(
@@ -285,6 +361,13 @@ fn overlapping_actions_are_drawn() {
     let rows = document.descendants().filter(|node| node.attribute("class") == Some("action"));
     let rows: Vec<_> = rows.filter_map(|node| Some((node.attribute("x")?, node.attribute("y")?))).collect();
     assert!(matches!(rows[..], [one, other] if one.1 != other.1), "{rows:?}");
+    let cost = std::fs::read_to_string(folder.path().join("pictures/number-1.svg")).expect("a picture");
+    let cost = values(&cost);
+    assert_eq!(cost.first(), Some(&(0.0, 0.0)), "nothing is spent before anything is done: {cost:?}");
+    assert!(
+        cost.len() > 2 && cost.iter().all(|(at, value)| (at - value).abs() < 1e-6),
+        "the metric is the time: {cost:?}"
+    );
 }
 
 /// Each answer with pictures gives them as files, too.
@@ -313,6 +396,12 @@ fn pictures_of_all_answers_are_files() {
                 document.descendants().any(|node| node.has_tag_name("circle")),
                 "{file}: something is drawn"
             );
+            let mut points: Vec<&str> =
+                document.descendants().filter_map(|node| node.attribute("data-point")).collect();
+            let all = points.len();
+            points.sort_unstable();
+            points.dedup();
+            assert_eq!(points.len(), all, "{file}: each point has a name of its own");
         }
     }
 }

@@ -158,7 +158,8 @@ pub fn metric_after(domain: &Domain, problem: &Problem, total_time: &BigRational
     metric(&world, &execution.state, total_time)
 }
 
-fn metric(world: &World<'_>, state: &State, total_time: &BigRational) -> Option<BigRational> {
+/// The value of the problem's metric if a plan ended in this state after `total_time`.
+pub(super) fn metric(world: &World<'_>, state: &State, total_time: &BigRational) -> Option<BigRational> {
     let metric = world.problem.metric.as_ref()?;
     let evaluator = Evaluator { total_time: Some(total_time), ..Evaluator::new(world, state) };
     evaluator.value(&metric.expression, &Bindings::default()).ok()

@@ -8,6 +8,7 @@ use rustc_hash::FxHashSet;
 
 use crate::ast::{Comparison, Condition, ConditionTime, Domain, EffectTime, Expression, Problem};
 
+use super::advance::metric;
 use super::effects::{Changes, Ground};
 use super::evaluate::{Bindings, Evaluator};
 use super::execute::Execution;
@@ -44,6 +45,9 @@ pub struct CourseMoment {
     pub values: Vec<(String, BigRational)>,
     /// What its conditions demand of numbers, here and until it ends.
     pub bounds: Vec<NumberBound>,
+    /// The value of the problem's metric if the plan ended now; none without a metric, or where it is undefined, as one that counts
+    /// violated preferences is before the end.
+    pub metric: Option<BigRational>,
 }
 
 /// What a condition demands of a number.
@@ -124,7 +128,7 @@ impl<'e, 'p> Follower<'e, 'p> {
         if is_whole {
             self.clock.clone_from(&time);
         }
-        self.course.moments.push(CourseMoment { step: index, time, is_end: is_whole, values, bounds });
+        self.note(CourseMoment { step: index, time, is_end: is_whole, values, bounds, metric: None });
         Ok((!is_whole).then_some(running))
     }
 
@@ -134,8 +138,14 @@ impl<'e, 'p> Follower<'e, 'p> {
         let bounds = self.bounds(running, ConditionTime::AtEnd);
         let values = self.happen(running, EffectTime::AtEnd, &time)?;
         self.clock.clone_from(&time);
-        self.course.moments.push(CourseMoment { step: index, time, is_end: true, values, bounds });
+        self.note(CourseMoment { step: index, time, is_end: true, values, bounds, metric: None });
         Ok(())
+    }
+
+    /// Adds a moment, after its effects, with the metric then.
+    fn note(&mut self, moment: CourseMoment) {
+        let metric = metric(self.execution.world, &self.execution.state, &moment.time);
+        self.course.moments.push(CourseMoment { metric, ..moment });
     }
 
     /// Lets effects take place; the numbers that they change.

@@ -34,16 +34,30 @@ function context(step) {
   return (step.arguments ?? []).filter((word) => !known.has(word)).join(" ");
 }
 
-function status(text, kind) {
-  $("status").textContent = text;
+// The headline follows from the state of things, never from the last message alone: what is over is not shown any longer.
+function headline() {
+  const { action, suspended, planning } = state;
+  if (state.lost) return ["The connection is lost; what was last seen stays here", "stuck"];
+  if (state.reached) return ["The goal is reached", "works"];
+  if (planning !== undefined) return [`Planning for ${planning} s`, "works"];
+  if (state.plan === "none") return ["There is no plan", "stuck"];
+  if (suspended !== undefined) return [`Action ${suspended.action} is suspended: ${suspended.because}`, "stuck"];
+  if (action) return [action, "works"];
+  return [state.plan === "found" ? "There is a plan" : "Connected", "works"];
+}
+
+function showState() {
+  const [text, kind] = headline();
+  $("plan-about").textContent = state.plan === "none" ? `There is no plan: ${state.why}` : state.found ?? "There is no plan yet.";
+  $("status").textContent = state.ended ? `${text} (the run has ended)` : text;
   $("status").dataset.state = kind;
 }
 
 function reset() {
-  state = { requested: 0, reached: false, configuration: new Map(), designs: new Map() };
+  state = { requested: 0, reached: false, plan: "unknown", configuration: new Map(), designs: new Map() };
   for (const id of ["configuration", "lines"]) $(id).tBodies[0].replaceChildren();
   for (const id of ["plan", "designs"]) $(id).replaceChildren();
-  $("plan-about").textContent = "There is no plan yet.";
+  showState();
 }
 
 // What is done, and what is under way, wherever it is drawn.
@@ -54,7 +68,9 @@ function markSteps() {
     own.classList.toggle("now", steps.includes(now));
     own.classList.toggle("done", steps.every((step) => step < now));
   }
-  const bar = $("plan").querySelector(".bar.now"), pane = bar?.closest(".scroll");
+  // Each picture is drawn in several widths, of which one is shown.
+  const bar = [...$("plan").querySelectorAll(".bar.now")].find((own) => own.getClientRects().length > 0);
+  const pane = bar?.closest(".scroll");
   if (pane) pane.scrollLeft += bar.getBoundingClientRect().left - pane.getBoundingClientRect().left - pane.clientWidth / 3;
 }
 
@@ -125,24 +141,23 @@ const WORDS = {
 // What an answer changes.
 const CHANGES = {
   ready: (it) => ($("mission").textContent = it.mission ?? ""),
-  planning: (it) => status(`Planning for ${it.seconds} s`, "works"),
+  planning: (it) => (state.planning = it.seconds),
   plan_found(it) {
-    state.reached = false;
-    $("plan-about").textContent = `Cost ${it.cost}${it.optimal ? ", proved optimal" : ", not proved optimal"}.`;
+    const found = `Cost ${it.cost}${it.optimal ? ", proved optimal" : ", not proved optimal"}.`;
+    Object.assign(state, { reached: false, plan: "found", found });
   },
-  plan_none(it) {
-    $("plan-about").textContent = `There is no plan: ${it.because}`;
-    status("There is no plan", "stuck");
-  },
+  plan_kept: () => (state.plan = "found"),
+  plan_none: (it) => Object.assign(state, { reached: false, plan: "none", why: it.because }),
   request_action(it) {
-    Object.assign(state, { requested: it.action, reached: false });
-    status(`Action ${it.action}: ${it.name} ${context(it)}`, "works");
+    Object.assign(state, { requested: it.action, reached: false, plan: "found", suspended: undefined });
+    state.action = `Action ${it.action}: ${it.name} ${context(it)}`;
     markSteps();
   },
-  suspend_action: (it) => status(`Action ${it.action} is suspended: ${it.because}`, "stuck"),
+  suspend_action: (it) => (state.suspended = { action: it.action, because: it.because }),
+  resume_action: () => (state.suspended = undefined),
+  cancel_action: (it) => Object.assign(state, { suspended: undefined, action: `Action ${it.action} is being cancelled: ${it.because}` }),
   goal_reached() {
-    state.reached = true;
-    status("The goal is reached", "works");
+    Object.assign(state, { reached: true, plan: "found", suspended: undefined });
     markSteps();
   },
   reconfigure(it) {
@@ -170,19 +185,26 @@ function take(message) {
   if (news.known) return know(news.known), showDesigns();
   if (news.planned) {
     state.requested = Math.max(state.requested, news.planned.under_way ?? 0);
+    // Where a search for a better plan finds none, the plan at hand stays.
+    if (news.planned.exists) state.plan = "found";
+    showState();
     return drawPlan();
   }
   const said = news.said;
+  // Whatever follows the progress of a search says that it is over.
+  state.planning = undefined;
   CHANGES[said.answer]?.(said);
+  showState();
   if (!QUIET.has(said.answer)) show(news.at, said.line, said.answer, WORDS[said.answer]?.(said) ?? "");
 }
 
 reset();
 const source = new EventSource("/events");
-source.addEventListener("begin", () => (reset(), status("Connected", "works")));
+source.addEventListener("begin", () => reset());
 source.addEventListener("message", take);
-source.addEventListener("error", () => status("The connection is lost; what was last seen stays here", "stuck"));
+source.addEventListener("error", () => ((state.lost = true), showState()));
 source.addEventListener("end", () => {
   source.close();
-  status(`${$("status").textContent} (the run has ended)`, $("status").dataset.state);
+  state.ended = true;
+  showState();
 });
