@@ -7,6 +7,7 @@ use ontology::tomasys::{Component, FunctionDesign, Measurement, Requirement};
 use picture::{Design, Reason, Step};
 use rules::{Derivation, Reason as Why, Symbols};
 
+use crate::explain::causes;
 use crate::knowledge::Knowledge;
 use crate::mapek::{said, unavailable};
 use crate::mission::Mission;
@@ -66,7 +67,7 @@ fn required(requirement: &Requirement, measurements: &[Measurement]) -> String {
     }
 }
 
-/// Why a design can be selected or not.
+/// Why a design can be selected or not: every cause.
 pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> Vec<Reason> {
     if available {
         let text = "nothing says that it is not realisable, and nothing that it is not available".to_owned();
@@ -76,9 +77,18 @@ pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> V
         let text = format!("it is not known what follows: {}", fault.message);
         return vec![Reason { text, supports: Vec::new() }];
     }
-    let symbols = knowledge.engine().symbols();
-    let derivations = unavailable(knowledge, design);
-    derivations.iter().map(|derivation| tree(derivation, 0, symbols, &mut BTreeSet::new())).collect()
+    let designs = knowledge.view().function_designs();
+    let known = designs.iter().find(|known| known.individual.name == design);
+    let causes = known.map(|known| causes(knowledge, known)).unwrap_or_default();
+    let each: Vec<&Knowledge> = causes.iter().map(|cause| &cause.knowledge).collect();
+    let each = if each.is_empty() { vec![knowledge] } else { each };
+    let reasons = each.into_iter().flat_map(|knowledge| {
+        let symbols = knowledge.engine().symbols();
+        let derivations = unavailable(knowledge, design);
+        let own = derivations.iter().map(|own| tree(own, 0, symbols, &mut BTreeSet::new()));
+        own.collect::<Vec<_>>()
+    });
+    reasons.collect()
 }
 
 /// A derivation as a tree; what was explained already is only named.

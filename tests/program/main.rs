@@ -1,5 +1,6 @@
 //! The whole, end to end: the program run as its users run it.
 
+mod anytime;
 mod book;
 mod browser;
 mod certificate;
@@ -13,6 +14,7 @@ mod configure;
 mod doubts;
 mod examples;
 mod explain;
+mod explain_causes;
 mod export;
 mod help;
 mod init;
