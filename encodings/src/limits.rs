@@ -32,6 +32,16 @@ impl Limits {
         self
     }
 
+    /// The same limits with half of the time that is left, so that something can follow. The flag is shared.
+    #[must_use]
+    pub fn half(&self) -> Self {
+        let left = self.deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
+        match left {
+            Some(left) => self.clone().with_time(left / 2),
+            None => self.clone(),
+        }
+    }
+
     /// Lets a search store so many bytes, as it estimates them.
     #[must_use]
     pub fn with_room(mut self, bytes: usize) -> Self {

@@ -293,13 +293,12 @@ impl Mission {
         let setup = self.read();
         let (found, stopped) = detached(py, &interrupt, || {
             let mission = &setup.mission;
-            let best = explain::best(mission, &limits)?;
             let json = if let Some(design) = &design {
                 let found = explain::design(mission, design, &limits)?;
-                serde_json::to_string(&DesignAnswer::new(&mission.name, &best, &found))
+                serde_json::to_string(&DesignAnswer::new(&mission.name, &found))
             } else {
-                let changes = explain::smallest_changes(mission, &limits)?;
-                serde_json::to_string(&ChangesAnswer::new(&mission.name, &best, &changes))
+                let changes = explain::smallest_changes(mission, &limits, &mut |_| {})?;
+                serde_json::to_string(&ChangesAnswer::new(&mission.name, &changes))
             };
             Ok(json.unwrap_or_default())
         });

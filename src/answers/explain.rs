@@ -5,7 +5,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::explain::{BestPlan, Change, DesignExplanation, Target};
+use crate::explain::{
+    Alteration, BestPlan, Cause, Change, DesignExplanation, Repair, SmallestChanges, Target,
+};
 use crate::mapek::PlannedStep;
 use crate::number::to_json;
 
@@ -23,6 +25,8 @@ pub struct ChangesAnswer<'a> {
     best: BestPart<'a>,
     /// The smallest changes that lead to another plan.
     changes: Vec<ChangePart<'a>>,
+    /// Whether these are all; if not, a limit was reached.
+    complete: bool,
 }
 
 /// All about one design.
@@ -49,8 +53,15 @@ pub struct DesignAnswer<'a> {
     alone: BestPart<'a>,
     /// The best plan that does not use it.
     without: BestPart<'a>,
-    /// What would have to change for it to be available, or to be so no more.
+    /// Single changes that have a part in whether it is available.
     changes: Vec<ChangePart<'a>>,
+    /// Each failed component and each measurement that has a part in ruling it out.
+    causes: Vec<CausePart<'a>>,
+    /// If it is not available, the smallest sets of changes that make it available; else the changes that make it unavailable. Each suffices if all
+    /// of its changes come true together, and not without one of them.
+    repairs: Vec<RepairPart<'a>>,
+    /// Whether all plans of this answer are proved; if not, a limit was reached.
+    complete: bool,
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
@@ -64,8 +75,9 @@ struct BestPart<'a> {
     steps: &'a [PlannedStep],
 }
 
+/// What is otherwise than it is now.
 #[derive(Debug, Clone, Serialize, JsonSchema)]
-struct ChangePart<'a> {
+struct AlterationPart<'a> {
     /// What changes: an attribute, a function of the problem, or a component.
     name: &'a str,
     /// Its value now; null for components.
@@ -73,40 +85,74 @@ struct ChangePart<'a> {
     from: Option<Value>,
     /// `at_least`, `at_most`, `above` or `below` the bound; `failed` or `recovered`.
     relation: &'static str,
-    /// The value from which on the plan is another one; null for components.
+    /// The value from which on it has come true; null for components.
     #[schemars(with = "Option<f64>")]
     bound: Option<Value>,
+}
+
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+struct ChangePart<'a> {
+    #[serde(flatten)]
+    alteration: AlterationPart<'a>,
+    /// How far the bound may be from the exact one; null if it is exact.
+    #[schemars(with = "Option<f64>")]
+    within: Option<Value>,
+    /// Whether the design is available, or is so no more, if this change alone comes true.
+    suffices: bool,
     /// The best plan in that case.
+    then: BestPart<'a>,
+}
+
+/// Something that has a part in ruling a design out.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+struct CausePart<'a> {
+    #[serde(flatten)]
+    alteration: AlterationPart<'a>,
+    /// The rules and facts by which the design is ruled out, whatever else is repaired.
+    because: &'a [String],
+}
+
+/// Changes that have to come true together.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+struct RepairPart<'a> {
+    /// All of them.
+    changes: Vec<AlterationPart<'a>>,
+    /// The best plan then.
     then: BestPart<'a>,
 }
 
 impl<'a> ChangesAnswer<'a> {
     /// The smallest changes that lead to another plan than the best.
-    pub fn new(mission: &'a str, best: &'a BestPlan, changes: &'a [Change]) -> Self {
+    pub fn new(mission: &'a str, found: &'a SmallestChanges) -> Self {
         Self {
             format: FORMAT,
             mission,
-            best: BestPart::of(best),
-            changes: changes.iter().map(ChangePart::of).collect(),
+            best: BestPart::of(&found.best),
+            changes: found.changes.iter().map(ChangePart::of).collect(),
+            complete: found.complete,
         }
     }
 }
 
 impl<'a> DesignAnswer<'a> {
     /// A design beside the best plan.
-    pub fn new(mission: &'a str, best: &'a BestPlan, found: &'a DesignExplanation) -> Self {
+    pub fn new(mission: &'a str, found: &'a DesignExplanation) -> Self {
+        let availability = &found.availability;
         Self {
             format: FORMAT,
             mission,
-            best: BestPart::of(best),
-            design: &found.design,
-            functions: &found.functions,
-            available: found.available,
-            because: &found.because,
+            best: BestPart::of(&found.best),
+            design: &availability.design,
+            functions: &availability.functions,
+            available: availability.available,
+            because: &availability.because,
             used: &found.used,
             alone: BestPart::of(&found.alone),
             without: BestPart::of(&found.without),
             changes: found.changes.iter().map(ChangePart::of).collect(),
+            causes: availability.causes.iter().map(CausePart::of).collect(),
+            repairs: found.repairs.iter().map(RepairPart::of).collect(),
+            complete: found.complete,
         }
     }
 }
@@ -117,9 +163,9 @@ impl<'a> BestPart<'a> {
     }
 }
 
-impl<'a> ChangePart<'a> {
-    fn of(change: &'a Change) -> Self {
-        let (relation, bound): (_, Option<&BigRational>) = match &change.to {
+impl<'a> AlterationPart<'a> {
+    fn of(alteration: &'a Alteration) -> Self {
+        let (relation, bound): (_, Option<&BigRational>) = match &alteration.to {
             Target::AtLeast(bound) => ("at_least", Some(bound)),
             Target::AtMost(bound) => ("at_most", Some(bound)),
             Target::Above(bound) => ("above", Some(bound)),
@@ -127,12 +173,31 @@ impl<'a> ChangePart<'a> {
             Target::Recovered => ("recovered", None),
             Target::Failed => ("failed", None),
         };
+        let from = alteration.from.as_ref().map(to_json);
+        Self { name: &alteration.name, from, relation, bound: bound.map(to_json) }
+    }
+}
+
+impl<'a> ChangePart<'a> {
+    fn of(change: &'a Change) -> Self {
         Self {
-            name: &change.name,
-            from: change.from.as_ref().map(to_json),
-            relation,
-            bound: bound.map(to_json),
+            alteration: AlterationPart::of(&change.alteration),
+            within: change.within.as_ref().map(to_json),
+            suffices: change.suffices,
             then: BestPart::of(&change.then),
         }
+    }
+}
+
+impl<'a> CausePart<'a> {
+    fn of(cause: &'a Cause) -> Self {
+        Self { alteration: AlterationPart::of(&cause.alteration), because: &cause.because }
+    }
+}
+
+impl<'a> RepairPart<'a> {
+    fn of(repair: &'a Repair) -> Self {
+        let changes = repair.alterations.iter().map(AlterationPart::of).collect();
+        Self { changes, then: BestPart::of(&repair.then) }
     }
 }

@@ -2,12 +2,17 @@
 
 use std::fmt::Write as _;
 
-use encodings::{Alternatives, Solution};
+use encodings::Alternatives;
+use metaplan::planner::Planned;
 
 use crate::cli::plan_text::steps_text;
 
 /// The further plans as tables, and for each step of the first one which of its choices are forced.
-pub(super) fn text(found: &Alternatives, first: &Solution) -> String {
+pub(super) fn text(found: Option<&Alternatives>, planned: &Planned<'_>) -> String {
+    let Some(found) = found else {
+        return "\nothers that are as good were not looked for: it is not proved that none is better\n"
+            .to_owned();
+    };
     let mut text = String::new();
     for (plan, number) in found.plans.iter().zip(1..) {
         let _ = write!(text, "\nalternative {number}\n{}", steps_text(plan));
@@ -15,9 +20,12 @@ pub(super) fn text(found: &Alternatives, first: &Solution) -> String {
     text += match (found.plans.is_empty(), found.complete) {
         (true, true) => "\nthe plan is the only one that is as good, proved\n",
         (false, true) => "\nthere are no others that are as good, proved\n",
+        (_, false) if planned.is_at_limit() => {
+            "\na limit was reached: there may be others that are as good\n"
+        }
         (_, false) => "\nthere may be others that are as good\n",
     };
-    let (Some(forced), Some(plan)) = (&found.forced, &first.plan) else { return text };
+    let (Some(forced), Some(plan)) = (&found.forced, &planned.solution.plan) else { return text };
     for ((step, forced), number) in plan.steps.iter().zip(forced).zip(1..) {
         let own = if forced.action { vec![step.action.as_str()] } else { Vec::new() };
         let all: Vec<_> = own.into_iter().chain(forced.functions.iter().map(String::as_str)).collect();

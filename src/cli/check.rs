@@ -16,6 +16,7 @@ use probabilistic::{Error, prism, property};
 use crate::cli::check_series::{Combination, combinations, csv, table};
 use crate::cli::check_text::as_text;
 use crate::cli::common::{Common, Exit, Failure, Format, process_failure};
+use crate::cli::limits::TimeLimit;
 use crate::cli::output;
 use crate::cli::progress::Progress;
 use crate::cli::values::setting;
@@ -62,6 +63,8 @@ pub struct Arguments {
     inexact: bool,
     #[command(flatten)]
     tightness: Tightness,
+    #[command(flatten)]
+    time: TimeLimit,
 }
 
 /// How tight bounds have to be.
@@ -99,6 +102,7 @@ struct Answered<'a> {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let _guard = arguments.time.guard(common)?;
     let file = source(&arguments.model)?;
     let model_text = (file.name(), file.text());
     let model = prism::parse(file.text()).map_err(|error| process_failure(error, model_text, ("", "")))?;

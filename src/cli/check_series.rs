@@ -116,7 +116,7 @@ fn cell(report: &Result<Report, Error>, text: impl Fn(&Answer) -> String) -> Str
                 let pairs = vertices.iter().map(|pair| pair.each_ref().map(&text).join(" "));
                 pairs.collect::<Vec<_>>().join("; ")
             }
-            Outcome::States(states) => format!("{} states", states.len()),
+            Outcome::States(states) => output::counted(states.len(), "state"),
         },
     }
 }

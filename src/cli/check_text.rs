@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use probabilistic::check::{Answer, Listed, Outcome, Report};
 
-use crate::cli::output;
+use crate::cli::output::{self, counted};
 
 pub fn as_text(report: &Report, verbose: bool) -> String {
     let mut text = match &report.outcome {
@@ -29,8 +29,12 @@ pub fn as_text(report: &Report, verbose: bool) -> String {
         let Report { states, choices, transitions, deadlocks, build, solve, .. } = report;
         let _ = writeln!(
             text,
-            "{states} states, {choices} choices, {transitions} transitions, {deadlocks} deadlocks; \
+            "{}, {}, {}, {}; \
              built in {:.3} s, solved in {:.3} s",
+            counted(*states, "state"),
+            counted(*choices, "choice"),
+            counted(*transitions, "transition"),
+            counted(*deadlocks, "deadlock"),
             build.as_secs_f64(),
             solve.as_secs_f64()
         );

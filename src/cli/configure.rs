@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
-use std::time::Duration;
 
 use clap::Args;
 use metaplan::answers::ConfigureAnswer;
@@ -12,11 +11,11 @@ use metaplan::message::Message;
 use num_rational::BigRational;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
-use crate::cli::limits::Guard;
+use crate::cli::limits::TimeLimit;
 use crate::cli::output;
 use crate::cli::progress::during;
 use crate::cli::situation::{Imports, consistent, knowledge};
-use crate::cli::values::{amount, seconds, setting};
+use crate::cli::values::{amount, setting};
 
 /// Arguments of `configure`.
 #[derive(Debug, Args)]
@@ -35,9 +34,8 @@ pub struct Arguments {
     /// A component that has failed (repeatable).
     #[arg(long, value_name = "COMPONENT")]
     fail: Vec<String>,
-    /// Stop after that many seconds with the best choice so far.
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
-    time_limit: Option<Duration>,
+    #[command(flatten)]
+    time: TimeLimit,
     #[command(flatten)]
     wanted: Wanted,
 }
@@ -129,8 +127,8 @@ impl Wanted {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
-    let Arguments { documents, rules, imports, set, fail, time_limit, wanted } = arguments;
-    let guard = Guard::new(*time_limit, None, common)?;
+    let Arguments { documents, rules, imports, set, fail, time, wanted } = arguments;
+    let guard = time.guard(common)?;
     let knowledge = during("reading", common, || knowledge(documents, rules, imports, fail, set))?;
     output::warnings(common, knowledge.warnings());
     let configurator = wanted.configurator(knowledge)?;

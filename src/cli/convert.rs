@@ -7,6 +7,7 @@ use metaplan::message::Message;
 use ontology::OutputSyntax;
 
 use crate::cli::common::{Common, Exit, Failure};
+use crate::cli::limits::TimeLimit;
 use crate::cli::output;
 use crate::cli::situation::Imports;
 
@@ -21,6 +22,8 @@ pub struct Arguments {
     syntax: Syntax,
     #[command(flatten)]
     imports: Imports,
+    #[command(flatten)]
+    time: TimeLimit,
     /// The file to write; standard output by default.
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -43,6 +46,7 @@ enum Syntax {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let _guard = arguments.time.guard(common)?;
     let syntax = match arguments.syntax {
         Syntax::Rdfxml => OutputSyntax::RdfXml,
         Syntax::Turtle => OutputSyntax::Turtle,

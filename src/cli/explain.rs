@@ -7,12 +7,18 @@ use clap::Args;
 use encodings::Limits;
 use metaplan::answers::{ChangesAnswer, CodeAnswer, DesignAnswer};
 use metaplan::codes::{self, Code};
-use metaplan::explain::{BestPlan, Change, DesignExplanation, Target, best, design, smallest_changes};
-use metaplan::message::{Message, did_you_mean};
+use metaplan::explain::{
+    Alteration, Availability, BestPlan, DesignExplanation, SmallestChanges, Target, availability,
+    smallest_changes,
+};
+use metaplan::message::{Errors, Message, did_you_mean};
+use metaplan::mission::Mission;
+use num_rational::BigRational;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::limits::TimeLimit;
 use crate::cli::output::{self, decimal};
-use crate::cli::progress::during;
+use crate::cli::progress::{Progress, during};
 use crate::cli::situation::Situation;
 
 /// Arguments of `explain`.
@@ -26,6 +32,8 @@ pub struct Arguments {
     query: Option<String>,
     #[command(flatten)]
     situation: Situation,
+    #[command(flatten)]
+    time: TimeLimit,
 }
 
 /// Runs the command.
@@ -35,28 +43,64 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     {
         return code(name, common);
     }
+    let guard = arguments.time.guard(common)?;
     let mission = arguments.situation.mission(std::slice::from_ref(&arguments.mission), common)?;
     output::warnings(common, mission.warnings());
-    let limits = Limits::none();
-    let answer = during("planning", common, || best(&mission, &limits))?;
-    let name = mission.name.as_str();
-    if let Some(query) = &arguments.query {
-        let found = during("planning", common, || design(&mission, query, &limits)).map_err(|messages| {
-            let exit = if messages.iter().any(|m| m.code == "M112") { Exit::Usage } else { Exit::BadInput };
-            Failure { exit, messages }
-        })?;
-        match common.format {
-            Format::Json => output::json_answer(&DesignAnswer::new(name, &answer, &found)),
-            _ => output::answer(&design_text(&answer, &found)),
+    let complete = match &arguments.query {
+        Some(query) => {
+            let why = during("reasoning", common, || availability(&mission, query));
+            let why = why.map_err(|messages| {
+                let exit =
+                    if messages.iter().any(|m| m.code == "M112") { Exit::Usage } else { Exit::BadInput };
+                Failure { exit, messages }
+            })?;
+            explain_design(&mission, why, &guard.plan(), common)?
         }
-    } else {
-        let changes = during("planning", common, || smallest_changes(&mission, &limits))?;
-        match common.format {
-            Format::Json => output::json_answer(&ChangesAnswer::new(name, &answer, &changes)),
-            _ => output::answer(&changes_text(&answer, &changes)),
-        }
+        None => explain_plan(&mission, &guard.plan(), common)?,
+    };
+    Ok(if complete { Exit::Done } else { Exit::NotProved })
+}
+
+/// Explains a design: why it is available or not at once, and the rest once it is planned. Returns whether all is proved.
+fn explain_design(
+    mission: &Mission,
+    why: Availability,
+    limits: &Limits,
+    common: &Common,
+) -> Result<bool, Failure> {
+    let is_text = common.format != Format::Json;
+    if is_text {
+        output::answer(&why_text(&why));
     }
-    Ok(Exit::Done)
+    let found = planning(common, limits, |hear| why.plan(mission, limits, hear))?;
+    if is_text {
+        output::answer(&design_text(&found));
+    } else {
+        output::json_answer(&DesignAnswer::new(&mission.name, &found));
+    }
+    Ok(found.complete)
+}
+
+/// Explains what would change the plan. Returns whether all is proved.
+fn explain_plan(mission: &Mission, limits: &Limits, common: &Common) -> Result<bool, Failure> {
+    let found = planning(common, limits, |hear| smallest_changes(mission, limits, hear))?;
+    match common.format {
+        Format::Json => output::json_answer(&ChangesAnswer::new(&mission.name, &found)),
+        _ => output::answer(&changes_text(&found)),
+    }
+    Ok(found.complete)
+}
+
+/// Plans, and shows what is being planned.
+fn planning<T>(
+    common: &Common,
+    limits: &Limits,
+    plan: impl FnOnce(&mut dyn FnMut(&str)) -> Result<T, Errors>,
+) -> Result<T, Failure> {
+    let progress = Progress::new("planning", common);
+    let outcome = plan(&mut |what| progress.set_message(what.to_owned()));
+    progress.finish();
+    outcome.map_err(|messages| Failure::planning(messages, limits))
 }
 
 /// What a code means.
@@ -83,87 +127,163 @@ fn plan_text(answer: &BestPlan) -> String {
 
 /// A metric, and how it differs from that of the best plan.
 fn cost_text(answer: &BestPlan, best: &BestPlan) -> String {
-    match (&answer.cost, &best.cost) {
-        (None, _) => "there is no plan".to_owned(),
-        (Some(cost), Some(base)) if cost == base => format!("the best plan costs {}, no more", decimal(cost)),
-        (Some(cost), Some(base)) if cost > base => {
+    let cost = match (&answer.cost, answer.proved) {
+        (None, true) => return "there is no plan".to_owned(),
+        (None, false) => return "not known: a limit was reached first".to_owned(),
+        (Some(cost), false) => {
+            return format!(
+                "a plan costs {}; a limit was reached before a better one was ruled out",
+                decimal(cost)
+            );
+        }
+        (Some(cost), true) => cost,
+    };
+    match &best.cost {
+        Some(base) if !best.proved => {
+            format!(
+                "the best plan costs {} (the best one known as things are, {})",
+                decimal(cost),
+                decimal(base)
+            )
+        }
+        Some(base) if cost == base => format!("the best plan costs {}, no more", decimal(cost)),
+        Some(base) if cost > base => {
             format!("the best plan costs {}, {} more", decimal(cost), decimal(&(cost - base)))
         }
-        (Some(cost), Some(base)) => {
-            format!("the best plan costs {}, {} less", decimal(cost), decimal(&(base - cost)))
-        }
-        (Some(cost), None) => format!("there is a plan, and the best costs {}", decimal(cost)),
+        Some(base) => format!("the best plan costs {}, {} less", decimal(cost), decimal(&(base - cost))),
+        None if best.proved => format!("there is a plan, and the best costs {}", decimal(cost)),
+        None => format!("the best plan costs {}", decimal(cost)),
     }
 }
 
-fn target_text(change: &Change) -> String {
-    let now = change.from.as_ref().map(|from| format!(" (now {})", decimal(from))).unwrap_or_default();
-    let name = &change.name;
-    match &change.to {
-        Target::AtLeast(bound) => format!("{name} at least {}{now}", decimal(bound)),
-        Target::AtMost(bound) => format!("{name} at most {}{now}", decimal(bound)),
-        Target::Above(bound) => format!("{name} above {}{now}", decimal(bound)),
-        Target::Below(bound) => format!("{name} below {}{now}", decimal(bound)),
+/// An alteration; `about` if its bound is not exact.
+fn alteration_text(alteration: &Alteration, about: bool) -> String {
+    let Alteration { name, from, to } = alteration;
+    let now = from.as_ref().map(|from| format!(" (now {})", decimal(from))).unwrap_or_default();
+    let about = if about { "about " } else { "" };
+    match to {
+        Target::AtLeast(bound) => format!("{name} at least {about}{}{now}", decimal(bound)),
+        Target::AtMost(bound) => format!("{name} at most {about}{}{now}", decimal(bound)),
+        Target::Above(bound) => format!("{name} above {about}{}{now}", decimal(bound)),
+        Target::Below(bound) => format!("{name} below {about}{}{now}", decimal(bound)),
         Target::Recovered => format!("{name} works again"),
         Target::Failed => format!("{name} fails"),
     }
 }
 
-fn design_text(best: &BestPlan, found: &DesignExplanation) -> String {
-    let mut text = String::new();
-    let functions = found.functions.join(", ");
-    let state = if found.available { "is available" } else { "is not available" };
-    // Writing to a string does not fail.
-    let _ = writeln!(text, "{} ({functions}) {state}", found.design);
-    for line in &found.because {
+/// What follows about a design without planning.
+fn why_text(why: &Availability) -> String {
+    let functions = why.functions.join(", ");
+    let state = if why.available { "is available" } else { "is not available" };
+    let mut text = format!("{} ({functions}) {state}\n", why.design);
+    for line in &why.because {
+        // Writing to a string does not fail.
         let _ = writeln!(text, "    {line}");
     }
+    if let ([way], false) = (&why.ways[..], why.available)
+        && way.len() > 1
+    {
+        let names = way.iter().map(|own| own.name.as_str()).collect::<Vec<_>>().join(", ");
+        let _ = writeln!(text, "{} causes, all of which have to go: {names}", way.len());
+    }
+    text
+}
+
+/// What plans show about a design.
+fn design_text(found: &DesignExplanation) -> String {
+    let DesignExplanation { availability, best, .. } = found;
+    let mut text = String::new();
+    let functions = availability.functions.join(", ");
     let used: Vec<String> = found.used.iter().map(ToString::to_string).collect();
-    match (&best.cost, used.is_empty()) {
-        (None, _) => text += "there is no plan\n",
-        (Some(cost), true) => {
-            let _ = writeln!(text, "the best plan costs {} and does not use it", decimal(cost));
+    let plan = if best.proved { "the best plan" } else { "the best plan so far (a limit was reached)" };
+    match (&best.cost, &used[..]) {
+        (None, _) if best.proved => text += "there is no plan\n",
+        (None, _) => text += "no plan was found before a limit was reached\n",
+        (Some(cost), []) => {
+            let _ = writeln!(text, "{plan} costs {} and does not use it", decimal(cost));
         }
-        (Some(cost), false) => {
-            let _ = writeln!(
-                text,
-                "the best plan costs {} and uses it in steps {}",
-                decimal(cost),
-                used.join(", ")
-            );
+        (Some(cost), [step]) => {
+            let _ = writeln!(text, "{plan} costs {} and uses it in step {step}", decimal(cost));
+        }
+        (Some(cost), steps) => {
+            let _ =
+                writeln!(text, "{plan} costs {} and uses it in steps {}", decimal(cost), steps.join(", "));
         }
     }
     text += &plan_text(best);
-    let condition = if found.available { "" } else { "if it were available, and " };
+    let condition = if availability.available { "" } else { "if it were available, and " };
     let _ = writeln!(text, "{condition}as the only design of {functions}: {}", cost_text(&found.alone, best));
     text += &plan_text(&found.alone);
     if !found.used.is_empty() {
         let _ = writeln!(text, "without it: {}", cost_text(&found.without, best));
         text += &plan_text(&found.without);
     }
-    if !found.changes.is_empty() {
-        let what =
-            if found.available { "it is not available any more if" } else { "what rules it out goes if" };
-        let _ = writeln!(text, "{what}");
-        for change in &found.changes {
-            let _ = writeln!(text, "    {}: {}", target_text(change), cost_text(&change.then, best));
+    text + &repairs_text(found)
+}
+
+/// What would make a design available, or unavailable.
+fn repairs_text(found: &DesignExplanation) -> String {
+    let DesignExplanation { availability, best, repairs, .. } = found;
+    let mut text = String::new();
+    if repairs.is_empty() && !availability.available {
+        return "no recovery of components and no change of measurements makes it available\n".to_owned();
+    }
+    let (singles, groups): (Vec<_>, Vec<_>) =
+        repairs.iter().partition(|repair| repair.alterations.len() == 1);
+    if !singles.is_empty() {
+        text += if availability.available {
+            "it is not available any more if\n"
+        } else {
+            "it is available again if\n"
+        };
+    }
+    for repair in singles {
+        for alteration in &repair.alterations {
+            let cost = cost_text(&repair.then, best);
+            let _ = writeln!(text, "    {}: {cost}", alteration_text(alteration, false));
         }
+    }
+    for repair in groups {
+        text += "it is available again if all of these come true together, and not without one of them\n";
+        for alteration in &repair.alterations {
+            let _ = writeln!(text, "    {}", alteration_text(alteration, false));
+        }
+        let _ = writeln!(text, "then {}", cost_text(&repair.then, best));
+        text += &plan_text(&repair.then);
     }
     text
 }
 
-fn changes_text(best: &BestPlan, changes: &[Change]) -> String {
-    let mut text = match &best.cost {
-        None => "there is no plan\n".to_owned(),
-        Some(cost) => format!("the best plan costs {}\n{}", decimal(cost), plan_text(best)),
+/// What would change the plan.
+fn changes_text(found: &SmallestChanges) -> String {
+    let SmallestChanges { best, changes, complete, .. } = found;
+    let mut text = match (&best.cost, best.proved) {
+        (None, true) => "there is no plan\n".to_owned(),
+        (None, false) => "no plan was found before a limit was reached\n".to_owned(),
+        (Some(cost), true) => format!("the best plan costs {}\n{}", decimal(cost), plan_text(best)),
+        (Some(cost), false) => {
+            let plan = plan_text(best);
+            format!("the best plan so far (a limit was reached) costs {}\n{plan}", decimal(cost))
+        }
     };
-    if changes.is_empty() {
-        return text + "no change of one measurement leads to another plan\n";
+    match (changes.is_empty(), complete) {
+        (true, true) => return text + "no change of one measurement leads to another plan\n",
+        (true, false) => {}
+        (false, _) => text += "the smallest changes that lead to another plan\n",
     }
-    text += "the smallest changes that lead to another plan\n";
     for change in changes {
-        let _ = writeln!(text, "{}: {}", target_text(change), cost_text(&change.then, best));
+        // What is exact to a millionth needs no word.
+        let about = change.within.as_ref().is_some_and(|within| *within > millionth());
+        let cost = cost_text(&change.then, best);
+        let _ = writeln!(text, "{}: {cost}", alteration_text(&change.alteration, about));
         text += &plan_text(&change.then);
     }
+    if !complete {
+        text += "a limit was reached: other changes were not looked for\n";
+    }
     text
+}
+
+fn millionth() -> BigRational {
+    BigRational::new(1.into(), 1_000_000.into())
 }

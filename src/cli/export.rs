@@ -12,6 +12,7 @@ use pddl::ast::Problem;
 use pddl::{portable, print_domain, print_problem};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::limits::TimeLimit;
 use crate::cli::output;
 use crate::cli::progress::during;
 use crate::cli::situation::Situation;
@@ -30,6 +31,8 @@ pub struct Arguments {
     setting: Setting,
     #[command(flatten)]
     situation: Situation,
+    #[command(flatten)]
+    time: TimeLimit,
     /// A directory for `domain.pddl` and `problem.pddl`, made if it is not there; for models, a file. Standard output by
     /// default.
     #[arg(long, short, value_name = "DIR")]
@@ -60,6 +63,7 @@ enum Setting {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let _guard = arguments.time.guard(common)?;
     let Setup { mission, roles, .. } = arguments.situation.setup(&arguments.inputs, common)?;
     if !matches!(arguments.target, Language::Pddl) {
         let (problem, warnings) = mission.filled()?;

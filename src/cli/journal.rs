@@ -9,6 +9,7 @@ use metaplan::journal::{Entry, JournalReport};
 use serde_json::Value;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::limits::TimeLimit;
 use crate::cli::output;
 use crate::cli::progress::during;
 
@@ -17,6 +18,8 @@ use crate::cli::progress::during;
 pub struct Arguments {
     #[command(subcommand)]
     what: Operation,
+    #[command(flatten)]
+    time: TimeLimit,
 }
 
 #[derive(Debug, Subcommand)]
@@ -37,6 +40,7 @@ enum Operation {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let _guard = arguments.time.guard(common)?;
     let (Operation::Check { directory } | Operation::Show { directory }) = &arguments.what;
     let report = during("reading", common, || JournalReport::read(directory))?;
     let shows = matches!(arguments.what, Operation::Show { .. });

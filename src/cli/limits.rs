@@ -1,22 +1,44 @@
 //! Time limits and signals, from the first file read to the last proof.
 //!
 //! While a mission is read and reasoned about there is no answer that could be saved, so that a signal ends the program at
-//! once, and a thread of its own ends it when time is up. From then on the planner listens: it answers with the best plan so
+//! once, and a thread of its own ends it when time is up, unless an answer is being written. That is all for commands that do not
+//! plan. Where something is planned, the planner listens from then on: it answers with the best plan so
 //! far, and a second signal ends the program at once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use clap::Args;
 use encodings::Limits;
 use metaplan::message::Message;
 use verify::memory;
 
 use crate::cli::common::{Common, Exit, Failure};
 use crate::cli::output;
+use crate::cli::values::seconds;
 
 /// How often the reading thread looks at the clock.
 const INTERVAL: Duration = Duration::from_millis(10);
+
+/// The option `--time-limit` of commands that have nothing to show before their end, and of those that show what they have.
+#[derive(Debug, Clone, Args)]
+pub(super) struct TimeLimit {
+    /// Stop after this many seconds: with what is known by then, or, if there is nothing to show before the end, without an answer
+    /// (status 12).
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
+    time_limit: Option<Duration>,
+}
+
+impl TimeLimit {
+    /// Begins to measure time.
+    ///
+    /// # Errors
+    /// None that depend on time alone.
+    pub(super) fn guard(&self, common: &Common) -> Result<Guard, Failure> {
+        Guard::new(self.time_limit, None, common)
+    }
+}
 
 /// The limits of a command that reads first, and plans then.
 pub(super) struct Guard {
@@ -84,8 +106,10 @@ fn give_up_late(limits: Limits, has_read: Arc<AtomicBool>, common: Common) {
             }
             std::thread::sleep(INTERVAL);
         }
-        if !has_read.swap(true, Ordering::Relaxed) {
-            let text = "a limit was reached while files were read and reasoned about; nothing was planned";
+        // Who writes an answer by now has it.
+        let _stdout = std::io::stdout().lock();
+        if !output::has_begun() && !has_read.swap(true, Ordering::Relaxed) {
+            let text = "a limit was reached before there was anything to show";
             output::failure(&common, &[Message::error("M130", text)]);
             std::process::exit(Exit::NothingFound as i32);
         }

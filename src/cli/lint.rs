@@ -7,7 +7,8 @@ use metaplan::answers::LintAnswer;
 use metaplan::lint::{in_order, lint};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
-use crate::cli::output;
+use crate::cli::limits::TimeLimit;
+use crate::cli::output::{self, counted};
 use crate::cli::progress::during;
 use crate::cli::situation::Situation;
 
@@ -19,10 +20,13 @@ pub struct Arguments {
     inputs: Vec<PathBuf>,
     #[command(flatten)]
     situation: Situation,
+    #[command(flatten)]
+    time: TimeLimit,
 }
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let _guard = arguments.time.guard(common)?;
     let messages = match arguments.situation.setup(&arguments.inputs, common) {
         Ok(setup) => during("looking", common, || lint(&setup)),
         Err(failure) if failure.exit == Exit::Usage => return Err(failure),
@@ -45,12 +49,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
 }
 
 fn summary(errors: usize, warnings: usize) -> String {
-    let count = |count: usize, what: &str| {
-        let plural = if count == 1 { "" } else { "s" };
-        format!("{count} {what}{plural}")
-    };
     match (errors, warnings) {
         (0, 0) => "nothing to complain about\n".to_owned(),
-        _ => format!("{}, {}\n", count(errors, "error"), count(warnings, "warning")),
+        _ => format!("{}, {}\n", counted(errors, "error"), counted(warnings, "warning")),
     }
 }

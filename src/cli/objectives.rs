@@ -32,10 +32,12 @@ pub(super) fn front_text(name: &str, objectives: &[String], front: &Front) -> St
             let _ = writeln!(text, "{} on the front, proved: there are no others", solved.len());
         }
         (Status::Feasible, _) => {
+            let proved = solved.iter().filter(|point| point.solution.status == Status::Optimal).count();
+            // Of the last point a better one by the first objective may exist.
+            let open = if proved < solved.len() { ", and one more that is not proved to be" } else { "" };
             let _ = writeln!(
                 text,
-                "{} on the front; a limit came before it was proved that there are no others",
-                solved.len()
+                "{proved} on the front{open}; a limit came before it was proved that there are no others"
             );
         }
         (_, Some(point)) => text += &answer_text(name, &point.solution, false, &Preparation::default()),

@@ -19,6 +19,9 @@ use crate::cli::common::{Common, Failure, Format};
 /// Whether an answer could not be written.
 static ANSWER_LOST: AtomicBool = AtomicBool::new(false);
 
+/// Whether an answer, or a part of one, is being written or has been written.
+static HAS_BEGUN: AtomicBool = AtomicBool::new(false);
+
 /// How many messages are shown before the rest is only counted.
 const MESSAGE_LIMIT: usize = 20;
 
@@ -33,6 +36,7 @@ pub fn answer(text: &str) {
 /// Writes a document as it is to standard output; a reader that has gone away is not a fault, a full disk is.
 pub fn document(text: &str) {
     let mut stdout = std::io::stdout().lock();
+    HAS_BEGUN.store(true, Ordering::Relaxed);
     if let Err(error) = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush())
         && error.kind() != ErrorKind::BrokenPipe
     {
@@ -45,6 +49,12 @@ pub fn document(text: &str) {
 /// Whether an answer could not be written.
 pub fn answer_lost() -> bool {
     ANSWER_LOST.load(Ordering::Relaxed)
+}
+
+/// Returns `true` if an answer, or a part of one, is being written or has been written. Who holds the lock of standard output gets an
+/// answer that stays so.
+pub fn has_begun() -> bool {
+    HAS_BEGUN.load(Ordering::Relaxed)
 }
 
 /// Writes an answer for programs to standard output.
@@ -105,6 +115,10 @@ pub fn failure(common: &Common, messages: &[Message]) {
 
 /// Writes a file so that it is either whole or untouched.
 pub fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
+    {
+        let _stdout = std::io::stdout().lock();
+        HAS_BEGUN.store(true, Ordering::Relaxed);
+    }
     file::write(path, text).map_err(Failure::from)
 }
 
@@ -126,4 +140,21 @@ pub fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> St
 /// An exact number as decimal text; a fraction that is not a decimal is rounded.
 pub fn decimal(value: &num_rational::BigRational) -> String {
     rules::Decimal::from_rational(value).to_string()
+}
+
+/// A number with what is counted, in the singular or in the plural: `1 conflict`, `2 conflicts`.
+pub fn counted<N: std::fmt::Display + PartialEq + From<u8>>(count: N, noun: &str) -> String {
+    let ending = if count == N::from(1) { "" } else { "s" };
+    format!("{count} {noun}{ending}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::counted;
+
+    #[test]
+    fn one_is_singular() {
+        let texts = [0_usize, 1, 2].map(|count| counted(count, "solver call"));
+        assert_eq!(texts, ["0 solver calls", "1 solver call", "2 solver calls"]);
+    }
 }

@@ -214,7 +214,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
                 improvement.horizon
             ));
             ControlFlow::Continue(())
-        });
+        })
+        .on_stage(|what| progress.set_message(what.to_owned()));
     if let Some(pair) = &arguments.pareto {
         let found = planner.pareto(two(pair)?);
         progress.finish();
@@ -289,7 +290,8 @@ fn show(
             let mut solution = planned.solution.clone();
             solution.plan = planned.written();
             let plan = answer_text(&mission.name, &solution, common.verbose, &planned.preparation);
-            let others = planned.alternatives.as_ref().map(|others| alternatives::text(others, &solution));
+            let others = arguments.alternatives.and(solution.plan.as_ref());
+            let others = others.map(|_| alternatives::text(planned.alternatives.as_ref(), planned));
             let blocking = planned.blocking.as_ref().map(|blocking| format!("{blocking}\n"));
             let overlaps = solution.plan.as_ref().filter(|_| planned.overlaps());
             let makespan =

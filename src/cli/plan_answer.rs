@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use encodings::{Part, Solution, Status};
 use metaplan::answers::{Preparation, milliseconds};
 
+use crate::cli::output::counted;
 use crate::cli::plan_text::steps_text;
 
 pub(super) fn answer_text(
@@ -51,8 +52,11 @@ fn statistics_text(solution: &Solution, preparation: &Preparation) -> String {
     };
     let _ = writeln!(
         text,
-        "{found_by}{} states expanded, {} generated, {} evaluated, {} restarts",
-        statistics.expanded, statistics.generated, statistics.evaluated, statistics.restarts
+        "{found_by}{} expanded, {} generated, {} evaluated, {}",
+        counted(statistics.expanded, "state"),
+        statistics.generated,
+        statistics.evaluated,
+        counted(statistics.restarts, "restart")
     );
     for moment in &statistics.history {
         let cost =
@@ -62,14 +66,14 @@ fn statistics_text(solution: &Solution, preparation: &Preparation) -> String {
     }
     let _ = write!(
         text,
-        "{} operators; {} variables, {} clauses ({}); {} conflicts in {} solver calls\n\
+        "{}; {}, {} ({}); {} in {}\n\
          read {} ms, ground {} ms, search {} ms, encode {} ms, solve {} ms\n",
-        statistics.operators,
-        statistics.variables,
-        statistics.clauses,
+        counted(statistics.operators, "operator"),
+        counted(statistics.variables, "variable"),
+        counted(statistics.clauses, "clause"),
         families.join(", "),
-        statistics.conflicts,
-        statistics.calls,
+        counted(statistics.conflicts, "conflict"),
+        counted(statistics.calls, "solver call"),
         milliseconds(preparation.read),
         milliseconds(preparation.ground),
         milliseconds(statistics.search),

@@ -11,6 +11,7 @@ use ontology::Equality;
 use rules::{DEFAULT_STEP_BUDGET, Delta, Limits};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::limits::TimeLimit;
 use crate::cli::output;
 use crate::cli::progress::during;
 use crate::cli::reason_ask::Questions;
@@ -48,10 +49,13 @@ pub struct Arguments {
     step_limit: u64,
     #[command(flatten)]
     questions: Questions,
+    #[command(flatten)]
+    time: TimeLimit,
 }
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    let _guard = arguments.time.guard(common)?;
     let mut knowledge = during("reasoning", common, || read(arguments))?;
     output::warnings(common, knowledge.warnings());
     let mut delta = Delta::default();
@@ -106,8 +110,8 @@ fn text(knowledge: &Knowledge, contradictions: &[Contradiction]) -> String {
         }
     }
     let inferred = ontology::ntriples(knowledge.engine().symbols(), &knowledge.inferred());
-    let _ =
-        writeln!(text, "{} rules, {} inferred assertions", knowledge.rule_count(), inferred.lines().count());
+    let rules = output::counted(knowledge.rule_count(), "rule");
+    let _ = writeln!(text, "{rules}, {}", output::counted(inferred.lines().count(), "inferred assertion"));
     text += &inferred;
     let view = knowledge.view();
     let designs = view.function_designs();

@@ -87,7 +87,8 @@ impl Questions {
             }
         }
         let count = found.iter().filter(|one| matches!(one.answer, Answer::Follows(_))).count();
-        let _ = writeln!(text, "{count} of {} statements follow", found.len());
+        let verb = if found.len() == 1 { "follows" } else { "follow" };
+        let _ = writeln!(text, "{count} of {} {verb}", output::counted(found.len(), "statement"));
         let json = output::pretty(&EntailmentAnswer::new(&found));
         Ok((text, json, if all { Exit::Done } else { Exit::NotProved }))
     }

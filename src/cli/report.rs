@@ -62,12 +62,12 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         let text = "`report` writes HTML; the same data come as JSON from `plan --format json`";
         return Err(Failure::usage(Message::error("M107", text)));
     }
+    let guard = Guard::new(arguments.time_limit, arguments.memory_limit, common)?;
     if let Some(directory) = &arguments.journal {
         return during("reading", common, || JournalReport::read(directory))
             .map_err(Failure::from)
             .and_then(|report| journal(arguments, directory, &report));
     }
-    let guard = Guard::new(arguments.time_limit, arguments.memory_limit, common)?;
     let setup = arguments.situation.setup(&arguments.inputs, common)?;
     let before = arguments.situation.before();
     let before = before.map(|situation| situation.setup(&arguments.inputs, common)).transpose()?;

@@ -12,6 +12,7 @@ use num_rational::BigRational;
 use pddl::validate::{Options, Verdict, validate};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::limits::TimeLimit;
 use crate::cli::output;
 use crate::cli::progress::during;
 use crate::cli::situation::Situation;
@@ -32,6 +33,8 @@ pub struct Arguments {
     /// How far times may lie from the exact ones, and how far apart actions that interfere must begin and end.
     #[arg(long, value_name = "TIME", default_value = "0.001", value_parser = time)]
     tolerance: BigRational,
+    #[command(flatten)]
+    time: TimeLimit,
 }
 
 /// Runs the command.
@@ -45,6 +48,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             )));
         }
     };
+    let _guard = arguments.time.guard(common)?;
     let mission = arguments.situation.mission(mission, common)?;
     let (problem, warnings) = mission.filled()?;
     output::warnings(common, mission.warnings().chain(&warnings));

@@ -120,7 +120,7 @@ pub const CODES: &[[&str; 4]] = &[
         "M130",
         "A limit was reached before all was done.",
         "The time or memory given does not suffice (status 12).",
-        "Raise the limit; what was found until then is shown.",
+        "Raise the limit; what was found until then is shown, if there is anything to show.",
     ],
     [
         "M132",

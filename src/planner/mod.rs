@@ -22,6 +22,9 @@ use crate::planner::objectives::{Objectives, fault};
 use crate::planner::planned::Ground;
 pub use crate::planner::planned::{Planned, PlannedFront};
 
+/// Hears what is being done once a plan is proved.
+type Stage<'a> = dyn FnMut(&str) + 'a;
+
 /// Hears of a better plan or a better bound.
 type Report<'a> = dyn FnMut(&Improvement) -> ControlFlow<()> + 'a;
 
@@ -54,6 +57,7 @@ pub struct Planner<'m, 'r> {
     separation: Option<BigRational>,
     alternatives: Option<usize>,
     report: Box<Report<'r>>,
+    stage: Box<Stage<'r>>,
 }
 
 impl<'m, 'r> Planner<'m, 'r> {
@@ -73,6 +77,7 @@ impl<'m, 'r> Planner<'m, 'r> {
             separation: None,
             alternatives: None,
             report: Box::new(|_| ControlFlow::Continue(())),
+            stage: Box::new(|_| {}),
         })
     }
 
@@ -128,6 +133,13 @@ impl<'m, 'r> Planner<'m, 'r> {
     #[must_use]
     pub fn on_improvement(mut self, report: impl FnMut(&Improvement) -> ControlFlow<()> + 'r) -> Self {
         self.report = Box::new(report);
+        self
+    }
+
+    /// Hears what is being done when planning goes on after the best plan is proved, in a few words.
+    #[must_use]
+    pub fn on_stage(mut self, stage: impl FnMut(&str) + 'r) -> Self {
+        self.stage = Box::new(stage);
         self
     }
 
@@ -211,7 +223,10 @@ impl<'m, 'r> Planner<'m, 'r> {
         let point = encodings::lexicographic(&task, &config, &mut self.hear());
         let reading = Reading::sequential(task.is_timed());
         let others = match self.alternatives {
-            Some(most) => self.others(&task, &point.solution, most)?,
+            Some(most) => {
+                (self.stage)("the plan is proved; other plans that are as good are looked for");
+                self.others(&task, &point.solution, most)?
+            }
             None => None,
         };
         let mut planned = self.planned(point, objectives, Ground::Integers(task), reading, ground)?;

@@ -72,6 +72,11 @@ impl Planned<'_> {
         &self.problem
     }
 
+    /// Whether a limit of time or memory has been reached, or an interruption was asked for.
+    pub fn is_at_limit(&self) -> bool {
+        self.limits.reached()
+    }
+
     /// Whether actions of the plan may overlap.
     pub fn overlaps(&self) -> bool {
         matches!(self.task, Ground::Concurrent)

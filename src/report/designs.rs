@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use ontology::tomasys::{Component, FunctionDesign, Measurement, Requirement};
-use ontology::vocab::local_name;
 use picture::{Design, Reason, Step};
-use rules::{Delta, Derivation, Fact, Reason as Why, Symbols, Value};
+use rules::{Derivation, Reason as Why, Symbols};
 
+use crate::explain::{Causes, causes};
 use crate::knowledge::Knowledge;
 use crate::mapek::{said, unavailable};
 use crate::mission::Mission;
@@ -67,7 +67,7 @@ fn required(requirement: &Requirement, measurements: &[Measurement]) -> String {
     }
 }
 
-/// Why a design can be selected or not.
+/// Why a design can be selected or not: every cause.
 pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> Vec<Reason> {
     if available {
         let text = "nothing says that it is not realisable, and nothing that it is not available".to_owned();
@@ -77,61 +77,28 @@ pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> V
         let text = format!("it is not known what follows: {}", fault.message);
         return vec![Reason { text, supports: Vec::new() }];
     }
-    let symbols = knowledge.engine().symbols();
-    let causes = causes(knowledge, design);
-    let trees = causes.iter().map(|derivation| tree(derivation, 0, symbols, &mut BTreeSet::new()));
-    let all = (causes.len() > 1).then(|| Reason {
-        text: format!(
-            "{} causes rule it out, and all of them have to go before it is available:",
-            causes.len()
-        ),
-        supports: Vec::new(),
+    let designs = knowledge.view().function_designs();
+    let design = designs.iter().find(|candidate| candidate.individual.name == design);
+    let Some(design) = design else { return Vec::new() };
+    let Causes { causes, are_all_needed } = causes(knowledge, design);
+    let count = causes.len();
+    let introduction = match are_all_needed {
+        true => format!("{count} causes rule it out, and all of them have to go before it is available:"),
+        false => format!("{count} causes rule it out:"),
+    };
+    let introduction = (count > 1).then(|| Reason { text: introduction, supports: Vec::new() });
+    // Where neither a component nor a measurement is a cause, what follows from the knowledge as it is.
+    let states: Vec<&Knowledge> = match count {
+        0 => vec![knowledge],
+        _ => causes.iter().map(|cause| &cause.knowledge).collect(),
+    };
+    let trees = states.into_iter().flat_map(|knowledge| {
+        let symbols = knowledge.engine().symbols();
+        let derivations = unavailable(knowledge, &design.individual.name);
+        let trees = derivations.iter().map(|derivation| tree(derivation, 0, symbols, &mut BTreeSet::new()));
+        trees.collect::<Vec<_>>()
     });
-    all.into_iter().chain(trees).collect()
-}
-
-/// All that rules a design out: a derivation for each cause. Rules record one derivation of a fact, so that the reports that a derivation rests on, of
-/// components and of measurements, are taken back, as though the cause had gone, until nothing rules the design out or nothing can be taken back.
-fn causes(knowledge: &Knowledge, design: &str) -> Vec<Derivation> {
-    let mut knowledge = knowledge.clone();
-    let mut causes: Vec<Derivation> = Vec::new();
-    loop {
-        let mut taken_back: Vec<Fact> = Vec::new();
-        for derivation in unavailable(&knowledge, design) {
-            let reports = reports(&knowledge, &derivation);
-            // One cause may be derived for several properties of the design.
-            let is_new = reports.is_empty() || !reports.iter().all(|fact| taken_back.contains(fact));
-            taken_back.extend(reports);
-            if is_new && !causes.contains(&derivation) {
-                causes.push(derivation);
-            }
-        }
-        let delta = Delta { insert: Vec::new(), delete: taken_back };
-        if delta.delete.is_empty() || knowledge.apply(delta).is_err() {
-            return causes;
-        }
-    }
-}
-
-/// The stated facts of a derivation that the robot reports: the status of a component, or a measured value.
-fn reports(knowledge: &Knowledge, derivation: &Derivation) -> Vec<Fact> {
-    let measurements = knowledge.view().measurements();
-    let symbols = knowledge.engine().symbols();
-    let name = |symbol| match symbols.value(symbol) {
-        Value::Name(name) => Some(&**name),
-        Value::Literal(_) => None,
-    };
-    let is_report = |fact: &Fact| match name(fact.predicate).map(local_name) {
-        Some("c_status") => true,
-        Some("hasValue") => fact
-            .arguments
-            .first()
-            .and_then(|subject| name(*subject))
-            .is_some_and(|subject| measurements.iter().any(|measured| measured.individual.iri == subject)),
-        _ => false,
-    };
-    let stated = derivation.steps.iter().filter(|step| matches!(step.reason, Why::Asserted));
-    stated.map(|step| &step.fact).filter(|fact| is_report(fact)).cloned().collect()
+    introduction.into_iter().chain(trees).collect()
 }
 
 /// A derivation as a tree; what was explained already is only named.

@@ -1,5 +1,6 @@
 //! The whole, end to end: the program run as its users run it.
 
+mod anytime;
 mod browser;
 mod certificate;
 mod certificate_numbers;
@@ -12,6 +13,7 @@ mod configure;
 mod doubts;
 mod examples;
 mod explain;
+mod explain_causes;
 mod export;
 mod help;
 mod init;

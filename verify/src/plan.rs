@@ -45,7 +45,8 @@ pub fn plan(
     if value.to_string() != claimed && to_decimal(&value).is_none_or(|decimal| decimal != claimed) {
         return Err(format!("its metric is {value}, where {claimed} is claimed"));
     }
-    Ok((format!("{steps} steps, valid, metric {claimed}"), value))
+    let ending = if steps == 1 { "" } else { "s" };
+    Ok((format!("{steps} step{ending}, valid, metric {claimed}"), value))
 }
 
 /// Whether an action of this name has a duration that is not fixed.

@@ -1,183 +1,100 @@
 //! Further cheapest plans, and which choices all of them share.
 //!
-//! The formula "a plan that costs at most the optimum", with as many steps as such a plan can have, is solved again and again, each
-//! plan excluded that was found before. What every cheapest plan has in common is its backbone [1]: asked for a plan that
-//! differs from the first one in at least one of the choices left, the solver names one, which rules out where the two
-//! differ, or proves that there is none. Equal designs and objects are not taken for one another here.
-//!
-//! [1] J. Marques-Silva, M. Janota, I. Lynce: On computing backbones of propositional theories, ECAI 2010.
+//! `graph` finds all states that cheapest plans pass through, and the steps between them, by search; `paths` lists plans of that graph. Where
+//! search cannot, or must not, answer, `formula` asks the SAT solver for one plan after the other. Equal designs and objects are not taken
+//! for one another here.
 
+mod choices;
+mod formula;
+mod graph;
+mod paths;
 #[cfg(test)]
 mod tests;
 
 use crate::bounds::Bounds;
 use crate::context::Context;
-use crate::encode::{CostLimit, Counting, Encoding, Meaning, Plans, Semantics};
-use crate::number::dense;
-use crate::optimize::Config;
+use crate::optimize::{Config, Engine};
 use crate::plan::ground::{GroundPlan, GroundStep, replay};
 use crate::plan::solution::{Solution, Status};
 use crate::plan::{Plan, decode};
-use crate::sat::{Answer, Backend, Lit, Solver};
-use crate::task::{Argument, Task};
+use crate::task::Task;
 
-/// What is known of the other cheapest plans.
-#[derive(Debug, Clone)]
-pub struct Alternatives {
-    /// Plans that cost as much as the first one; not the first one itself.
-    pub plans: Vec<Plan>,
-    /// Whether it is proved that there are no others.
-    pub complete: bool,
-    /// For each step of the first plan which of its choices every cheapest plan makes at that step; none if a limit was
-    /// reached, or if cheapest plans may be longer than any that was looked for.
-    pub forced: Option<Vec<Forced>>,
-}
+use choices::{Choice, forced, shares};
+use formula::by_formula;
+use graph::{Graph, cheapest};
+use paths::{End, Paths};
 
-/// Choices at a step that are the same in every cheapest plan.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Forced {
-    /// Whether the action is, with its arguments apart from designs.
-    pub action: bool,
-    /// The functions whose design is.
-    pub functions: Vec<String>,
-}
+pub use choices::{Alternatives, Forced};
 
-/// Looks for so many more cheapest plans than that of an optimal solution. None if the solution is not optimal, or its formula
-/// could not be built within the limits.
+/// Looks for at most `most` cheapest plans besides that of an optimal solution, those with the fewest steps first. At a limit, those that are
+/// known by then are the answer. None if the solution is not optimal.
 pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Config) -> Option<Alternatives> {
     let first = solution.ground.as_ref().filter(|_| solution.status == Status::Optimal)?;
     let context = Context::new(task, &config.limits);
-    let bounds = Bounds::new(context).ok()?;
-    let window = bounds.window(context, Some(first.cost), config.horizon).ok()?;
-    let is_complete = window.steps.is_some_and(|steps| steps <= window.allowed.len());
-    // Nobody has checked what a program says of a formula without a model.
-    let complete = is_complete && !matches!(config.backend, Backend::Program { .. });
-    let allowed = if is_complete || config.horizon.is_some() {
-        window.allowed
+    let unknown = Alternatives { plans: Vec::new(), complete: false, forced: None };
+    let Ok(bounds) = Bounds::new(context) else { return Some(unknown) };
+    let by_graph = if config.engine == Engine::Sat || config.horizon.is_some() {
+        None
     } else {
-        bounds.window(context, Some(first.cost), Some(first.steps.len())).ok()?.allowed
+        by_graph(context, &bounds, first, most)
     };
-    let cost = CostLimit { limit: first.cost, bounds: &bounds, counting: Counting::Sum };
-    let plans =
-        Plans { allowed: &allowed, cost: Some(cost), semantics: Semantics::Sequential, most: usize::MAX };
-    let encoding = Encoding::with_equals(context, plans)?;
-    let mut solver = config.backend.start(&config.limits, u64::MAX);
-    for clause in config.limits.watch(encoding.formula.clauses()) {
-        solver.add_clause(clause.ok()?.1);
-    }
-    let mut run = Run { task, encoding, solver };
-    let plan =
-        |steps: &[GroundStep]| decode(context, &GroundPlan { steps: steps.to_vec(), cost: first.cost });
-    let mut found = vec![first.steps.clone()];
-    // What differs in waits only is one plan to its reader.
-    let mut plans = vec![plan(&first.steps)];
-    let mut exhausted = false;
-    // Excludes the plans that are known as long as it is assumed.
-    let others = run.encoding.formula.fresh(Meaning::Others);
-    while plans.len() <= most && !exhausted {
-        if let Some(known) = found.last() {
-            run.exclude(known, others);
-        }
-        match run.solve(&[others]) {
-            (Answer::Satisfiable, Some(other)) => {
-                let shown = plan(&other);
-                found.push(other);
-                if !plans.contains(&shown) {
-                    plans.push(shown);
-                }
-            }
-            (Answer::Unsatisfiable, _) => exhausted = true,
-            _ => break,
-        }
-    }
+    by_graph.or_else(|| by_formula(context, &bounds, first, most, config)).or(Some(unknown))
+}
+
+/// The other cheapest plans by search; none if the task does not suit it.
+fn by_graph(context: Context<'_>, bounds: &Bounds, first: &GroundPlan, most: usize) -> Option<Alternatives> {
+    let task = context.task;
+    let mut is_enough = |graph: &Graph| List::new(context, first, most, graph).0.is_full();
+    let graph = cheapest(context, bounds, first.cost, &mut is_enough)?;
+    let (list, end) = List::new(context, first, most, &graph);
     // Where there are waits, one action is several operators, at one place or another.
     let has_waits = task.operators.iter().any(|operator| operator.wait.is_some());
-    let forced = if complete && !has_waits { run.forced(&first.steps, &found) } else { None };
-    plans.remove(0);
-    Some(Alternatives { plans, complete: complete && exhausted, forced })
+    let is_known = graph.is_complete && graph.is_exact && !has_waits;
+    let forced = is_known.then(|| forced(task, &first.steps, &shared(task, &first.steps, &graph)));
+    let complete = graph.is_complete && graph.is_exact && end == End::Exhausted;
+    Some(Alternatives { plans: list.plans, complete, forced })
 }
 
-struct Run<'a> {
-    task: &'a Task,
-    encoding: Encoding<'a>,
-    solver: Box<dyn Solver>,
+/// Plans as their reader sees them, the first one apart. What differs in waits only is one plan.
+struct List {
+    plans: Vec<Plan>,
+    most: usize,
 }
 
-/// A choice of the first plan: an operator at a step, or the design of one of its slots (by position).
-type Choice = (usize, Option<u32>);
-
-impl Run<'_> {
-    /// Excludes a plan if the literal holds.
-    fn exclude(&mut self, plan: &[GroundStep], literal: Lit) {
-        let mut clause = self.encoding.other_than(plan);
-        clause.push(!literal);
-        self.solver.add_clause(&clause);
-    }
-
-    /// A plan of the formula under assumptions.
-    fn solve(&mut self, assumptions: &[Lit]) -> (Answer, Option<Vec<GroundStep>>) {
-        let answer = self.solver.solve(assumptions);
-        if answer != Answer::Satisfiable {
-            return (answer, None);
-        }
-        let steps = self.encoding.decode(self.solver.as_ref());
-        let is_plan = replay(self.task, &steps).is_some();
-        debug_assert!(is_plan, "the encoding admits a sequence that is not a plan");
-        (answer, is_plan.then_some(steps))
-    }
-
-    /// Which choices of the first plan all cheapest plans make; some of them are known.
-    fn forced(&mut self, first: &[GroundStep], known: &[Vec<GroundStep>]) -> Option<Vec<Forced>> {
-        let mut choices: Vec<Choice> = Vec::new();
-        for (at, step) in first.iter().enumerate() {
-            choices.push((at, None));
-            choices.extend((0..dense(step.choice.len())).map(|slot| (at, Some(slot))));
-        }
-        for plan in known {
-            choices.retain(|choice| self.shares(first, plan, *choice));
-        }
-        while !choices.is_empty() {
-            let other = self.encoding.formula.fresh(Meaning::Others);
-            let differs = choices.iter().map(|choice| !self.encoding.choice(first, *choice));
-            let clause: Vec<_> = differs.chain([!other]).collect();
-            self.solver.add_clause(&clause);
-            match self.solve(&[other]) {
-                (Answer::Satisfiable, Some(plan)) => {
-                    choices.retain(|choice| self.shares(first, &plan, *choice));
-                }
-                (Answer::Unsatisfiable, _) => break,
-                _ => return None,
+impl List {
+    /// The plans of a graph, and whether there are others.
+    fn new(context: Context<'_>, first: &GroundPlan, most: usize, graph: &Graph) -> (Self, End) {
+        let mut list = Self { plans: Vec::new(), most };
+        let own = decode(context, first);
+        let end = Paths::new(graph).each(&mut |steps| {
+            // Of an unfinished graph some paths need more of a resource than there is.
+            if !graph.is_exact && replay(context.task, &steps).is_none_or(|(_, cost)| cost != first.cost) {
+                return true;
             }
-        }
-        Some(first.iter().enumerate().map(|(at, step)| self.names(at, step, &choices)).collect())
-    }
-
-    fn shares(&self, first: &[GroundStep], plan: &[GroundStep], (at, slot): Choice) -> bool {
-        let Some(other) = plan.get(at) else { return false };
-        match slot {
-            None => other.operator == first[at].operator,
-            Some(slot) => {
-                let own = self.design(&first[at], slot as usize);
-                (0..other.choice.len()).any(|position| self.design(other, position) == own)
+            let plan = decode(context, &GroundPlan { steps, cost: first.cost });
+            let is_new = plan != own && !list.plans.contains(&plan);
+            if is_new && list.is_full() {
+                return false;
             }
-        }
+            list.plans.extend(is_new.then_some(plan));
+            true
+        });
+        (list, end)
     }
 
-    /// Slot and design in the task's numbering.
-    fn design(&self, step: &GroundStep, position: usize) -> (usize, u32) {
-        let usage = &self.task.operators[step.operator.index()].slots[position];
-        (usage.slot.index(), usage.designs[step.choice[position] as usize])
+    fn is_full(&self) -> bool {
+        self.plans.len() >= self.most
     }
+}
 
-    fn names(&self, at: usize, step: &GroundStep, forced: &[Choice]) -> Forced {
-        let action = forced.contains(&(at, None));
-        let operator = &self.task.operators[step.operator.index()];
-        let is_forced = |argument: &Argument| match argument {
-            Argument::Object(_) => action,
-            Argument::Slot(slot) => forced.contains(&(at, Some(*slot))),
-        };
-        let functions = operator.configuration.iter().filter(|(_, argument)| is_forced(argument));
-        let name = |function: crate::lifted::ObjectId| self.task.object_names[function.index()].clone();
-        Forced { action, functions: functions.map(|(function, _)| name(*function)).collect() }
-    }
+/// The choices of a plan that all cheapest plans make.
+fn shared(task: &Task, first: &[GroundStep], graph: &Graph) -> Vec<Choice> {
+    let layers = Paths::new(graph).layers(first.len());
+    let mut choices = Choice::all(first);
+    choices.retain(|choice| {
+        layers[choice.step].as_ref().is_some_and(|steps| {
+            steps.iter().all(|other| shares(task, &first[choice.step], other, choice.slot))
+        })
+    });
+    choices
 }

@@ -1,13 +1,14 @@
 //! All cheapest plans of small missions, enumerated: the same ones, and the same common choices.
 
 use std::collections::BTreeSet;
+use std::sync::atomic::Ordering;
 
 use super::{Forced, alternatives};
 use crate::context::Context;
 use crate::ground::{GroundConfig, ground};
 use crate::limits::Limits;
 use crate::number::Int;
-use crate::optimize::{Config, optimize};
+use crate::optimize::{Config, Engine, optimize};
 use crate::plan::ground::{GroundPlan, GroundStep};
 use crate::plan::solution::Status;
 use crate::plan::{Plan, decode};
@@ -86,15 +87,29 @@ fn check(seed: u64) -> usize {
         .map(|steps| decode(Context::new(&task, &Limits::none()), &GroundPlan { steps, cost: ground.cost }))
         .collect();
     let first = solution.plan.as_ref().expect("a plan");
-    let found = alternatives(&task, &solution, 1_000, &config).expect("alternatives");
-    let texts: BTreeSet<_> = found.plans.iter().chain([first]).map(steps).collect();
-    assert_eq!(texts, plans.iter().map(steps).collect(), "seed {seed}: {mission:?}");
-    assert_eq!(found.plans.len() + 1, plans.len(), "seed {seed}: a plan is listed twice");
-    assert!(found.complete, "seed {seed}");
-    assert_eq!(found.forced, Some(forced(first, &plans)), "seed {seed}: {mission:?}");
-    let fewer = alternatives(&task, &solution, 1, &config).expect("alternatives");
-    assert_eq!((fewer.plans.len(), &fewer.forced), (1.min(found.plans.len()), &found.forced), "seed {seed}");
-    assert_eq!(fewer.complete, plans.len() == 1, "seed {seed}");
+    // By search, and by formulas.
+    for config in [config, Config::default().with_engine(Engine::Sat)] {
+        let context = format!("seed {seed}, {:?}: {mission:?}", config.engine);
+        let found = alternatives(&task, &solution, 1_000, &config).expect("alternatives");
+        let texts: BTreeSet<_> = found.plans.iter().chain([first]).map(steps).collect();
+        assert_eq!(texts, plans.iter().map(steps).collect(), "{context}");
+        assert_eq!(found.plans.len() + 1, plans.len(), "a plan is listed twice: {context}");
+        assert!(found.complete, "{context}");
+        assert_eq!(found.forced, Some(forced(first, &plans)), "{context}");
+        let fewer = alternatives(&task, &solution, 1, &config).expect("alternatives");
+        assert_eq!(
+            (fewer.plans.len(), &fewer.forced),
+            (1.min(found.plans.len()), &found.forced),
+            "{context}"
+        );
+        // Formulas are not asked for one plan more.
+        let most = if config.engine == Engine::Sat { 1 } else { 2 };
+        assert_eq!(fewer.complete, plans.len() <= most, "{context}");
+    }
+    let limits = Limits::none();
+    limits.interrupt().store(true, Ordering::Relaxed);
+    let late = alternatives(&task, &solution, 3, &Config::default().with_limits(limits)).expect("an answer");
+    assert!(!late.complete && late.forced.is_none(), "seed {seed}: what is not proved is claimed");
     plans.len()
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use pddl::ast::{Domain, InitialElement, Problem};
+use pddl::ast::{Domain, Problem};
 
 use crate::ground::GroundConfig;
 
@@ -14,11 +14,10 @@ const INITIAL: usize = 20_000;
 pub(super) struct Kept(Arc<(Domain, Problem, GroundConfig)>);
 
 impl Kept {
-    /// None if something happens by itself, or if the problem is large.
+    /// None if the problem is large.
     pub(super) fn new(domain: &Domain, problem: &Problem, config: &GroundConfig) -> Option<Self> {
-        let is_timed = |element: &InitialElement| matches!(element, InitialElement::Timed(..));
-        let is_plain = problem.init.len() <= INITIAL && !problem.init.iter().any(is_timed);
-        is_plain.then(|| Self(Arc::new((domain.clone(), problem.clone(), config.clone()))))
+        let is_small = problem.init.len() <= INITIAL;
+        is_small.then(|| Self(Arc::new((domain.clone(), problem.clone(), config.clone()))))
     }
 
     pub(super) fn files(&self) -> &(Domain, Problem, GroundConfig) {

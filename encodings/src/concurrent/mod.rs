@@ -50,7 +50,7 @@ use num_traits::Signed;
 use tracing::info_span;
 
 use crate::bounds::Bounds;
-use crate::compile::{Compiled, Course, compile as compile_away, is_hidden, is_needed};
+use crate::compile::{Compiled, Course, compile as compile_away, is_hidden};
 use crate::context::Context;
 use crate::error::{Error, Errors, File, Place};
 use crate::ground::{Generality, GroundConfig, ground_lifted};
@@ -91,12 +91,13 @@ pub fn ground_concurrent(
     let separation = Rational::from_big(separation.clone());
     let own = Course::Overlapping(&separation.to_big());
     let plain = info_span!("compile").in_scope(|| compile_away(domain, problem, &config.objectives, own))?;
+    let kept = Kept::new(domain, problem, config);
     let config = config.clone().with_objectives(plain.objectives.to_vec());
     let mut task = ground_plain((&plain.domain, &plain.problem, &config, &separation))?;
-    let shortest = task.shortest.take().map(|shortest| Box::new(shortest.judged_by(&plain)));
-    let is_plain = plain.deadlines.is_empty() && plain.objectives.is_empty();
-    let is_plain = is_plain && !is_needed(domain, problem);
-    let kept = if is_plain { Kept::new(domain, problem, &config) } else { None };
+    let shortest = task.shortest.take().map(|shortest| {
+        let shortest = shortest.judged_by(&plain);
+        Box::new(Concurrent { kept: kept.clone(), ..shortest })
+    });
     Ok(Concurrent { shortest, kept, ..task.judged_by(&plain) })
 }
 

@@ -23,6 +23,8 @@ const SOON: usize = 10_000;
 /// How many situations the greedy search evaluates at its first turn, and how many the exact one looks at then.
 const GREEDY: usize = 5_000;
 const EXACT: usize = 20_000;
+/// How many turns the search for plans of actions one after another has where a plan is known: the best of those is an upper bound.
+const WHOLE: usize = 2;
 
 /// Searches until nothing better is left, a limit is reached, or both have had so many turns. `record` hears of each better plan and of what none can get below.
 pub(super) fn take_turns(
@@ -50,20 +52,24 @@ pub(super) fn take_turns(
     let differs = concurrent.instances.iter().any(|instance| !instance.compressible);
     let mut greedy = vec![begin(Mode::Overlapping)];
     greedy.extend(differs.then(|| begin(Mode::Sequential)));
-    let whole = if differs { Whole::new(concurrent, limits) } else { None };
+    let whole = Whole::new(concurrent, limits);
     let mut seeker = whole.as_ref().map(|own| Seeker::new(own, limits));
     let mut share = 1_usize;
-    for _ in 0..rounds {
+    for round in 0..rounds {
         let is_over = exact.is_over() || is_best(concurrent, &exact, root);
         if is_over || limits.reached() || (greedy.is_empty() && exact.is_full(limits)) {
             break;
         }
-        seeker = seeker.filter(|_| exact.incumbent.is_none());
+        seeker = seeker.filter(|_| exact.incumbent.is_none() || round < WHOLE);
         if let Some(seeker) = &mut seeker {
             let _span = info_span!("satisfice").entered();
-            exact.incumbent = seeker.run((concurrent, &expansion), share, &mut record.statistics);
-            let incumbent = exact.incumbent.iter();
-            incumbent.for_each(|sequence| sequence.tell(exact.lower(), Part::Satisficing, record));
+            let found = seeker.run((concurrent, &expansion), share, &mut record.statistics);
+            let is_better =
+                |own: &Sequence| exact.incumbent.as_ref().is_none_or(|known| own.value < known.value);
+            if let Some(sequence) = found.filter(is_better) {
+                sequence.tell(exact.lower(), Part::Satisficing, record);
+                exact.incumbent = Some(sequence);
+            }
         }
         for position in (0..greedy.len()).rev() {
             let _span = info_span!("greedy").entered();

@@ -1,14 +1,17 @@
-//! A plan of actions one after another, and then at the earliest times: the first plan of a task that does not ask for overlap.
+//! Plans of actions one after another, and then at the earliest times: the first plan of a task that does not ask for overlap, and an upper
+//! bound for all others.
 //!
-//! Without timed initial literals, such plans are those of the task that is planned for where actions do not overlap. The searches for that have more to go
+//! Such plans are those of the task that is planned for where actions do not overlap. The searches for that have more to go
 //! by: fewer variables with more values, landmarks, pairs of facts that lead nowhere, objects that are interchangeable. What they find is executed
-//! like any sequence, and its times overlap where they can.
+//! like any sequence, and its times overlap where they can. So each plan that is given is one of the overlapping task: what does not fit it, such as an action
+//! that timed initial literals would cut short, is left out.
 
 use std::cell::OnceCell;
 
 use rustc_hash::FxHashMap;
 
 use crate::bounds::Bounds;
+use crate::compile::is_hidden;
 use crate::concurrent::compile::Concurrent;
 use crate::concurrent::expansion::{Expansion, Situation};
 use crate::concurrent::greedy::{Links, Mode};
@@ -85,6 +88,21 @@ impl Whole {
         let mut links = Links::new();
         for step in &plan.steps {
             let operator = &self.task.operators[step.operator.index()];
+            if let Some(until) = operator.wait {
+                let until = until.checked_mul(concurrent.task.time_scale)?;
+                while let Some((time, event)) = expansion.next_event(&situation.clocks)
+                    && time.checked_mul(self.task.time_scale)? <= until
+                {
+                    let together = situation.clocks.unsettled();
+                    situation = expansion.step(&situation, event).ok()?;
+                    links.push((event, together));
+                }
+                continue;
+            }
+            // What is violated in the end is found by looking at the last state.
+            if is_hidden(&self.task.schema_names[operator.schema as usize]) {
+                continue;
+            }
             let begins = self.begins.get(&call(&self.task, operator, &step.choice))?;
             let mut executed = begins.iter().filter_map(|begin| {
                 let mut own = Links::new();
@@ -119,6 +137,8 @@ pub(super) struct Seeker<'w> {
     exact: Exact<'w>,
     /// How many states the latter may store by now.
     stored: usize,
+    /// What the best plan costs where actions do not overlap.
+    known: Option<Int>,
 }
 
 enum Exact<'w> {
@@ -131,23 +151,22 @@ enum Exact<'w> {
 impl<'w> Seeker<'w> {
     pub(super) fn new(whole: &'w Whole, limits: &'w Limits) -> Self {
         let satisficer = Satisficer::new(Context::new(&whole.task, limits)).ok().flatten();
-        Self { whole, limits, satisficer, exact: Exact::Later, stored: 0 }
+        Self { whole, limits, satisficer, exact: Exact::Later, stored: 0, known: None }
     }
 
-    /// Goes on for so many shares of work: a plan whose sequence can be executed.
+    /// Goes on for so many shares of work: the better of two plans whose sequences can be executed.
     pub(super) fn run(
         &mut self,
         of: (&Concurrent, &Expansion<'_>),
         share: usize,
         statistics: &mut Statistics,
     ) -> Option<Sequence> {
-        if let Some(sequence) = self.estimate(of, share, statistics) {
-            return Some(sequence);
-        }
+        let some = self.estimate(of, share, statistics);
         if self.limits.reached() {
-            return None;
+            return some;
         }
-        self.search(of, share, statistics)
+        let best = self.search(of, share, statistics);
+        some.into_iter().chain(best).min_by_key(|sequence| sequence.value)
     }
 
     fn estimate(
@@ -158,10 +177,13 @@ impl<'w> Seeker<'w> {
     ) -> Option<Sequence> {
         let satisficer = self.satisficer.as_mut()?;
         let before = satisficer.figures;
-        let advance = satisficer.run(None, WORK.saturating_mul(share as u64));
+        let advance = satisficer.run(self.known.as_ref(), WORK.saturating_mul(share as u64));
         satisficer.figures.add_to(before, statistics);
         match advance {
-            Ok(Advance::Plan(plan)) => self.whole.sequence(concurrent, expansion, &plan),
+            Ok(Advance::Plan(plan)) => {
+                self.known = Some(plan.cost);
+                self.whole.sequence(concurrent, expansion, &plan)
+            }
             Ok(Advance::Paused) => None,
             Ok(Advance::Unsolvable | Advance::Ended) | Err(_) => {
                 self.satisficer = None;

@@ -1,0 +1,318 @@
+//! What rules a design out, and the smallest sets of alterations after which it is available.
+//!
+//! Sets of alterations are tried
+//! from the smallest on, by reasoning in a copy of the knowledge, so that each set that is listed was seen to suffice, and none
+//! contains another one. What is still concluded once all of a set but one alteration has come true is the work of that cause. These are the diagnoses of R. Reiter: A theory of diagnosis from first principles, Artificial Intelligence 32, 1987.
+
+use encodings::Limits;
+use num_rational::BigRational;
+use ontology::tomasys::change::Status as Component;
+use ontology::tomasys::{FunctionDesign, Requirement};
+
+use crate::explain::parts::{Alteration, BestPlan, Change, Repair, Target};
+use crate::explain::solve::best;
+use crate::explain::thresholds::measured;
+use crate::knowledge::Knowledge;
+use crate::mapek::ruled_out;
+use crate::message::Errors;
+use crate::mission::Mission;
+
+/// Upper limit on the sets of alterations that are tried.
+const MAX_TRIED: usize = 2_000;
+
+/// What follows about one design, without planning.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Availability {
+    /// Its local name.
+    pub design: String,
+    /// The functions that it solves.
+    pub functions: Vec<String>,
+    /// Whether it is available.
+    pub available: bool,
+    /// The rules and facts that rule it out, those of all causes.
+    pub because: Vec<String>,
+    /// Each failed component and each measurement that has a part in that.
+    pub causes: Vec<Cause>,
+    /// Where it is not available: the smallest sets of alterations that make it available, each of which suffices if all of it comes true, and none without
+    /// one of its parts. Where it is available: what each makes it unavailable by itself.
+    pub ways: Vec<Vec<Alteration>>,
+}
+
+/// Something that has a part in ruling a design out.
+#[derive(Debug, Clone)]
+pub struct Cause {
+    /// What would have to be otherwise for this cause to go; others may be left.
+    pub alteration: Alteration,
+    /// The rules and facts by which the design is ruled out once the other alterations of a smallest set have come true.
+    pub because: Vec<String>,
+    /// The knowledge in which these have come true, for those who look closer.
+    pub knowledge: Knowledge,
+}
+
+impl PartialEq for Cause {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.alteration, &self.because) == (&other.alteration, &other.because)
+    }
+}
+
+/// The causes that rule a design out.
+#[derive(Debug, Clone)]
+pub struct Causes {
+    /// Empty if the design is available, or if neither a component nor a measurement is a cause.
+    pub causes: Vec<Cause>,
+    /// `true` if the design becomes available only when all causes have gone; `false` if smaller sets of them suffice.
+    pub are_all_needed: bool,
+}
+
+/// Returns everything that has a part in ruling a design out.
+pub fn causes(knowledge: &Knowledge, design: &FunctionDesign) -> Causes {
+    if design.available {
+        return Causes { causes: Vec::new(), are_all_needed: false };
+    }
+    let ways = ways(knowledge, design);
+    Causes { causes: causes_of(knowledge, design, &ways), are_all_needed: ways.len() == 1 }
+}
+
+/// The causes that smallest sets of alterations show: with all others of a set repaired, what is left is the work of one.
+fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alteration>]) -> Vec<Cause> {
+    let mut causes: Vec<Cause> = Vec::new();
+    for (way, own) in ways.iter().flat_map(|way| way.iter().map(move |own| (way, own))) {
+        let is_known = causes.iter().any(|cause| cause.alteration == *own);
+        let others = way.iter().filter(|other| *other != own);
+        if let Some(knowledge) = altered(knowledge, others).filter(|_| !is_known) {
+            let because = ruled_out(&knowledge, &design.individual.name);
+            causes.push(Cause { alteration: own.clone(), because, knowledge });
+        }
+    }
+    causes
+}
+
+/// The smallest sets of alterations that make a design available.
+fn ways(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Vec<Alteration>> {
+    let candidates = candidates(knowledge, design);
+    let ways = repairs(knowledge, design, &candidates);
+    // Rules may look at what the design itself does not need.
+    if ways.is_empty() { repairs(knowledge, design, &all_candidates(knowledge, candidates)) } else { ways }
+}
+
+/// What follows about a design.
+pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availability {
+    let mut availability = Availability {
+        design: design.individual.name.clone(),
+        functions: design.solves.iter().map(|function| function.name.clone()).collect(),
+        available: design.available,
+        because: Vec::new(),
+        causes: Vec::new(),
+        ways: Vec::new(),
+    };
+    let Some(knowledge) = mission.knowledge() else { return availability };
+    if design.available {
+        let loses = |own: &Alteration| {
+            altered(knowledge, [own]).is_some_and(|knowledge| !is_available(&knowledge, design))
+        };
+        let candidates = candidates(knowledge, design).into_iter();
+        availability.ways = candidates.filter(loses).map(|own| vec![own]).collect();
+        return availability;
+    }
+    availability.ways = ways(knowledge, design);
+    availability.causes = causes_of(knowledge, design, &availability.ways);
+    let derived = ruled_out(knowledge, &design.individual.name);
+    for line in availability.causes.iter().flat_map(|cause| &cause.because).chain(&derived) {
+        if !availability.because.contains(line) {
+            availability.because.push(line.clone());
+        }
+    }
+    availability
+}
+
+/// The smallest sets of alterations that make a design available, smaller ones first.
+fn repairs(
+    knowledge: &Knowledge,
+    design: &FunctionDesign,
+    candidates: &[Alteration],
+) -> Vec<Vec<Alteration>> {
+    let suffice = |set: &[&Alteration]| {
+        altered(knowledge, set.iter().copied()).is_some_and(|knowledge| is_available(&knowledge, design))
+    };
+    let all: Vec<&Alteration> = candidates.iter().collect();
+    let without = |own: &Alteration| all.iter().copied().filter(|other| *other != own).collect::<Vec<_>>();
+    // What nothing else makes up for is in every set.
+    let (needed, rest): (Vec<&Alteration>, Vec<&Alteration>) = if suffice(&all) {
+        all.iter().copied().partition(|own| !suffice(&without(own)))
+    } else {
+        (Vec::new(), all.clone())
+    };
+    let mut found: Vec<Vec<&Alteration>> = Vec::new();
+    let subsets = std::iter::once(Vec::new()).chain(subsets(rest.len()));
+    for positions in subsets.take(MAX_TRIED) {
+        let is_in = |own: &&Alteration| {
+            needed.contains(own) || positions.iter().any(|position| rest[*position] == *own)
+        };
+        let set: Vec<&Alteration> = all.iter().copied().filter(is_in).collect();
+        let contains = |known: &Vec<&Alteration>| known.iter().all(|own| set.contains(own));
+        // A value cannot be altered in two ways.
+        let is_twice =
+            |(at, own): (usize, &&Alteration)| set[..at].iter().any(|other| other.name == own.name);
+        let is_open = !set.is_empty() && !set.iter().enumerate().any(is_twice) && !found.iter().any(contains);
+        if is_open && suffice(&set) {
+            found.push(minimal(set, &suffice));
+        }
+    }
+    if found.is_empty() && suffice(&all) {
+        found.push(minimal(all, &suffice));
+    }
+    found.into_iter().map(|set| set.into_iter().cloned().collect()).collect()
+}
+
+/// The subsets of so many elements that are not empty, as positions: smaller ones first, then in lexicographic order.
+fn subsets(count: usize) -> impl Iterator<Item = Vec<usize>> {
+    (1..=count).flat_map(move |size| {
+        std::iter::successors(Some((0..size).collect::<Vec<usize>>()), move |last| {
+            let at = (0..size).rev().find(|at| last[*at] < count - size + at)?;
+            let mut next = last.clone();
+            for (position, element) in next[at..].iter_mut().zip(last[at] + 1..) {
+                *position = element;
+            }
+            Some(next)
+        })
+    })
+}
+
+/// A part of a set that suffices and none of whose parts does, by deletion.
+fn minimal<'a>(
+    mut set: Vec<&'a Alteration>,
+    suffice: &dyn Fn(&[&'a Alteration]) -> bool,
+) -> Vec<&'a Alteration> {
+    for position in (0..set.len()).rev() {
+        let mut less = set.clone();
+        less.remove(position);
+        if suffice(&less) {
+            set = less;
+        }
+    }
+    set
+}
+
+/// Knowledge in which alterations have come true; none if a rule runs away.
+fn altered<'a>(
+    knowledge: &Knowledge,
+    alterations: impl IntoIterator<Item = &'a Alteration>,
+) -> Option<Knowledge> {
+    let mut knowledge = knowledge.clone();
+    for own in alterations {
+        let outcome = match own.to {
+            Target::Recovered => knowledge.report(&own.name, Component::Recovered),
+            Target::Failed => knowledge.report(&own.name, Component::Failed),
+            _ => knowledge.observe(&own.name, &own.to.example()),
+        };
+        outcome.ok()?;
+    }
+    Some(knowledge)
+}
+
+fn is_available(knowledge: &Knowledge, design: &FunctionDesign) -> bool {
+    let designs = knowledge.view().function_designs();
+    designs.iter().any(|own| own.individual == design.individual && own.available)
+}
+
+/// The best plan once alterations have come true.
+pub(super) fn in_situation(
+    mission: &Mission,
+    alterations: &[Alteration],
+    limits: &Limits,
+) -> Result<BestPlan, Errors> {
+    let mut mission = mission.clone();
+    if let Some(knowledge) = mission.knowledge_mut() {
+        let altered = altered(knowledge, alterations);
+        *knowledge = altered.unwrap_or_else(|| knowledge.clone());
+    }
+    best(&mission, limits)
+}
+
+/// Each alteration of repairs, with the best plan if it alone comes true.
+pub(super) fn singly(mission: &Mission, repairs: &[Repair], limits: &Limits) -> Result<Vec<Change>, Errors> {
+    let mut changes: Vec<Change> = Vec::new();
+    for own in repairs.iter().flat_map(|repair| &repair.alterations) {
+        if changes.iter().any(|change| change.alteration == *own) {
+            continue;
+        }
+        let alone = repairs.iter().find(|repair| repair.alterations == [own.clone()]);
+        let then = match alone {
+            Some(repair) => repair.then.clone(),
+            None => in_situation(mission, std::slice::from_ref(own), limits)?,
+        };
+        changes.push(Change { alteration: own.clone(), within: None, suffices: alone.is_some(), then });
+    }
+    Ok(changes)
+}
+
+/// What could change whether a design is available: its components, and measurements that it depends on, where its requirements and
+/// estimations begin or cease to hold.
+fn candidates(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Alteration> {
+    let is_own = |component: &str| design.components.iter().any(|own| own.iri == component);
+    let mut all = components(knowledge, design.available, &is_own);
+    for (attribute, from) in measured(knowledge) {
+        let bounds = design.requirements.iter().filter(|requirement| requirement.attribute == attribute);
+        for to in targets(bounds, &from, design.available) {
+            all.push(Alteration { name: attribute.clone(), from: Some(from.clone()), to });
+        }
+        // Some vocabularies compare a measurement with what a design estimates.
+        let is_required = design.requirements.iter().any(|requirement| requirement.attribute == attribute);
+        let estimated = design.estimations.get(&attribute).filter(|_| !is_required).cloned();
+        for to in estimated.into_iter().flat_map(|bound| around(&bound, &from)) {
+            all.push(Alteration { name: attribute.clone(), from: Some(from.clone()), to });
+        }
+    }
+    all
+}
+
+/// The same, of all that has failed and of all requirements that are broken.
+fn all_candidates(knowledge: &Knowledge, mut all: Vec<Alteration>) -> Vec<Alteration> {
+    let designs = knowledge.view().function_designs();
+    let more = designs.iter().flat_map(|design| candidates(knowledge, design));
+    for own in components(knowledge, false, &|_| true).into_iter().chain(more) {
+        if own.to != Target::Failed && !all.contains(&own) {
+            all.push(own);
+        }
+    }
+    all
+}
+
+/// The components that have failed, to work again; or those that work, to fail.
+fn components(knowledge: &Knowledge, working: bool, is_own: &dyn Fn(&str) -> bool) -> Vec<Alteration> {
+    let all = knowledge.view().components().into_iter();
+    let all = all.filter(|component| is_own(&component.individual.iri));
+    let has_failed = |status: Option<&str>| matches!(status, Some("FALSE" | "ERROR" | "false"));
+    let all = all.filter(|component| has_failed(component.status.as_deref()) != working);
+    let to = if working { Target::Failed } else { Target::Recovered };
+    all.map(|component| Alteration { name: component.individual.name, from: None, to: to.clone() }).collect()
+}
+
+/// The values from which on all requirements on an attribute hold, or one does not.
+fn targets<'a>(bounds: impl Iterator<Item = &'a Requirement>, from: &BigRational, hold: bool) -> Vec<Target> {
+    let (mut least, mut most): (Vec<&BigRational>, Vec<&BigRational>) = (Vec::new(), Vec::new());
+    for requirement in bounds {
+        least.extend(requirement.minimum.iter().filter(|minimum| (from >= minimum) == hold));
+        most.extend(requirement.maximum.iter().filter(|maximum| (from <= maximum) == hold));
+    }
+    let (least, most) = (least.into_iter().max().cloned(), most.into_iter().min().cloned());
+    let (least, most) = if hold {
+        (least.map(Target::Below), most.map(Target::Above))
+    } else {
+        (least.map(Target::AtLeast), most.map(Target::AtMost))
+    };
+    least.into_iter().chain(most).collect()
+}
+
+/// Values at a bound and beyond it, seen from a value.
+fn around(bound: &BigRational, from: &BigRational) -> Vec<Target> {
+    let bound = bound.clone();
+    if *from < bound {
+        vec![Target::AtLeast(bound.clone()), Target::Above(bound)]
+    } else if *from > bound {
+        vec![Target::AtMost(bound.clone()), Target::Below(bound)]
+    } else {
+        vec![Target::Below(bound.clone()), Target::Above(bound)]
+    }
+}

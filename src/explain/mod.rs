@@ -1,0 +1,144 @@
+//! Why a design is available or not, why it is chosen or not, and what would have to be measured for another answer.
+//!
+//! "Why is it not available?" is answered by reasoning alone: [`availability`]. "Why not this one?" is answered by planning
+//! again: with the design in question as the only one for its functions, and, if
+//! it is not available, as if it were. The difference of the metrics is what the answer is worth. "What would change
+//! it?" is answered by trying the values at which a requirement begins or ceases to hold, and, for values of the problem such as
+//! a battery, by bisection between a value with the same plan and one with another.
+
+mod causes;
+mod parts;
+mod solve;
+mod thresholds;
+
+use std::collections::BTreeSet;
+
+use encodings::Limits;
+use ontology::tomasys::FunctionDesign;
+use ontology::vocab::local_name;
+
+use crate::mapek::PlannedStep;
+use crate::message::{Errors, Message};
+use crate::mission::Mission;
+
+use solve::solve;
+
+pub use causes::{Availability, Cause, Causes, causes};
+pub use parts::{Alteration, BestPlan, Change, Repair, Target};
+pub use solve::best;
+pub use thresholds::{SmallestChanges, smallest_changes};
+
+/// All about one design.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct DesignExplanation {
+    /// What follows without planning.
+    pub availability: Availability,
+    /// The best plan for the mission as it is.
+    pub best: BestPlan,
+    /// The steps of the best plan that use it, from 1.
+    pub used: Vec<usize>,
+    /// The best plan in which no other design solves its functions; as if it were available if it is not.
+    pub alone: BestPlan,
+    /// The best plan without it.
+    pub without: BestPlan,
+    /// For each of [`Availability::ways`], the best plan once all of it has come true.
+    pub repairs: Vec<Repair>,
+    /// Single alterations: those of the ways, each with the best plan if it alone comes true.
+    pub changes: Vec<Change>,
+    /// Whether all of that was found before a limit was reached.
+    pub complete: bool,
+}
+
+/// A design by its local name or IRI.
+///
+/// # Errors
+/// M112, there is no such design.
+fn find(mission: &Mission, name: &str) -> Result<(FunctionDesign, Vec<FunctionDesign>), Errors> {
+    let designs =
+        mission.knowledge().map(|knowledge| knowledge.view().function_designs()).unwrap_or_default();
+    let named = designs.iter().find(|design| design.individual.name == name);
+    let is_meant = |design: &&FunctionDesign| {
+        [local_name(&design.individual.iri), &design.individual.iri].contains(&name)
+    };
+    if let Some(found) = named.or_else(|| designs.iter().find(is_meant)) {
+        return Ok((found.clone(), designs));
+    }
+    let known: Vec<&str> = designs.iter().map(|design| design.individual.name.as_str()).collect();
+    let meant = crate::message::did_you_mean(name, known.iter().map(|own| &**own));
+    let text = format!("there is no design `{name}`; there are: {}{meant}", known.join(", "));
+    Err(vec![Message::error("M112", text)].into())
+}
+
+/// Explains by reasoning alone whether one design, by its local name, is available.
+///
+/// # Errors
+/// There is no such design.
+pub fn availability(mission: &Mission, name: &str) -> Result<Availability, Errors> {
+    let (found, _) = find(mission, name)?;
+    Ok(causes::availability(mission, &found))
+}
+
+/// Explains one design, by its local name. At a limit, what is known by then is the answer.
+///
+/// ```
+/// use std::path::Path;
+/// use metaplan::{encodings::Limits, explain, setup::Setup};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let mut mission = Setup::read(Path::new("missions/ugv.toml"))?.mission;
+/// mission.fail("c_kinect")?;
+/// let found = explain::design(&mission, "fd_amcl_kinect", &Limits::none())?;
+/// assert!(!found.availability.available && !found.availability.because.is_empty());
+/// # Ok(())
+/// # }
+/// ```
+///
+/// # Errors
+/// There is no such design, or the mission cannot be planned for.
+pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignExplanation, Errors> {
+    availability(mission, name)?.plan(mission, limits, &mut |_| {})
+}
+
+impl Availability {
+    /// Adds what plans show; `hear` is told what is being planned.
+    ///
+    /// # Errors
+    /// The mission cannot be planned for.
+    pub fn plan(
+        self,
+        mission: &Mission,
+        limits: &Limits,
+        hear: &mut dyn FnMut(&str),
+    ) -> Result<DesignExplanation, Errors> {
+        let (found, designs) = find(mission, &self.design)?;
+        let name = self.design.as_str();
+        let rivals: BTreeSet<&str> = designs
+            .iter()
+            .filter(|other| other.solves.iter().any(|function| found.solves.contains(function)))
+            .map(|other| other.individual.name.as_str())
+            .collect();
+        hear("the best plan");
+        let best = best(mission, limits)?;
+        let uses = |step: &PlannedStep| step.configuration.iter().any(|(_, design)| design == name);
+        let used = (1..).zip(&best.steps).filter(|(_, step)| uses(step)).map(|(number, _)| number).collect();
+        let mut repairs = Vec::new();
+        for (way, number) in self.ways.iter().zip(1..) {
+            hear(&format!("change {number} of {}", self.ways.len()));
+            let then = causes::in_situation(mission, way, limits)?;
+            repairs.push(Repair { alterations: way.clone(), then });
+        }
+        hear("it as the only design");
+        let alone = solve(mission, limits, &|other, available| {
+            other == name || available && !rivals.contains(other)
+        })?;
+        hear("without it");
+        let without = solve(mission, limits, &|other, available| other != name && available)?;
+        hear("single changes");
+        let changes = causes::singly(mission, &repairs, limits)?;
+        let all = [&best, &alone, &without].into_iter();
+        let all = all.chain(repairs.iter().map(|repair| &repair.then));
+        let complete = all.chain(changes.iter().map(|change| &change.then)).all(|plan| plan.proved);
+        Ok(DesignExplanation { availability: self, best, used, alone, without, repairs, changes, complete })
+    }
+}

@@ -1,0 +1,40 @@
+//! The best plan for a mission as it is, or with other designs.
+
+use encodings::{Config, Limits, Status, optimize};
+
+use crate::explain::parts::BestPlan;
+use crate::mapek::PlannedStep;
+use crate::message::Errors;
+use crate::mission::{Mission, ground_with};
+use crate::number;
+
+/// The best plan for a mission as it is, or the best so far if a limit is reached.
+///
+/// # Errors
+/// The mission cannot be planned for.
+pub fn best(mission: &Mission, limits: &Limits) -> Result<BestPlan, Errors> {
+    solve(mission, limits, &|_, available| available)
+}
+
+/// The best plan where `allowed` says, of each design and whether it is available, whether it may be used.
+pub(super) fn solve(
+    mission: &Mission,
+    limits: &Limits,
+    allowed: &dyn Fn(&str, bool) -> bool,
+) -> Result<BestPlan, Errors> {
+    let (mut problem, _) = mission.filled()?;
+    let domain = mission.allow(&mut problem, allowed);
+    // Other questions are to be answered, too.
+    let limits = &limits.half();
+    let task = match ground_with(mission, &domain, &problem, &[], limits) {
+        Ok(task) => task,
+        Err(_) if limits.reached() => return Ok(BestPlan::default()),
+        Err(errors) => return Err(errors),
+    };
+    let config = Config::default().with_limits(limits.clone());
+    let solution = optimize(&task, &config, &mut |_| {});
+    let proved = matches!(solution.status, Status::Optimal | Status::Unsolvable);
+    let steps = solution.plan.iter().flat_map(|plan| &plan.steps);
+    let steps = steps.map(|step| PlannedStep::new(mission, step)).collect();
+    Ok(BestPlan { cost: solution.plan.map(|plan| number::of_plan(&plan.cost)), proved, steps })
+}

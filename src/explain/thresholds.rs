@@ -1,0 +1,252 @@
+//! The smallest changes of measurements and of values of the problem that lead to another plan.
+
+use encodings::Limits;
+use num_bigint::BigInt;
+use num_rational::BigRational;
+
+use crate::explain::parts::{Alteration, BestPlan, Change, Target, little};
+use crate::explain::solve::best;
+use crate::knowledge::Knowledge;
+use crate::message::Errors;
+use crate::mission::Mission;
+use crate::number;
+
+/// How finely values are told apart, as a part of the value, before a number with fewer digits is tried.
+const FINENESS: i64 = 1000;
+
+/// The smallest changes that lead to another plan.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct SmallestChanges {
+    /// The best plan for the mission as it is.
+    pub best: BestPlan,
+    /// The changes.
+    pub changes: Vec<Change>,
+    /// Whether these are all: no limit was reached.
+    pub complete: bool,
+}
+
+/// For each measured attribute and each value of the problem the smallest changes, upwards and downwards, that lead to
+/// another plan; at a limit, those that are known by then. `hear` is told what is being tried.
+///
+/// # Errors
+/// The mission cannot be planned for.
+pub fn smallest_changes(
+    mission: &Mission,
+    limits: &Limits,
+    hear: &mut dyn FnMut(&str),
+) -> Result<SmallestChanges, Errors> {
+    hear("the best plan");
+    let base = best(mission, limits)?;
+    let mut found = SmallestChanges { best: base, changes: Vec::new(), complete: false };
+    if !found.best.proved {
+        return Ok(found);
+    }
+    let tried = Tried { mission, base: found.best.clone(), limits };
+    let attributes = mission.knowledge().map(measured).unwrap_or_default();
+    for (attribute, from) in attributes {
+        hear(&attribute);
+        for upwards in [false, true] {
+            match tried.first_threshold(&attribute, &from, upwards)? {
+                Outcome::Found(change) => found.changes.push(change),
+                Outcome::None => {}
+                Outcome::AtLimit => return Ok(found),
+            }
+        }
+    }
+    for (function, from) in mission.values() {
+        hear(&function);
+        for upwards in [false, true] {
+            match tried.bisected(&function, &from, upwards)? {
+                Outcome::Found(change) => found.changes.push(change),
+                Outcome::None => {}
+                Outcome::AtLimit => return Ok(found),
+            }
+        }
+    }
+    found.complete = true;
+    Ok(found)
+}
+
+/// The measured attributes with their values.
+pub(super) fn measured(knowledge: &Knowledge) -> Vec<(String, BigRational)> {
+    let measurements = knowledge.view().measurements().into_iter();
+    measurements.filter_map(|measurement| Some((measurement.attribute, measurement.value?))).collect()
+}
+
+/// What came of looking for a change in one direction.
+enum Outcome {
+    Found(Change),
+    None,
+    AtLimit,
+}
+
+/// What is tried, and compared with the best plan.
+struct Tried<'a> {
+    mission: &'a Mission,
+    base: BestPlan,
+    limits: &'a Limits,
+}
+
+impl Tried<'_> {
+    /// The best plan with another value; none at a limit.
+    fn with(&self, name: &str, value: &BigRational) -> Result<Option<BestPlan>, Errors> {
+        let mut other = self.mission.clone();
+        other.set(name, &number::decimal(value))?;
+        Ok(Some(best(&other, self.limits)?).filter(|plan| plan.proved))
+    }
+
+    /// Whether another plan is the answer.
+    fn is_other(&self, plan: &BestPlan) -> bool {
+        let steps = |plan: &BestPlan| -> Vec<_> {
+            plan.steps.iter().map(|step| (step.action.clone(), step.arguments.clone())).collect()
+        };
+        steps(plan) != steps(&self.base) || plan.cost.is_some() != self.base.cost.is_some()
+    }
+
+    /// The nearest value of an attribute at which a requirement begins or ceases to hold, and the plan is another one.
+    fn first_threshold(&self, attribute: &str, from: &BigRational, upwards: bool) -> Result<Outcome, Errors> {
+        for target in thresholds(self.mission, attribute, from, upwards) {
+            let Some(then) = self.with(attribute, &target.example())? else { return Ok(Outcome::AtLimit) };
+            if self.is_other(&then) {
+                return Ok(Outcome::Found(change(attribute, from, target, None, then)));
+            }
+        }
+        Ok(Outcome::None)
+    }
+
+    /// Looks for the nearest value of a function, on one side, with another plan.
+    fn bisected(&self, function: &str, from: &BigRational, upwards: bool) -> Result<Outcome, Errors> {
+        if *from <= BigRational::default() {
+            return Ok(Outcome::None);
+        }
+        let whole = |value: i64| BigRational::from_integer(value.into());
+        let (mut same, mut other) = (from.clone(), None);
+        for percent in [1, 2, 5, 10, 20, 50, 100] {
+            let part = from * whole(percent) / whole(100);
+            let value = if upwards { from + part } else { from - part };
+            let Some(then) = self.with(function, &value)? else { return Ok(Outcome::AtLimit) };
+            if self.is_other(&then) {
+                other = Some((value, then));
+                break;
+            }
+            same = value;
+        }
+        let Some((mut value, mut then)) = other else { return Ok(Outcome::None) };
+        let fine = from / whole(FINENESS);
+        loop {
+            let distance = if upwards { &value - &same } else { &same - &value };
+            if distance <= fine {
+                break;
+            }
+            let middle = number::rounded(&((&value + &same) / whole(2)));
+            let Some(between) = self.with(function, &middle)? else { return Ok(Outcome::AtLimit) };
+            if self.is_other(&between) {
+                (value, then) = (middle, between);
+            } else {
+                same = middle;
+            }
+        }
+        self.simplest(function, from, (same, value), then)
+    }
+
+    /// The bound between a value with the same plan and one with another: the number with the fewest digits, if the plan changes there.
+    fn simplest(
+        &self,
+        function: &str,
+        from: &BigRational,
+        (same, other): (BigRational, BigRational),
+        then: BestPlan,
+    ) -> Result<Outcome, Errors> {
+        let upwards = other > same;
+        let (low, high) = if upwards { (&same, &other) } else { (&other, &same) };
+        let bound = shortest_decimal(low, high);
+        let step = if upwards { little() } else { -little() };
+        let (before, beyond) = (&bound - &step, &bound + &step);
+        let Some(at) = self.with(function, &bound)? else { return Ok(Outcome::AtLimit) };
+        if self.is_other(&at) {
+            let Some(plan) = self.with(function, &before)? else { return Ok(Outcome::AtLimit) };
+            if !self.is_other(&plan) {
+                let to = if upwards { Target::AtLeast(bound) } else { Target::AtMost(bound) };
+                return Ok(Outcome::Found(change(function, from, to, Some(little()), at)));
+            }
+        } else {
+            let Some(plan) = self.with(function, &beyond)? else { return Ok(Outcome::AtLimit) };
+            if self.is_other(&plan) {
+                let to = if upwards { Target::Above(bound) } else { Target::Below(bound) };
+                return Ok(Outcome::Found(change(function, from, to, Some(little()), plan)));
+            }
+        }
+        let within = high - low;
+        let to = if upwards { Target::AtLeast(other) } else { Target::AtMost(other) };
+        Ok(Outcome::Found(change(function, from, to, Some(within), then)))
+    }
+}
+
+fn change(name: &str, from: &BigRational, to: Target, within: Option<BigRational>, then: BestPlan) -> Change {
+    let alteration = Alteration { name: name.to_owned(), from: Some(from.clone()), to };
+    Change { alteration, within, suffices: true, then }
+}
+
+/// A number with the fewest decimals that is at least `low` and at most `high`, which is above 0.
+fn shortest_decimal(low: &BigRational, high: &BigRational) -> BigRational {
+    let mut unit = BigInt::from(1);
+    loop {
+        let scale = BigRational::from_integer(unit.clone());
+        let rounded = (low * &scale).ceil() / scale;
+        if rounded <= *high {
+            return rounded;
+        }
+        unit *= 10;
+    }
+}
+
+/// The values of an attribute at which a requirement begins or ceases to hold, the nearest first.
+fn thresholds(mission: &Mission, attribute: &str, from: &BigRational, upwards: bool) -> Vec<Target> {
+    let designs =
+        mission.knowledge().map(|knowledge| knowledge.view().function_designs()).unwrap_or_default();
+    let requirements = designs.iter().flat_map(|design| &design.requirements);
+    let mut targets: Vec<Target> = Vec::new();
+    for requirement in requirements.filter(|requirement| requirement.attribute == attribute) {
+        if let Some(minimum) = &requirement.minimum {
+            match (upwards, from < minimum) {
+                (true, true) => targets.push(Target::AtLeast(minimum.clone())),
+                (false, false) => targets.push(Target::Below(minimum.clone())),
+                _ => {}
+            }
+        }
+        if let Some(maximum) = &requirement.maximum {
+            match (upwards, from > maximum) {
+                (false, true) => targets.push(Target::AtMost(maximum.clone())),
+                (true, false) => targets.push(Target::Above(maximum.clone())),
+                _ => {}
+            }
+        }
+    }
+    let distance = |target: &Target| {
+        let distance = target.example() - from;
+        if upwards { distance } else { -distance }
+    };
+    targets.sort_by_key(distance);
+    targets.dedup();
+    targets
+}
+
+#[cfg(test)]
+mod tests {
+    use num_rational::BigRational;
+
+    use super::shortest_decimal;
+
+    #[test]
+    fn the_shortest_decimal_of_an_interval() {
+        let number = |value: i64| BigRational::new(value.into(), 1_000_000.into());
+        let check =
+            |low, high, expected| assert_eq!(shortest_decimal(&number(low), &number(high)), number(expected));
+        check(7_910_157, 8_010_000, 8_000_000);
+        check(12_400_000, 12_412_000, 12_400_000);
+        check(12_410_001, 12_419_000, 12_411_000);
+        check(86_953_125, 87_000_000, 87_000_000);
+        check(0, 30, 0);
+    }
+}

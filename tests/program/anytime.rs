@@ -1,0 +1,138 @@
+//! Answers that come at a limit, and further plans: what is known by then, and nothing more.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use serde_json::{Value, json};
+
+use crate::common::{copy_folder, edit, metaplan, metaplan_in, root};
+use crate::probabilistic::shared;
+
+/// The hospital of a newcomer, with its larger problem if `large`; none where the reports of newcomers are not at hand.
+fn ward(large: bool) -> Option<tempfile::TempDir> {
+    let folder = shared("field3/newcomer3/ward")?;
+    let directory = tempfile::tempdir().expect("a directory");
+    copy_folder(&folder, directory.path());
+    if large {
+        edit(directory.path(), "mission.toml", "problem.pddl", "problem-large.pddl");
+    }
+    Some(directory)
+}
+
+/// Missions with several cheapest plans: directories, and their manifests.
+fn missions() -> Vec<(PathBuf, &'static str)> {
+    let ward = ward(false).map(|directory| (directory.keep(), "mission.toml"));
+    let own = ["missions/templates/warehouse/mission.toml", "missions/ugv.toml", "missions/uuv.toml"];
+    own.map(|mission| (root(), mission)).into_iter().chain(ward).collect()
+}
+
+fn plan(directory: &Path, arguments: &[&str]) -> Value {
+    let all = [&["plan"][..], arguments, &["--format", "json"]].concat();
+    metaplan_in(directory, &all, "").json()
+}
+
+/// Each further plan is valid, costs as much as the first one, and is another one; there are three, or it is proved that there are fewer.
+#[test]
+fn three_alternatives_come_soon() {
+    for (directory, mission) in missions() {
+        let answer = plan(&directory, &[mission, "--alternatives", "3", "--time-limit", "60"]);
+        let found = &answer["alternatives"];
+        let plans = found["plans"].as_array().unwrap_or_else(|| panic!("{mission}: {answer:#}"));
+        assert!(plans.len() == 3 || found["complete"] == true, "{mission}: {answer:#}");
+        assert!(!found["forced"].is_null(), "{mission}: {answer:#}");
+        let mut seen = vec![answer["steps"].clone()];
+        for steps in plans {
+            let file = tempfile::NamedTempFile::new().expect("a file");
+            let mut other = answer.clone();
+            other["steps"] = steps.clone();
+            std::fs::write(file.path(), other.to_string()).expect("a file");
+            let file = file.path().display().to_string();
+            let verdict =
+                metaplan_in(&directory, &["validate", mission, &file, "--format", "json"], "").json();
+            assert_eq!((&verdict["valid"], &verdict["metric"]), (&json!(true), &answer["cost"]), "{mission}");
+            assert!(!seen.contains(steps), "{mission}: a plan is listed twice");
+            seen.push(steps.clone());
+        }
+    }
+}
+
+/// The sequential plan with gaps is a plan whose actions could overlap: none that is found may cost more.
+#[test]
+fn overlapping_plans_cost_no_more_than_the_sequential_one() {
+    for (directory, mission) in missions() {
+        let file = tempfile::NamedTempFile::new().expect("a file");
+        let sequential = metaplan_in(&directory, &["plan", mission, "--plan-format", "plansys2"], "");
+        std::fs::write(file.path(), sequential.stdout).expect("a file");
+        let file = file.path().display().to_string();
+        let validate = ["validate", mission, &file, "--concurrent", "--format", "json"];
+        let verdict = metaplan_in(&directory, &validate, "").json();
+        let Some(bound) = verdict["metric"].as_f64().filter(|_| verdict["valid"] == true) else { continue };
+        let answer = plan(&directory, &[mission, "--concurrent", "--time-limit", "10"]);
+        let cost = answer["cost"].as_f64().unwrap_or_else(|| panic!("{mission}: {answer:#}"));
+        assert!(cost <= bound + 1e-9, "{mission}: {cost} > {bound}");
+    }
+}
+
+#[test]
+fn explanations_say_why_before_they_plan() {
+    let Some(directory) = ward(true) else { return };
+    let query = ["explain", "mission.toml", "fd_uv", "--fail", "c_uv_lamp", "--time-limit", "2"];
+    let outcome = metaplan_in(directory.path(), &query, "");
+    assert_eq!(outcome.status, 1, "{outcome:#?}");
+    let why = "fd_uv (f_disinfect) is not available\n";
+    assert!(outcome.stdout.starts_with(why), "{outcome:#?}");
+    assert!(outcome.stdout.contains("it is available again if\n    c_uv_lamp works again: "), "{outcome:#?}");
+    assert!(outcome.stdout.contains("limit was reached"), "{outcome:#?}");
+    let answer = metaplan_in(directory.path(), &[&query[..], &["--format", "json"]].concat(), "").json();
+    assert_eq!((&answer["complete"], &answer["available"]), (&json!(false), &json!(false)), "{answer:#}");
+}
+
+#[cfg(unix)]
+#[test]
+fn explanations_end_with_what_they_have_on_a_signal() {
+    let Some(directory) = ward(true) else { return };
+    let mut child = Command::new(env!("CARGO_BIN_EXE_metaplan"))
+        .args(["explain", "mission.toml", "fd_uv", "--fail", "c_uv_lamp"])
+        .current_dir(directory.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program starts");
+    std::thread::sleep(Duration::from_secs(3));
+    Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill");
+    let status = child.wait().expect("it ends");
+    let mut text = String::new();
+    std::io::Read::read_to_string(&mut child.stdout.take().expect("a pipe"), &mut text).expect("text");
+    assert_eq!(status.code(), Some(1), "{text}");
+    assert!(text.starts_with("fd_uv (f_disinfect) is not available\n"), "{text}");
+    assert!(text.contains("limit was reached"), "{text}");
+}
+
+/// A front that was cut short has the points that were found, and says that there may be others.
+#[test]
+fn a_front_at_a_limit_has_the_points_that_were_found() {
+    let Some(directory) = ward(true) else { return };
+    let front = ["mission.toml", "--pareto", "(total-time),(waited)", "--time-limit", "2"];
+    let answer = plan(directory.path(), &front);
+    assert!(answer["status"] != "optimal" && answer["points"].is_array(), "{answer:#}");
+}
+
+/// Commands that have nothing to show before their end say so when time is up.
+#[test]
+fn every_command_that_may_take_long_has_a_time_limit() {
+    let ugv = "ontology/kb/ugv.ttl";
+    let commands: [&[&str]; 6] = [
+        &["reason", ugv],
+        &["lint", "missions/ugv.toml"],
+        &["convert", ugv, "--to", "turtle"],
+        &["export", "missions/ugv.toml", "--to", "pddl"],
+        &["validate", "missions/ugv.toml", "missions/ugv.toml"],
+        &["explain", "missions/ugv.toml"],
+    ];
+    for command in commands {
+        let outcome = metaplan(&[command, &["--time-limit", "0"]].concat());
+        assert_eq!(outcome.status, 12, "{command:?}: {outcome:#?}");
+        assert!(outcome.stderr.contains("M130") && outcome.stdout.is_empty(), "{command:?}: {outcome:#?}");
+    }
+}
