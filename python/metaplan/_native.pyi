@@ -1,4 +1,4 @@
-"""The native part; `metaplan` makes objects of what it answers."""
+"""The native module: answers as JSON text, from which `metaplan` makes objects."""
 
 from collections.abc import Callable
 
@@ -6,6 +6,7 @@ __version__: str
 
 class Planned:
     json: str
+    exact: str
     text: str | None
     verdict: str
     warnings: str
@@ -26,6 +27,7 @@ class Mission:
         names: list[tuple[str, str]],
     ) -> Mission: ...
     def copy(self) -> Mission: ...
+    def digest(self) -> str: ...
     @property
     def name(self) -> str: ...
     @property
