@@ -95,6 +95,9 @@ _REASONS = {
 }
 """Reasons why some features are not supported; the names of the others say enough."""
 
+_UNDECLARED = ("DURATION_INEQUALITIES", "FLUENTS_IN_DURATIONS")
+"""Features that are not declared and nevertheless planned for with ``skip_checks``: with a metric, planning may not end by itself."""
+
 _UNTIMED = ("TRAJECTORY_CONSTRAINTS", "STATE_INVARIANTS")
 """Features that are supported in problems without time."""
 
@@ -121,13 +124,17 @@ def _refusals(kind: ProblemKind, supported: ProblemKind) -> list[str]:
 
 
 class _Converter(ConverterToPDDLString):
-    """Writes fractions without a finite decimal as quotients; that of unified-planning rounds them to ten digits."""
+    """Writes all rational and truth values; that of unified-planning rounds fractions to ten digits, and refuses truth values."""
 
     def convert_fraction(self, frac: Fraction) -> str:
         """PDDL of a rational number."""
         if frac.denominator == 1:
             return str(frac.numerator)
         return f"(/ {frac.numerator} {frac.denominator})"
+
+    def walk_bool_constant(self, expression: FNode, args: list[str]) -> str:
+        """PDDL of a truth value: an empty conjunction or disjunction."""
+        return "(and)" if expression.is_true() else "(or)"
 
 
 def _exact(method: Any) -> FunctionType:
@@ -318,8 +325,11 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
 
     def _answer(self, problem: Any, timeout: float | None, output_stream: IO[str] | None) -> PlanGenerationResult:
         began = time.monotonic()
-        if refusals := _refusals(problem.kind, self.supported_kind()):
-            # Also with `skip_checks`: the PDDL of such a problem is another problem.
+        supported = self.supported_kind()
+        if self.skip_checks:
+            supported = supported.union(_kind({"time": _UNDECLARED[:1], "expression_duration": _UNDECLARED[1:]}))
+        if refusals := _refusals(problem.kind, supported):
+            # Other features not even with `skip_checks`: the PDDL of such a problem is another problem.
             return self._none(PlanGenerationResultStatus.UNSUPPORTED_PROBLEM, f"not supported: {'; '.join(refusals)}")
         options = dict(self._options)
         try:
