@@ -1,12 +1,14 @@
-"""Answers as objects; each keeps the JSON that it was made of."""
+"""Answers as objects; each keeps the JSON document that it was read from."""
 
 from __future__ import annotations
 
 import html
 import json
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from decimal import Decimal
-from typing import TYPE_CHECKING, Any
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, cast
 
 from metaplan._errors import Message, messages_of
 
@@ -15,22 +17,25 @@ if TYPE_CHECKING:
 
     from metaplan._native import Planned
 
-Number = int | Decimal
-"""Exact: a fraction that is not a decimal is the nearest one."""
+Number = int | Decimal | Fraction
+"""An exact number: ``int`` or ``Decimal``; in a plan with a value that has no finite decimal, such as 1/3, ``int`` or ``Fraction``.
+
+So the numbers of one plan can be added and compared with each other.
+"""
 
 
 def exact(value: Any) -> Number | None:
-    """A number of JSON that was read without loss."""
+    """A number of a JSON document that was read without loss."""
     return value if value is None or isinstance(value, int) else Decimal(value)
 
 
-def load(text: str) -> dict[str, Any]:
-    """JSON with exact numbers."""
-    return json.loads(text, parse_float=Decimal)
+def _load(text: str) -> dict[str, Any]:
+    """A JSON object with exact numbers."""
+    return cast("dict[str, Any]", json.loads(text, parse_float=Decimal))
 
 
-def frame(rows: list[dict[str, Any]]) -> pandas.DataFrame:
-    """A table, if pandas is there."""
+def _frame(rows: list[dict[str, Any]]) -> pandas.DataFrame:
+    """A table, if pandas is installed."""
     try:
         import pandas
     except ImportError as error:
@@ -39,18 +44,18 @@ def frame(rows: list[dict[str, Any]]) -> pandas.DataFrame:
 
 
 class Answer:
-    """What the program answers, with the fields of its JSON format."""
+    """An answer in one of the program's JSON formats."""
 
     def __init__(self, text: str) -> None:
         self._text = text
-        self._fields = load(text)
+        self._fields = _load(text)
 
     def to_dict(self) -> dict[str, Any]:
-        """The answer in its JSON format; ``format`` names that and its version."""
-        return json.loads(self._text)
+        """Returns the JSON document; its ``format`` names the format and its version."""
+        return cast("dict[str, Any]", json.loads(self._text))
 
     def to_json(self) -> str:
-        """The answer as text in its JSON format."""
+        """Returns the JSON document as text."""
         return self._text
 
     def __repr__(self) -> str:
@@ -59,78 +64,124 @@ class Answer:
 
 @dataclass(frozen=True)
 class Step:
-    """An action of a plan, with its configuration."""
+    """An action of a plan with its configuration."""
 
     action: str
+    """Name of the action."""
     arguments: tuple[str, ...]
+    """Arguments in the order of the action's parameters."""
     configuration: dict[str, str]
-    """The design of each function."""
+    """Design of each function."""
     start: Number
-    """In the domain's time unit."""
+    """Start time in the domain's time unit."""
     duration: Number
-    """In the domain's time unit."""
+    """Duration in the domain's time unit; 0 for actions without duration."""
     cost: Number
-    """What the step adds to the metric."""
+    """Contribution of the step to the metric."""
     reconfigured: tuple[str, ...] = ()
-    """Functions that change their design."""
+    """Functions whose design changes."""
 
     def __str__(self) -> str:
         return f"({' '.join((self.action, *self.arguments))})"
 
-    @classmethod
-    def _of(cls, own: dict[str, Any]) -> Step:
-        return cls(
-            action=own["action"],
-            arguments=tuple(own["arguments"]),
-            configuration=dict(own["configuration"]),
-            start=exact(own["start"]),
-            duration=exact(own["duration"]),
-            cost=exact(own["cost"]),
-            reconfigured=tuple(own["reconfigured"]),
-        )
+
+class _Numbers:
+    """Reads the exact numbers of a plan, all as ``Fraction`` if one of them has no finite decimal."""
+
+    def __init__(self, texts: Iterable[str | None]) -> None:
+        self._fractions = any(text is not None and "/" in text for text in texts)
+
+    def read(self, text: str) -> Number:
+        """A number from ``3``, ``3.5`` or ``1/3``."""
+        if self._fractions:
+            value = Fraction(text)
+            return value.numerator if value.denominator == 1 else value
+        return Decimal(text) if "." in text else int(text)
+
+    def maybe(self, text: str | None) -> Number | None:
+        """A number, or ``None`` for ``None``."""
+        return None if text is None else self.read(text)
+
+    def steps(self, steps: list[dict[str, Any]], numbers: list[list[str]]) -> list[Step]:
+        """The steps of a plan from their JSON objects and their exact start, duration and cost."""
+        return [
+            Step(
+                action=step["action"],
+                arguments=tuple(step["arguments"]),
+                configuration=dict(step["configuration"]),
+                start=self.read(start),
+                duration=self.read(duration),
+                cost=self.read(cost),
+                reconfigured=tuple(step["reconfigured"]),
+            )
+            for step, (start, duration, cost) in zip(steps, numbers, strict=True)
+        ]
+
+
+def _texts(value: Any) -> Iterator[str]:
+    """All strings in lists and dictionaries."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, (dict, list)):
+        for own in value.values() if isinstance(value, dict) else value:
+            yield from _texts(own)
 
 
 class Plan(Answer):
-    """A plan, and what is proved of it; ``steps`` is empty where there is none."""
+    """A plan with its proof; ``steps`` is empty if there is no plan."""
 
-    def __init__(self, text: str, planned: Planned | None = None) -> None:
+    def __init__(self, text: str, exact_numbers: dict[str, Any], planned: Planned | None = None) -> None:
         super().__init__(text)
-        own = self._fields
-        self.mission: str = own["mission"]
-        self.status: str = own["status"]
+        answer, numbers = self._fields, _Numbers(_texts(exact_numbers))
+        self.mission: str = answer["mission"]
+        """Name of the mission."""
+        self.status: str = answer["status"]
         """``optimal``, ``feasible``, ``unsolvable``, ``unsolvable_within_horizon`` or ``unknown``."""
-        self.cost: Number | None = exact(own["cost"])
-        """By the metric, or by the first objective."""
-        self.lower_bound: Number | None = exact(own["lower_bound"])
-        """No plan costs less."""
-        self.steps: list[Step] = [Step._of(step) for step in own["steps"]]
-        self.proof: dict[str, Any] | None = own["proof"]
-        self.horizon: int = own["horizon"]
-        self.makespan: Number | None = exact(own.get("makespan"))
-        """Where actions overlap, in the domain's time unit."""
+        self.cost: Number | None = numbers.maybe(exact_numbers["cost"])
+        """Value of the metric, or of the first objective; ``None`` without a plan."""
+        self.lower_bound: Number | None = numbers.maybe(exact_numbers["lower_bound"])
+        """Lower bound on the cost of every plan; ``None`` if nothing is proved."""
+        self.steps: list[Step] = numbers.steps(answer["steps"], exact_numbers["steps"])
+        """Actions in order of execution."""
+        self.proof: dict[str, Any] | None = answer["proof"]
+        """Proof of the status; ``None`` if there is none."""
+        self.horizon: int = answer["horizon"]
+        """Number of steps up to which all plans were considered."""
+        self.makespan: Number | None = numbers.maybe(exact_numbers["makespan"])
+        """End of the last action if actions may overlap, in the domain's time unit; otherwise ``None``."""
+        names = [objective["minimize"] for objective in answer.get("objectives") or []]
         self.objectives: dict[str, Number] = {
-            objective["minimize"]: exact(objective["value"]) for objective in own.get("objectives") or []
+            name: numbers.read(value) for name, value in zip(names, exact_numbers["objectives"], strict=True)
         }
-        self.blocking: list[str] = own.get("blocking") or []
-        """Where there is no plan: designs without which there is none."""
-        self.statistics: dict[str, Any] = own["statistics"]
+        """Value of each objective of ``minimize`` or ``pareto``."""
+        self.blocking: list[str] = answer.get("blocking") or []
+        """Without a plan: a minimal list of designs of which one has to become available."""
+        self.statistics: dict[str, Any] = answer["statistics"]
+        """Counters and times of the search."""
         self.verdict: str = planned.verdict if planned else self.status
-        """What is claimed, and what proves it."""
+        """The claim and its proof in a sentence."""
         self.text: str | None = planned.text if planned else None
-        """The plan with a step on each line, as validators read it."""
+        """The plan with one step on each line, as validators read it; ``None`` without a plan."""
         self.warnings: list[Message] = messages_of(planned.warnings) if planned else []
+        """Warnings about the mission's files."""
+        self._alternatives = [
+            numbers.steps(plan, own)
+            for plan, own in zip(
+                (answer.get("alternatives") or {"plans": []})["plans"], exact_numbers["alternatives"], strict=True
+            )
+        ]
         self._planned = planned
+        self._svg: str | None = None
 
     @property
     def optimal(self) -> bool:
-        """Whether it is proved that no plan is better."""
+        """``True`` if it is proved that no plan has a lower cost."""
         return self.status == "optimal"
 
     @property
     def alternatives(self) -> list[list[Step]]:
-        """Further plans that are as good."""
-        found = self._fields.get("alternatives") or {"plans": []}
-        return [[Step._of(step) for step in plan] for plan in found["plans"]]
+        """Further plans with the same cost, for ``plan(alternatives=N)``."""
+        return self._alternatives
 
     def __bool__(self) -> bool:
         return self.cost is not None
@@ -138,7 +189,7 @@ class Plan(Answer):
     def __len__(self) -> int:
         return len(self.steps)
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[Step]:
         return iter(self.steps)
 
     def __repr__(self) -> str:
@@ -148,8 +199,8 @@ class Plan(Answer):
         return self.text or self.verdict
 
     def to_df(self) -> pandas.DataFrame:
-        """A row for each step: start, duration and cost as floats, a column for each function's design."""
-        return frame(
+        """Returns a row for each step: start, duration and cost as floats, and a column for each function's design."""
+        return _frame(
             [
                 {
                     "start": float(step.start),
@@ -164,37 +215,51 @@ class Plan(Answer):
         )
 
     def svg(self) -> str | None:
-        """The plan as a timeline; ``None`` if there is none."""
-        return self._planned.svg() if self._planned else None
+        """Returns the plan as a timeline in SVG; ``None`` without a plan."""
+        if self._svg is None and self._planned:
+            self._svg = self._planned.svg()
+        return self._svg
 
     def _repr_html_(self) -> str:
         head = f"<p><b>{html.escape(self.mission)}</b>: {html.escape(self.verdict)}</p>"
-        # A page has no place for the declaration of a file.
+        # HTML does not allow an XML declaration.
         return head + (self.svg() or "").partition("?>\n")[2]
+
+    def __getstate__(self) -> dict[str, Any]:
+        # The native object cannot be pickled, and it is needed for the picture only.
+        return {**self.__dict__, "_svg": self.svg(), "_planned": None}
 
 
 class Front(Answer):
-    """The plans of which no other one is better by one of two objectives and not worse by the other."""
+    """The Pareto front of two objectives: plans that no other plan dominates."""
 
-    def __init__(self, text: str, planned: Planned | None = None) -> None:
+    def __init__(self, text: str, exact_numbers: dict[str, Any], planned: Planned) -> None:
         super().__init__(text)
         self.mission: str = self._fields["mission"]
+        """Name of the mission."""
         self.status: str = self._fields["status"]
-        """``optimal`` if it is proved that there are no others."""
+        """``optimal`` if it is proved that the front is complete; otherwise as :attr:`Plan.status`."""
         self.objectives: list[str] = self._fields["objectives"]
-        plain = json.loads(text)["points"]
-        self.points: list[Plan] = [Plan(json.dumps(point)) for point in plain]
-        self.warnings: list[Message] = messages_of(planned.warnings) if planned else []
+        """The two objectives."""
+        points = json.loads(text)["points"]
+        self.points: list[Plan] = [
+            Plan(json.dumps(point), own) for point, own in zip(points, exact_numbers["points"], strict=True)
+        ]
+        """A plan for each point, from the best one by the first objective on."""
+        self.verdict: str = planned.verdict
+        """The status as the program prints it."""
+        self.warnings: list[Message] = messages_of(planned.warnings)
+        """Warnings about the mission's files."""
 
     def __len__(self) -> int:
         return len(self.points)
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[Plan]:
         return iter(self.points)
 
     def to_df(self) -> pandas.DataFrame:
-        """A row for each plan: the value of each objective, and the number of steps."""
-        return frame(
+        """Returns a row for each plan: the value of each objective as a float, and the number of steps."""
+        return _frame(
             [
                 {**{name: float(value) for name, value in point.objectives.items()}, "steps": len(point)}
                 for point in self.points
@@ -211,21 +276,21 @@ class Front(Answer):
 
 
 class Comparison(Answer):
-    """The plan beside the policies of probabilistic model checking, all evaluated in one process."""
+    """The plan beside the policies of probabilistic model checking, all evaluated in the same Markov decision process."""
 
     @property
     def candidates(self) -> list[dict[str, Any]]:
-        """Ways to decide, ``kind`` `a` to `f` and ``name``, with the measures of each; ``None`` where one has no value."""
-        return self.to_dict()["comparisons"][0]["candidates"]
+        """Plans and policies: ``kind`` (`a` to `f`), ``name``, and each measure; ``None`` for a measure without a value."""
+        return cast("list[dict[str, Any]]", self.to_dict()["comparisons"][0]["candidates"])
 
     @property
     def front(self) -> list[tuple[float, float]]:
-        """The front of the process's policies: probability of the goal, and time."""
+        """Pareto front of the policies: probability of reaching the goal, and expected time."""
         return [(first, second) for first, second in self.to_dict()["comparisons"][0]["front"]]
 
     def to_df(self) -> pandas.DataFrame:
-        """A row for each candidate, a column for each measure."""
-        return frame(self.candidates)
+        """Returns a row for each candidate and a column for each measure."""
+        return _frame(self.candidates)
 
     def _repr_html_(self) -> str:
         measures = [name for name in self.candidates[0] if name not in ("kind", "name")]
@@ -238,21 +303,21 @@ class Comparison(Answer):
 
 
 class Verdict(Answer):
-    """What the validator says of a plan."""
+    """The validator's verdict on a plan."""
 
     @property
     def valid(self) -> bool:
-        """Whether the plan can be executed and reaches the goal."""
-        return self._fields["valid"]
+        """``True`` if the plan can be executed and reaches the goal."""
+        return bool(self._fields["valid"])
 
     @property
     def metric(self) -> Number | None:
-        """What it comes to by the problem's metric."""
+        """Value of the problem's metric; ``None`` for a plan that is not valid."""
         return exact(self._fields.get("metric"))
 
     @property
     def violation(self) -> dict[str, Any] | None:
-        """Why it is not valid: step, action and message."""
+        """Cause for which the plan is not valid: ``step``, ``action`` and ``message``."""
         return self._fields.get("violation")
 
     def __bool__(self) -> bool:
@@ -260,7 +325,7 @@ class Verdict(Answer):
 
 
 class Verification(Answer):
-    """What came of checking a certificate."""
+    """The result of checking a certificate."""
 
     def __init__(self, text: str, shown: str) -> None:
         super().__init__(text)
@@ -268,18 +333,18 @@ class Verification(Answer):
 
     @property
     def verified(self) -> bool:
-        """Whether the claim is proved."""
-        return self._fields["verified"]
+        """``True`` if the claim is proved."""
+        return bool(self._fields["verified"])
 
     @property
     def claim(self) -> Any:
-        """What the certificate claims."""
+        """The claim of the certificate."""
         return self._fields["claim"]
 
     @property
     def parts(self) -> list[dict[str, Any]]:
-        """Part by part: ``part``, ``verified`` and ``message``."""
-        return self._fields["parts"]
+        """The result for each part: ``part``, ``verified`` and ``message``."""
+        return cast("list[dict[str, Any]]", self._fields["parts"])
 
     def __bool__(self) -> bool:
         return self.verified
@@ -288,19 +353,26 @@ class Verification(Answer):
         return self._shown
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class LoopAnswer:
-    """What the loop answers to an event; ``kind`` is its ``answer``."""
+    """An answer of the adaptation loop; the fields of its JSON object are attributes."""
 
     kind: str
-    fields: dict[str, Any] = field(repr=False)
+    """Type of the answer, the field ``answer`` of its JSON object."""
+    fields: dict[str, Any] = field(hash=False)
+    """All fields of the JSON object."""
 
     def to_dict(self) -> dict[str, Any]:
-        """The line in its JSON format."""
+        """Returns the JSON object."""
         return dict(self.fields)
 
     def __getattr__(self, name: str) -> Any:
-        try:
-            return self.fields[name]
-        except KeyError:
-            raise AttributeError(f"an answer {self.kind!r} has no {name!r}") from None
+        # Copies are made without `__init__`, and ask for special methods before they have fields.
+        fields = self.__dict__.get("fields", {})
+        if name not in fields:
+            raise AttributeError(f"an answer {self.__dict__.get('kind')!r} has no {name!r}")
+        return fields[name]
+
+    def __repr__(self) -> str:
+        content = {name: value for name, value in self.fields.items() if name != "answer"}
+        return f"LoopAnswer({', '.join([repr(self.kind), *(f'{name}={value!r}' for name, value in content.items())])})"

@@ -1,4 +1,4 @@
-"""Errors with all that is wrong, each with its place."""
+"""Errors with all problems of an input, each with its place."""
 
 from __future__ import annotations
 
@@ -8,19 +8,20 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Message:
-    """One thing that is wrong, or may be other than meant."""
+    """A problem of an input: an error or a warning."""
 
     code: str
-    """The stable code of the cause; :func:`metaplan.explain_code` says what it means."""
+    """Stable code of the cause; :func:`metaplan.explain_code` explains it."""
     severity: str
     """``error`` or ``warning``."""
     message: str
-    """What is wrong, and what would be right."""
+    """The problem and its remedy."""
     file: str | None = None
+    """File of the problem, if it has one."""
     line: int | None = None
-    """From 1."""
+    """Line, from 1."""
     column: int | None = None
-    """From 1, in characters."""
+    """Column, from 1, in characters."""
 
     def __str__(self) -> str:
         place = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
@@ -37,10 +38,13 @@ def messages_of(text: str) -> list[Message]:
 
 
 class Error(Exception):
-    """Why there is no answer: everything that is wrong with the input.
+    """All problems of an input for which there is no answer.
 
     ``code``, ``file``, ``line`` and ``column`` are those of the first message.
     """
+
+    messages: list[Message]
+    """All messages, in the order of the input."""
 
     def __init__(self, messages: list[Message]) -> None:
         super().__init__("\n".join(map(str, messages)))
@@ -52,22 +56,22 @@ class Error(Exception):
 
     @property
     def code(self) -> str:
-        """The code of the first message."""
+        """Code of the first message."""
         return self.messages[0].code
 
     @property
     def file(self) -> str | None:
-        """The file of the first message."""
+        """File of the first message."""
         return self.messages[0].file
 
     @property
     def line(self) -> int | None:
-        """The line of the first message, from 1."""
+        """Line of the first message, from 1."""
         return self.messages[0].line
 
     @property
     def column(self) -> int | None:
-        """The column of the first message, from 1, in characters."""
+        """Column of the first message, from 1, in characters."""
         return self.messages[0].column
 
     def __reduce__(self) -> tuple[type[Error], tuple[list[Message]]]:

@@ -5,18 +5,39 @@ from __future__ import annotations
 import asyncio
 import json
 import os
+import pickle
+import threading
 import time
 from collections.abc import AsyncIterable, AsyncIterator, Callable, Iterable, Iterator, Mapping
 from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, cast, overload
 
 from metaplan import _native
-from metaplan._answers import Answer, Comparison, Front, LoopAnswer, Plan, Verdict, Verification, exact
+from metaplan._answers import Answer, Comparison, Front, LoopAnswer, Plan, Verdict, Verification
 from metaplan._errors import Message, messages_of
 
+if TYPE_CHECKING:
+    # Of Python 3.11.
+    from typing_extensions import Unpack
+
 File = str | os.PathLike[str]
-"""A path; a string that begins with ``(`` is PDDL itself."""
+"""A path, or for domains, problems and plans PDDL itself: a string that begins with ``(`` or ``;``."""
+
+
+class PlanOptions(TypedDict, total=False):
+    """Keywords of :meth:`Mission.plan` but ``pareto``, ``certificate`` and ``on_improvement``."""
+
+    minimize: str | Iterable[str]
+    alternatives: int | None
+    concurrent: bool | float | str | Decimal | Fraction
+    horizon: int | None
+    engine: Literal["auto", "sat", "search"] | None
+    strategy: str | None
+    confirm: bool
+    time_limit: float | None
+    memory_limit: int | None
 
 
 def _file(name: str, value: File) -> tuple[str, str | None]:
@@ -34,6 +55,16 @@ def _value(value: Any) -> str:
     return str(value)
 
 
+def _absolute(path: File) -> str:
+    return os.path.abspath(os.fspath(path))
+
+
+def _document(path: File) -> str:
+    """A name of shipped rules as it is, and a path as an absolute one."""
+    name = os.fspath(path)
+    return name if name in ("coadaptation", "tomasys") else _absolute(name)
+
+
 def _toml(value: Any) -> str:
     """A value of a manifest."""
     if isinstance(value, Mapping):
@@ -48,25 +79,48 @@ def _toml(value: Any) -> str:
 class Mission:
     """A mission in its present situation.
 
-    Changes (:meth:`fail`, :meth:`set`, :meth:`scenario`) count for all that is asked from then on; :meth:`copy` keeps a situation.
-    Threads may plan for one mission at the same time.
+    :meth:`fail`, :meth:`set` and :meth:`scenario` change the situation; :meth:`copy` returns a mission that later changes do not affect.
+    Threads may plan for one mission at the same time. A mission can be pickled: the copy reads the same files again, and
+    :class:`pickle.UnpicklingError` is raised if they have changed.
     """
 
-    def __init__(self, native: _native.Mission) -> None:
+    def __init__(self, native: _native.Mission, source: _Source, changes: Iterable[tuple[str, ...]] = ()) -> None:
         self._native = native
+        # How to make the mission again: native objects cannot be pickled.
+        self._source = source
+        self._changes = list(changes)
+        self._lock = threading.Lock()
+
+    @classmethod
+    def _of(cls, source: _Source) -> Mission:
+        maker, arguments = source
+        return cls(getattr(_native.Mission, maker)(*arguments), source)
+
+    def _change(self, *change: str) -> Mission:
+        method, *arguments = change
+        with self._lock:
+            getattr(self._native, method)(*arguments)
+            self._changes.append(change)
+        return self
+
+    def __reduce__(self) -> tuple[Callable[..., Mission], tuple[Any, ...]]:
+        with self._lock:
+            maker, arguments = self._source
+            return _restored, (type(self), _portable(maker, arguments), tuple(self._changes), self._native.digest())
 
     @classmethod
     def load(cls, manifest: File | Mapping[str, Any], directory: File = ".") -> Mission:
-        """From a manifest: a path, its text, or a mapping with its sections, whose paths are relative to ``directory``.
+        """Reads a manifest: a path, its text, or a mapping with its sections.
 
-        Raises :class:`metaplan.Error` with all that is wrong with the manifest and the files that it names.
+        Paths in a text or mapping are relative to ``directory``, and in a file to the file's directory.
+
+        :raises metaplan.Error: with all problems of the manifest and of the files that it names
         """
         if isinstance(manifest, Mapping):
-            text = "".join(f"{key} = {_toml(value)}\n" for key, value in manifest.items())
-            return cls(_native.Mission.parse("manifest", text, os.fspath(directory)))
+            manifest = "".join(f"{key} = {_toml(value)}\n" for key, value in manifest.items()) + "\n"
         if isinstance(manifest, str) and "\n" in manifest:
-            return cls(_native.Mission.parse("manifest", manifest, os.fspath(directory)))
-        return cls(_native.Mission.load(os.fspath(manifest)))
+            return cls._of(("parse", ("manifest", manifest, os.fspath(directory))))
+        return cls._of(("load", (os.fspath(manifest),)))
 
     @classmethod
     def from_files(
@@ -80,71 +134,90 @@ class Mission:
         names: Mapping[str, str] | None = None,
         name: str = "",
     ) -> Mission:
-        """From a PDDL domain and problem, each a path or PDDL itself, and perhaps knowledge bases (OWL).
+        """Joins a PDDL domain and problem, each a path or PDDL itself, with knowledge bases (OWL), if there are any.
 
-        ``rules`` are files of rules, ``coadaptation`` (unless any are given) or ``tomasys``; ``names`` says what individuals are called in the problem.
+        :param rules: files of rules, ``coadaptation`` (the default) or ``tomasys``
+        :param bindings: the manifest's section ``[bindings]``
+        :param names: object of the problem for each individual of the knowledge bases that has another name
+        :param name: name of the mission
+        :raises metaplan.Error: with all problems of the files
         """
-        return cls(
-            _native.Mission.join(
-                name,
-                (_file("domain", domain), _file("problem", problem)),
-                [os.fspath(path) for path in knowledge],
-                [os.fspath(rule) for rule in rules],
-                dict(bindings or {}),
-                list((names or {}).items()),
-            )
-        )
+        files = (_file("domain", domain), _file("problem", problem))
+        documents = [os.fspath(path) for path in knowledge]
+        own_rules = [os.fspath(rule) for rule in rules]
+        return cls._of(("join", (name, files, documents, own_rules, dict(bindings or {}), list((names or {}).items()))))
 
     def copy(self) -> Mission:
-        """Another mission in the same situation."""
-        return Mission(self._native.copy())
+        """Returns another mission in the same situation."""
+        with self._lock:
+            return Mission(self._native.copy(), self._source, self._changes)
 
     __copy__ = copy
 
     @property
     def name(self) -> str:
-        """The mission's name."""
+        """Name of the mission."""
         return self._native.name
 
     @property
     def description(self) -> str:
-        """What the mission is about."""
+        """Description of the mission, from its manifest."""
         return self._native.description
 
     @property
     def scenarios(self) -> list[str]:
-        """The names of the manifest's scenarios."""
+        """Names of the manifest's scenarios."""
         return self._native.scenarios
 
     @property
     def warnings(self) -> list[Message]:
-        """What may be other than meant in its files."""
+        """Warnings about the mission's files."""
         return messages_of(self._native.warnings)
 
     def pddl(self) -> tuple[str, str]:
-        """Domain and problem as they are planned with: with what the knowledge base contributes."""
+        """Returns domain and problem as PDDL, with the objects and facts that the knowledge base contributes."""
         return self._native.pddl()
 
     def scenario(self, name: str) -> Mission:
-        """Brings the mission into a scenario of its manifest; returns itself."""
-        self._native.scenario(name)
-        return self
+        """Applies a scenario of the manifest; returns the mission itself."""
+        return self._change("scenario", name)
 
     def fail(self, *components: str) -> Mission:
-        """Components have failed; returns the mission itself."""
+        """Marks components as failed; returns the mission itself."""
         for component in components:
-            self._native.fail(component)
+            self._change("fail", component)
         return self
 
     def set(self, *args: Any, **values: Any) -> Mission:
-        """``set("ambient_light", 0.9)`` or ``set(battery=30, robot_at="wp2")``: measured attributes, numeric fluents and facts have
-        values; returns the mission itself. ``True`` and ``False`` are those of attributes."""
+        """Sets measured attributes, numeric fluents and facts; returns the mission itself.
+
+        Write ``set("ambient_light", 0.9)`` or ``set(battery=30, robot_at="wp2")``.
+        """
         if args:
             name, value = args
             values = {name: value, **values}
         for name, value in values.items():
-            self._native.set(name, _value(value))
+            self._change("set", name, _value(value))
         return self
+
+    @overload
+    def plan(
+        self,
+        *,
+        pareto: None = None,
+        certificate: File | None = None,
+        on_improvement: Callable[[Decimal, Decimal, float, int], bool | None] | None = None,
+        **options: Unpack[PlanOptions],
+    ) -> Plan: ...
+
+    @overload
+    def plan(
+        self,
+        *,
+        pareto: tuple[str, str],
+        on_improvement: Callable[[Decimal, Decimal, float, int], bool | None] | None = None,
+        **options: Unpack[PlanOptions],
+    ) -> Front: ...
 
     def plan(
         self,
@@ -152,9 +225,9 @@ class Mission:
         minimize: str | Iterable[str] = (),
         pareto: tuple[str, str] | None = None,
         alternatives: int | None = None,
-        concurrent: bool | float | str | Decimal = False,
+        concurrent: bool | float | str | Decimal | Fraction = False,
         horizon: int | None = None,
-        engine: str | None = None,
+        engine: Literal["auto", "sat", "search"] | None = None,
         strategy: str | None = None,
         confirm: bool = False,
         time_limit: float | None = None,
@@ -162,28 +235,34 @@ class Mission:
         certificate: File | None = None,
         on_improvement: Callable[[Decimal, Decimal, float, int], bool | None] | None = None,
     ) -> Plan | Front:
-        """The best plan with its configuration, and what is proved of it.
+        """Returns a plan of least cost with its configuration and proof; with ``pareto`` the :class:`Front` of two objectives.
 
-        :param minimize: what counts in place of the problem's metric, the most important first
-        :param pareto: two objectives; the answer is a :class:`Front`
-        :param alternatives: up to so many further plans that are as good
-        :param concurrent: actions may overlap; a number says how far apart those lie that interfere (0.001), in the domain's time unit
-        :param horizon: only plans with at most so many steps
+        :param minimize: objectives in place of the problem's metric, the most important first
+        :param pareto: two objectives
+        :param alternatives: maximum number of further plans of the same cost
+        :param concurrent: actions may overlap; a number is the least distance in time of actions that interfere (0.001), in the
+            domain's time unit
+        :param horizon: maximum number of steps
         :param engine: ``auto``, ``sat`` or ``search``
-        :param time_limit: in seconds; the best plan so far is the answer then, as it is after Ctrl-C
-        :param memory_limit: in megabytes that searches store
-        :param certificate: a directory that does not exist yet, to check the answer with :func:`metaplan.verify`
-        :param on_improvement: hears cost, lower bound, gap (0 to 1) and steps of each better plan; planning ends when it returns ``False``
-
-        Raises :class:`metaplan.Error`; ``KeyboardInterrupt`` only if there is no plan yet.
+        :param strategy: of the SAT solver: ``auto``, ``tighten`` or ``cores``
+        :param confirm: let the SAT solver confirm what is proved without it, however long that takes
+        :param time_limit: in seconds; the best plan until then is returned, as it is after Ctrl-C
+        :param memory_limit: in megabytes, for the states that searches store
+        :param certificate: a directory that does not exist yet; :func:`metaplan.verify` checks what is written there
+        :param on_improvement: called with cost, lower bound, gap (0 to 1) and number of steps of each better plan; planning ends when it
+            returns ``False``
+        :raises metaplan.Error: if the mission cannot be planned for
+        :raises KeyboardInterrupt: after Ctrl-C, if there is no plan yet
         """
         separation = None
         if concurrent is not False:
             separation = "0.001" if concurrent is True else _value(concurrent)
         listener = None
-        if on_improvement:
+        if on_improvement is not None:
+            heard = on_improvement
+
             def listener(cost: str, bound: str, gap: float, steps: int) -> bool | None:
-                return on_improvement(_number(cost), _number(bound), gap, steps)
+                return heard(_number(cost), _number(bound), gap, steps)
 
         found = self._native.plan(
             minimize=[minimize] if isinstance(minimize, str) else list(minimize),
@@ -196,18 +275,25 @@ class Mission:
             confirm=confirm,
             time_limit=time_limit,
             memory_limit=memory_limit,
-            certificate=certificate and os.fspath(certificate),
+            certificate=None if certificate is None else os.fspath(certificate),
             on_improvement=listener,
         )
-        return Front(found.json, found) if pareto else Plan(found.json, found)
+        numbers = json.loads(found.exact)
+        return Front(found.json, numbers, found) if pareto else Plan(found.json, numbers, found)
 
-    def certify(self, directory: File, **options: Any) -> Verification:
-        """Plans, writes a certificate into a directory that does not exist yet, and checks it. ``options`` are those of :meth:`plan`."""
+    def certify(self, directory: File, **options: Unpack[PlanOptions]) -> Verification:
+        """Plans, writes a certificate into a directory that does not exist yet, and checks it.
+
+        ``options`` are those of :meth:`plan`.
+        """
         self.plan(certificate=directory, **options)
         return verify(directory, self)
 
     def explain(self, design: str | None = None, *, time_limit: float | None = None) -> Answer:
-        """Why a design is available or not, chosen or not, and what that is worth; without one, the smallest changes of measurements that lead to another plan."""
+        """Explains why a design is available or chosen, or why not, and the difference in cost.
+
+        Without ``design``: the smallest changes of measurements that lead to another plan.
+        """
         return Answer(self._native.explain(design, time_limit))
 
     def compare(
@@ -218,18 +304,20 @@ class Mission:
         penalty: float | None = None,
         state_limit: int = 20_000_000,
     ) -> Comparison:
-        """The plan beside the policies of probabilistic model checking (Cámara et al. 2020), all evaluated in one process.
+        """Compares the plan with policies of probabilistic model checking (Cámara et al. 2020) in one Markov decision process.
 
-        :param loss: the component that may be lost on the way, and with which probability at each move
-        :param battery_unit: how much battery a level of the process stands for
-        :param penalty: the time that a mission costs which does not get to its goal; ten times our plan's unless given
+        :param loss: a component that may fail, and the probability of its failure at each move
+        :param battery_unit: battery charge of one level of the process
+        :param penalty: time of a mission that does not reach its goal; by default ten times the time of the plan
+        :param state_limit: maximum number of states of the process
         """
         return Comparison(self._native.compare(loss, battery_unit, penalty, state_limit))
 
     def validate(self, plan: Plan | File, *, concurrent: bool = False, tolerance: float | str | Decimal = "0.001") -> Verdict:
-        """What a plan does by the definition of PDDL: a :class:`Plan`, its text, a path, or a ``metaplan-plan/1`` document.
+        """Executes a plan by the definition of PDDL: a :class:`Plan`, its text, a path, or a ``metaplan-plan/1`` document.
 
-        ``tolerance`` says how far times may lie from the exact ones, in the domain's time unit.
+        :param concurrent: actions may overlap
+        :param tolerance: maximum difference of times from the exact ones, in the domain's time unit
         """
         if isinstance(plan, Plan):
             text = plan.to_json()
@@ -240,9 +328,9 @@ class Mission:
         return Verdict(self._native.validate(text, concurrent, _value(tolerance)))
 
     def run(self, events: Iterable[Mapping[str, Any] | str], *, time_limit: float | None = None) -> Iterator[LoopAnswer]:
-        """The loop: the first plan and request, then what follows from each event.
+        """Runs the adaptation loop: yields the first plan and request, then the answers to each event.
 
-        An event is a line of JSON or a mapping with its fields. Where it has no ``time``, it is heard at the time that has passed since the start.
+        An event is a line of JSON or a mapping with its fields. An event without ``time`` has the time since the start of the loop.
         """
         loop = Loop(self, time_limit=time_limit)
         yield from loop.start()
@@ -252,7 +340,7 @@ class Mission:
     async def arun(
         self, events: AsyncIterable[Mapping[str, Any] | str], *, time_limit: float | None = None
     ) -> AsyncIterator[LoopAnswer]:
-        """As :meth:`run`, for `asyncio`: the event loop goes on while plans are made."""
+        """Runs the adaptation loop as :meth:`run` does, for `asyncio`: the event loop is not blocked while the planner works."""
         loop = Loop(self, time_limit=time_limit)
         for answer in await asyncio.to_thread(loop.start):
             yield answer
@@ -265,20 +353,48 @@ class Mission:
 
 
 class Loop:
-    """The adaptation loop of one robot, which begins in a mission's present situation."""
+    """The adaptation loop of one robot. It starts in a mission's present situation."""
 
     def __init__(self, mission: Mission, *, time_limit: float | None = None) -> None:
         self._native = _native.Loop(mission._native, time_limit)
         self._began = time.monotonic()
 
     def start(self) -> list[LoopAnswer]:
-        """The first plan and the first request."""
+        """Returns the first plan and the first request."""
         return list(map(_answer, self._native.start()))
 
     def handle(self, event: Mapping[str, Any] | str, now: float | None = None) -> list[LoopAnswer]:
-        """What follows from an event, heard ``now`` seconds after the start."""
+        """Returns the answers to an event that arrives ``now`` seconds after the start; by default at the present time."""
         line = event if isinstance(event, str) else json.dumps(dict(event))
         return list(map(_answer, self._native.handle(line, time.monotonic() - self._began if now is None else now)))
+
+
+_Source = tuple[str, tuple[Any, ...]]
+"""Native constructor of a mission and its arguments."""
+
+
+def _portable(maker: str, arguments: tuple[Any, ...]) -> _Source:
+    """A source with absolute paths, for another working directory."""
+    if maker == "load":
+        return maker, (_absolute(arguments[0]),)
+    if maker == "parse":
+        name, text, directory = arguments
+        return maker, (name, text, _absolute(directory))
+    name, files, documents, rules, bindings, names = arguments
+    files = tuple((path if text is not None else _absolute(path), text) for path, text in files)
+    return maker, (name, files, list(map(_absolute, documents)), list(map(_document, rules)), bindings, names)
+
+
+def _restored(cls: type[Mission], source: _Source, changes: tuple[tuple[str, ...], ...], digest: str) -> Mission:
+    """A mission that was pickled."""
+    mission = cls._of(source)
+    for change in changes:
+        mission._change(*change)
+    if mission._native.digest() != digest:
+        raise pickle.UnpicklingError(
+            f"the mission {mission.name!r} differs from the one that was pickled: its files or the version of metaplan have changed"
+        )
+    return mission
 
 
 def _answer(line: str) -> LoopAnswer:
@@ -292,13 +408,24 @@ def _number(text: str) -> Decimal:
 
 
 def verify(certificate: File, mission: Mission | None = None, *, time_limit: float | None = None) -> Verification:
-    """Checks a certificate without trusting the planner, and whether it is about a mission in its present situation."""
-    return Verification(*_native.verify(os.fspath(certificate), mission and mission._native, time_limit))
+    """Checks a certificate without trusting the planner, and that it belongs to a mission in its present situation, if one is given.
+
+    :param time_limit: in seconds
+    """
+    native = None if mission is None else mission._native
+    return Verification(*_native.verify(os.fspath(certificate), native, time_limit))
 
 
-def validate(domain: File, problem: File, plan: Plan | File, **options: Any) -> Verdict:
-    """What a plan does by the definition of PDDL; ``options`` are those of :meth:`Mission.validate`."""
-    return Mission.from_files(domain, problem).validate(plan, **options)
+def validate(
+    domain: File,
+    problem: File,
+    plan: Plan | File,
+    *,
+    concurrent: bool = False,
+    tolerance: float | str | Decimal = "0.001",
+) -> Verdict:
+    """Executes a plan by the definition of PDDL, as :meth:`Mission.validate` does."""
+    return Mission.from_files(domain, problem).validate(plan, concurrent=concurrent, tolerance=tolerance)
 
 
 def reason(
@@ -307,7 +434,12 @@ def reason(
     fail: Iterable[str] = (),
     set: Mapping[str, Any] | None = None,  # noqa: A002 - as the command line has it
 ) -> Answer:
-    """What follows from knowledge bases and rules: inferred assertions, availability of designs, objectives in error."""
+    """Queries knowledge bases and rules: inferred assertions, availability of designs, objectives in error.
+
+    :param rules: files of rules, ``coadaptation`` or ``tomasys``
+    :param fail: components that have failed
+    :param set: values of measured attributes
+    """
     return Answer(
         _native.reason(
             [os.fspath(path) for path in documents],
@@ -319,9 +451,10 @@ def reason(
 
 
 def check(model: File, property: str, *, constants: Mapping[str, Any] | None = None, exact: bool | None = None) -> Answer:  # noqa: A002
-    """The value of a property of a model in the PRISM language, a path or the model itself, with bounds that are proved.
+    """Checks a property of a model in the PRISM language, a path or the model itself; the value has proved bounds.
 
-    ``exact`` is whether to solve in rational numbers; while that is cheap, unless it is said.
+    :param constants: values of the model's undefined constants
+    :param exact: solve in rational numbers; by default only for models for which that is fast
     """
     if isinstance(model, str) and "\n" in model:
         name, text = "model", model
@@ -332,8 +465,9 @@ def check(model: File, property: str, *, constants: Mapping[str, Any] | None = N
 
 
 def explain_code(code: str) -> Answer:
-    """What a code of a message means, what causes it and what to do."""
+    """Explains a code of a message: its meaning, causes and remedies.
+
+    :raises KeyError: if there is no such code
+    """
     return Answer(_native.explain_code(code))
 
-
-__all__ = ["File", "Loop", "Mission", "check", "exact", "explain_code", "reason", "validate", "verify"]

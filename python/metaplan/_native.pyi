@@ -1,16 +1,24 @@
-"""The native part; `metaplan` makes objects of what it answers."""
+"""The native module: answers as JSON text, from which `metaplan` makes objects."""
 
 from collections.abc import Callable
+from typing import final
+
+from typing_extensions import Self
+
+__all__ = ["Loop", "Mission", "Planned", "__version__", "check", "explain_code", "reason", "verify"]
 
 __version__: str
 
+@final
 class Planned:
     json: str
+    exact: str
     text: str | None
     verdict: str
     warnings: str
     def svg(self) -> str | None: ...
 
+@final
 class Mission:
     @staticmethod
     def load(manifest: str) -> Mission: ...
@@ -26,6 +34,7 @@ class Mission:
         names: list[tuple[str, str]],
     ) -> Mission: ...
     def copy(self) -> Mission: ...
+    def digest(self) -> str: ...
     @property
     def name(self) -> str: ...
     @property
@@ -60,8 +69,9 @@ class Mission:
     def validate(self, plan: str, concurrent: bool, tolerance: str) -> str: ...
     def explain(self, design: str | None, time_limit: float | None) -> str: ...
 
+@final
 class Loop:
-    def __init__(self, mission: Mission, time_limit: float | None) -> None: ...
+    def __new__(cls, mission: Mission, time_limit: float | None) -> Self: ...
     def start(self) -> list[str]: ...
     def handle(self, line: str, now: float) -> list[str]: ...
 

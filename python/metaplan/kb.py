@@ -1,4 +1,4 @@
-"""Knowledge bases from Python: owlready2 worlds and rdflib graphs in, what follows from them out.
+"""Knowledge bases of other libraries: owlready2 worlds and rdflib graphs as input, inferred assertions as output.
 
 >>> import metaplan.kb
 >>> knowledge = metaplan.kb.load(world)  # an owlready2 world or ontology, or an rdflib graph
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +22,10 @@ __all__ = ["Knowledge", "load"]
 
 
 class Knowledge:
-    """A knowledge base as a document that Metaplan reads; it is gone with this object unless it was given a path."""
+    """A knowledge base as a document that Metaplan reads.
+
+    Without ``path`` the document is temporary: it is deleted with this object, so a mission of it cannot be pickled for later.
+    """
 
     def __init__(self, graph: rdflib.Graph, path: str | os.PathLike[str] | None = None) -> None:
         self._temporary = None
@@ -30,7 +33,7 @@ class Knowledge:
             self._temporary = tempfile.TemporaryDirectory(prefix="metaplan-kb-")
             path = Path(self._temporary.name) / "knowledge.nt"
         self.path = Path(path)
-        """The document, in N-Triples."""
+        """Path of the document, in N-Triples."""
         text = graph.serialize(format="nt", encoding="utf-8")
         # The same graph gives the same document.
         self.path.write_bytes(b"".join(sorted(text.splitlines(keepends=True))))
@@ -38,18 +41,21 @@ class Knowledge:
     def __fspath__(self) -> str:
         return os.fspath(self.path)
 
+    def __reduce__(self) -> tuple[Callable[..., Knowledge], tuple[str, str | None]]:
+        return _restored, (self.path.read_text(encoding="utf-8"), None if self._temporary else os.fspath(self.path))
+
     def reason(self, **options: Any) -> Answer:
-        """What follows from it; ``options`` are those of :func:`metaplan.reason`."""
+        """Queries the knowledge base; ``options`` are those of :func:`metaplan.reason`."""
         return reason(self.path, **options)
 
     def inferred(self, **options: Any) -> rdflib.Graph:
-        """The assertions that follow from it, as a graph; ``options`` are those of :func:`metaplan.reason`."""
+        """Returns the inferred assertions as a graph; ``options`` are those of :func:`metaplan.reason`."""
         graph = rdflib.Graph()
         graph.parse(data="\n".join(self.reason(**options).to_dict()["inferred"]), format="nt")
         return graph
 
     def into(self, world: Any, **options: Any) -> None:
-        """Adds what follows to an owlready2 world."""
+        """Adds the inferred assertions to an owlready2 world; ``options`` are those of :func:`metaplan.reason`."""
         graph = world.as_rdflib_graph()
         with world.get_ontology("http://metaplan.invalid/inferred#"):
             for triple in self.inferred(**options):
@@ -57,13 +63,21 @@ class Knowledge:
 
 
 def load(source: Any, path: str | os.PathLike[str] | None = None) -> Knowledge:
-    """From an owlready2 world or ontology, an rdflib graph, or a mapping of these; with ``path`` the document stays there."""
+    """Reads an owlready2 world or ontology, an rdflib graph, or a mapping of these.
+
+    :param path: where to write the document; by default it is temporary
+    """
     if isinstance(source, Mapping):
         joined = rdflib.Graph()
         for own in source.values():
             joined += _graph(own)
         return Knowledge(joined, path)
     return Knowledge(_graph(source), path)
+
+
+def _restored(document: str, path: str | None) -> Knowledge:
+    """A knowledge base that was pickled."""
+    return Knowledge(rdflib.Graph().parse(data=document, format="nt"), path)
 
 
 def _graph(source: Any) -> rdflib.Graph:

@@ -5,8 +5,8 @@
 >>> from unified_planning.shortcuts import OneshotPlanner
 >>> planner = OneshotPlanner(name="metaplan")
 
-A problem goes to Metaplan as the PDDL that unified-planning writes; names are mapped back. Actions overlap where a problem has time, and follow
-one another where it has none.
+A problem is passed to Metaplan as the PDDL that unified-planning writes; names are mapped back. Actions overlap if a problem has time, and
+follow one another otherwise. Fractions stay exact, and the optional goals of an oversubscription metric are preferences of PDDL 3.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from fractions import Fraction
+from types import FunctionType
 from typing import IO, Any
 
 import unified_planning as up
@@ -32,25 +33,26 @@ from unified_planning.engines import (
     ValidationResultStatus,
 )
 from unified_planning.engines.compilers import BoundedTypesRemover
+from unified_planning.engines.compilers.usertype_fluents_remover import UsertypeFluentsRemover
 from unified_planning.engines.mixins import AnytimePlannerMixin, OneshotPlannerMixin, PlanValidatorMixin
 from unified_planning.io import PDDLWriter
-from unified_planning.model import Problem, ProblemKind
+from unified_planning.io.pddl_writer import ConverterToPDDLString
+from unified_planning.model import FNode, Problem, ProblemKind
 from unified_planning.plans import ActionInstance, PlanKind, SequentialPlan, TimeTriggeredPlan
 
-from metaplan._answers import Plan
+from metaplan._answers import Plan, Step
 from metaplan._errors import Error
 from metaplan._mission import Mission
 
 __all__ = ["MetaplanEngine", "MetaplanValidator", "compile", "register"]
 
 SEPARATION = "0.001"
-"""How far apart actions lie that interfere, where a problem does not say (``problem.epsilon``)."""
+"""Distance in time of actions that interfere, for problems without ``epsilon``."""
 
 _FEATURES: dict[str, tuple[str, ...]] = {
     "problem_class": ("ACTION_BASED",),
-    # Not GENERAL_NUMERIC_PLANNING: what is linear of it is planned for with `skip_checks`, and products of changing numbers are refused.
-    "problem_type": ("SIMPLE_NUMERIC_PLANNING",),
-    # Not TIMED_EFFECTS: those that come after a plan's end count there, and in PDDL they do not.
+    # Of general numeric problems, products of changing numbers are refused when they are read: the kind does not show them.
+    "problem_type": ("SIMPLE_NUMERIC_PLANNING", "GENERAL_NUMERIC_PLANNING"),
     "time": ("CONTINUOUS_TIME", "DISCRETE_TIME"),
     "expression_duration": ("STATIC_FLUENTS_IN_DURATIONS", "INT_TYPE_DURATIONS", "REAL_TYPE_DURATIONS"),
     "numbers": ("BOUNDED_TYPES",),
@@ -67,25 +69,37 @@ _FEATURES: dict[str, tuple[str, ...]] = {
         "DECREASE_EFFECTS",
         "STATIC_FLUENTS_IN_BOOLEAN_ASSIGNMENTS",
         "STATIC_FLUENTS_IN_NUMERIC_ASSIGNMENTS",
+        "STATIC_FLUENTS_IN_OBJECT_ASSIGNMENTS",
         "FLUENTS_IN_BOOLEAN_ASSIGNMENTS",
         "FLUENTS_IN_NUMERIC_ASSIGNMENTS",
+        "FLUENTS_IN_OBJECT_ASSIGNMENTS",
         "FORALL_EFFECTS",
     ),
     "typing": ("FLAT_TYPING", "HIERARCHICAL_TYPING"),
-    "fluents_type": ("INT_FLUENTS", "REAL_FLUENTS"),
-    "quality_metrics": ("ACTIONS_COST", "FINAL_VALUE", "MAKESPAN", "PLAN_LENGTH"),
+    "fluents_type": ("INT_FLUENTS", "REAL_FLUENTS", "OBJECT_FLUENTS"),
+    "quality_metrics": ("ACTIONS_COST", "FINAL_VALUE", "MAKESPAN", "PLAN_LENGTH", "OVERSUBSCRIPTION"),
     "actions_cost_kind": (
         "STATIC_FLUENTS_IN_ACTIONS_COST",
         "FLUENTS_IN_ACTIONS_COST",
         "INT_NUMBERS_IN_ACTIONS_COST",
         "REAL_NUMBERS_IN_ACTIONS_COST",
     ),
+    "oversubscription_kind": ("INT_NUMBERS_IN_OVERSUBSCRIPTION", "REAL_NUMBERS_IN_OVERSUBSCRIPTION"),
+    "constraints_kind": ("TRAJECTORY_CONSTRAINTS", "STATE_INVARIANTS"),
     "initial_state": ("UNDEFINED_INITIAL_NUMERIC",),
 }
 
+_REASONS = {
+    "TIMED_EFFECTS": "timed effects (after the end of a plan they count in unified-planning, and in PDDL they do not)",
+    "UNDEFINED_INITIAL_SYMBOLIC": "fluents without an initial value (in PDDL they are false)",
+}
+"""Reasons why some features are not supported; the names of the others say enough."""
 
-def _epsilon(problem: Problem) -> str:
-    return SEPARATION if problem.epsilon is None else str(problem.epsilon)
+_UNDECLARED = ("DURATION_INEQUALITIES", "FLUENTS_IN_DURATIONS")
+"""Features that are not declared and nevertheless planned for with ``skip_checks``: with a metric, planning may not end by itself."""
+
+_UNTIMED = ("TRAJECTORY_CONSTRAINTS", "STATE_INVARIANTS")
+"""Features that are supported in problems without time."""
 
 
 def _kind(features: dict[str, tuple[str, ...]]) -> ProblemKind:
@@ -96,8 +110,73 @@ def _kind(features: dict[str, tuple[str, ...]]) -> ProblemKind:
     return kind
 
 
-def _is_timed(problem: Problem) -> bool:
-    return problem.kind.has_continuous_time() or problem.kind.has_discrete_time()
+def _is_timed(kind: ProblemKind) -> bool:
+    return bool(kind.has_continuous_time() or kind.has_discrete_time())
+
+
+def _refusals(kind: ProblemKind, supported: ProblemKind) -> list[str]:
+    """Descriptions of the features of a kind that are not supported."""
+    own = set(kind.features)
+    missing = [_REASONS.get(name, name.lower().replace("_", " ")) for name in sorted(own - set(supported.features))]
+    if _is_timed(kind):
+        missing += [f"{name.lower().replace('_', ' ')} in a problem with time" for name in _UNTIMED if name in own]
+    return missing
+
+
+class _Converter(ConverterToPDDLString):
+    """Writes all rational and truth values; that of unified-planning rounds fractions to ten digits, and refuses truth values."""
+
+    def convert_fraction(self, frac: Fraction) -> str:
+        """PDDL of a rational number."""
+        if frac.denominator == 1:
+            return str(frac.numerator)
+        return f"(/ {frac.numerator} {frac.denominator})"
+
+    def walk_bool_constant(self, expression: FNode, args: list[str]) -> str:
+        """PDDL of a truth value: an empty conjunction or disjunction."""
+        return "(and)" if expression.is_true() else "(or)"
+
+
+def _exact(method: Any) -> FunctionType:
+    """A method of the writer with :class:`_Converter` in place of its converter, for which it has no parameter."""
+    names = {**method.__globals__, "ConverterToPDDLString": _Converter}
+    return FunctionType(method.__code__, names, method.__name__, method.__defaults__, method.__closure__)
+
+
+class _Writer(PDDLWriter):
+    """Writes problems as PDDL: with exact numbers, and with optional goals as preferences."""
+
+    _write_domain = _exact(PDDLWriter._write_domain)
+    _write_problem = _exact(PDDLWriter._write_problem)
+
+    def __init__(self, problem: Problem) -> None:
+        self._optional: list[tuple[FNode, Fraction]] = []
+        if problem.kind.has_oversubscription():
+            metric, *others = problem.quality_metrics
+            if others:
+                raise up.exceptions.UPUnsupportedProblemTypeError("Only one metric is supported!")
+            problem = problem.clone()
+            problem.clear_quality_metrics()
+            manager = problem.environment.expression_manager
+            for goal, gain in metric.goals.items():
+                # A goal that costs something is one that had better not hold.
+                goal = manager.auto_promote(goal)[0]
+                self._optional.append((goal, Fraction(gain)) if gain >= 0 else (manager.Not(goal), -Fraction(gain)))
+        PDDLWriter.__init__(self, problem, rewrite_bool_assignments=True)
+
+    def get_problem(self) -> str:
+        """The problem as PDDL."""
+        text: str = PDDLWriter.get_problem(self)
+        if not self._optional:
+            return text
+        converter = _Converter(self.problem.environment, self._get_mangled_name)
+        mark = " (:goal (and \n"
+        before, _, after = text.rpartition(mark)
+        goals = "".join(f"  (preference p{number} {converter.convert(goal)})\n" for number, (goal, _) in enumerate(self._optional))
+        losses = " ".join(
+            f"(* {converter.convert_fraction(loss)} (is-violated p{number}))" for number, (_, loss) in enumerate(self._optional)
+        )
+        return f"{before}{mark}{goals}{after.rstrip().removesuffix(')')} (:metric minimize (+ 0 {losses}))\n)\n"
 
 
 class _Written:
@@ -105,15 +184,21 @@ class _Written:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.timed = _is_timed(problem)
-        self.separation = _epsilon(problem)
-        self._back: Callable[[ActionInstance], ActionInstance | None] | None = None
+        self.timed = _is_timed(problem.kind)
+        self.separation = SEPARATION if problem.epsilon is None else str(problem.epsilon)
+        self._back: list[Callable[[ActionInstance], ActionInstance | None]] = []
+        # PDDL has no bounds: they become conditions. Fluents with objects as values become predicates.
+        if problem.kind.has_object_fluents():
+            problem = self._compiled(UsertypeFluentsRemover(), problem, CompilationKind.USERTYPE_FLUENTS_REMOVING)
         if problem.kind.has_bounded_types():
-            # PDDL has no bounds: they become conditions.
-            unbounded = BoundedTypesRemover().compile(problem, CompilationKind.BOUNDED_TYPES_REMOVING)
-            problem, self._back = unbounded.problem, unbounded.map_back_action_instance
+            problem = self._compiled(BoundedTypesRemover(), problem, CompilationKind.BOUNDED_TYPES_REMOVING)
         self.written = problem
-        self.writer = PDDLWriter(problem, rewrite_bool_assignments=True)
+        self.writer = _Writer(problem)
+
+    def _compiled(self, compiler: Any, problem: Problem, kind: CompilationKind) -> Problem:
+        result = compiler.compile(problem, kind)
+        self._back.insert(0, result.map_back_action_instance)
+        return result.problem
 
     def mission(self) -> Mission:
         return Mission.from_files(self.writer.get_domain(), self.writer.get_problem())
@@ -123,21 +208,22 @@ class _Written:
         environment = self.problem.environment
         manager = environment.expression_manager
 
-        def instance(step: Any) -> ActionInstance:
+        def instance(step: Step) -> ActionInstance:
             objects = [manager.ObjectExp(self.writer.get_item_named(name)) for name in step.arguments]
             own = ActionInstance(self.writer.get_item_named(step.action), tuple(objects))
-            return self._back(own) if self._back else own
+            for back in self._back:
+                own = back(own)
+            return own
 
         if not self.timed:
             return SequentialPlan([instance(step) for step in found], environment)
 
-        def timed(step: Any) -> tuple[Fraction, ActionInstance, Fraction | None]:
+        def timed(step: Step) -> tuple[Fraction, ActionInstance, Fraction | None]:
             own = instance(step)
             lasts = isinstance(own.action, up.model.DurativeAction)
             return Fraction(step.start), own, Fraction(step.duration) if lasts else None
 
         return TimeTriggeredPlan([timed(step) for step in found], environment)
-
 
     def steps(self, plan: SequentialPlan) -> str:
         """A plan of the problem as text."""
@@ -159,10 +245,10 @@ _STATUSES = {
 
 
 class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
-    """Plans by search and SAT, with a proof that the plan is optimal.
+    """Planner by search and SAT; a plan that it calls optimal is proved to be.
 
-    :param memory_limit: in megabytes that searches store
-    :param certificate: a directory that does not exist yet, to check the answer with :func:`metaplan.verify`; for problems without time
+    :param memory_limit: in megabytes, for the states that searches store
+    :param certificate: a directory that does not exist yet, for problems without time; :func:`metaplan.verify` checks what is written there
     :param options: further keywords of :meth:`metaplan.Mission.plan`
     """
 
@@ -170,36 +256,39 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
         Engine.__init__(self)
         OneshotPlannerMixin.__init__(self)
         AnytimePlannerMixin.__init__(self)
-        self._options = {"memory_limit": memory_limit, "certificate": certificate, **options}
+        self._options: dict[str, Any] = {"memory_limit": memory_limit, "certificate": certificate, **options}
 
     @property
     def name(self) -> str:
-        """What unified-planning calls it."""
+        """Name of the engine in unified-planning."""
         return "metaplan"
 
     @staticmethod
     def supported_kind() -> ProblemKind:
-        """Which problems are planned for."""
+        """Returns the supported features; trajectory constraints only without time, see :meth:`supports`."""
         return _kind(_FEATURES)
 
     @staticmethod
     def supports(problem_kind: ProblemKind) -> bool:
-        """Whether problems of a kind are planned for."""
-        return problem_kind <= MetaplanEngine.supported_kind()
+        """Returns ``True`` if problems of this kind are planned for.
+
+        Of general numeric problems, those with products of fluents that actions change are refused when they are read.
+        """
+        return not _refusals(problem_kind, MetaplanEngine.supported_kind())
 
     @staticmethod
     def satisfies(optimality_guarantee: OptimalityGuarantee) -> bool:
-        """Both guarantees: what is called optimal is proved."""
+        """Returns ``True``: the engine gives both guarantees."""
         return True
 
     @staticmethod
     def ensures(anytime_guarantee: AnytimeGuarantee) -> bool:
-        """Each plan is better than the one before."""
-        return anytime_guarantee == AnytimeGuarantee.INCREASING_QUALITY
+        """Returns ``True`` for increasing quality: each plan is better than the one before."""
+        return bool(anytime_guarantee == AnytimeGuarantee.INCREASING_QUALITY)
 
     @staticmethod
     def get_credits(**_: Any) -> Credits | None:
-        """Who made it."""
+        """Returns authors, licence and description."""
         about = "Task plans and robot architectures, adapted together, with proofs that they are optimal."
         return Credits("Metaplan", "The Metaplan developers", "", "", "MIT OR Apache-2.0", about, about)
 
@@ -215,7 +304,8 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
     def _get_solutions(
         self, problem: up.model.AbstractProblem, timeout: float | None = None, output_stream: IO[str] | None = None
     ) -> Iterator[PlanGenerationResult]:
-        began, share, best = time.monotonic(), 0.1, None
+        began, share = time.monotonic(), 0.1
+        best: Fraction | None = None
         while True:
             left = None if timeout is None else timeout - (time.monotonic() - began)
             is_last = left is not None and left <= share
@@ -227,17 +317,20 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
             if is_ended or is_last:
                 yield result
                 return
-            cost = None if result.metrics is None else result.metrics.get("cost")
-            if result.plan is not None and (best is None or Fraction(cost) < best):
-                best = Fraction(cost)
+            if result.plan is not None and (best is None or Fraction(result.metrics["cost"]) < best):
+                best = Fraction(result.metrics["cost"])
                 result.status = PlanGenerationResultStatus.INTERMEDIATE
                 yield result
             share *= 2
 
     def _answer(self, problem: Any, timeout: float | None, output_stream: IO[str] | None) -> PlanGenerationResult:
         began = time.monotonic()
-        if not isinstance(problem, Problem):
-            return self._none(PlanGenerationResultStatus.UNSUPPORTED_PROBLEM, "the problem is not a classical, numeric or temporal one")
+        supported = self.supported_kind()
+        if self.skip_checks:
+            supported = supported.union(_kind({"time": _UNDECLARED[:1], "expression_duration": _UNDECLARED[1:]}))
+        if refusals := _refusals(problem.kind, supported):
+            # Other features not even with `skip_checks`: the PDDL of such a problem is another problem.
+            return self._none(PlanGenerationResultStatus.UNSUPPORTED_PROBLEM, f"not supported: {'; '.join(refusals)}")
         options = dict(self._options)
         try:
             written = _Written(problem)
@@ -254,7 +347,7 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
                 return self._none(PlanGenerationResultStatus.TIMEOUT, str(error))
             return self._none(PlanGenerationResultStatus.UNSUPPORTED_PROBLEM, str(error))
         except (up.exceptions.UPException, NotImplementedError) as error:
-            return self._none(PlanGenerationResultStatus.UNSUPPORTED_PROBLEM, str(error))
+            return self._none(PlanGenerationResultStatus.UNSUPPORTED_PROBLEM, str(error) or repr(error))
         if output_stream is not None:
             output_stream.write(f"{found.verdict}\n")
         status = _STATUSES[found.status]
@@ -278,11 +371,11 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
         return PlanGenerationResult(status, None, engine_name=self.name, log_messages=[LogMessage(LogLevel.ERROR, text)])
 
     def destroy(self) -> None:
-        """Nothing is left behind."""
+        """Does nothing: the engine holds no resources."""
 
 
 class MetaplanValidator(Engine, PlanValidatorMixin):
-    """Executes plans by the definition of PDDL, in exact numbers, and shares nothing with the planner."""
+    """Validator that executes plans by the definition of PDDL, in exact numbers."""
 
     def __init__(self, **_: Any) -> None:
         Engine.__init__(self)
@@ -290,30 +383,30 @@ class MetaplanValidator(Engine, PlanValidatorMixin):
 
     @property
     def name(self) -> str:
-        """What unified-planning calls it."""
+        """Name of the engine in unified-planning."""
         return "metaplan-val"
 
     @staticmethod
     def supported_kind() -> ProblemKind:
-        """For which problems plans are executed: those without time."""
+        """Returns the supported features: those of the planner but time."""
         return _kind({**_FEATURES, "time": (), "expression_duration": ()})
 
     @staticmethod
     def supports(problem_kind: ProblemKind) -> bool:
-        """Whether plans for problems of a kind are executed."""
-        return problem_kind <= MetaplanValidator.supported_kind()
+        """Returns ``True`` if plans for problems of this kind are validated."""
+        return not _refusals(problem_kind, MetaplanValidator.supported_kind())
 
     @staticmethod
     def supports_plan(plan_kind: PlanKind) -> bool:
-        """Sequences. Whether steps with times interfere is decided otherwise in PDDL 2.1."""
-        return plan_kind == PlanKind.SEQUENTIAL_PLAN
+        """Returns ``True`` for sequential plans: PDDL 2.1 decides in another way whether timed steps interfere."""
+        return bool(plan_kind == PlanKind.SEQUENTIAL_PLAN)
 
     def _validate(self, problem: up.model.AbstractProblem, plan: up.plans.Plan) -> ValidationResult:
         try:
             written = _Written(problem)
             verdict = written.mission().validate(written.steps(plan))
         except (Error, up.exceptions.UPException, NotImplementedError) as error:
-            log = [LogMessage(LogLevel.ERROR, str(error))]
+            log = [LogMessage(LogLevel.ERROR, str(error) or repr(error))]
             return ValidationResult(ValidationResultStatus.UNKNOWN, self.name, log)
         if verdict:
             return ValidationResult(ValidationResultStatus.VALID, self.name, [])
@@ -330,24 +423,24 @@ class MetaplanValidator(Engine, PlanValidatorMixin):
         )
 
 
-def compile(problem: Problem, *knowledge: str, **options: Any) -> Problem:  # noqa: A001 - as unified-planning has it
-    """The problem with the configurations that knowledge bases add: designs become parameters of actions, and their availability facts.
+def compile(problem: Problem | Mission, *knowledge: str, **options: Any) -> Problem:  # noqa: A001 - as unified-planning has it
+    """Returns the problem with the configurations of knowledge bases: designs become parameters of actions, and their availability facts.
 
-    ``options`` are those of :meth:`metaplan.Mission.from_files`. What has failed or was measured can be told to a mission instead:
-    ``compile(mission)``.
+    ``options`` are those of :meth:`metaplan.Mission.from_files`. For a situation with failures and measurements, pass a mission in place of
+    the problem.
     """
     from unified_planning.io import PDDLReader
 
     if isinstance(problem, Mission):
         mission = problem
     else:
-        writer = PDDLWriter(problem, rewrite_bool_assignments=True)
+        writer = _Writer(problem)
         mission = Mission.from_files(writer.get_domain(), writer.get_problem(), knowledge, **options)
     return PDDLReader().parse_problem_string(*mission.pddl())
 
 
 def register(environment: up.environment.Environment | None = None) -> None:
-    """Makes the engines known to an environment of unified-planning, the global one unless another is given."""
+    """Adds the engines to an environment of unified-planning, by default to the global one."""
     factory = (environment or up.environment.get_environment()).factory
     factory.add_engine("metaplan", __name__, "MetaplanEngine")
     factory.add_engine("metaplan-val", __name__, "MetaplanValidator")

@@ -9,9 +9,10 @@ use metaplan::answers::{
     ChangesAnswer, CompareAnswer, ComparisonAnswer, DesignAnswer, PlanAnswer, VerdictAnswer,
 };
 use metaplan::comparison::{self, Coadaptation, Compared, NoResult, Risk, Tasked};
-use metaplan::encodings::{Config, Exact, Limits, Plan, Solution};
+use metaplan::encodings::{Config, Exact, Limits, Plan, Solution, Step};
 use metaplan::file::source;
 use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
+use metaplan::mapek::Loop;
 use metaplan::message::{Errors, Message};
 use metaplan::mission::{self as missions, Bindings, Names, read_plan};
 use metaplan::pddl::{Source, validate};
@@ -21,6 +22,7 @@ use metaplan::setup::Setup;
 use metaplan::{explain, report};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use serde::Serialize;
 
 use crate::failure::{listed, raise, raise_one};
 use crate::wait::detached;
@@ -37,6 +39,9 @@ pub(crate) struct Planned {
     /// The answer in the JSON format of `metaplan plan`, or of `metaplan plan --pareto`.
     #[pyo3(get)]
     json: String,
+    /// The numbers of the answer as exact texts, in JSON: see [`Numbers`].
+    #[pyo3(get)]
+    exact: String,
     /// The plan with a step on each line; nothing if there is none, or for a front.
     #[pyo3(get)]
     text: Option<String>,
@@ -47,6 +52,43 @@ pub(crate) struct Planned {
     #[pyo3(get)]
     warnings: String,
     seen: Option<Drawable>,
+}
+
+/// The numbers of a plan as texts, a decimal where there is one and else a fraction: a number of JSON cannot be 1/3.
+#[derive(Serialize)]
+struct Numbers {
+    cost: Option<String>,
+    lower_bound: Option<String>,
+    makespan: Option<String>,
+    objectives: Vec<String>,
+    steps: Vec<[String; 3]>,
+    alternatives: Vec<Vec<[String; 3]>>,
+}
+
+/// The numbers of the plans of a front.
+#[derive(Serialize)]
+struct FrontNumbers {
+    points: Vec<Numbers>,
+}
+
+impl Numbers {
+    fn of(solution: &Solution, objectives: &[Exact], alternatives: &[Plan]) -> Self {
+        let text = |number: &Exact| number.to_string();
+        Self {
+            cost: solution.plan.as_ref().map(|plan| text(&plan.cost)),
+            lower_bound: solution.lower_bound.as_ref().map(text),
+            makespan: None,
+            objectives: objectives.iter().map(text).collect(),
+            steps: solution.plan.as_ref().map(Self::steps).unwrap_or_default(),
+            alternatives: alternatives.iter().map(Self::steps).collect(),
+        }
+    }
+
+    /// Start, duration and cost of each step.
+    fn steps(plan: &Plan) -> Vec<[String; 3]> {
+        let numbers = |step: &Step| [&step.start, &step.duration, &step.cost].map(Exact::to_string);
+        plan.steps.iter().map(numbers).collect()
+    }
 }
 
 /// What a plan is drawn from, when somebody looks.
@@ -133,6 +175,13 @@ impl Mission {
     /// Another mission in the same situation.
     fn copy(&self) -> Self {
         Self { setup: RwLock::new(self.read()) }
+    }
+
+    /// A checksum of all that decisions rest on: knowledge, rules, domain, problem and settings.
+    fn digest(&self, py: Python<'_>) -> PyResult<String> {
+        let setup = self.read();
+        let control = py.detach(|| Loop::new(setup.mission.clone(), setup.settings.clone()));
+        control.map(|control| control.digest()).map_err(|messages| raise(py, &messages))
     }
 
     /// The mission's name.
@@ -388,8 +437,11 @@ fn planned(setup: &Arc<Setup>, wanted: Wanted, on_improvement: Option<&Py<PyAny>
         Some([first, second]) => {
             let front = planner.pareto([first, second])?;
             let json = serde_json::to_string(&front.answer()).unwrap_or_default();
+            let solved = front.front.points.iter().filter(|point| point.solution.plan.is_some());
+            let points = solved.map(|point| Numbers::of(&point.solution, &point.values, &[])).collect();
+            let exact = serde_json::to_string(&FrontNumbers { points }).unwrap_or_default();
             let verdict = front.front.status.to_string();
-            Planned { json, text: None, verdict, warnings, seen: None }
+            Planned { json, exact, text: None, verdict, warnings, seen: None }
         }
         None => answered(setup, planner.plan()?, wanted.certificate, warnings)?,
     };
@@ -410,9 +462,18 @@ fn answered(
     }
     let answer: PlanAnswer = found.answer();
     let json = serde_json::to_string(&answer).unwrap_or_default();
+    let alternatives = found.alternatives.as_ref().map_or(&[][..], |found| &found.plans);
+    // The values of the problem's own metric are not named, and no part of the answer.
+    let values = &found.values[..found.values.len().min(found.objectives().len())];
+    let makespan = found.solution.plan.as_ref().filter(|_| found.overlaps()).map(Plan::makespan);
+    let numbers = Numbers {
+        makespan: makespan.map(|makespan| makespan.to_string()),
+        ..Numbers::of(&found.solution, values, alternatives)
+    };
+    let exact = serde_json::to_string(&numbers).unwrap_or_default();
     let (verdict, problem) = (found.solution.verdict(), found.problem().clone());
     let solution = found.solution;
     let text = solution.plan.as_ref().map(Plan::to_string);
     let seen = text.is_some().then(|| Drawable { setup: Arc::clone(setup), problem, solution });
-    Ok(Planned { json, text, verdict, warnings, seen })
+    Ok(Planned { json, exact, text, verdict, warnings, seen })
 }

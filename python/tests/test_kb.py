@@ -1,5 +1,6 @@
 """Knowledge bases from and to other libraries."""
 
+import pickle
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,8 @@ def test_an_rdflib_graph_is_a_knowledge_base(tmp_path):
     assert knowledge.reason(fail=["c_kinect"]).to_dict()["inferred"] == own
     assert len(knowledge.inferred(fail=["c_kinect"])) == len(own)
     assert metaplan.Mission.from_files(*FILES, [knowledge]).plan().cost == 408
+    copied = pickle.loads(pickle.dumps(knowledge))
+    assert copied.reason().to_dict()["inferred"] == knowledge.reason().to_dict()["inferred"]
     kept = metaplan.kb.load(rdflib.Graph().parse(UGV), tmp_path / "kb.nt")
     assert kept.path.read_bytes() == knowledge.path.read_bytes()
 

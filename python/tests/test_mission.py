@@ -1,12 +1,16 @@
 """Missions: what the command line answers is what the package answers."""
 
 import asyncio
+import copy
 import json
+import os
+import pickle
 import signal
 import subprocess
 import sys
 import threading
 from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
@@ -49,6 +53,83 @@ def test_numbers_are_exact():
     assert plan.to_df()["cost"].sum() == 3.5
 
 
+def test_fractions_are_exact_and_numbers_of_a_plan_go_together():
+    problem = PROBLEM.replace("(length a b) 1.5", "(length a b) (/ 1 3)").replace("(length b c) 2", "(length b c) 0.5")
+    mission = metaplan.Mission.from_files(DOMAIN, problem)
+    plan = mission.plan()
+    assert plan.cost == Fraction(5, 6) == plan.lower_bound
+    assert [step.cost for step in plan] == [Fraction(1, 3), Fraction(1, 2)] and sum(step.cost for step in plan) == plan.cost
+    assert plan.to_df()["cost"].tolist() == [1 / 3, 0.5]
+    assert mission.plan(minimize="total-cost").objectives == {"total-cost": Fraction(5, 6)}
+    assert mission.plan(pareto=("total-cost", "total-time")).points[0].cost == Fraction(5, 6)
+    assert mission.plan(concurrent=Fraction(1, 7)).makespan == Fraction(1, 7)
+
+
+SOURCES = {
+    "path": lambda: metaplan.Mission.load(os.path.relpath(UGV)),
+    "text": lambda: metaplan.Mission.load(UGV.read_text(), os.path.relpath(ROOT / "missions")),
+    "mapping": lambda: metaplan.Mission.load(OWN, os.path.relpath(ROOT)),
+    "PDDL": lambda: metaplan.Mission.from_files(DOMAIN, PROBLEM, name="own"),
+    "files": lambda: metaplan.Mission.from_files(*FILES, [os.path.relpath(UGV_KB)], rules=["coadaptation"]),
+}
+OWN = {
+    "name": "mine",
+    "knowledge": {"files": ["ontology/kb/ugv.ttl"]},
+    "planning": {"domain": "encodings/ugv/domain.pddl", "problem": "encodings/ugv/problem.pddl"},
+}
+FILES = [ROOT / f"encodings/ugv/{name}.pddl" for name in ("domain", "problem")]
+UGV_KB = ROOT / "ontology/kb/ugv.ttl"
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_missions_are_pickled_with_their_situation(source, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    mission = SOURCES[source]()
+    if source == "PDDL":
+        mission.set("length a b", Decimal("0.25"))
+    else:
+        mission.fail("c_kinect").set(robot_at="wp2")
+    # A process of its own in another directory, as of a pool.
+    Path("elsewhere").mkdir()
+    program = "import pickle, sys; plan = pickle.load(sys.stdin.buffer).plan(); pickle.dump(plan, sys.stdout.buffer)"
+    out = subprocess.run([sys.executable, "-c", program], input=pickle.dumps(mission), cwd="elsewhere", capture_output=True, check=False)
+    assert out.returncode == 0, out.stderr.decode()
+    plan, own = pickle.loads(out.stdout), mission.plan()
+    assert plan.steps == own.steps and plan.cost == own.cost and plan.text == own.text and plan.svg() == own.svg()
+    for copied in (copy.copy(mission), copy.deepcopy(mission)):
+        assert copied.name == mission.name and copied.pddl() == mission.pddl()
+
+
+def test_a_pickled_mission_whose_files_have_changed_is_refused(tmp_path):
+    for name, text in (("d.pddl", DOMAIN), ("p.pddl", PROBLEM)):
+        (tmp_path / name).write_text(text)
+    pickled = pickle.dumps(metaplan.Mission.from_files(tmp_path / "d.pddl", tmp_path / "p.pddl"))
+    assert pickle.loads(pickled).plan()
+    (tmp_path / "p.pddl").write_text(PROBLEM.replace("1.5", "2.5"))
+    with pytest.raises(pickle.UnpicklingError, match="have changed"):
+        pickle.loads(pickled)
+
+
+def test_answers_are_pickled_and_copied():
+    mission = metaplan.Mission.load(UGV)
+    with pytest.raises(metaplan.Error) as caught:
+        mission.fail("c_kinekt")
+    verdict = mission.validate(mission.plan())
+    answers = [mission.plan(), verdict, mission.explain(), metaplan.reason(UGV_KB), caught.value, *mission.run([])]
+    answers += [metaplan.Mission.from_files(DOMAIN, PROBLEM).plan(pareto=("total-cost", "total-time"))]
+    for answer in answers:
+        for copied in (pickle.loads(pickle.dumps(answer)), copy.copy(answer), copy.deepcopy(answer)):
+            assert type(copied) is type(answer) and str(copied) == str(answer)
+            if not isinstance(answer, Exception):
+                assert copied.to_dict() == answer.to_dict()
+
+
+def test_an_answer_of_the_loop_shows_its_content():
+    shown = {answer.kind: repr(answer) for answer in metaplan.Mission.load(UGV).run([])}
+    assert shown["request_action"].startswith("LoopAnswer('request_action', ")
+    assert "name='move'" in shown["request_action"] and "'wp1', 'wp2']" in shown["request_action"]
+
+
 def test_errors_have_code_and_place():
     with pytest.raises(metaplan.Error) as caught:
         metaplan.Mission.from_files(DOMAIN.replace("(at ?a) (way", "(at ?a) (ways"), PROBLEM)
@@ -65,15 +146,10 @@ def test_errors_have_code_and_place():
 def test_manifests_are_files_texts_and_mappings():
     text = UGV.read_text()
     assert metaplan.Mission.load(text, ROOT / "missions").plan().cost == 408
-    own = {
-        "name": "mine",
-        "knowledge": {"files": ["ontology/kb/ugv.ttl"]},
-        "planning": {"domain": "encodings/ugv/domain.pddl", "problem": "encodings/ugv/problem.pddl"},
-    }
-    mission = metaplan.Mission.load(own, ROOT)
+    mission = metaplan.Mission.load(OWN, ROOT)
     assert mission.name == "mine" and mission.plan()
     with pytest.raises(metaplan.Error):
-        metaplan.Mission.load({**own, "planing": {}}, ROOT)
+        metaplan.Mission.load({**OWN, "planing": {}}, ROOT)
 
 
 def test_objectives_fronts_and_alternatives():

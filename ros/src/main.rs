@@ -71,9 +71,16 @@ fn main() -> ExitCode {
             for message in &messages {
                 eprint!("{}", message.text());
             }
-            ExitCode::from(2)
+            ExitCode::from(status(&messages))
         }
     }
+}
+
+/// Exit status for errors: 75 (`EX_TEMPFAIL` of `sysexits.h`) if the network is not up yet, so that a
+/// supervisor tries again; 2 for errors that remain until a person corrects a file or an argument.
+fn status(messages: &[Message]) -> u8 {
+    let is_temporary = messages.iter().all(|message| message.code == "N120");
+    if is_temporary { 75 } else { 2 }
 }
 
 fn start() -> Result<(), Errors> {
