@@ -87,7 +87,7 @@ fn a_mission_with_mapped_names_is_the_same_mission() {
         (&["explain", MANIFEST, "fd_speed_high"], ""),
         (&["run", MANIFEST], &lines),
         (
-            &["simulate", MANIFEST, "--scenario", "suave", "--runs", "2", "--csv", "/dev/stdout", "--quiet"],
+            &["simulate", MANIFEST, "--scenario", "suave", "--runs", "2", "--csv", "-", "--quiet"],
             "",
         ),
     ] {
