@@ -6,8 +6,8 @@ use std::io::{ErrorKind, IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use comfy_table::{ContentArrangement, Table, TableStyle};
-use console::Term;
+use comfy_table::{ColumnConstraint, ContentArrangement, Table, TableStyle, Width};
+use console::{Term, measure_text_width};
 use metaplan::answers::ErrorAnswer;
 use metaplan::file;
 use metaplan::message::Message;
@@ -156,20 +156,46 @@ pub fn table_within(
 ) -> String {
     let mut table = Table::new();
     table.load_style(TableStyle::new()).set_header(header);
+    table.add_rows(rows);
     match columns {
         Some(columns) => {
             table.set_content_arrangement(ContentArrangement::Dynamic).set_width(columns);
+            keep_words(&mut table, columns);
         }
         None => {
             table.set_content_arrangement(ContentArrangement::Disabled);
         }
     }
-    table.add_rows(rows);
     table.lines().fold(String::new(), |text, line| {
         text + line.trim_end()
             + "
 "
     })
+}
+
+/// Breaks cells between words only, if there are columns enough for the longest words.
+fn keep_words(table: &mut Table, columns: u16) {
+    let mut longest = vec![0; table.column_count()];
+    for row in table.header().into_iter().chain(table.row_iter()) {
+        for (cell, longest) in row.cell_iter().zip(&mut longest) {
+            let content = cell.content();
+            let words = content.split_whitespace().map(measure_text_width);
+            *longest = words.max().unwrap_or(0).max(*longest);
+        }
+    }
+    let widths: Vec<u16> = table
+        .column_iter()
+        .zip(longest)
+        .map(|(column, longest)| {
+            u16::try_from(longest).unwrap_or(u16::MAX).saturating_add(column.padding_width())
+        })
+        .collect();
+    if widths.iter().copied().fold(0, u16::saturating_add) > columns {
+        return;
+    }
+    for (column, width) in table.column_iter_mut().zip(widths) {
+        column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(width)));
+    }
 }
 
 /// An exact number as decimal text; a fraction that is not a decimal is rounded.

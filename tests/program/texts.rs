@@ -65,7 +65,11 @@ fn designs_functions_and_components_have_letters_of_any_script() {
         ] {
             ok(folder, arguments);
         }
-        assert_eq!(ok(folder, &["lint", "mission.toml"]), ok(plain.path(), &["lint", "mission.toml"]), "{new}");
+        assert_eq!(
+            ok(folder, &["lint", "mission.toml"]),
+            ok(plain.path(), &["lint", "mission.toml"]),
+            "{new}"
+        );
         if new.starts_with('c') {
             ok(folder, &["plan", "mission.toml", "--fail", new]);
         } else if old.starts_with("fd") {
@@ -113,7 +117,13 @@ fn byte_order_marks_are_read_over() {
     let answers = || -> Vec<Outcome> {
         let commands = [
             &["plan", ugv][..],
-            &["plan", "encodings/ugv/domain.pddl", "encodings/ugv/problem.pddl", "--kb", "ontology/kb/ugv.ttl"],
+            &[
+                "plan",
+                "encodings/ugv/domain.pddl",
+                "encodings/ugv/problem.pddl",
+                "--kb",
+                "ontology/kb/ugv.ttl",
+            ],
             &["report", "missions/templates/warehouse/mission.toml"],
             &["validate", ugv, "plan.txt"],
             &["validate", ugv, "plan.json"],

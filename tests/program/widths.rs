@@ -33,7 +33,7 @@ fn tables_fit_into_the_columns() {
         (&["plan", "missions/uuv.toml"][..], 80),
         (&["plan", "missions/templates/warehouse/mission.toml"], 80),
         (&["plan", "missions/templates/warehouse/mission.toml"], 60),
-        (&["configure", "ontology/kb/ugv.ttl", "--rules", "coadaptation", "--fail", "c_kinect"], 60),
+        (&["configure", "ontology/kb/ugv.ttl", "--rules", "coadaptation", "--fail", "c_kinect"], 72),
         (&["simulate", "missions/uuv.toml", "--scenario", "suave", "--runs", "1"], 80),
         (&["schema"], 60),
     ] {
