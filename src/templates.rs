@@ -6,6 +6,8 @@ use std::path::Path;
 use encodings::shipped;
 use ontology::kb;
 
+use crate::file::create_directory;
+
 /// The manifest's file in every template.
 pub const MANIFEST: &str = "mission.toml";
 
@@ -74,20 +76,11 @@ impl Template {
         if directory.symlink_metadata().is_ok() {
             return Err(io::ErrorKind::AlreadyExists.into());
         }
-        let above = directory.parent().filter(|above| !above.as_os_str().is_empty());
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".metaplan-");
-        // Temporary directories are for their owner alone; the process's mask applies to this one, too.
-        #[cfg(unix)]
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
-        let whole = builder.tempdir_in(above.unwrap_or(Path::new(".")))?;
+        let whole = create_directory(directory)?;
         for (file, text) in self.files(mission, schema) {
             std::fs::write(whole.path().join(file), text)?;
         }
-        std::fs::rename(whole.path(), directory)?;
-        // What it was called before is not there any more.
-        let _ = whole.keep();
-        Ok(())
+        whole.commit()
     }
 }
 

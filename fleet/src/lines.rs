@@ -47,7 +47,7 @@ async fn feed<S: Store>(store: &S, session: &str, mut stop: watch::Receiver<bool
             break;
         };
         number += 1;
-        let line = String::from_utf8_lossy(&line).trim().to_owned();
+        let line = String::from_utf8_lossy(&line).trim_start_matches('\u{feff}').trim().to_owned();
         if line.is_empty() {
             continue;
         }

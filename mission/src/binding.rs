@@ -17,6 +17,7 @@ use pddl::ast::{
 use crate::called::Names;
 use crate::knowledge::{Catalogue, Knowledge};
 use crate::message::Message;
+use crate::visible::visible;
 
 /// The predicates that say which design solves which function, unless a binding says so of others, too.
 const SOLVES: [&str; 4] = ["fd_solve_f", "fd_solves_f", "inferred-SolvesF", "solvesF"];
@@ -287,7 +288,9 @@ impl Fill<'_> {
         for Individual { iri, name } in &*members {
             let spelled = Name::new(name);
             if !is_pddl_name(name) {
-                let text = format!("<{iri}> is left out: `{name}` is not a PDDL name");
+                let text = format!(
+                    "<{iri}> is left out: `{name}` is not a PDDL name; give it another one under `[bindings.names]`"
+                );
                 self.warnings.push(Message::warning("M201", text));
             } else if known.insert(spelled.clone()) {
                 let alternatives = vec![identifier(r#type)];
@@ -297,8 +300,11 @@ impl Fill<'_> {
         }
     }
 
+    /// Adds a fact, unless it is about an individual that is left out.
     fn fact(&mut self, predicate: &Name, arguments: &[&str]) {
-        self.problem.init.push(InitialElement::Fact(atom(predicate, arguments)));
+        if arguments.iter().all(|argument| is_pddl_name(argument)) {
+            self.problem.init.push(InitialElement::Fact(atom(predicate, arguments)));
+        }
     }
 
     /// What the problem itself says with a predicate.
@@ -358,6 +364,10 @@ impl Fill<'_> {
             let all: Vec<&str> = std::iter::once(action.individual.name.as_str()).chain(functions).collect();
             if stated.contains(&all.iter().map(|name| Name::new(name)).collect::<Vec<_>>()) {
                 // The problem says so, too.
+            } else if let Some(name) = all.iter().find(|name| !is_pddl_name(name)) {
+                let text =
+                    format!("`{}` requires `{name}`, which is not a PDDL name", action.individual.name);
+                self.warnings.push(Message::error("M117", text));
             } else if all.len() == declared.parameters.len() {
                 self.fact(&declared.identifier.name, &all);
             } else {
@@ -403,7 +413,7 @@ impl Fill<'_> {
         }
         for (arguments, value) in values {
             let key: Vec<Name> = arguments.iter().map(|argument| Name::new(argument)).collect();
-            if !stated.contains(&key) {
+            if !stated.contains(&key) && arguments.iter().all(|argument| is_pddl_name(argument)) {
                 let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
                 self.problem.init.push(InitialElement::Value(atom(name, &arguments), value, Span::default()));
             }
@@ -432,7 +442,9 @@ pub fn atom(predicate: &Name, arguments: &[&str]) -> Atom {
     }
 }
 
+/// Returns `true` if an object may have this name: letters of any script, digits, `-`, `_` and `.`, and nothing that is not seen.
 pub(super) fn is_pddl_name(name: &str) -> bool {
-    let allowed = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
-    !name.is_empty() && name.chars().all(allowed)
+    let allowed =
+        |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c) || !c.is_ascii() && !c.is_whitespace();
+    !name.is_empty() && name.chars().all(allowed) && visible(name) == name
 }

@@ -65,7 +65,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "M201",
         "An individual is left out.",
-        "Its local name is not a PDDL name, so it cannot be an object.",
+        "Its local name is not a PDDL name, which has letters, digits, `-`, `_` and `.`, so it cannot be an object.",
         "Rename it, or give it another name under `[bindings.names]`.",
     ],
     [

@@ -2,13 +2,16 @@
 //! quoted in a message: a hostile manifest may name any file.
 
 use std::collections::BTreeMap;
-use std::io::{self, Read as _, Write as _};
+use std::io::{self, Read as _};
 use std::path::Path;
 
 use pddl::Source;
-use tempfile::NamedTempFile;
+
+pub use output::{Pending, PendingDirectory, create, create_directory, is_stdout, write};
 
 use crate::message::Message;
+
+mod output;
 
 /// The code of the message that a file is of another kind.
 pub(crate) const CODE: &str = "M131";
@@ -52,38 +55,6 @@ pub fn source(path: &Path) -> Result<Source, Message> {
         Ok(bytes) => Ok(Source::from_bytes(name, &bytes)),
         Err(error) => Err(Message::at("M101", &name, None, format!("the file cannot be read: {error}"))),
     }
-}
-
-/// Writes a text file so that it is either whole or untouched, with the permissions that files are made with.
-///
-/// # Errors
-/// It cannot be written.
-pub fn write(path: &Path, text: &str) -> Result<(), Message> {
-    let written = temporary(path).and_then(|mut file| {
-        file.write_all(text.as_bytes())?;
-        file.as_file().sync_all()?;
-        file.persist(path).map_err(|error| error.error)
-    });
-    match written {
-        Ok(_) => Ok(()),
-        Err(error) => {
-            let text = format!("the file cannot be written: {}", error.kind());
-            Err(Message::at("M109", &path.display().to_string(), None, text))
-        }
-    }
-}
-
-/// A file beside the one with this path, to be given its name once it is whole.
-///
-/// # Errors
-/// It cannot be made.
-pub fn temporary(path: &Path) -> io::Result<NamedTempFile> {
-    let directory = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut temporary = tempfile::Builder::new();
-    // Temporary files are for their owner alone; the process's mask applies to these, too.
-    #[cfg(unix)]
-    temporary.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    temporary.tempfile_in(directory)
 }
 
 /// What a text may be.
@@ -207,7 +178,9 @@ pub(crate) fn quoted(messages: Vec<Message>) -> Vec<Message> {
         let text = texts.entry(file).or_insert_with_key(|file| {
             let path = Path::new(file);
             let bytes = is_knowledge(path).then(|| read(path).ok()).flatten()?;
-            String::from_utf8(bytes).ok().filter(|text| !text.contains('\0'))
+            // A byte order mark has no column.
+            let bytes = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(&bytes);
+            String::from_utf8(bytes.to_vec()).ok().filter(|text| !text.contains('\0'))
         });
         match text {
             Some(text) => message.with_source(text),
@@ -237,19 +210,6 @@ mod tests {
 
     fn check(text: &str, expected: Option<Kind>) {
         assert_eq!(Kind::of(text), expected, "{text}");
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn files_can_be_read_by_those_who_can_read_others() {
-        use std::os::unix::fs::PermissionsExt;
-
-        let directory = tempfile::tempdir().expect("a directory");
-        let [own, other] = ["own", "other"].map(|name| directory.path().join(name));
-        super::write(&own, "text").expect("written");
-        std::fs::write(&other, "text").expect("written");
-        let mode = |path| std::fs::metadata(path).expect("a file").permissions().mode();
-        assert_eq!(mode(&own), mode(&other));
     }
 
     #[test]

@@ -7,6 +7,8 @@ pub(crate) fn place(at: usize) -> u32 {
     u32::try_from(at).unwrap_or(u32::MAX)
 }
 
+const BYTE_ORDER_MARK: char = '\u{feff}';
+
 /// A text to parse: a file, or what stands for one.
 #[derive(Debug, Clone)]
 pub struct Source {
@@ -25,9 +27,12 @@ pub struct Position {
 }
 
 impl Source {
-    /// The text `text` of the file `name`.
+    /// The text `text` of the file `name`, without a byte order mark.
     pub fn new(name: impl Into<String>, text: impl Into<String>) -> Self {
-        let text = text.into();
+        let mut text = text.into();
+        if text.starts_with(BYTE_ORDER_MARK) {
+            text.remove(0);
+        }
         let newlines = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
         let line_starts = std::iter::once(0)
             .chain(newlines.map_while(|(at, _)| u32::try_from(at).ok()?.checked_add(1)))
@@ -35,10 +40,14 @@ impl Source {
         Self { name: name.into(), text, line_starts }
     }
 
-    /// The bytes `bytes` of the file `name`; what is not UTF-8 becomes U+FFFD, as comments of older
-    /// files are often Latin-1.
+    /// The bytes `bytes` of the file `name`: UTF-16 where they begin with its byte order mark, as `>` of Windows PowerShell writes
+    /// files, and else UTF-8. What is neither becomes U+FFFD, as comments of older files are often Latin-1.
     pub fn from_bytes(name: impl Into<String>, bytes: &[u8]) -> Self {
-        Self::new(name, String::from_utf8_lossy(bytes))
+        match bytes {
+            [0xff, 0xfe, rest @ ..] => Self::new(name, utf16(rest, u16::from_le_bytes)),
+            [0xfe, 0xff, rest @ ..] => Self::new(name, utf16(rest, u16::from_be_bytes)),
+            _ => Self::new(name, String::from_utf8_lossy(bytes)),
+        }
     }
 
     /// The name of the file.
@@ -76,6 +85,11 @@ impl Source {
     }
 }
 
+fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> String {
+    let units: Vec<u16> = bytes.chunks(2).map(|pair| pair.try_into().map_or(0xfffd, unit)).collect();
+    String::from_utf16_lossy(&units)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -93,5 +107,22 @@ mod tests {
     #[test]
     fn latin_1_is_read() {
         assert_eq!(Source::from_bytes("f", b"; caf\xe9").text(), "; caf\u{fffd}");
+    }
+
+    #[test]
+    fn byte_order_marks_are_no_text() {
+        let encoded = |unit: fn(u16) -> [u8; 2]| -> Vec<u8> {
+            "\u{feff}(é 𝄞)".encode_utf16().flat_map(unit).collect()
+        };
+        let cases = [
+            "\u{feff}(é 𝄞)".as_bytes().to_vec(),
+            "(é 𝄞)".as_bytes().to_vec(),
+            encoded(u16::to_le_bytes),
+            encoded(u16::to_be_bytes),
+        ];
+        for bytes in cases {
+            assert_eq!(Source::from_bytes("f", &bytes).text(), "(é 𝄞)", "{bytes:?}");
+        }
+        assert_eq!(Source::from_bytes("f", b"\xff\xfea\0b").text(), "a\u{fffd}");
     }
 }

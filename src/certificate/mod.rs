@@ -26,6 +26,7 @@ use ::verify::manifest::{
 use ::verify::plan::plan as executed;
 use ::verify::task::{read_pddl, same_task};
 
+use crate::file::create_directory;
 use crate::message::Message;
 use crate::mission::Mission;
 
@@ -120,11 +121,10 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
     if files.iter().map(|(_, text)| text.len() as u64).sum::<u64>() > TEXT_LIMIT {
         return Err(wrong(&format_args!("its files have more than {TEXT_LIMIT} bytes")));
     }
-    let parent = directory.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let failed = |error: std::io::Error| {
         Message::at("M109", &name, None, format!("the directory cannot be written: {}", error.kind()))
     };
-    let whole = tempfile::tempdir_in(parent).map_err(failed)?;
+    let whole = create_directory(directory).map_err(failed)?;
     let metric = contents.metric().map_err(|reason| wrong(&reason))?;
     // What `verify` would refuse is not written.
     check(text(&files, TASK), text(&files, ARGUMENT), metric.as_ref()).map_err(|fault| wrong(&fault))?;
@@ -144,8 +144,7 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
     let mut text = serde_json::to_string_pretty(&manifest).map_err(|error| wrong(&error))?;
     text.push('\n');
     fs::write(whole.path().join("manifest.json"), text).map_err(failed)?;
-    // Only an empty directory is replaced.
-    fs::rename(whole.path(), directory).map_err(failed)
+    whole.commit().map_err(failed)
 }
 
 /// Makes the witness, and compares the task with the files as `verify` will: what cannot be compared gets no certificate.

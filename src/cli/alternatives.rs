@@ -8,14 +8,14 @@ use metaplan::planner::Planned;
 use crate::cli::plan_text::steps_text;
 
 /// The further plans as tables, and for each step of the first one which of its choices are forced.
-pub(super) fn text(found: Option<&Alternatives>, planned: &Planned<'_>) -> String {
+pub(super) fn text(found: Option<&Alternatives>, planned: &Planned<'_>, columns: Option<u16>) -> String {
     let Some(found) = found else {
         return "\nothers that are as good were not looked for: it is not proved that none is better\n"
             .to_owned();
     };
     let mut text = String::new();
     for (plan, number) in found.plans.iter().zip(1..) {
-        let _ = write!(text, "\nalternative {number}\n{}", steps_text(plan));
+        let _ = write!(text, "\nalternative {number}\n{}", steps_text(plan, columns));
     }
     text += match (found.plans.is_empty(), found.complete) {
         (true, true) => "\nthe plan is the only one that is as good, proved\n",

@@ -37,9 +37,8 @@ pub fn run(arguments: &Arguments, mut command: Command) -> Exit {
 /// Writes all pages.
 pub fn man(arguments: &ManArguments, command: Command) -> Result<Exit, Failure> {
     let directory = &arguments.output;
-    let written =
-        std::fs::create_dir_all(directory).and_then(|()| clap_mangen::generate_to(command, directory));
-    written.map_err(|error| {
+    output::make_directory(directory)?;
+    clap_mangen::generate_to(command, directory).map_err(|error| {
         let text = format!("the pages cannot be written: {}", error.kind());
         Message::at("M109", &directory.display().to_string(), None, text)
     })?;

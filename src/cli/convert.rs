@@ -59,7 +59,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
             .map_err(|errors| errors.iter().map(Message::from_ontology).collect::<Vec<_>>())?;
     let warnings: Vec<_> = warnings.iter().map(Message::from_ontology_warning).collect();
     output::warnings(common, &warnings);
-    match &arguments.output {
+    match output::file_named(arguments.output.as_ref()) {
         Some(file) => output::write_file(file, &text)?,
         None => output::document(&text),
     }

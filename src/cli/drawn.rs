@@ -4,9 +4,7 @@ use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use console::Term;
 use encodings::Solution;
-use metaplan::message::Message;
 use metaplan::mission::Mission;
 use metaplan::picture::Sheet;
 use metaplan::report::timeline_picture;
@@ -71,10 +69,7 @@ impl Pages {
 
 /// Writes pictures into a directory.
 pub(super) fn write_pictures(directory: &Path, pictures: &[(String, String)]) -> Result<(), Failure> {
-    std::fs::create_dir_all(directory).map_err(|error| {
-        let text = format!("the directory cannot be made: {}", error.kind());
-        Message::at("M109", &directory.display().to_string(), None, text)
-    })?;
+    output::make_directory(directory)?;
     pictures.iter().try_for_each(|(name, text)| output::write_file(&directory.join(name), &visible(text)))
 }
 
@@ -110,7 +105,7 @@ impl Drawing {
         if let Some(file) = &self.svg {
             output::write_file(file, &visible(&plan.svg()))?;
         }
-        let columns = Term::stdout().size_checked().map_or(COLUMNS, |(_, columns)| columns);
+        let columns = output::columns().unwrap_or(COLUMNS);
         let text = is_wanted.then(|| plan.text(usize::from(columns))).flatten();
         Ok(text.map(|text| text + "\n").unwrap_or_default())
     }

@@ -9,14 +9,16 @@ pub(super) const PLAN: &str = "\
 Examples:
   metaplan plan missions/ugv.toml
   metaplan plan missions/ugv.toml --fail c_kinect --set robot_at=wp2
-  metaplan plan missions/uuv.toml --scenario murky_water --time-limit 60 --certificate proof
-  metaplan plan missions/ugv.toml --plan-format ipc -o ugv.plan
-  metaplan plan encodings/ugv/domain.pddl encodings/ugv/problem.pddl --kb ontology/kb/ugv.ttl";
+  metaplan plan missions/uuv.toml --scenario murky_water --certificate proof
+  metaplan plan missions/ugv.toml -o ugv.plan
+  metaplan plan encodings/ugv/domain.pddl encodings/ugv/problem.pddl \\
+    --kb ontology/kb/ugv.ttl";
 
 pub(super) const LINT: &str = "\
 Examples:
   metaplan lint missions/ugv.toml
-  metaplan lint encodings/ugv/domain.pddl encodings/ugv/problem.pddl --kb ontology/kb/ugv.ttl";
+  metaplan lint encodings/ugv/domain.pddl encodings/ugv/problem.pddl \\
+    --kb ontology/kb/ugv.ttl";
 
 pub(super) const REASON: &str = "\
 Examples:
@@ -29,7 +31,8 @@ Examples:
 
 pub(super) const COMPARE: &str = "\
 Examples:
-  metaplan compare missions/camara_like.toml --battery-unit 1000 --report compared.html";
+  metaplan compare missions/camara_like.toml --battery-unit 1000 \\
+    --report compared.html";
 
 pub(super) const CONFIGURE: &str = "\
 Examples:
@@ -43,12 +46,13 @@ Examples:
 
 pub(super) const EXPORT: &str = "\
 Examples:
-  metaplan export missions/ugv.toml --to pddl --fail c_kinect -o ugv-without-kinect";
+  metaplan export missions/ugv.toml --to pddl --fail c_kinect -o without-kinect";
 
 pub(super) const REPORT: &str = "\
 Examples:
   metaplan report missions/ugv.toml -o ugv.html
-  metaplan report missions/ugv.toml --scenario kinect_failure -o failure.html --svg pictures";
+  metaplan report missions/ugv.toml --scenario kinect_failure \\
+    -o failure.html --svg pictures";
 
 pub(super) const RUN: &str = "\
 Examples:
@@ -69,7 +73,8 @@ pub(super) const SWEEP: &str = "\
 Examples:
   metaplan sweep missions/studies/kinect.toml --output results
   metaplan sweep missions/studies/kinect.toml --output results --resume
-  metaplan sweep missions/studies/kinect.toml --output results --merge --csv results.csv";
+  metaplan sweep missions/studies/kinect.toml --output results \\
+    --merge --csv results.csv";
 
 pub(super) const VALIDATE: &str = "\
 Examples:

@@ -74,12 +74,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     output::warnings(common, mission.warnings().chain(&warnings));
     let (domain, problem) = portable(&domain, &problem);
     let (domain, problem) = (print_domain(&domain), print_problem(&problem));
-    match &arguments.output {
+    match output::file_named(arguments.output.as_ref()) {
         Some(directory) => {
-            std::fs::create_dir_all(directory).map_err(|error| {
-                let text = format!("the directory cannot be made: {}", error.kind());
-                Message::at("M109", &directory.display().to_string(), None, text)
-            })?;
+            output::make_directory(directory)?;
             output::write_file(&directory.join("domain.pddl"), &domain)?;
             output::write_file(&directory.join("problem.pddl"), &problem)?;
         }
@@ -122,7 +119,7 @@ fn process(
         },
         _ => probabilistic::prism::write(&model),
     };
-    match &arguments.output {
+    match output::file_named(arguments.output.as_ref()) {
         Some(file) => output::write_file(file, &text)?,
         None if common.format == Format::Json => {
             output::json_answer(&ModelExport::new(text));

@@ -111,10 +111,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     };
     let files = import_map(file.name(), file.text(), &options)?;
     output::warnings(common, &files.warnings);
-    std::fs::create_dir_all(&map.output).map_err(|error| {
-        let text = format!("the directory cannot be made: {}", error.kind());
-        Message::at("M109", &map.output.display().to_string(), None, text)
-    })?;
+    output::make_directory(&map.output)?;
     let manifest = format!("{}.toml", map.name);
     let written = [
         (manifest.clone(), &files.manifest),

@@ -122,6 +122,12 @@ enum Subcommands {
     Man(completions::ManArguments),
 }
 
+/// The width of help where it is not known how wide a line may be.
+const HELP_COLUMNS: usize = 80;
+
+/// Longer lines of help are hard to read.
+const MAX_HELP_COLUMNS: usize = 100;
+
 /// Runs the program.
 pub fn main() -> ExitCode {
     let cli = parse();
@@ -160,7 +166,8 @@ fn parse() -> Cli {
     let beside = beside.map(|(_, value)| value.as_str());
     let joined = words.iter().filter_map(|word| word.strip_prefix("--color="));
     let color = beside.chain(joined).last().and_then(|value| ColorChoice::from_str(value, false).ok());
-    let matches = Cli::command().color(color.unwrap_or_default()).get_matches();
+    let columns = output::columns().map_or(HELP_COLUMNS, usize::from).min(MAX_HELP_COLUMNS);
+    let matches = Cli::command().color(color.unwrap_or_default()).term_width(columns).get_matches();
     Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }
 

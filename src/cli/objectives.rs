@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 
 use encodings::{Exact, Front, Status};
-use metaplan::answers::Preparation;
 
 use crate::cli::plan_answer::answer_text;
 use crate::cli::plan_text::steps_text;
@@ -17,13 +16,13 @@ pub(super) fn values_text(objectives: &[String], values: &[Exact]) -> String {
 }
 
 /// A front as tables.
-pub(super) fn front_text(name: &str, objectives: &[String], front: &Front) -> String {
+pub(super) fn front_text(name: &str, objectives: &[String], front: &Front, columns: Option<u16>) -> String {
     let solved: Vec<_> = front.points.iter().filter(|point| point.solution.plan.is_some()).collect();
     let mut text = String::new();
     for (point, number) in solved.iter().zip(1..) {
         let _ = writeln!(text, "point {number}: {}", pairs(objectives, &point.values));
         if let Some(plan) = &point.solution.plan {
-            text += &steps_text(plan);
+            text += &steps_text(plan, columns);
         }
         text.push('\n');
     }
@@ -40,7 +39,7 @@ pub(super) fn front_text(name: &str, objectives: &[String], front: &Front) -> St
                 "{proved} on the front{open}; a limit came before it was proved that there are no others"
             );
         }
-        (_, Some(point)) => text += &answer_text(name, &point.solution, false, &Preparation::default()),
+        (_, Some(point)) => text += &answer_text(name, &point.solution, columns),
         (_, None) => {}
     }
     text

@@ -2,11 +2,12 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::io::{ErrorKind, Write as _};
-use std::path::Path;
+use std::io::{ErrorKind, IsTerminal as _, Write as _};
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use comfy_table::{ContentArrangement, Table, TableStyle};
+use comfy_table::{ColumnConstraint, ContentArrangement, Table, TableStyle, Width};
+use console::{Term, measure_text_width};
 use metaplan::answers::ErrorAnswer;
 use metaplan::file;
 use metaplan::message::Message;
@@ -113,7 +114,7 @@ pub fn failure(common: &Common, messages: &[Message]) {
     }
 }
 
-/// Writes a file so that it is either whole or untouched.
+/// Writes a file so that it is either whole or untouched, see [`file::write`].
 pub fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
     {
         let _stdout = std::io::stdout().lock();
@@ -122,19 +123,93 @@ pub fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
     file::write(path, text).map_err(Failure::from)
 }
 
-/// A table without borders.
+/// The file that `--output` names; none for standard output, which is `-`, too.
+pub fn file_named(output: Option<&PathBuf>) -> Option<&Path> {
+    output.map(PathBuf::as_path).filter(|path| !file::is_stdout(path))
+}
+
+/// Makes a directory for several files, with those above it.
+pub fn make_directory(path: &Path) -> Result<(), Failure> {
+    require_directory(path)?;
+    std::fs::create_dir_all(path).map_err(|error| {
+        let text = format!("the directory cannot be made: {}", error.kind());
+        Message::at("M109", &path.display().to_string(), None, text).into()
+    })
+}
+
+/// Refuses standard output in the place of a directory.
+pub fn require_directory(path: &Path) -> Result<(), Failure> {
+    if path.as_os_str() != "-" {
+        return Ok(());
+    }
+    let text =
+        "`-` is standard output, and several files are written; name a directory (`./-` if it is called so)";
+    Err(Failure::usage(Message::error("M107", text)))
+}
+
+/// The number of columns that answers may take: `COLUMNS`, or the width of the terminal; none where the answer goes elsewhere.
+pub fn columns() -> Option<u16> {
+    let wanted = std::env::var("COLUMNS").ok().and_then(|columns| columns.trim().parse().ok());
+    let of_terminal = || {
+        let size = std::io::stdout().is_terminal().then(|| Term::stdout().size_checked()).flatten();
+        size.map(|(_, columns)| columns)
+    };
+    wanted.or_else(of_terminal).filter(|columns| *columns > 0)
+}
+
+/// A table without borders, for standard output: cells are wrapped where it is too wide.
 pub fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
+    table_within(columns(), header, rows)
+}
+
+/// A table without borders, at most this many columns wide.
+pub fn table_within(
+    columns: Option<u16>,
+    header: &[&str],
+    rows: impl IntoIterator<Item = Vec<String>>,
+) -> String {
     let mut table = Table::new();
-    table
-        .load_style(TableStyle::new())
-        .set_content_arrangement(ContentArrangement::Disabled)
-        .set_header(header);
+    table.load_style(TableStyle::new()).set_header(header);
     table.add_rows(rows);
+    match columns {
+        Some(columns) => {
+            table.set_content_arrangement(ContentArrangement::Dynamic).set_width(columns);
+            keep_words(&mut table, columns);
+        }
+        None => {
+            table.set_content_arrangement(ContentArrangement::Disabled);
+        }
+    }
     table.lines().fold(String::new(), |text, line| {
         text + line.trim_end()
             + "
 "
     })
+}
+
+/// Breaks cells between words only, if there are columns enough for the longest words.
+fn keep_words(table: &mut Table, columns: u16) {
+    let mut longest = vec![0; table.column_count()];
+    for row in table.header().into_iter().chain(table.row_iter()) {
+        for (cell, longest) in row.cell_iter().zip(&mut longest) {
+            let content = cell.content();
+            let words = content.split_whitespace().map(measure_text_width);
+            *longest = words.max().unwrap_or(0).max(*longest);
+        }
+    }
+    let widths: Vec<u16> = table
+        .column_iter()
+        .zip(longest)
+        .map(|(column, longest)| {
+            u16::try_from(longest).unwrap_or(u16::MAX).saturating_add(column.padding_width())
+        })
+        .collect();
+    if widths.iter().copied().fold(0, u16::saturating_add) > columns {
+        return;
+    }
+    for (column, width) in table.column_iter_mut().zip(widths) {
+        column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(width)));
+    }
 }
 
 /// An exact number as decimal text; a fraction that is not a decimal is rounded.

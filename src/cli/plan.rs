@@ -1,11 +1,11 @@
 //! `metaplan plan`.
 
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
-use encodings::{Backend, Config, Limits, Plan, Semantics, Status};
+use encodings::{Backend, Config, Limits, Plan, Semantics, Solution, Status};
 use metaplan::message::Message;
 use metaplan::mission::{Mission, btcpp_text, plan_lines, popf_text};
 use metaplan::planner::{Planned, PlannedFront, Planner};
@@ -19,7 +19,7 @@ use crate::cli::drawn::Drawing;
 use crate::cli::limits::Guard;
 use crate::cli::objectives;
 use crate::cli::output;
-use crate::cli::plan_answer::answer_text;
+use crate::cli::plan_answer::{answer_text, statistics_text};
 use crate::cli::plan_text::PlanFormat;
 use crate::cli::progress::Progress;
 use crate::cli::situation::Situation;
@@ -75,7 +75,7 @@ pub struct Arguments {
     alternatives: Option<usize>,
     #[command(flatten)]
     overlap: Overlap,
-    /// Only the plan, in a format that other tools read.
+    /// How the plan is written: by default `table` on standard output, and `ipc` in a file.
     #[arg(long, value_enum)]
     plan_format: Option<PlanFormat>,
     #[command(flatten)]
@@ -83,7 +83,8 @@ pub struct Arguments {
     /// Write the front as a page to look at, too, whose points unfold to plans.
     #[arg(long, value_name = "FILE", requires = "pareto")]
     report: Option<PathBuf>,
-    /// Write the answer to a file.
+    /// Write the plan to a file: steps that `metaplan validate` and other tools read. With `--format json`, `--pareto` or
+    /// `--alternatives` the file has the whole answer. `-` is standard output.
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
 }
@@ -179,9 +180,30 @@ impl Arguments {
         Ok(())
     }
 
+    /// The file for the answer; none for standard output.
+    fn file(&self) -> Option<&Path> {
+        output::file_named(self.output.as_ref())
+    }
+
+    /// How the plan is written.
+    fn form(&self, common: &Common) -> PlanFormat {
+        match (self.plan_format, common.format) {
+            (Some(format), _) => format,
+            (None, Format::Json) => PlanFormat::Json,
+            // No format of plans has several of them.
+            (None, _) if self.file().is_some() && self.alternatives.is_none() => PlanFormat::Ipc,
+            (None, _) => PlanFormat::Table,
+        }
+    }
+
+    /// The number of columns for tables; a file has no width.
+    fn columns(&self) -> Option<u16> {
+        if self.file().is_some() { None } else { output::columns() }
+    }
+
     /// Whether people read the answer where it is.
     fn is_text(&self, common: &Common) -> bool {
-        self.plan_format.is_none() && self.output.is_none() && common.format == Format::Text
+        self.plan_format.is_none() && self.file().is_none() && common.format == Format::Text
     }
 }
 
@@ -190,6 +212,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let started = Instant::now();
     let guard = Guard::new(arguments.time_limit, arguments.memory_limit, common)?;
     arguments.check()?;
+    arguments.certificate.as_deref().map_or(Ok(()), output::require_directory)?;
 
     let setup = arguments.situation.setup(&arguments.inputs, common)?;
     let is_drawn = arguments.report.is_some() || arguments.drawing.is_file_wanted();
@@ -266,16 +289,41 @@ fn finish(
 ) -> Result<(), Failure> {
     let is_text = arguments.is_text(common);
     let drawn = arguments.drawing.draw(mission, &planned.solution, is_text)?;
-    match (show(planned, mission, (arguments, common)), &arguments.output) {
+    match (show(planned, mission, (arguments, common)), arguments.file()) {
         (Some(text), Some(file)) => {
             output::write_file(file, &text)?;
-            output::note(&format!("{}\n", planned.solution.verdict()));
+            output::note(&beside(planned, arguments, common));
         }
         (Some(text), None) => output::answer(&(drawn + &text)),
         // There is nothing to write, and readers of plans would stumble over anything else.
-        (None, _) => output::note(&format!("{}\n", planned.solution.verdict())),
+        (None, _) => output::note(&beside(planned, arguments, common)),
     }
     Ok(())
+}
+
+/// What there is to report beside a file: the verdict, and what the file has no place for.
+fn beside(planned: &Planned<'_>, arguments: &Arguments, common: &Common) -> String {
+    let verdict = format!("{}\n", planned.solution.verdict());
+    match arguments.form(common) {
+        PlanFormat::Json | PlanFormat::Table => verdict,
+        PlanFormat::Ipc | PlanFormat::Plansys2 | PlanFormat::Btcpp => {
+            verdict + &further(planned, &planned.solution, (arguments, common))
+        }
+    }
+}
+
+/// What people read below the verdict.
+fn further(planned: &Planned<'_>, solution: &Solution, (arguments, common): (&Arguments, &Common)) -> String {
+    let statistics =
+        common.verbose.then(|| statistics_text(solution, &planned.preparation)).unwrap_or_default();
+    let overlaps = solution.plan.as_ref().filter(|_| planned.overlaps());
+    let makespan = overlaps.map_or_else(String::new, |plan| format!("makespan {}\n", plan.makespan()));
+    let columns = arguments.columns();
+    let others = arguments.alternatives.and(solution.plan.as_ref());
+    let others = others.map(|_| alternatives::text(planned.alternatives.as_ref(), planned, columns));
+    let blocking = planned.blocking.as_ref().map(|blocking| format!("{blocking}\n"));
+    let values = objectives::values_text(planned.objectives(), &planned.values);
+    statistics + &values + &makespan + &others.or(blocking).unwrap_or_default()
 }
 
 /// The answer in the form that the user asks for; none if that is a plan, and there is none.
@@ -284,25 +332,18 @@ fn show(
     mission: &Mission,
     (arguments, common): (&Arguments, &Common),
 ) -> Option<String> {
-    match (arguments.plan_format, common.format) {
-        (Some(PlanFormat::Json), _) | (None, Format::Json) => Some(output::pretty(&planned.answer())),
-        (None, _) => {
+    match arguments.form(common) {
+        PlanFormat::Json => Some(output::pretty(&planned.answer())),
+        PlanFormat::Table => {
             let mut solution = planned.solution.clone();
             solution.plan = planned.written();
-            let plan = answer_text(&mission.name, &solution, common.verbose, &planned.preparation);
-            let others = arguments.alternatives.and(solution.plan.as_ref());
-            let others = others.map(|_| alternatives::text(planned.alternatives.as_ref(), planned));
-            let blocking = planned.blocking.as_ref().map(|blocking| format!("{blocking}\n"));
-            let overlaps = solution.plan.as_ref().filter(|_| planned.overlaps());
-            let makespan =
-                overlaps.map_or_else(String::new, |plan| format!("makespan {}\n", plan.makespan()));
-            let values = objectives::values_text(planned.objectives(), &planned.values);
-            Some(plan + &values + &makespan + &others.or(blocking).unwrap_or_default())
+            let text = answer_text(&mission.name, &solution, arguments.columns());
+            Some(text + &further(planned, &solution, (arguments, common)))
         }
-        (Some(PlanFormat::Btcpp), _) => planned.written().map(|plan| btcpp_text(mission, &plan)),
-        (Some(PlanFormat::Plansys2), _) => planned.spaced().map(|plan| popf_text(&plan_lines(&plan))),
+        PlanFormat::Btcpp => planned.written().map(|plan| btcpp_text(mission, &plan)),
+        PlanFormat::Plansys2 => planned.spaced().map(|plan| popf_text(&plan_lines(&plan))),
         // What `validate` executes has the designs, what the user's own domain has no place for them has not.
-        (Some(PlanFormat::Ipc), _) => planned.solution.plan.as_ref().map(Plan::to_string),
+        PlanFormat::Ipc => planned.solution.plan.as_ref().map(Plan::to_string),
     }
 }
 
@@ -322,9 +363,9 @@ fn show_front(
     }
     let text = match common.format {
         Format::Json => output::pretty(&front.answer()),
-        _ => objectives::front_text(name, front.objectives(), &front.written()),
+        _ => objectives::front_text(name, front.objectives(), &front.written(), arguments.columns()),
     };
-    match &arguments.output {
+    match arguments.file() {
         Some(file) => output::write_file(file, &text)?,
         None => output::answer(&text),
     }

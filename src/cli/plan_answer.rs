@@ -8,18 +8,13 @@ use metaplan::answers::{Preparation, milliseconds};
 use crate::cli::output::counted;
 use crate::cli::plan_text::steps_text;
 
-pub(super) fn answer_text(
-    name: &str,
-    solution: &Solution,
-    verbose: bool,
-    preparation: &Preparation,
-) -> String {
+pub(super) fn answer_text(name: &str, solution: &Solution, columns: Option<u16>) -> String {
     let mut text = String::new();
     if let Some(plan) = &solution.plan {
         if plan.steps.is_empty() {
             text += "nothing has to be done: the goal holds already\n";
         }
-        text += &steps_text(plan);
+        text += &steps_text(plan, columns);
         let _ = write!(
             text,
             "\n{}cost {}",
@@ -33,13 +28,11 @@ pub(super) fn answer_text(
     }
     text += &solution.verdict();
     text.push('\n');
-    if verbose {
-        text += &statistics_text(solution, preparation);
-    }
     text
 }
 
-fn statistics_text(solution: &Solution, preparation: &Preparation) -> String {
+/// How an answer was found, for `--verbose`.
+pub(super) fn statistics_text(solution: &Solution, preparation: &Preparation) -> String {
     let statistics = &solution.statistics;
     let families: Vec<_> =
         statistics.families.iter().map(|(family, count)| format!("{family} {count}")).collect();

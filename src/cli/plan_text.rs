@@ -16,10 +16,12 @@ pub(super) enum PlanFormat {
     Btcpp,
     /// As `--format json`.
     Json,
+    /// A table for people, with the cost and what is proved; `validate` does not read it.
+    Table,
 }
 
-/// The steps as a table.
-pub(super) fn steps_text(plan: &Plan) -> String {
+/// The steps as a table, at most this many columns wide.
+pub(super) fn steps_text(plan: &Plan, columns: Option<u16>) -> String {
     let rows = plan.steps.iter().enumerate().map(|(index, step)| {
         let configuration: Vec<_> =
             step.configuration.iter().map(|(f, design)| format!("{f} = {design}")).collect();
@@ -34,7 +36,7 @@ pub(super) fn steps_text(plan: &Plan) -> String {
         ]
     });
     let rows: Vec<_> = rows.collect();
-    output::table(&["step", "start", "duration", "action", "configuration", "cost"], rows)
+    output::table_within(columns, &["step", "start", "duration", "action", "configuration", "cost"], rows)
 }
 
 /// The arguments of a step apart from functions and their designs.

@@ -63,6 +63,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         return Err(Failure::usage(Message::error("M107", text)));
     }
     let guard = Guard::new(arguments.time_limit, arguments.memory_limit, common)?;
+    arguments.svg.as_deref().map_or(Ok(()), output::require_directory)?;
     if let Some(directory) = &arguments.journal {
         return during("reading", common, || JournalReport::read(directory))
             .map_err(Failure::from)
@@ -110,7 +111,7 @@ fn journal(arguments: &Arguments, directory: &Path, report: &JournalReport) -> R
 /// Writes a page where it is wanted, with nothing that is not seen; what is to be said of it goes beside a file.
 fn write(arguments: &Arguments, page: &str, said: &str) -> Result<(), Failure> {
     let page = &*visible(page);
-    match &arguments.output {
+    match output::file_named(arguments.output.as_ref()) {
         Some(file) => {
             output::write_file(file, page)?;
             output::note(said);

@@ -91,13 +91,12 @@ impl Lines {
 
 fn next_text(reader: &mut Box<dyn BufRead>) -> io::Result<Option<Line>> {
     loop {
-        match read_line(reader)? {
-            Some(bytes) if bytes.trim_ascii().is_empty() => {}
-            Some(bytes) => {
-                let text = String::from_utf8_lossy(bytes.trim_ascii()).into_owned();
-                return Ok(Some(Line { text, now: None }));
-            }
-            None => return Ok(None),
+        let Some(bytes) = read_line(reader)? else { return Ok(None) };
+        let text = String::from_utf8_lossy(&bytes);
+        // A byte order mark stands before the first line, and before others where files were joined.
+        let text = text.trim_start_matches('\u{feff}').trim_ascii();
+        if !text.is_empty() {
+            return Ok(Some(Line { text: text.to_owned(), now: None }));
         }
     }
 }

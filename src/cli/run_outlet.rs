@@ -159,6 +159,10 @@ fn record(path: &Path, events: Recorded, mission: &str) -> Result<(Recorder, Str
         Recorded::String => Form::Text,
     };
     let name = path.display().to_string();
+    if metaplan::file::is_stdout(path) {
+        let text = "standard output has the answers; name a file for the recording";
+        return Err(Message::at("M331", &name, None, text));
+    }
     let recorder = Recorder::create(path, mission, form).map_err(|error| {
         let text = if error.kind() == io::ErrorKind::AlreadyExists {
             "is there already, and no recording is overwritten: name another file, or remove it".to_owned()

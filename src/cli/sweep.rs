@@ -38,6 +38,7 @@ pub struct Arguments {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+    output::require_directory(&arguments.output)?;
     let study = Study::read(&arguments.study)?;
     if arguments.merge { merge(arguments, &study, common) } else { sweep(arguments, &study, common) }
 }

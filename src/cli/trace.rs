@@ -2,16 +2,15 @@
 
 use std::path::{Path, PathBuf};
 
-use metaplan::file::temporary;
+use metaplan::file::{Pending, create};
 use metaplan::message::Message;
-use tempfile::TempPath;
 use tracing_chrome::{ChromeLayerBuilder, FlushGuard};
 use tracing_subscriber::layer::SubscriberExt as _;
 
-/// A trace under way. The file has its name only once it is whole.
+/// A trace under way.
 pub(super) struct Trace {
     flush: FlushGuard,
-    written: TempPath,
+    pending: Pending,
     file: PathBuf,
 }
 
@@ -21,22 +20,21 @@ impl Trace {
     /// # Errors
     /// The file cannot be made.
     pub(super) fn begin(file: &Path) -> Result<Self, Message> {
-        let made = temporary(file).map_err(|error| unwritten(file, &error))?;
-        let (writer, written) = made.into_parts();
+        let (writer, pending) = create(file).map_err(|error| unwritten(file, &error))?;
         let (layer, flush) = ChromeLayerBuilder::new().writer(writer).include_args(true).build();
         let subscriber = tracing_subscriber::registry().with(layer);
         tracing::subscriber::set_global_default(subscriber)
             .map_err(|error| unwritten(file, &std::io::Error::other(error)))?;
-        Ok(Self { flush, written, file: file.to_owned() })
+        Ok(Self { flush, pending, file: file.to_owned() })
     }
 
-    /// Gives the file its name.
+    /// Completes the file.
     ///
     /// # Errors
     /// It cannot be written.
     pub(super) fn end(self) -> Result<(), Message> {
         drop(self.flush);
-        self.written.persist(&self.file).map_err(|error| unwritten(&self.file, &error.error))
+        self.pending.commit().map_err(|error| unwritten(&self.file, &error))
     }
 }
 

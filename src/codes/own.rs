@@ -183,6 +183,12 @@ pub const CODES: &[[&str; 4]] = &[
         "Correct the line.",
     ],
     [
+        "M142",
+        "A budget is negative.",
+        "A budget is the most that the estimations of all chosen designs may add up to.",
+        "Give a number that is 0 or larger.",
+    ],
+    [
         "M150",
         "A study is wrong.",
         "A key of its file has a value that cannot be varied, a placeholder stands for nothing, or there are too many runs.",

@@ -4,12 +4,14 @@ use std::collections::BTreeSet;
 
 use encodings::Limits;
 use num_rational::BigRational;
+use num_traits::Signed as _;
 use ontology::runtime::{NewObjective, Objective};
 use rules::Literal;
 
 use crate::configure::choice::{Choice, Configuration, Wishes, Worth, choose};
 use crate::knowledge::Knowledge;
 use crate::message::{Errors, Message, did_you_mean};
+use crate::number::decimal;
 
 /// What follows from what was heard is to be found in so many steps; see [`rules::Limits`].
 const STEPS: u64 = 100_000_000;
@@ -48,7 +50,7 @@ impl Configurator {
     /// Takes over a knowledge base.
     ///
     /// # Errors
-    /// All attribute types and components of the wishes that are not in the knowledge base.
+    /// All attribute types and components of the wishes that are not in the knowledge base, and negative budgets.
     pub fn new(mut knowledge: Knowledge, wishes: Wishes) -> Result<Self, Errors> {
         knowledge.limit(STEPS);
         let view = knowledge.view();
@@ -68,6 +70,10 @@ impl Configurator {
         }
         wishes.budgets.iter().for_each(|(name, _)| check("quality attribute type", name, &attributes));
         wishes.exclusive.iter().for_each(|name| check("component", name, &components));
+        for (name, most) in wishes.budgets.iter().filter(|(_, most)| most.is_negative()) {
+            let text = format!("the budget of `{name}` is {}, but should not be negative", decimal(most));
+            wrong.push(Message::error("M142", text));
+        }
         if wrong.is_empty() {
             Ok(Self { knowledge, wishes, pending: BTreeSet::new() })
         } else {

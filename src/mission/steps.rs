@@ -14,12 +14,25 @@ use crate::message::{Errors, Message};
 /// The steps of a plan: as text with a step on each line, or a `metaplan-plan/1` document.
 ///
 /// # Errors
-/// All lines that are not steps; M111, what is wrong with the document.
+/// All lines that are not steps; M111, what is wrong with the document, or that it is a table.
 pub fn read_plan(source: &Source, mission: &Mission) -> Result<PlanText, Errors> {
     if source.text().trim_start().starts_with('{') {
         return json_plan(source, mission);
     }
+    if let Some(line) = table_heading(source.text()) {
+        let text = "this is a table for people; write the plan with `metaplan plan … -o FILE`, or with `--plan-format ipc`";
+        return Err(Message::at("M111", source.name(), Some((line, 1)), text)
+            .with_source(source.text())
+            .into());
+    }
     PlanText::parse(source).map_err(|diagnostics| Message::from_pddl(&diagnostics, &[source]).into())
+}
+
+/// The line, from 1, where the table of `metaplan plan` begins, if the text has one.
+fn table_heading(text: &str) -> Option<usize> {
+    let heading = ["step", "start", "duration", "action"];
+    let is_heading = |line: &str| line.split_whitespace().take(heading.len()).eq(heading);
+    text.lines().position(is_heading).map(|index| index + 1)
 }
 
 /// The steps of a `metaplan-plan/1` document. Where the knowledge base has given an action of a plain domain its designs, they stand in the

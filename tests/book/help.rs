@@ -39,7 +39,9 @@ fn help(command: &[&str]) -> String {
 fn subcommands(help: &str) -> Vec<(String, String)> {
     let Some((_, rest)) = help.split_once("\nCommands:\n") else { return Vec::new() };
     let lines = rest.lines().take_while(|line| !line.is_empty());
-    let named = lines.filter_map(|line| line.trim().split_once("  "));
+    // What a command does may take several lines, the further ones farther in.
+    let lines = lines.filter_map(|line| line.strip_prefix("  ").filter(|line| !line.starts_with(' ')));
+    let named = lines.filter_map(|line| line.split_once("  "));
     let named = named.map(|(name, about)| (name.to_owned(), about.trim().to_owned()));
     named.filter(|(name, _)| name != "help").collect()
 }
@@ -63,10 +65,11 @@ fn is_common(head: &str) -> bool {
     COMMON.iter().any(|common| head == *common || head.starts_with(&format!("{common} ")))
 }
 
-/// The arguments and options of a help: each begins less than ten columns from the left, and its text follows farther in.
+/// The arguments and options of a help: each begins less than ten columns from the left, and its text follows farther in. Paragraphs
+/// are wrapped; an empty line, or a value of an enumeration, begins another one.
 fn entries(help: &str) -> Vec<Entry> {
     let mut found: Vec<Entry> = Vec::new();
-    let mut is_list = false;
+    let (mut is_list, mut begins) = (false, true);
     for line in help.lines() {
         let indent = line.len() - line.trim_start().len();
         let content = line.trim();
@@ -74,8 +77,12 @@ fn entries(help: &str) -> Vec<Entry> {
             is_list = matches!(content, "Arguments:" | "Options:");
         } else if is_list && (1..10).contains(&indent) && content.starts_with(['-', '<', '[']) {
             found.push(Entry { head: content.replace('|', "\\|"), text: String::new() });
-        } else if let Some(entry) = found.last_mut().filter(|_| is_list && !content.is_empty()) {
+            begins = true;
+        } else if content.is_empty() {
+            begins = true;
+        } else if let Some(entry) = found.last_mut().filter(|_| is_list) {
             let content = content.replace('|', "\\|");
+            let begins = std::mem::take(&mut begins);
             match content.strip_prefix("- ").and_then(|value| value.split_once(':')) {
                 Some((value, text)) => {
                     let separator = if entry.text.ends_with(':') { ' ' } else { ';' };
@@ -83,6 +90,9 @@ fn entries(help: &str) -> Vec<Entry> {
                     let _ = write!(entry.text, "{separator}{space}`{value}`: {}", text.trim());
                 }
                 None if content == "Possible values:" => entry.text.push_str(". Values:"),
+                None if !begins => {
+                    let _ = write!(entry.text, " {content}");
+                }
                 None if content.starts_with('[') => {
                     let _ = write!(entry.text, " {content}");
                 }

@@ -53,6 +53,8 @@ fn all_wrong_names_are_told() {
     for (further, part) in [
         (&["--budget", "safety"][..], "NAME=VALUE"),
         (&["--budget", "safety=many"], "decimal number"),
+        (&["--budget", "safety=-1"], "the budget of `safety` is -1, but should not be negative"),
+        (&["--budget", "safety=-0.001", "--budget", "safety=3"], "M142"),
         (&["--require", "safety=1"], "FUNCTION.ATTRIBUTE=BOUND"),
         (&["--most", "safety", "--least", "safety"], "cannot be used with"),
         (&["--set", "safety=x"], "not a decimal number"),

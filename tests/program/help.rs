@@ -15,11 +15,14 @@ fn every_example_works() {
     let all = metaplan(&["help"]).stdout;
     let (_, commands) = all.split_once("\nCommands:\n").expect("commands");
     let names = commands.lines().take_while(|line| !line.is_empty());
+    // What a command does may take several lines.
+    let names = names.filter_map(|line| line.strip_prefix("  ").filter(|line| !line.starts_with(' ')));
     let names = names.filter_map(|line| line.split_whitespace().next()).filter(|name| *name != "help");
     let mut count = 0;
     for name in names {
         let help = metaplan(&["help", name]).stdout;
         let Some((_, examples)) = help.split_once("\nExamples:\n") else { continue };
+        let examples = examples.replace(" \\\n   ", "");
         for line in examples.lines().map(str::trim).filter(|line| !line.is_empty()) {
             let line = line.replace("--serve", "--serve=0");
             let words: Vec<&str> = line.split(' ').skip(1).collect();

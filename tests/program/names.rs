@@ -86,10 +86,7 @@ fn a_mission_with_mapped_names_is_the_same_mission() {
         (&["explain", MANIFEST, "fd_search_high", "--set", "water_visibility=1.5"], ""),
         (&["explain", MANIFEST, "fd_speed_high"], ""),
         (&["run", MANIFEST], &lines),
-        (
-            &["simulate", MANIFEST, "--scenario", "suave", "--runs", "2", "--csv", "/dev/stdout", "--quiet"],
-            "",
-        ),
+        (&["simulate", MANIFEST, "--scenario", "suave", "--runs", "2", "--csv", "-", "--quiet"], ""),
     ] {
         assert_eq!(said(one.path(), arguments, input), said(other.path(), arguments, input), "{arguments:?}");
     }

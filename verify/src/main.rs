@@ -19,7 +19,7 @@ const FAULT: u8 = 70;
 
 /// Checks a certificate of an optimal plan, or that there is no plan, without trusting the planner.
 #[derive(Debug, Clone, Parser)]
-#[command(name = "metaplan-verify", version, about)]
+#[command(name = "metaplan-verify", version, about, max_term_width = 100)]
 struct Arguments {
     /// What `metaplan plan --certificate` has written.
     directory: PathBuf,

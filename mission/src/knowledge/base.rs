@@ -411,7 +411,8 @@ impl Knowledge {
     /// # Errors
     /// All that is wrong with the document.
     pub fn assertions(&mut self, file: &Path) -> Result<Vec<Fact>, Errors> {
-        let options = ReadOptions { allow_missing_imports: true, ..ReadOptions::default() };
+        let options =
+            ReadOptions { allow_missing_imports: true, allow_empty: true, ..ReadOptions::default() };
         let ontology = ontology::read_files(&[file], &options)
             .map_err(|errors| errors.iter().map(Message::from_ontology).collect::<Vec<_>>())?;
         Ok(ontology::lower(&ontology, self.runtime.engine_mut().symbols_mut()).facts)

@@ -119,6 +119,7 @@ pub fn rule_text(file: &str) -> Result<String, Message> {
             String::from_utf8(bytes).map_err(|_| std::io::Error::other("it is not UTF-8 text"))
         }),
     };
+    let text = text.map(|text| text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text));
     text.map_err(|error| Message::at("M101", file, None, format!("the file cannot be read: {error}")))
 }
 

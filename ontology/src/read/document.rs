@@ -29,6 +29,19 @@ pub(crate) fn decoded<'a>(bytes: &'a [u8], name: &str) -> Result<Cow<'a, [u8]>, 
     })
 }
 
+/// Refuses a document that is in none of the syntaxes.
+///
+/// # Errors
+/// What it looks like.
+pub(crate) fn require_syntax(text: &[u8], name: &str) -> Result<(), Errors> {
+    match foreign::recognized(text) {
+        Some(what) => {
+            Err(vec![Error::OtherSyntax { position: Position::of_offset(name, text, 0), what }].into())
+        }
+        None => Ok(()),
+    }
+}
+
 /// Parses `text`. Relative IRIs are resolved against `base`; blank nodes get names that start with `prefix`, and all names
 /// numbers of `names`.
 pub(crate) fn parse(
@@ -38,9 +51,6 @@ pub(crate) fn parse(
     prefix: &str,
     names: &mut Names,
 ) -> Result<Document, Errors> {
-    if let Some(what) = foreign::recognized(text) {
-        return Err(vec![Error::OtherSyntax { position: Position::of_offset(name, text, 0), what }].into());
-    }
     let syntax = Syntax::detect(text);
     let mut sink = Sink { names, prefix, blanks: HashMap::default(), triples: Vec::new() };
     match syntax {

@@ -216,6 +216,9 @@ fn load(
         Cow::Borrowed(decoded) if decoded.len() == text.len() => text,
         decoded => decoded.into_owned(),
     };
+    if !options.allow_empty || !text.trim_ascii().is_empty() {
+        document::require_syntax(&text, &name)?;
+    }
     let document = document::parse(&text, &name, &base, &format!("d{index}"), names)?;
     Ok(seen.text(text, path.as_deref()).map(|text| (document, path, text)))
 }

@@ -13,6 +13,8 @@ pub struct ReadOptions {
     pub directories: Vec<PathBuf>,
     /// Whether an import that is found nowhere is a warning instead of an error.
     pub allow_missing_imports: bool,
+    /// Whether a document may be empty, as one with what is added or removed.
+    pub allow_empty: bool,
     /// Whether documents are N-Triples that import nothing, as for those that nobody vouches for: no file is opened but those
     /// that are named, and no text is larger when it has been read.
     pub closed: bool,

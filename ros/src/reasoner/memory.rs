@@ -1,11 +1,12 @@
 //! What a reasoner has to know after a restart: the goals that it pursues, the designs that they have, and what was reported last.
 //!
-//! It is one file, written anew beside the old one and put in its place, so that it is whole whenever the program ends.
+//! It is one file, which is replaced as a whole, whenever the program ends.
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use metaplan::file::create;
 use metaplan::message::Message;
 use serde::{Deserialize, Serialize};
 
@@ -91,11 +92,10 @@ impl MemoryFile {
                 format!("the file cannot be written: {error}"),
             )
         };
-        let directory = self.path.parent().unwrap_or_else(|| Path::new("."));
-        let mut file = tempfile::NamedTempFile::new_in(directory).map_err(failed)?;
+        let (mut file, pending) = create(&self.path).map_err(failed)?;
         let text = serde_json::to_string(&memory).unwrap_or_default();
         file.write_all(text.as_bytes()).map_err(failed)?;
-        file.persist(&self.path).map_err(|error| failed(error.error))?;
+        pending.commit().map_err(failed)?;
         self.last = memory;
         Ok(())
     }

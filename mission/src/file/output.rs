@@ -1,0 +1,287 @@
+//! Output files. A regular file is replaced as a whole, by renaming a temporary file, and keeps its mode and owner. What is not a
+//! regular file (a device, a FIFO, a socket's descriptor) is written through, and a symbolic link is followed: neither is ever replaced.
+//!
+//! A file is overwritten in place where a rename would change more than its content: it has other hard links, its owner cannot be
+//! kept, its directory is not writable, it is a mount point, or it is named by a descriptor (`/dev/fd/3`). Vim's `backupcopy=auto`
+//! draws the same line. If overwriting fails, the former content is restored.
+
+use std::fs::{File, Metadata, OpenOptions};
+use std::io::{self, ErrorKind, Read as _, Seek as _, Write as _};
+use std::path::{Path, PathBuf};
+
+use tempfile::{NamedTempFile, TempDir, TempPath};
+
+use crate::message::Message;
+
+/// The name of standard output.
+const STDOUT: &str = "-";
+
+/// More symbolic links than this in a row are a loop, as for Linux.
+const MAX_LINKS: usize = 40;
+
+/// Writes a text to a file, which is either whole or untouched; `-` is standard output. A reader that has closed its end of a pipe is
+/// not a fault.
+///
+/// # Errors
+/// M109: it cannot be written.
+pub fn write(path: &Path, text: &str) -> Result<(), Message> {
+    let written = create(path).and_then(|(mut file, pending)| {
+        file.write_all(text.as_bytes())?;
+        drop(file);
+        pending.commit()
+    });
+    match written {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            let text = format!("the file cannot be written: {}", error.kind());
+            Err(Message::at("M109", &path.display().to_string(), None, text))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Returns `true` if the path is `-`, or names what standard output is, as `/dev/stdout` does.
+pub fn is_stdout(path: &Path) -> bool {
+    path.as_os_str() == STDOUT || std::fs::metadata(path).is_ok_and(|named| is_same(&named, stdout().ok()))
+}
+
+/// Opens a file for writing. What is written to a regular file is visible once it is committed.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn create(path: &Path) -> io::Result<(File, Pending)> {
+    if is_stdout(path) {
+        // What was printed before comes first.
+        io::stdout().flush()?;
+        return Ok((stdout()?, Pending::written()));
+    }
+    let existing = match std::fs::metadata(path) {
+        Ok(existing) if is_same(&existing, stderr().ok()) => return Ok((stderr()?, Pending::written())),
+        Ok(existing) if !existing.is_file() => {
+            return Ok((OpenOptions::new().write(true).open(path)?, Pending::written()));
+        }
+        Ok(existing) => Some(existing),
+        Err(error) if error.kind() == ErrorKind::NotFound => None,
+        Err(error) => return Err(error),
+    };
+    let (target, is_descriptor) = followed(path)?;
+    let Some(existing) = existing else {
+        return pending(temporary(&target)?, target, None);
+    };
+    // A file that is protected against writing is not replaced either.
+    let mut writable = OpenOptions::new();
+    writable.write(true);
+    let old = writable.clone().read(true).open(path).or_else(|_| writable.open(path))?;
+    let replacement =
+        if is_descriptor || has_other_links(&existing) { None } else { temporary(&target).ok() };
+    match replacement.filter(|file| adopt(file.as_file(), &existing).is_ok()) {
+        Some(replacement) => pending(replacement, target, Some(InPlace { old, is_certain: false })),
+        None => pending(NamedTempFile::new()?, target, Some(InPlace { old, is_certain: true })),
+    }
+}
+
+/// A file that is written, and not yet visible under its name.
+#[derive(Debug)]
+#[must_use = "a regular file has its content once it is committed"]
+pub struct Pending(Option<(TempPath, PathBuf, Option<InPlace>)>);
+
+/// A file to overwrite: in any case, or only where it cannot be replaced.
+#[derive(Debug)]
+struct InPlace {
+    old: File,
+    is_certain: bool,
+}
+
+impl Pending {
+    /// Nothing is left to do.
+    fn written() -> Self {
+        Self(None)
+    }
+
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// It cannot be written. The former content, if there is any, is unchanged then.
+    pub fn commit(self) -> io::Result<()> {
+        let Some((temporary, target, existing)) = self.0 else { return Ok(()) };
+        File::open(&temporary)?.sync_all()?;
+        match existing {
+            Some(InPlace { old, is_certain: true }) => overwrite(old, &temporary),
+            Some(InPlace { old, is_certain: false }) => match temporary.persist(target) {
+                Ok(()) => Ok(()),
+                // A mount point cannot be replaced.
+                Err(refused) => overwrite(old, &refused.path),
+            },
+            None => temporary.persist(target).map_err(|refused| refused.error),
+        }
+    }
+}
+
+fn pending(file: NamedTempFile, target: PathBuf, old: Option<InPlace>) -> io::Result<(File, Pending)> {
+    let (file, temporary) = file.into_parts();
+    Ok((file, Pending(Some((temporary, target, old)))))
+}
+
+/// Overwrites a file with the content of another one. If that fails, the former content is restored.
+fn overwrite(mut file: File, source: &Path) -> io::Result<()> {
+    let mut former = Vec::new();
+    let is_kept = file.read_to_end(&mut former).is_ok();
+    let mut fill = |content: &mut dyn io::Read| {
+        file.rewind()?;
+        let length = io::copy(content, &mut file)?;
+        file.set_len(length)?;
+        file.sync_all()
+    };
+    let written = File::open(source).and_then(|mut source| fill(&mut source));
+    if written.is_err() && is_kept {
+        // The first error is reported.
+        let _ = fill(&mut &former[..]);
+    }
+    written
+}
+
+/// The path behind all symbolic links, whether or not there is something, and whether a link is a descriptor of a process.
+fn followed(path: &Path) -> io::Result<(PathBuf, bool)> {
+    let (mut path, mut is_descriptor) = (path.to_owned(), false);
+    for _ in 0..MAX_LINKS {
+        let Ok(next) = std::fs::read_link(&path) else { return Ok((path, is_descriptor)) };
+        let directory = directory(&path).to_owned();
+        is_descriptor |= directory.canonicalize().is_ok_and(|directory| directory.starts_with("/proc"));
+        path = directory.join(next);
+    }
+    Err(io::Error::other("too many levels of symbolic links"))
+}
+
+fn directory(path: &Path) -> &Path {
+    path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// A file in the directory of another one, with the permissions that the process gives to new files.
+fn temporary(path: &Path) -> io::Result<NamedTempFile> {
+    let mut temporary = tempfile::Builder::new();
+    // Temporary files are for their owner alone; the process's mask applies to these, too.
+    #[cfg(unix)]
+    temporary.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    temporary.tempfile_in(directory(path))
+}
+
+/// A directory that is filled, and not yet visible under its name.
+#[derive(Debug)]
+#[must_use = "the directory has its files once it is committed"]
+pub struct PendingDirectory {
+    files: TempDir,
+    target: PathBuf,
+    /// Whether it is there already, and empty.
+    exists: bool,
+}
+
+/// Begins a directory, which must not be there yet or be empty. One that is there keeps its mode and owner, and may be a mount point.
+///
+/// # Errors
+/// It is there and not empty, or cannot be written.
+pub fn create_directory(path: &Path) -> io::Result<PendingDirectory> {
+    let (target, _) = followed(path)?;
+    let exists = target.is_dir();
+    if exists && std::fs::read_dir(&target)?.next().is_some() {
+        return Err(ErrorKind::DirectoryNotEmpty.into());
+    }
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".metaplan-");
+    // As for files.
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
+    let files = builder.tempdir_in(if exists { &target } else { directory(&target) })?;
+    Ok(PendingDirectory { files, target, exists })
+}
+
+impl PendingDirectory {
+    /// The directory to write the files into.
+    pub fn path(&self) -> &Path {
+        self.files.path()
+    }
+
+    /// Gives the directory its name.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn commit(self) -> io::Result<()> {
+        if !self.exists {
+            std::fs::rename(self.path(), &self.target)?;
+            // The temporary name is gone, so there is nothing to remove.
+            let _ = self.files.keep();
+            return Ok(());
+        }
+        for entry in std::fs::read_dir(self.path())? {
+            let entry = entry?;
+            std::fs::rename(entry.path(), self.target.join(entry.file_name()))?;
+        }
+        self.files.close()
+    }
+}
+
+#[cfg(unix)]
+mod system {
+    use std::os::fd::AsFd as _;
+    use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, fchown};
+
+    use super::{File, Metadata, io};
+
+    pub(super) fn stdout() -> io::Result<File> {
+        io::stdout().as_fd().try_clone_to_owned().map(File::from)
+    }
+
+    pub(super) fn stderr() -> io::Result<File> {
+        io::stderr().as_fd().try_clone_to_owned().map(File::from)
+    }
+
+    /// Returns `true` if the metadata are those of an open file.
+    pub(super) fn is_same(named: &Metadata, open: Option<File>) -> bool {
+        let open = open.and_then(|file| file.metadata().ok());
+        open.is_some_and(|open| (named.dev(), named.ino()) == (open.dev(), open.ino()))
+    }
+
+    pub(super) fn has_other_links(file: &Metadata) -> bool {
+        file.nlink() > 1
+    }
+
+    /// Gives a file the owner, the group and the mode of another one.
+    pub(super) fn adopt(file: &File, other: &Metadata) -> io::Result<()> {
+        let own = file.metadata()?;
+        if (own.uid(), own.gid()) != (other.uid(), other.gid()) {
+            fchown(file, Some(other.uid()), Some(other.gid()))?;
+        }
+        file.set_permissions(std::fs::Permissions::from_mode(other.mode() & 0o7777))
+    }
+}
+
+#[cfg(windows)]
+mod system {
+    use std::os::windows::io::AsHandle as _;
+
+    use super::{File, Metadata, io};
+
+    pub(super) fn stdout() -> io::Result<File> {
+        io::stdout().as_handle().try_clone_to_owned().map(File::from)
+    }
+
+    pub(super) fn stderr() -> io::Result<File> {
+        io::stderr().as_handle().try_clone_to_owned().map(File::from)
+    }
+
+    /// No path names a standard stream.
+    pub(super) fn is_same(_: &Metadata, _: Option<File>) -> bool {
+        false
+    }
+
+    /// The standard library does not count them.
+    pub(super) fn has_other_links(_: &Metadata) -> bool {
+        false
+    }
+
+    /// New files inherit the rights of their directory.
+    #[expect(clippy::unnecessary_wraps, reason = "as on other systems, where it can fail")]
+    pub(super) fn adopt(_: &File, _: &Metadata) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+use system::{adopt, has_other_links, is_same, stderr, stdout};

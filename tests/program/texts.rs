@@ -1,0 +1,217 @@
+//! Letters of other scripts in names, byte order marks, and documents that say nothing.
+
+use std::fs;
+use std::path::Path;
+
+use crate::common::{Outcome, copy_folder, copy_of_mission, edit, headlines, metaplan, metaplan_in, root};
+
+/// Files of text in a folder, with those below it.
+fn texts(folder: &Path) -> Vec<std::path::PathBuf> {
+    let entries = fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
+    entries.flat_map(|path| if path.is_dir() { texts(&path) } else { vec![path] }).collect()
+}
+
+/// A copy of the tutorial's mission in which a name is another one everywhere.
+fn warehouse_with(old: &str, new: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    copy_folder(&root().join("missions/templates/warehouse"), folder.path());
+    let mut count = 0;
+    for file in texts(folder.path()) {
+        let text = fs::read_to_string(&file).expect("a text");
+        count += text.matches(old).count();
+        fs::write(&file, text.replace(old, new)).expect("written");
+    }
+    assert!(count > 0, "{old}");
+    folder
+}
+
+fn ok(folder: &Path, arguments: &[&str]) -> Outcome {
+    let outcome = metaplan_in(folder, arguments, "");
+    assert_eq!(outcome.status, 0, "{arguments:?}: {outcome:#?}");
+    outcome
+}
+
+#[test]
+fn designs_functions_and_components_have_letters_of_any_script() {
+    for (old, new) in [
+        ("fd_lidar", "fd_lidär"),
+        ("fd_lidar", "激光雷达"),
+        // A letter and a mark that is written above it.
+        ("fd_lidar", "fd_lida\u{308}r"),
+        ("f_navigate", "f_überqueren"),
+        ("c_lidar", "c_лидар"),
+    ] {
+        let plain = warehouse_with("name = ", "name = ");
+        let folder = warehouse_with(old, new);
+        let folder = folder.path();
+        let expected = ok(plain.path(), &["plan", "mission.toml"]).stdout.replace(old, new);
+        let shown = ok(folder, &["plan", "mission.toml"]).stdout;
+        let cells = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+        assert_eq!(cells(&shown), cells(&expected), "{new}");
+        for arguments in [
+            &["plan", "mission.toml", "-o", "plan.txt", "--certificate", "proof"][..],
+            &["validate", "mission.toml", "plan.txt"],
+            &["verify", "proof", "--mission", "mission.toml"],
+            &["plan", "mission.toml", "--format", "json", "-o", "plan.json"],
+            &["validate", "mission.toml", "plan.json"],
+            &["plan", "mission.toml", "--plan-format", "plansys2"],
+            &["plan", "mission.toml", "--plan-format", "btcpp"],
+            &["export", "mission.toml", "--to", "pddl", "-o", "exported"],
+            &["plan", "exported/domain.pddl", "exported/problem.pddl", "-o", "other.txt"],
+            &["validate", "exported/domain.pddl", "exported/problem.pddl", "other.txt"],
+            &["validate", "mission.toml", "other.txt"],
+            &["lint", "mission.toml"],
+            &["report", "mission.toml", "-o", "report.html"],
+        ] {
+            ok(folder, arguments);
+        }
+        assert_eq!(
+            ok(folder, &["lint", "mission.toml"]),
+            ok(plain.path(), &["lint", "mission.toml"]),
+            "{new}"
+        );
+        if new.starts_with('c') {
+            ok(folder, &["plan", "mission.toml", "--fail", new]);
+        } else if old.starts_with("fd") {
+            ok(folder, &["explain", "mission.toml", new]);
+        }
+    }
+}
+
+#[test]
+fn a_design_that_cannot_be_named_is_left_out() {
+    let copy = copy_of_mission("ugv");
+    edit(copy.path(), "ontology/kb/ugv.ttl", ":fd_amcl_kinect", ":fd_amcl%28kinect%29");
+    let manifest = ["plan", "missions/ugv.toml"];
+    let outcome = ok(copy.path(), &manifest);
+    assert!(outcome.stdout.contains("cost "), "{outcome:#?}");
+    assert!(outcome.stderr.contains("M201") && outcome.stderr.contains("[bindings.names]"), "{outcome:#?}");
+    let without = metaplan(&["plan", "missions/ugv.toml", "--fail", "c_kinect"]);
+    assert_eq!(without.status, 0);
+}
+
+#[test]
+fn byte_order_marks_are_read_over() {
+    const MARK: &[u8] = b"\xef\xbb\xbf";
+    let folder = tempfile::tempdir().expect("a folder");
+    let within = |name: &str| folder.path().join(name);
+    for part in ["missions", "encodings/ugv", "ontology/kb", "rules/swrl"] {
+        copy_folder(&root().join(part), &within(part));
+    }
+    fs::write(within("model.prism"), "dtmc\nmodule m\ns : [0..1] init 0;\n[] s=0 -> (s'=1);\nendmodule\n")
+        .expect("a model");
+    fs::write(within("props"), "P=? [ F s=1 ];\n").expect("properties");
+    fs::write(within("events.jsonl"), "{\"event\": \"component_failed\", \"component\": \"c_kinect\"}\n")
+        .expect("events");
+    let ugv = "missions/ugv.toml";
+    for arguments in [
+        &["plan", ugv, "-o", "plan.txt"][..],
+        &["plan", ugv, "--format", "json", "-o", "plan.json"],
+        &["convert", "ontology/kb/ugv.ttl", "--to", "ntriples", "-o", "kb.nt"],
+        &["convert", "ontology/kb/ugv.ttl", "--to", "functional", "-o", "kb.ofn"],
+        &["convert", "ontology/kb/ugv.ttl", "--to", "owlxml", "-o", "kb.owx"],
+        &["convert", "ontology/kb/ugv.ttl", "--to", "rdfxml", "-o", "kb.owl"],
+    ] {
+        ok(folder.path(), arguments);
+    }
+    let answers = || -> Vec<Outcome> {
+        let commands = [
+            &["plan", ugv][..],
+            &[
+                "plan",
+                "encodings/ugv/domain.pddl",
+                "encodings/ugv/problem.pddl",
+                "--kb",
+                "ontology/kb/ugv.ttl",
+            ],
+            &["report", "missions/templates/warehouse/mission.toml"],
+            &["validate", ugv, "plan.txt"],
+            &["validate", ugv, "plan.json"],
+            &["reason", "kb.nt", "--rules", "rules/swrl/coadaptation.swrl"],
+            &["reason", "kb.ofn", "--rules", "rules/swrl/coadaptation.swrl"],
+            &["reason", "kb.owx", "--rules", "rules/swrl/tomasys.swrl"],
+            &["reason", "kb.owl", "--assert", "kb.nt"],
+            &["check", "model.prism", "--props", "props"],
+            &["run", ugv, "--events", "events.jsonl"],
+        ];
+        commands.iter().map(|command| ok(folder.path(), command)).collect()
+    };
+    let untimed = |outcomes: Vec<Outcome>| -> Vec<String> {
+        let is_measured = |line: &&str| !line.contains("microseconds");
+        outcomes
+            .into_iter()
+            .map(|own| (own.stdout + &own.stderr).lines().filter(is_measured).collect::<Vec<_>>().join("\n"))
+            .collect()
+    };
+    let expected = untimed(answers());
+    let mut count = 0;
+    for file in texts(folder.path()) {
+        let text = fs::read(&file).expect("a text");
+        if !text.starts_with(MARK) && std::str::from_utf8(&text).is_ok() {
+            fs::write(&file, [MARK, &text].concat()).expect("written");
+            count += 1;
+        }
+    }
+    assert!(count > 20, "{count} files");
+    assert_eq!(untimed(answers()), expected);
+    // As `>` of Windows PowerShell writes a plan.
+    let plan = fs::read_to_string(within("plan.txt")).expect("a plan").replace('\n', "\r\n");
+    let bytes: Vec<u8> = plan.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    fs::write(within("plan.txt"), bytes).expect("written");
+    ok(folder.path(), &["validate", ugv, "plan.txt"]);
+}
+
+#[test]
+fn an_empty_document_adds_and_takes_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let kb = root().join("ontology/kb/ugv.ttl").display().to_string();
+    let reason = ["reason", &kb, "--rules", "coadaptation"];
+    let expected = ok(folder.path(), &reason).stdout;
+    for text in ["", "\n \r\n\t\n", "# nothing\n\n# at all", "\u{feff}"] {
+        fs::write(folder.path().join("nothing.nt"), text).expect("written");
+        for option in ["--assert", "--retract"] {
+            let outcome = ok(folder.path(), &[&reason[..], &[option, "nothing.nt"]].concat());
+            assert_eq!(outcome.stdout, expected, "{text:?} {option}");
+            let piped = metaplan_in(folder.path(), &[&reason[..], &[option, "-"]].concat(), text);
+            assert_eq!((piped.status, piped.stdout), (0, expected.clone()), "{text:?} {option}");
+        }
+    }
+    // A knowledge base says something, and what is in another syntax is no change.
+    fs::write(folder.path().join("other.nt"), "{\"@context\": {}}").expect("written");
+    for arguments in [&["reason", "nothing.nt"][..], &[&reason[..], &["--assert", "other.nt"]].concat()] {
+        let outcome = metaplan_in(folder.path(), arguments, "");
+        assert_eq!(outcome.status, 3, "{outcome:#?}");
+        assert!(headlines(&outcome.stderr).contains("O113"), "{outcome:#?}");
+    }
+}
+
+#[test]
+fn a_plan_in_a_file_is_one_that_is_read() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("plan.txt").display().to_string();
+    for mission in ["missions/ugv.toml", "missions/uuv.toml", "missions/templates/warehouse/mission.toml"] {
+        let written = metaplan(&["plan", mission, "-o", &file]);
+        assert_eq!((written.status, written.stdout.as_str()), (0, ""), "{mission}");
+        assert!(written.stderr.contains("proved"), "{written:#?}");
+        let text = fs::read_to_string(&file).expect("a plan");
+        assert_eq!(text, metaplan(&["plan", mission, "--plan-format", "ipc"]).stdout, "{mission}");
+        let valid = metaplan(&["validate", mission, &file]);
+        assert!(valid.status == 0 && valid.stdout.starts_with("valid"), "{mission}: {valid:#?}");
+        // A table is refused once, with what to do.
+        for table in [&["--plan-format", "table"][..], &["--plan-format", "table", "--verbose"]] {
+            assert_eq!(metaplan(&[&["plan", mission, "-o", &file], table].concat()).status, 0);
+            let refused = metaplan(&["validate", mission, &file]);
+            assert_eq!(refused.status, 3, "{refused:#?}");
+            assert_eq!(headlines(&refused.stderr).matches("error[").count(), 1, "{refused:#?}");
+            assert!(refused.stderr.contains("M111") && refused.stderr.contains("--plan-format ipc"));
+        }
+    }
+    // What no format of plans holds goes beside the file, or into it as people read it.
+    let unsolvable = metaplan(&["plan", "missions/uuv.toml", "--set", "water_visibility=1", "-o", &file]);
+    assert_eq!(unsolvable.status, 10);
+    let shown = metaplan(&["plan", "missions/uuv.toml", "--set", "water_visibility=1"]);
+    assert_eq!(unsolvable.stderr, shown.stdout);
+    let further = ["plan", "missions/ugv.toml", "--alternatives", "1"];
+    assert_eq!(metaplan(&[&further[..], &["-o", &file]].concat()).status, 0);
+    assert_eq!(fs::read_to_string(&file).expect("an answer"), metaplan(&further).stdout);
+}
