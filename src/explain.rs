@@ -15,6 +15,7 @@ use ontology::vocab::local_name;
 
 use crate::mapek::{PlannedStep, ruled_out};
 use crate::message::{Errors, Message};
+use crate::mission::numbers::against;
 use crate::mission::{Mission, ground_with};
 use crate::number;
 
@@ -156,7 +157,7 @@ pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignEx
         design: name.to_owned(),
         functions: found.solves.iter().map(|function| function.name.clone()).collect(),
         available: found.available,
-        because: mission.knowledge().map(|knowledge| ruled_out(knowledge, name)).unwrap_or_default(),
+        because: because(mission, name),
         used,
         alone: solve(mission, limits, &|other, available| {
             other == name || available && !rivals.contains(other)
@@ -164,6 +165,12 @@ pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignEx
         without: solve(mission, limits, &|other, available| other != name && available)?,
         changes: availability_changes(mission, found, limits)?,
     })
+}
+
+/// What rules a design out, and why it could not be used though it were available.
+fn because(mission: &Mission, name: &str) -> Vec<String> {
+    let ruled_out = mission.knowledge().map(|knowledge| ruled_out(knowledge, name)).unwrap_or_default();
+    ruled_out.into_iter().chain(against(mission, name)).collect()
 }
 
 /// For each measured attribute and each value of the problem the smallest changes, upwards and downwards, that lead to

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use encodings::{Backend, Config, Limits, Plan, Semantics, Status};
 use metaplan::message::Message;
+use metaplan::mission::numbers::MissingValue;
 use metaplan::mission::{Mission, btcpp_text, plan_lines, popf_text};
 use metaplan::planner::{Planned, PlannedFront, Planner};
 use metaplan::report::Positions;
@@ -291,6 +292,7 @@ fn show(
             let plan = answer_text(&mission.name, &solution, common.verbose, &planned.preparation);
             let others = planned.alternatives.as_ref().map(|others| alternatives::text(others, &solution));
             let blocking = planned.blocking.as_ref().map(|blocking| format!("{blocking}\n"));
+            let blocking = blocking.map(|text| text + &missing_text(&planned.missing_values));
             let overlaps = solution.plan.as_ref().filter(|_| planned.overlaps());
             let makespan =
                 overlaps.map_or_else(String::new, |plan| format!("makespan {}\n", plan.makespan()));
@@ -302,6 +304,21 @@ fn show(
         // What `validate` executes has the designs, what the user's own domain has no place for them has not.
         (Some(PlanFormat::Ipc), _) => planned.solution.plan.as_ref().map(Plan::to_string),
     }
+}
+
+/// The numbers that are missing, a line each.
+fn missing_text(missing: &[MissingValue]) -> String {
+    let line = |own: &MissingValue| {
+        let (function, actions, file) = (&own.function, own.needed_by.join(", "), &own.file);
+        match &own.estimation {
+            Some((design, attribute)) => {
+                format!("    the estimation of {attribute} of {design}, for {actions}, in {file}\n")
+            }
+            None => format!("    {function}, for {actions}, in {file}\n"),
+        }
+    };
+    let lines: String = missing.iter().map(line).collect();
+    if lines.is_empty() { lines } else { format!("numbers are missing without which actions cannot be done:\n{lines}") }
 }
 
 /// Shows a Pareto front.

@@ -1,0 +1,410 @@
+//! Numbers that a mission lacks, or that cannot be meant: what keeps actions and designs from ever being used, though no file is wrong.
+//!
+//! For each numeric function that an action needs, the objects are tried for which the action is possible as far as the facts say that no
+//! action changes (three-valued evaluation of its conditions, as in grounding). A missing value counts where such a fact is about just
+//! these objects, as `(lit_aisle a b)` is for `(distance a b)`, or where most of the objects have a value: a mission may leave out numbers
+//! of what can never happen.
+
+mod syntax;
+mod warnings;
+
+use std::cell::Cell;
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+
+use ::mission::Mission;
+use num_rational::BigRational;
+use num_traits::Zero as _;
+use pddl::TypeHierarchy;
+use pddl::ast::{
+    Action, ActionBody, Arithmetic, Assignment, Comparison, Condition, Domain, Effect, Expression,
+    InitialElement, Name, Problem, Term, TypeExpression,
+};
+
+use syntax::{
+    Binding, conditions, constants, effects, grounded, grows, in_expression, known, needed, object, variables_of,
+    walk,
+};
+
+use crate::message::Message;
+use crate::mission::conditions::written;
+use crate::number;
+
+/// How many conditions are evaluated before what is left stays unchecked.
+const BUDGET: usize = 50_000;
+
+/// A numeric function with its arguments that has no value, though actions need it.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct MissingValue {
+    /// The function with its arguments, as the domain writes it: `(distance a b)`; of a design, `(ATTRIBUTE DESIGN)`.
+    pub function: String,
+    /// The actions that need it.
+    pub needed_by: Vec<String>,
+    /// The design whose estimation is missing, and the attribute, where it is that.
+    pub estimation: Option<(String, String)>,
+    /// The file that should have it.
+    pub file: String,
+    symbol: String,
+    /// No other arguments of the function have a value either.
+    is_silent: bool,
+}
+
+/// A duration that is negative.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+struct NegativeDuration {
+    action: String,
+    duration: String,
+    /// Values below 0 that it comes from: the function with its arguments, and the value.
+    causes: Vec<(String, String)>,
+    design: Option<String>,
+}
+
+/// Adds to the warnings of a mission what may be other than meant, once its situation is complete: [`Mission::doubts`], and for missions
+/// with a knowledge base [`doubts`].
+pub fn note_doubts(mission: &mut Mission) {
+    mission.note_doubts();
+    if mission.knowledge().is_some() {
+        let doubts = doubts(mission);
+        mission.change_warnings(|warnings| warnings.into_iter().chain(doubts).collect());
+    }
+}
+
+/// Warnings about numbers that are missing and about durations below 0.
+pub fn doubts(mission: &Mission) -> Vec<Message> {
+    let numbers = Numbers::new(mission);
+    let (missing, negative) = numbers.check();
+    // Functions without any value have a warning of their own (M206).
+    let missing: Vec<MissingValue> = missing.into_iter().filter(|own| !own.is_silent).collect();
+    let estimations = missing.iter().filter_map(|own| Some((own, own.estimation.as_ref()?)));
+    let mut doubts: Vec<Message> =
+        estimations.map(|(own, (design, attribute))| numbers.no_estimation(own, design, attribute)).collect();
+    let mut values: BTreeMap<&str, Vec<&MissingValue>> = BTreeMap::new();
+    for own in missing.iter().filter(|own| own.estimation.is_none()) {
+        values.entry(&own.symbol).or_default().push(own);
+    }
+    doubts.extend(values.values().map(|missing| numbers.no_value(missing)));
+    doubts.extend(negative.iter().map(|own| numbers.negative(own)));
+    doubts
+}
+
+/// The numeric functions that have no value and that actions need.
+pub fn missing_values(mission: &Mission) -> Vec<MissingValue> {
+    Numbers::new(mission).check().0
+}
+
+/// Why a design can never be used though it may be available, in sentences.
+pub fn against(mission: &Mission, design: &str) -> Vec<String> {
+    let (missing, negative) = Numbers::new(mission).check();
+    let missing = missing.iter().filter_map(|own| {
+        let (of, attribute) = own.estimation.as_ref()?;
+        (of == design)
+            .then(|| format!("it has no estimation of {attribute}, which {} needs", own.needed_by.join(", ")))
+    });
+    let negative = negative.iter().filter(|own| own.design.as_deref() == Some(design));
+    let negative = negative.map(|own| format!("with it {} would take {}, less than no time", own.action, own.duration));
+    missing.chain(negative).collect()
+}
+
+/// What is known of a mission's numbers before anything has happened.
+struct Numbers<'m> {
+    mission: &'m Mission,
+    domain: &'m Domain,
+    problem: Problem,
+    types: TypeHierarchy,
+    /// Predicates that actions, axioms or the robot change.
+    dynamic: HashSet<Name>,
+    /// Functions that actions change, and those that actions give a value.
+    changed: HashSet<Name>,
+    assigned: HashSet<Name>,
+    facts: HashMap<Name, HashSet<Vec<Name>>>,
+    values: HashMap<Name, HashMap<Vec<Name>, BigRational>>,
+    designs: BTreeSet<String>,
+    budget: Cell<usize>,
+}
+
+impl<'m> Numbers<'m> {
+    fn new(mission: &'m Mission) -> Self {
+        let domain = mission.domain();
+        let mut problem = mission.problem().clone();
+        mission.fill(&mut problem);
+        let mut facts: HashMap<Name, HashSet<Vec<Name>>> = HashMap::new();
+        let mut values: HashMap<Name, HashMap<Vec<Name>, BigRational>> = HashMap::new();
+        let mut dynamic: HashSet<Name> =
+            domain.derived.iter().map(|axiom| axiom.head.identifier.name.clone()).collect();
+        let predicates = domain.predicates.iter().map(|declared| &declared.identifier.name);
+        dynamic.extend(predicates.filter(|name| mission.bindings().is_availability(name)).cloned());
+        for element in &problem.init {
+            match element {
+                InitialElement::Fact(atom) => {
+                    facts.entry(atom.predicate.name.clone()).or_default().insert(constants(atom));
+                }
+                InitialElement::Value(atom, value, _) => {
+                    let own = values.entry(atom.predicate.name.clone()).or_default();
+                    own.insert(constants(atom), value.clone());
+                }
+                InitialElement::Timed(_, atom, ..) => drop(dynamic.insert(atom.predicate.name.clone())),
+                InitialElement::NegatedFact(_) => {}
+            }
+        }
+        let (mut changed, mut assigned) = (HashSet::new(), HashSet::new());
+        for effect in domain.actions.iter().flat_map(|action| effects(&action.body)) {
+            walk(effect, &mut |effect| match effect {
+                Effect::Add(atom) | Effect::Delete(atom) => drop(dynamic.insert(atom.predicate.name.clone())),
+                Effect::Assign(kind, target, ..) => {
+                    changed.insert(target.predicate.name.clone());
+                    if *kind == Assignment::Assign {
+                        assigned.insert(target.predicate.name.clone());
+                    }
+                }
+                _ => {}
+            });
+        }
+        let knowledge = mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
+        let designs = knowledge.map(|design| design.individual.name.clone()).collect();
+        let (types, budget) = (TypeHierarchy::of(domain), Cell::new(BUDGET));
+        Self { mission, domain, problem, types, dynamic, changed, assigned, facts, values, designs, budget }
+    }
+
+    fn check(&self) -> (Vec<MissingValue>, Vec<NegativeDuration>) {
+        let mut missing: BTreeMap<(Name, Vec<Name>), BTreeSet<String>> = BTreeMap::new();
+        let mut negative = BTreeSet::new();
+        if !self.domain.functions.is_empty() {
+            for action in &self.domain.actions {
+                self.missing(action, &mut missing);
+            }
+        }
+        for action in &self.domain.actions {
+            self.negative_durations(action, &mut negative);
+        }
+        let missing = missing.into_iter();
+        let missing = missing.map(|((function, arguments), actions)| self.described(&function, &arguments, actions));
+        (missing.collect(), negative.into_iter().collect())
+    }
+
+    fn described(&self, function: &Name, arguments: &[Name], actions: BTreeSet<String>) -> MissingValue {
+        let words: Vec<&str> = arguments.iter().map(Name::as_str).collect();
+        let needed_by = actions.into_iter().collect();
+        let (symbol, is_silent) = (function.to_string(), !self.values.contains_key(function));
+        if let [design] = words[..]
+            && self.designs.contains(design)
+        {
+            let attribute = self.attribute(function);
+            let documents = self.mission.knowledge().map(|own| own.documents().join(", "));
+            return MissingValue {
+                function: format!("({attribute} {design})"),
+                needed_by,
+                estimation: Some((design.to_owned(), attribute)),
+                file: documents.unwrap_or_default(),
+                symbol,
+                is_silent,
+            };
+        }
+        let function = std::iter::once(function.as_str()).chain(words).collect::<Vec<_>>().join(" ");
+        MissingValue {
+            function: format!("({function})"),
+            needed_by,
+            estimation: None,
+            file: self.mission.problem_source().name().to_owned(),
+            symbol,
+            is_silent,
+        }
+    }
+
+    /// The attribute that a function of a design is the estimation of.
+    fn attribute(&self, function: &Name) -> String {
+        let mut bound = self.mission.bindings().written().iter();
+        let bound = bound.find(|(symbol, _)| Name::new(symbol) == *function);
+        let attribute = bound.and_then(|(_, query)| query.strip_prefix("estimation:"));
+        let attribute = attribute.unwrap_or(function.as_str());
+        attribute.strip_prefix("fd_").unwrap_or(attribute).to_owned()
+    }
+
+    /// Notes the functions that an action needs and that have no value.
+    fn missing(&self, action: &Action, missing: &mut BTreeMap<(Name, Vec<Name>), BTreeSet<String>>) {
+        let conditions = conditions(&action.body);
+        let mut checked = HashSet::new();
+        for atom in needed(action) {
+            let function = &atom.predicate.name;
+            let is_own = function.as_str().eq_ignore_ascii_case("total-cost")
+                || !checked.insert(written(atom));
+            // What an action gives a value may be without one before, unless it is a stock that grows or shrinks.
+            let is_stock = || self.domain.actions.iter().any(|action| grows(action, function));
+            if is_own || (self.assigned.contains(function) && !is_stock()) {
+                continue;
+            }
+            let Some(variables) = variables_of(atom, action) else { continue };
+            let (mut without, mut count) = (Vec::new(), 0_usize);
+            self.each(&variables, &conditions, &mut Vec::new(), &mut |binding| {
+                count += 1;
+                let arguments = grounded(atom, binding);
+                if !self.values.get(function).is_some_and(|own| own.contains_key(&arguments)) {
+                    let mut told = HashSet::new();
+                    conditions.iter().for_each(|condition| self.evidence(condition, binding, &mut told));
+                    let is_meant = variables.iter().all(|(variable, _)| told.contains(*variable));
+                    without.push((arguments, is_meant));
+                }
+            });
+            let most = 2 * without.len() < count;
+            let is_silent = !self.values.contains_key(function);
+            // From a place to itself there is no distance.
+            let is_apart = |arguments: &[Name]| arguments.iter().collect::<HashSet<_>>().len() == arguments.len();
+            let is_expected =
+                |(arguments, is_meant): &(Vec<Name>, bool)| *is_meant || is_silent || (most && is_apart(arguments));
+            for (arguments, _) in without.into_iter().filter(is_expected) {
+                missing.entry((function.clone(), arguments)).or_default().insert(action.identifier.name.to_string());
+            }
+        }
+    }
+
+    /// Notes durations below 0 that follow from values that nothing changes.
+    fn negative_durations(&self, action: &Action, negative: &mut BTreeSet<NegativeDuration>) {
+        let ActionBody::Durative { duration, .. } = &action.body else { return };
+        let conditions = conditions(&action.body);
+        let is_upper = |operator| matches!(operator, Comparison::Equal | Comparison::LessOrEqual | Comparison::Less);
+        for constraint in duration.iter().filter(|constraint| is_upper(constraint.operator)) {
+            let mut fluents = Vec::new();
+            in_expression(&constraint.expression, &mut fluents);
+            let mut variables: Vec<(&Name, &TypeExpression)> = Vec::new();
+            if !fluents.iter().all(|atom| {
+                let own = variables_of(atom, action);
+                let is_known = own.is_some() && !self.changed.contains(&atom.predicate.name);
+                for variable in own.into_iter().flatten() {
+                    if !variables.iter().any(|(name, _)| *name == variable.0) {
+                        variables.push(variable);
+                    }
+                }
+                is_known
+            }) {
+                continue;
+            }
+            self.each(&variables, &conditions, &mut Vec::new(), &mut |binding| {
+                let value = self.value(&constraint.expression, binding);
+                let Some(value) = value.filter(|value| *value < BigRational::zero()) else { return };
+                let causes = fluents.iter().filter_map(|atom| {
+                    let arguments = grounded(atom, binding);
+                    let value = self.values.get(&atom.predicate.name)?.get(&arguments)?;
+                    let words = std::iter::once(&atom.predicate.name).chain(&arguments);
+                    let words = words.map(Name::as_str).collect::<Vec<_>>().join(" ");
+                    (*value < BigRational::zero()).then(|| (format!("({words})"), number::decimal(value)))
+                });
+                let causes: Vec<(String, String)> = causes.collect();
+                let of = |(function, _): &(String, String)| {
+                    let last = function.trim_end_matches(')').rsplit(' ').next()?.to_owned();
+                    self.designs.contains(&last).then_some(last)
+                };
+                let design = causes.iter().find_map(of);
+                // One is enough for each cause.
+                let is_told = |own: &NegativeDuration| {
+                    own.action == action.identifier.name.as_str() && own.causes == causes
+                };
+                if !negative.iter().any(is_told) {
+                    negative.insert(NegativeDuration {
+                        action: action.identifier.name.to_string(),
+                        duration: number::decimal(&value),
+                        causes,
+                        design,
+                    });
+                }
+            });
+        }
+    }
+
+    /// Visits all objects for some variables for which the conditions may hold.
+    fn each<'a>(
+        &self,
+        variables: &[(&'a Name, &'a TypeExpression)],
+        conditions: &[&Condition],
+        binding: &mut Binding<'a>,
+        visit: &mut dyn FnMut(&Binding<'a>),
+    ) {
+        let Some((variable, r#type)) = variables.get(binding.len()) else { return visit(binding) };
+        let objects = self.domain.constants.iter().chain(&self.problem.objects);
+        let mut seen = HashSet::new();
+        for object in objects.filter(|object| self.types.fits(&object.r#type, r#type)) {
+            let left = self.budget.get();
+            if left == 0 {
+                return;
+            }
+            self.budget.set(left - 1);
+            if !seen.insert(&object.identifier.name) {
+                continue;
+            }
+            binding.push((variable, object.identifier.name.clone()));
+            if conditions.iter().all(|condition| self.truth(condition, binding) != Some(false)) {
+                self.each(variables, conditions, binding, visit);
+            }
+            binding.pop();
+        }
+    }
+
+    /// Whether a condition holds whatever actions change; none where that depends on them, or on variables that are open.
+    fn truth(&self, condition: &Condition, binding: &Binding<'_>) -> Option<bool> {
+        match condition {
+            Condition::And(parts) => {
+                parts.iter().try_fold(Some(true), |all, part| match self.truth(part, binding) {
+                    Some(false) => Err(()),
+                    Some(true) => Ok(all),
+                    None => Ok(None),
+                }).unwrap_or(Some(false))
+            }
+            Condition::Or(parts) => {
+                parts.iter().try_fold(Some(false), |any, part| match self.truth(part, binding) {
+                    Some(true) => Err(()),
+                    Some(false) => Ok(any),
+                    None => Ok(None),
+                }).unwrap_or(Some(true))
+            }
+            Condition::Not(inner) => self.truth(inner, binding).map(|holds| !holds),
+            Condition::Imply(premise, conclusion) => match (self.truth(premise, binding), self.truth(conclusion, binding)) {
+                (Some(false), _) | (_, Some(true)) => Some(true),
+                (Some(true), conclusion) => conclusion,
+                (None, _) => None,
+            },
+            Condition::Atom(atom) => {
+                let arguments = known(atom, binding).filter(|_| !self.dynamic.contains(&atom.predicate.name))?;
+                Some(self.facts.get(&atom.predicate.name).is_some_and(|own| own.contains(&arguments)))
+            }
+            Condition::Equal(left, right, _) => Some(object(left, binding)? == object(right, binding)?),
+            Condition::Compare(..) | Condition::Exists(..) | Condition::ForAll(..) => None,
+        }
+    }
+
+    /// The variables that facts are about which no action changes and by which the action is possible.
+    fn evidence<'a>(&self, condition: &'a Condition, binding: &Binding<'_>, told: &mut HashSet<&'a Name>) {
+        match condition {
+            Condition::And(parts) | Condition::Or(parts) => {
+                parts.iter().for_each(|part| self.evidence(part, binding, told));
+            }
+            Condition::Atom(atom) if self.truth(condition, binding) == Some(true) => {
+                told.extend(atom.arguments.iter().filter_map(|term| match term {
+                    Term::Variable(variable) => Some(&variable.name),
+                    Term::Constant(_) => None,
+                }));
+            }
+            _ => {}
+        }
+    }
+
+    fn value(&self, expression: &Expression, binding: &Binding<'_>) -> Option<BigRational> {
+        match expression {
+            Expression::Number(value, _) => Some(value.clone()),
+            Expression::Fluent(atom) => {
+                self.values.get(&atom.predicate.name)?.get(&known(atom, binding)?).cloned()
+            }
+            Expression::Operation(operation, parts, _) => {
+                let values: Option<Vec<BigRational>> = parts.iter().map(|part| self.value(part, binding)).collect();
+                let mut values = values?.into_iter();
+                let first = values.next()?;
+                if parts.len() == 1 {
+                    return Some(if *operation == Arithmetic::Subtract { -first } else { first });
+                }
+                values.try_fold(first, |left, right| match operation {
+                    Arithmetic::Add => Some(left + right),
+                    Arithmetic::Subtract => Some(left - right),
+                    Arithmetic::Multiply => Some(left * right),
+                    Arithmetic::Divide => (!right.is_zero()).then(|| left / right),
+                })
+            }
+            Expression::Duration(_) | Expression::TotalTime(_) => None,
+        }
+    }
+}
