@@ -148,6 +148,7 @@ impl Setup {
         let Some(simulation) = &found.simulation else {
             return Err(self.not_simulated(scenario, "its scenario has no `simulation` section").into());
         };
+        self.mission.filled()?;
         let (mission, mistakes) = self.situation(scenario, found);
         Errors::unless_empty(mistakes)?;
         Experiment::new(mission, self.settings.clone(), simulation.clone(), self.time_unit)
@@ -161,9 +162,11 @@ impl Setup {
     /// The mission in the situation of a scenario, and all that is wrong with that and with its simulation.
     fn situation(&self, name: &str, scenario: &Scenario<Simulation>) -> (Mission, Vec<Message>) {
         let mut mission = self.mission.clone();
+        let is_sound = mission.filled().is_ok();
         let mut mistakes = scenario.mistakes(&mut mission);
         if let Some(simulation) = &scenario.simulation {
             let more = simulation.mistakes(&mission).into_iter();
+            let more = more.filter(|mistake| is_sound || !mistake.is_of_pddl());
             let below = |mistake: Mistake| {
                 let path = std::iter::once(Key::from("simulation")).chain(mistake.path).collect();
                 Mistake { path, ..mistake }

@@ -306,6 +306,9 @@ fn show(
     }
 }
 
+/// How many missing numbers are shown before the rest is only counted.
+const MISSING_SHOWN: usize = 10;
+
 /// The numbers that are missing, a line each.
 fn missing_text(missing: &[MissingValue]) -> String {
     let line = |own: &MissingValue| {
@@ -317,7 +320,9 @@ fn missing_text(missing: &[MissingValue]) -> String {
             None => format!("    {function}, for {actions}, in {file}\n"),
         }
     };
-    let lines: String = missing.iter().map(line).collect();
+    let more = missing.len().saturating_sub(MISSING_SHOWN);
+    let more = if more > 0 { format!("    and {more} more; `--format json` lists all\n") } else { String::new() };
+    let lines: String = missing.iter().take(MISSING_SHOWN).map(line).chain([more]).collect();
     if lines.is_empty() { lines } else { format!("numbers are missing without which actions cannot be done:\n{lines}") }
 }
 

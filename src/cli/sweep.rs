@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::error::ErrorKind;
-use clap::{Args, Parser as _};
+use clap::Args;
 use metaplan::message::{Errors, Message, did_you_mean};
 use metaplan::sweep::{Group, Line, Results, Shard, Study, SweepAnswer, Table, perform, read_lines};
 
@@ -13,8 +13,8 @@ use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::limits::Guard;
 use crate::cli::output;
 use crate::cli::progress::Progress;
+use crate::cli::simulate;
 use crate::cli::values::seconds;
-use crate::cli::{Cli, Subcommands, simulate};
 
 /// Arguments of `sweep`.
 #[derive(Debug, Args)]
@@ -45,17 +45,23 @@ pub struct Arguments {
     measured: bool,
 }
 
-/// Runs the command.
-pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+/// Reads the words of a command line; those of `simulate` are returned.
+pub type Read<'a> = dyn Fn(Vec<String>) -> Result<Option<simulate::Arguments>, clap::Error> + 'a;
+
+/// Runs the command; the command lines of the study are read by a function.
+pub fn run(arguments: &Arguments, common: &Common, read: &Read<'_>) -> Result<Exit, Failure> {
     let guard = Guard::new(arguments.time_limit, None, common)?;
     let study = Study::read(&arguments.study)?;
-    if arguments.merge { merge(arguments, &study, common) } else { sweep(arguments, &study, guard, common) }
+    if arguments.merge {
+        return merge(arguments, &study, common);
+    }
+    check(&study, common, read)?;
+    sweep(arguments, &study, guard, common)
 }
 
 fn sweep(arguments: &Arguments, study: &Study, guard: Guard, common: &Common) -> Result<Exit, Failure> {
     let program = std::env::current_exe()
         .map_err(|error| Message::error("M152", format!("the program's own file is unknown: {error}")))?;
-    check(study, common)?;
     let mut results = Results::open(&arguments.output, study, arguments.shard, arguments.resume)?;
     let limits = guard.plan();
     let progress = Progress::new("sweeping", common);
@@ -90,12 +96,12 @@ fn sweep(arguments: &Arguments, study: &Study, guard: Guard, common: &Common) ->
 ///
 /// # Errors
 /// All that is wrong with them, once each.
-fn check(study: &Study, common: &Common) -> Result<(), Failure> {
+fn check(study: &Study, common: &Common, read: &Read<'_>) -> Result<(), Failure> {
     let (mut mistakes, mut simulated): (Vec<Message>, BTreeSet<String>) = (Vec::new(), BTreeSet::new());
     for (path, run) in study.samples() {
         let words = study.words(&run, Path::new("{dir}"));
-        let command = match Cli::try_parse_from(std::iter::once("metaplan".to_owned()).chain(words)) {
-            Ok(cli) => cli.command,
+        let simulation = match read(words) {
+            Ok(simulation) => simulation,
             // A file that is to be written for the run is not there yet.
             Err(error) if study.generates() && error.kind() == ErrorKind::ValueValidation => continue,
             Err(error) => {
@@ -107,7 +113,7 @@ fn check(study: &Study, common: &Common) -> Result<(), Failure> {
                 continue;
             }
         };
-        if let Subcommands::Simulate(arguments) = command
+        if let Some(arguments) = simulation
             && !study.generates()
             && simulated.insert(simulate::subject(&arguments))
         {

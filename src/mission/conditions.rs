@@ -33,7 +33,7 @@ pub fn condition(mission: &Mission, text: &str) -> Result<Condition, Vec<Fault>>
         let text = format!("`{text}` is not a condition; write one such as `(robot_at dock)`, with its parentheses in pairs");
         return Err(vec![Fault { offset: None, message: Message::error("M135", text) }]);
     }
-    mission.goal(&format!("{open}{text}{close}")).map_err(|errors| faults(errors, text, before.len()))
+    mission.goal(&format!("{open}{text}{close}")).map_err(|errors| faults(errors, text, before.chars().count()))
 }
 
 /// A numeric function with its arguments, such as `(battery)`; the parentheses may be left out.
@@ -54,7 +54,8 @@ pub fn function(mission: &Mission, text: &str) -> Result<Atom, Vec<Fault>> {
     }
 }
 
-/// A setting that [`Mission::set`] has accepted names objects that there are, of the right types; otherwise what is wrong.
+/// What is wrong with the objects that a setting names which [`Mission::set`] has accepted: there are none of their names, or they have other
+/// types.
 pub(super) fn setting(mission: &Mission, name: &str, value: &str) -> Option<Message> {
     if mission.knowledge().is_some_and(|knowledge| knowledge.has_attribute(name.trim())) {
         return None;
@@ -77,11 +78,13 @@ pub fn written(atom: &Atom) -> String {
     format!("({})", words.join(" "))
 }
 
-/// Messages about a text that stands in a line of its own, behind so many bytes.
+/// Messages about a text that stands in a line of its own, behind so many characters.
 fn faults(errors: Errors, text: &str, before: usize) -> Vec<Fault> {
+    // What stands elsewhere is not about the text; a parenthesis that was added stands for its beginning.
+    let is_own = |error: &Message| error.line != Some(1) || error.column.is_none_or(|column| column >= before);
     let fault = |error: Message| {
         let offset = error.column.filter(|_| error.line == Some(1)).and_then(|column| {
-            let characters = column.checked_sub(before + 1)?;
+            let characters = column.saturating_sub(before + 1);
             text.char_indices().map(|(at, _)| at).nth(characters)
         });
         let message = Message::error(&error.code, &error.message);
@@ -91,5 +94,5 @@ fn faults(errors: Errors, text: &str, before: usize) -> Vec<Fault> {
         };
         Fault { offset, message }
     };
-    errors.into_iter().map(fault).collect()
+    errors.into_iter().filter(is_own).map(fault).collect()
 }

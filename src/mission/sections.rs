@@ -254,6 +254,13 @@ pub struct Mistake {
     pub message: Message,
 }
 
+impl Mistake {
+    /// Whether it was found by reading PDDL, which presupposes that the mission's own files are right.
+    pub fn is_of_pddl(&self) -> bool {
+        self.message.code.starts_with('P')
+    }
+}
+
 impl<S> Scenario<S> {
     /// Puts the situation into effect, as far as it fits the mission.
     ///
@@ -266,6 +273,8 @@ impl<S> Scenario<S> {
     /// As [`Scenario::apply`]; returns all that does not fit, with its place.
     pub fn mistakes(&self, mission: &mut Mission) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
+        // Of a mission that is wrong itself it is not known what there is.
+        let is_sound = mission.filled().is_ok();
         for (index, component) in self.fail.iter().enumerate() {
             let wrong = mission.fail(component).err();
             mistakes.extend(wrong.map(|message| Mistake {
@@ -280,7 +289,7 @@ impl<S> Scenario<S> {
                 other => other.to_string(),
             };
             let path = || vec!["set".into(), name.as_str().into()];
-            mistakes.extend(setting(mission, name, &value, path));
+            mistakes.extend(setting(mission, name, &value, path).filter(|wrong| is_sound || !wrong.is_of_pddl()));
         }
         mistakes
     }

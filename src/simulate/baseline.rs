@@ -11,7 +11,7 @@
 //! - *random* takes any admissible design instead.
 //!
 //! What is admissible is said by [`Admission`]. Where no design is, the action keeps that of its plan if it is available, and otherwise gets
-//! an available one; it may be done later.
+//! an available one; it may be done later. If the action cannot be done with what was chosen, but with the designs of its plan, it gets those.
 //!
 //! \[1\] Rezende Silva et al., PLANTA, 2025. \[2\] Bozhinoski et al., MROS, Advanced Robotics 36, 2022.
 
@@ -196,7 +196,9 @@ impl Controller {
                 chosen = chosen.with_design(function, &design);
             }
         }
-        chosen
+        // Designs that were chosen one after the other need not go together, and those of the plan do.
+        let whole = Admission::new(mission.domain(), &problem, step, done, &[]);
+        if !whole.admits(&chosen) && whole.admits(step) { step.clone() } else { chosen }
     }
 
     /// Chooses anew where the action under way has lost a design.

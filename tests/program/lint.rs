@@ -156,7 +156,7 @@ fn numbers_that_nothing_needs_are_no_warnings() {
           :effect (and (not (at ?a)) (at ?b) (assign (started) 3)))
         (:action end :parameters (?a - place) :precondition (and (at ?a) (> (started) 2)) :effect (not (at ?a))))";
     let problem = "(define (problem p) (:domain d) (:objects x y z - place)
-        (:init (at x) (road x y) (road y z) (= (far x y) 3) (= (far y z) 2) (= (spent) 0)
+        (:init (at x) (road x y) (road y z) (road z y) (= (far z y) 2) (= (far x y) 3) (= (far y z) 2) (= (spent) 0)
           (= (toll x y) 1) (= (toll y x) 1) (= (toll x z) 1) (= (toll z x) 1) (= (toll y z) 1) (= (toll z y) 1))
         (:goal (at z)) (:metric minimize (spent)))";
     let directory = tempfile::tempdir().expect("a directory");

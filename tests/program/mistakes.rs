@@ -78,7 +78,7 @@ fn all_names_of_a_scenario_are_checked_at_once() {
         ],
         &[
             ("batery", &["P122", "did you mean `battery`?"]),
-            ("0 ", &["`patience` is 0, but should be positive"]),
+            ("0      # seconds that", &["`patience` is 0, but should be positive"]),
             ("-1", &["`within` is -1"]),
             ("\"c_lidra\"", &["did you mean `c_lidar`?"]),
             ("\"dok\"", &["`dok`", "did you mean `dock`?"]),

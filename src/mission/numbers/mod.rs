@@ -1,9 +1,9 @@
 //! Numbers that a mission lacks, or that cannot be meant: what keeps actions and designs from ever being used, though no file is wrong.
 //!
 //! For each numeric function that an action needs, the objects are tried for which the action is possible as far as the facts say that no
-//! action changes (three-valued evaluation of its conditions, as in grounding). A missing value counts where such a fact is about just
-//! these objects, as `(lit_aisle a b)` is for `(distance a b)`, or where most of the objects have a value: a mission may leave out numbers
-//! of what can never happen.
+//! action changes (three-valued evaluation of its conditions, as in grounding). A mission may leave out numbers of what can never
+//! happen, so a missing value is worth a warning only where the function has no arguments, where three quarters of the objects have a
+//! value, or two thirds of those that one such fact is about, as `(lit_aisle a b)` is for `(distance a b)`; and of designs always.
 
 mod syntax;
 mod warnings;
@@ -44,17 +44,22 @@ pub struct MissingValue {
     /// The file that should have it.
     pub file: String,
     symbol: String,
-    /// No other arguments of the function have a value either.
+    /// Nothing gives the function a value for any arguments.
     is_silent: bool,
+    /// It is hardly left out on purpose.
+    is_likely: bool,
 }
+
+/// Functions without a value, with whether that is hardly on purpose, and the actions that need them.
+type Needed = BTreeMap<(Name, Vec<Name>), (bool, BTreeSet<String>)>;
 
 /// A duration that is negative.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct NegativeDuration {
     action: String,
     duration: String,
-    /// Values below 0 that it comes from: the function with its arguments, and the value.
-    causes: Vec<(String, String)>,
+    /// The values below 0 that it comes from, in words.
+    causes: Vec<String>,
     design: Option<String>,
 }
 
@@ -73,7 +78,7 @@ pub fn doubts(mission: &Mission) -> Vec<Message> {
     let numbers = Numbers::new(mission);
     let (missing, negative) = numbers.check();
     // Functions without any value have a warning of their own (M206).
-    let missing: Vec<MissingValue> = missing.into_iter().filter(|own| !own.is_silent).collect();
+    let missing: Vec<MissingValue> = missing.into_iter().filter(|own| !own.is_silent && own.is_likely).collect();
     let estimations = missing.iter().filter_map(|own| Some((own, own.estimation.as_ref()?)));
     let mut doubts: Vec<Message> =
         estimations.map(|(own, (design, attribute))| numbers.no_estimation(own, design, attribute)).collect();
@@ -86,9 +91,12 @@ pub fn doubts(mission: &Mission) -> Vec<Message> {
     doubts
 }
 
-/// The numeric functions that have no value and that actions need.
+/// The numeric functions that have no value and that actions need: those that are hardly left out on purpose, and otherwise all.
 pub fn missing_values(mission: &Mission) -> Vec<MissingValue> {
-    Numbers::new(mission).check().0
+    let all = Numbers::new(mission).check().0;
+    let is_told = |own: &MissingValue| own.is_likely || own.is_silent;
+    let is_any = all.iter().any(is_told);
+    all.into_iter().filter(|own| !is_any || is_told(own)).collect()
 }
 
 /// Why a design can never be used though it may be available, in sentences.
@@ -165,7 +173,7 @@ impl<'m> Numbers<'m> {
     }
 
     fn check(&self) -> (Vec<MissingValue>, Vec<NegativeDuration>) {
-        let mut missing: BTreeMap<(Name, Vec<Name>), BTreeSet<String>> = BTreeMap::new();
+        let mut missing = Needed::new();
         let mut negative = BTreeSet::new();
         if !self.domain.functions.is_empty() {
             for action in &self.domain.actions {
@@ -175,27 +183,30 @@ impl<'m> Numbers<'m> {
         for action in &self.domain.actions {
             self.negative_durations(action, &mut negative);
         }
-        let missing = missing.into_iter();
-        let missing = missing.map(|((function, arguments), actions)| self.described(&function, &arguments, actions));
+        let missing = missing.into_iter().map(|((function, arguments), (is_likely, actions))| MissingValue {
+            is_likely,
+            ..self.described(&function, &arguments, actions)
+        });
         (missing.collect(), negative.into_iter().collect())
     }
 
     fn described(&self, function: &Name, arguments: &[Name], actions: BTreeSet<String>) -> MissingValue {
         let words: Vec<&str> = arguments.iter().map(Name::as_str).collect();
         let needed_by = actions.into_iter().collect();
-        let (symbol, is_silent) = (function.to_string(), !self.values.contains_key(function));
+        let is_silent = !self.values.contains_key(function) && !self.assigned.contains(function);
+        let symbol = function.to_string();
         if let [design] = words[..]
             && self.designs.contains(design)
         {
             let attribute = self.attribute(function);
-            let documents = self.mission.knowledge().map(|own| own.documents().join(", "));
             return MissingValue {
                 function: format!("({attribute} {design})"),
                 needed_by,
+                file: self.file_of(design),
                 estimation: Some((design.to_owned(), attribute)),
-                file: documents.unwrap_or_default(),
                 symbol,
                 is_silent,
+                is_likely: false,
             };
         }
         let function = std::iter::once(function.as_str()).chain(words).collect::<Vec<_>>().join(" ");
@@ -206,6 +217,7 @@ impl<'m> Numbers<'m> {
             file: self.mission.problem_source().name().to_owned(),
             symbol,
             is_silent,
+            is_likely: false,
         }
     }
 
@@ -219,7 +231,7 @@ impl<'m> Numbers<'m> {
     }
 
     /// Notes the functions that an action needs and that have no value.
-    fn missing(&self, action: &Action, missing: &mut BTreeMap<(Name, Vec<Name>), BTreeSet<String>>) {
+    fn missing(&self, action: &Action, missing: &mut Needed) {
         let conditions = conditions(&action.body);
         let mut checked = HashSet::new();
         for atom in needed(action) {
@@ -232,25 +244,25 @@ impl<'m> Numbers<'m> {
                 continue;
             }
             let Some(variables) = variables_of(atom, action) else { continue };
+            let names: Vec<&Name> = variables.iter().map(|(name, _)| *name).collect();
             let (mut without, mut count) = (Vec::new(), 0_usize);
             self.each(&variables, &conditions, &mut Vec::new(), &mut |binding| {
-                count += 1;
                 let arguments = grounded(atom, binding);
-                if !self.values.get(function).is_some_and(|own| own.contains_key(&arguments)) {
-                    let mut told = HashSet::new();
-                    conditions.iter().for_each(|condition| self.evidence(condition, binding, &mut told));
-                    let is_meant = variables.iter().all(|(variable, _)| told.contains(*variable));
-                    without.push((arguments, is_meant));
+                // From a place to itself there is no distance.
+                let is_apart = arguments.iter().collect::<HashSet<_>>().len() == arguments.len();
+                count += usize::from(is_apart);
+                if is_apart && !self.values.get(function).is_some_and(|own| own.contains_key(&arguments)) {
+                    let is_linked = conditions.iter().any(|condition| self.is_linked(condition, &names, binding));
+                    without.push((arguments, is_linked));
                 }
             });
-            let most = 2 * without.len() < count;
-            let is_silent = !self.values.contains_key(function);
-            // From a place to itself there is no distance.
-            let is_apart = |arguments: &[Name]| arguments.iter().collect::<HashSet<_>>().len() == arguments.len();
-            let is_expected =
-                |(arguments, is_meant): &(Vec<Name>, bool)| *is_meant || is_silent || (most && is_apart(arguments));
-            for (arguments, _) in without.into_iter().filter(is_expected) {
-                missing.entry((function.clone(), arguments)).or_default().insert(action.identifier.name.to_string());
+            let (is_third, is_few) = (3 * without.len() <= count, 4 * without.len() <= count);
+            for (arguments, is_linked) in without {
+                let is_design = arguments.len() == 1 && self.designs.contains(arguments[0].as_str());
+                let is_likely = names.is_empty() || is_few || is_linked && (is_third || is_design);
+                let own = missing.entry((function.clone(), arguments)).or_insert((false, BTreeSet::new()));
+                own.0 |= is_likely;
+                own.1.insert(action.identifier.name.to_string());
             }
         }
     }
@@ -279,19 +291,22 @@ impl<'m> Numbers<'m> {
             self.each(&variables, &conditions, &mut Vec::new(), &mut |binding| {
                 let value = self.value(&constraint.expression, binding);
                 let Some(value) = value.filter(|value| *value < BigRational::zero()) else { return };
-                let causes = fluents.iter().filter_map(|atom| {
+                let mut design = None;
+                let mut causes: Vec<String> = Vec::new();
+                for atom in &fluents {
                     let arguments = grounded(atom, binding);
-                    let value = self.values.get(&atom.predicate.name)?.get(&arguments)?;
-                    let words = std::iter::once(&atom.predicate.name).chain(&arguments);
-                    let words = words.map(Name::as_str).collect::<Vec<_>>().join(" ");
-                    (*value < BigRational::zero()).then(|| (format!("({words})"), number::decimal(value)))
-                });
-                let causes: Vec<(String, String)> = causes.collect();
-                let of = |(function, _): &(String, String)| {
-                    let last = function.trim_end_matches(')').rsplit(' ').next()?.to_owned();
-                    self.designs.contains(&last).then_some(last)
-                };
-                let design = causes.iter().find_map(of);
+                    let own = self.values.get(&atom.predicate.name).and_then(|own| own.get(&arguments));
+                    let Some(value) = own.filter(|value| **value < BigRational::zero()) else { continue };
+                    let of = self.described(&atom.predicate.name, &arguments, BTreeSet::new());
+                    let name = match of.estimation {
+                        Some((of, attribute)) => {
+                            design.get_or_insert(of.clone());
+                            format!("`{attribute}` of `{of}`")
+                        }
+                        None => format!("`{}`", of.function),
+                    };
+                    causes.push(format!("{name} is {}", number::decimal(value)));
+                }
                 // One is enough for each cause.
                 let is_told = |own: &NegativeDuration| {
                     own.action == action.identifier.name.as_str() && own.causes == causes
@@ -301,7 +316,7 @@ impl<'m> Numbers<'m> {
                         action: action.identifier.name.to_string(),
                         duration: number::decimal(&value),
                         causes,
-                        design,
+                        design: design.clone(),
                     });
                 }
             });
@@ -368,19 +383,17 @@ impl<'m> Numbers<'m> {
         }
     }
 
-    /// The variables that facts are about which no action changes and by which the action is possible.
-    fn evidence<'a>(&self, condition: &'a Condition, binding: &Binding<'_>, told: &mut HashSet<&'a Name>) {
+    /// Whether a fact that no action changes and by which the action is possible is about all these variables.
+    fn is_linked(&self, condition: &Condition, variables: &[&Name], binding: &Binding<'_>) -> bool {
         match condition {
             Condition::And(parts) | Condition::Or(parts) => {
-                parts.iter().for_each(|part| self.evidence(part, binding, told));
+                parts.iter().any(|part| self.is_linked(part, variables, binding))
             }
-            Condition::Atom(atom) if self.truth(condition, binding) == Some(true) => {
-                told.extend(atom.arguments.iter().filter_map(|term| match term {
-                    Term::Variable(variable) => Some(&variable.name),
-                    Term::Constant(_) => None,
-                }));
-            }
-            _ => {}
+            Condition::Atom(atom) if self.truth(condition, binding) == Some(true) => variables.iter().all(|variable| {
+                let is_it = |term: &Term| matches!(term, Term::Variable(own) if own.name == **variable);
+                atom.arguments.iter().any(is_it)
+            }),
+            _ => false,
         }
     }
 

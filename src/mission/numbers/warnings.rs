@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use ::mission::doubt_about;
+use ontology::tomasys::FunctionDesign;
 use pddl::ast::Span;
 use pddl::{Diagnostic, Severity, Source};
 
@@ -15,19 +16,32 @@ const NAMED: usize = 3;
 /// The warnings.
 impl Numbers<'_> {
     pub(super) fn no_estimation(&self, own: &MissingValue, design: &str, attribute: &str) -> Message {
-        let known = self.mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
-        let mut known = known.filter(|known| known.individual.name == design);
-        let individual = known.next();
+        let individual = self.design(design);
         let estimated = individual.iter().flat_map(|known| known.estimations.keys().map(String::as_str));
         let text = format!(
             "the design `{design}` has no estimation of `{attribute}`, which {} needs, so it can never be used there{}",
             quoted(&own.needed_by),
             did_you_mean(attribute, estimated)
         );
-        match (self.mission.knowledge(), individual) {
-            (Some(knowledge), Some(known)) => doubt_about(knowledge, "M230", &known.individual.iri, text),
-            _ => Message::warning("M230", text),
+        self.about(design, "M230", text)
+    }
+
+    fn design(&self, name: &str) -> Option<&FunctionDesign> {
+        let designs = self.mission.knowledge()?.catalogue().designs();
+        designs.iter().find(|design| design.individual.name == name)
+    }
+
+    /// A warning about a design, with its place in the knowledge base.
+    fn about(&self, design: &str, code: &str, text: String) -> Message {
+        match (self.mission.knowledge(), self.design(design)) {
+            (Some(knowledge), Some(design)) => doubt_about(knowledge, code, &design.individual.iri, text),
+            _ => Message::warning(code, text),
         }
+    }
+
+    /// The file of the knowledge base that has a design.
+    pub(super) fn file_of(&self, design: &str) -> String {
+        self.about(design, "M230", String::new()).file.clone().unwrap_or_default()
     }
 
     pub(super) fn no_value(&self, missing: &[&MissingValue]) -> Message {
@@ -50,17 +64,14 @@ impl Numbers<'_> {
     }
 
     pub(super) fn negative(&self, own: &NegativeDuration) -> Message {
-        let because = own.causes.iter().map(|(function, value)| format!("`{function}` is {value}"));
-        let because: Vec<String> = because.collect();
-        let because = if because.is_empty() { String::new() } else { format!(" ({})", because.join(", ")) };
+        let because =
+            if own.causes.is_empty() { String::new() } else { format!(" ({})", own.causes.join(", ")) };
         let text = format!(
             "`{}` would take {}, less than no time{because}, so it can never be done so",
             own.action, own.duration
         );
-        let designs = self.mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
-        let mut designs = designs.filter(|design| Some(&design.individual.name) == own.design.as_ref());
-        if let (Some(knowledge), Some(design)) = (self.mission.knowledge(), designs.next()) {
-            return doubt_about(knowledge, "M232", &design.individual.iri, text);
+        if let Some(design) = &own.design {
+            return self.about(design, "M232", text);
         }
         let mut actions = self.domain.actions.iter().map(|action| &action.identifier);
         let span = actions.find(|action| action.name.as_str() == own.action).map(|action| action.span);
