@@ -119,9 +119,13 @@ impl ManifestPath {
             let next = match (value, key) {
                 (DeValue::Table(table), Key::Name(name)) => {
                     let entry = table.get_key_value(name.as_str());
-                    entry.map(|(key, value)| (if is_last && part == Part::Key { key.span() } else { value.span() }, value))
+                    entry.map(|(key, value)| {
+                        (if is_last && part == Part::Key { key.span() } else { value.span() }, value)
+                    })
                 }
-                (DeValue::Array(array), Key::Index(index)) => array.get(*index).map(|value| (value.span(), value)),
+                (DeValue::Array(array), Key::Index(index)) => {
+                    array.get(*index).map(|value| (value.span(), value))
+                }
                 _ => None,
             };
             let Some((place, next)) = next else { break };
@@ -227,7 +231,8 @@ fn without(text: &str, place: std::ops::Range<usize>) -> Option<String> {
 /// Which key was meant, where the message of the parser lists those that there are.
 fn meant(message: &str) -> String {
     let mut quoted = message.split('`').skip(1).step_by(2);
-    match (["unknown field", "unknown variant"].iter().any(|start| message.starts_with(start)), quoted.next()) {
+    match (["unknown field", "unknown variant"].iter().any(|start| message.starts_with(start)), quoted.next())
+    {
         (true, Some(written)) => did_you_mean(written, quoted),
         _ => String::new(),
     }

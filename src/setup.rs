@@ -14,7 +14,9 @@ use crate::knowledge::Knowledge;
 use crate::manifest::{self, Key, ManifestPath};
 use crate::mapek::{AdaptationSection, Settings};
 use crate::message::{Errors, Message, did_you_mean};
-use crate::mission::{BindingsSection, KnowledgeSection, Mission, Mistake, PlanningSection, Scenario, TimeUnit};
+use crate::mission::{
+    BindingsSection, KnowledgeSection, Mission, Mistake, PlanningSection, Scenario, TimeUnit,
+};
 use crate::report::{Positions, ReportSection};
 use crate::simulate::{Experiment, Simulation};
 

@@ -215,7 +215,8 @@ fn attributes(knowledge: &Knowledge) -> Vec<Message> {
     for kind in all.iter().filter(|kind| mentioned(&kind.iri)) {
         let others = all.iter().filter(|other| other.iri != kind.iri && !mentioned(&other.iri));
         let meant = did_you_mean(&kind.name, others.map(|other| other.name.as_str()));
-        let text = format!("the attribute <{}> is only mentioned, and nothing else is said of it{meant}", kind.iri);
+        let text =
+            format!("the attribute <{}> is only mentioned, and nothing else is said of it{meant}", kind.iri);
         doubts.push(doubt_about(knowledge, "M229", &kind.iri, text));
     }
     for kind in all {

@@ -114,7 +114,10 @@ impl SoFar {
     /// That time was up, and how much there is.
     fn message(&self) -> Message {
         let Some(of) = self.of else {
-            return Message::error("M130", "the time limit or an interruption came before anything was compared");
+            return Message::error(
+                "M130",
+                "the time limit or an interruption came before anything was compared",
+            );
         };
         let measured = self.begun.as_ref().map_or(0, |begun| begun.candidates.len());
         let text = format!(

@@ -321,9 +321,14 @@ fn missing_text(missing: &[MissingValue]) -> String {
         }
     };
     let more = missing.len().saturating_sub(MISSING_SHOWN);
-    let more = if more > 0 { format!("    and {more} more; `--format json` lists all\n") } else { String::new() };
+    let more =
+        if more > 0 { format!("    and {more} more; `--format json` lists all\n") } else { String::new() };
     let lines: String = missing.iter().take(MISSING_SHOWN).map(line).chain([more]).collect();
-    if lines.is_empty() { lines } else { format!("numbers are missing without which actions cannot be done:\n{lines}") }
+    if lines.is_empty() {
+        lines
+    } else {
+        format!("numbers are missing without which actions cannot be done:\n{lines}")
+    }
 }
 
 /// Shows a Pareto front.

@@ -116,7 +116,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     match common.format {
         Format::Json => {
             let answer = SimulateAnswer::new(mission, &arguments.scenario, &strategies, runs);
-            let answer = answer.timed(experiment.time_unit()).of(total, incomplete.clone().into_iter().collect());
+            let answer =
+                answer.timed(experiment.time_unit()).of(total, incomplete.clone().into_iter().collect());
             output::json_answer(&answer);
         }
         _ => {
@@ -239,12 +240,16 @@ fn failures_text(strategies: &[Strategy], runs: &[Run]) -> String {
     for &strategy in strategies {
         let count = |ending: Ending| runs_of(runs, strategy).filter(|run| run.ending == ending).count();
         let reasons = [Ending::Time, Ending::Lost, Ending::GaveUp].map(|ending| (count(ending), ending));
-        let reasons: Vec<String> =
-            reasons.iter().filter(|(count, _)| *count > 0).map(|(count, ending)| format!("{count} {ending}")).collect();
+        let reasons: Vec<String> = reasons
+            .iter()
+            .filter(|(count, _)| *count > 0)
+            .map(|(count, ending)| format!("{count} {ending}"))
+            .collect();
         let (all, done) = (runs_of(runs, strategy).count(), count(Ending::Goal));
         if !reasons.is_empty() {
             let done = if done == 0 { "none".to_owned() } else { done.to_string() };
-            let _ = writeln!(text, "{}: {done} of {all} accomplished; {}", strategy.name(), reasons.join(", "));
+            let _ =
+                writeln!(text, "{}: {done} of {all} accomplished; {}", strategy.name(), reasons.join(", "));
         }
     }
     if text.is_empty() { text } else { format!("\n{text}") }

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use clap::error::ErrorKind;
 use clap::Args;
+use clap::error::ErrorKind;
 use metaplan::message::{Errors, Message, did_you_mean};
 use metaplan::sweep::{Group, Line, Results, Shard, Study, SweepAnswer, Table, perform, read_lines};
 
@@ -128,7 +128,8 @@ fn check(study: &Study, common: &Common, read: &Read<'_>) -> Result<(), Failure>
 fn refusal(error: &clap::Error) -> String {
     let text = error.to_string();
     let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
-    let lines: Vec<&str> = lines.take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more")).collect();
+    let lines: Vec<&str> =
+        lines.take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more")).collect();
     lines.join("; ").trim_start_matches("error: ").replace("; tip: ", "; ")
 }
 
@@ -141,7 +142,8 @@ fn merge(arguments: &Arguments, study: &Study, common: &Common) -> Result<Exit, 
         let known = answer.as_object().into_iter().flatten().map(|(key, _)| format!("/{key}"));
         let known: Vec<String> = known.collect();
         let meant = did_you_mean(study.rows(), known.iter().map(String::as_str));
-        let text = format!("no answer has anything at `{}`{meant}; there are: {}", study.rows(), known.join(", "));
+        let text =
+            format!("no answer has anything at `{}`{meant}; there are: {}", study.rows(), known.join(", "));
         return Err(study.mistake(&["rows".into()], &text).into());
     }
     let table = Table::new(&lines, study.rows(), arguments.measured);

@@ -30,10 +30,14 @@ pub fn condition(mission: &Mission, text: &str) -> Result<Condition, Vec<Fault>>
         _ => depth,
     });
     if text.trim().is_empty() || closed != Some(0) {
-        let text = format!("`{text}` is not a condition; write one such as `(robot_at dock)`, with its parentheses in pairs");
+        let text = format!(
+            "`{text}` is not a condition; write one such as `(robot_at dock)`, with its parentheses in pairs"
+        );
         return Err(vec![Fault { offset: None, message: Message::error("M135", text) }]);
     }
-    mission.goal(&format!("{open}{text}{close}")).map_err(|errors| faults(errors, text, before.chars().count()))
+    mission
+        .goal(&format!("{open}{text}{close}"))
+        .map_err(|errors| faults(errors, text, before.chars().count()))
 }
 
 /// A numeric function with its arguments, such as `(battery)`; the parentheses may be left out.
@@ -48,7 +52,8 @@ pub fn function(mission: &Mission, text: &str) -> Result<Atom, Vec<Fault>> {
     match metric.expression {
         Expression::Fluent(atom) => Ok(atom),
         _ => {
-            let text = format!("`{text}` is not one numeric function with its arguments, such as `(battery)`");
+            let text =
+                format!("`{text}` is not one numeric function with its arguments, such as `(battery)`");
             Err(vec![Fault { offset: None, message: Message::error("M135", text) }])
         }
     }
@@ -81,7 +86,8 @@ pub fn written(atom: &Atom) -> String {
 /// Messages about a text that stands in a line of its own, behind so many characters.
 fn faults(errors: Errors, text: &str, before: usize) -> Vec<Fault> {
     // What stands elsewhere is not about the text; a parenthesis that was added stands for its beginning.
-    let is_own = |error: &Message| error.line != Some(1) || error.column.is_none_or(|column| column >= before);
+    let is_own =
+        |error: &Message| error.line != Some(1) || error.column.is_none_or(|column| column >= before);
     let fault = |error: Message| {
         let offset = error.column.filter(|_| error.line == Some(1)).and_then(|column| {
             let characters = column.saturating_sub(before + 1);

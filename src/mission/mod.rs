@@ -21,5 +21,7 @@ pub use lean::lean;
 pub use planning::Planning;
 pub(crate) use planning::{ground_with, replanner};
 pub use plansys2::{PlanLine, instant, plan_lines, popf_text, spaced};
-pub use sections::{BindingsSection, KnowledgeSection, Mistake, PlanningSection, Scenario, TimeUnit, setting};
+pub use sections::{
+    BindingsSection, KnowledgeSection, Mistake, PlanningSection, Scenario, TimeUnit, setting,
+};
 pub use steps::read_plan;

@@ -289,7 +289,8 @@ impl<S> Scenario<S> {
                 other => other.to_string(),
             };
             let path = || vec!["set".into(), name.as_str().into()];
-            mistakes.extend(setting(mission, name, &value, path).filter(|wrong| is_sound || !wrong.is_of_pddl()));
+            mistakes
+                .extend(setting(mission, name, &value, path).filter(|wrong| is_sound || !wrong.is_of_pddl()));
         }
         mistakes
     }

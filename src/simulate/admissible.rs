@@ -69,11 +69,15 @@ fn drop_open(condition: &mut Condition, open: &[Name]) {
 fn mentions(condition: &Condition, names: &[Name]) -> bool {
     match condition {
         Condition::And(parts) | Condition::Or(parts) => parts.iter().any(|part| mentions(part, names)),
-        Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => mentions(inner, names),
+        Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
+            mentions(inner, names)
+        }
         Condition::Imply(left, right) => mentions(left, names) || mentions(right, names),
         Condition::Atom(atom) => is_about(atom, names),
         Condition::Equal(left, right, _) => [left, right].into_iter().any(|term| is_one_of(term, names)),
-        Condition::Compare(_, left, right, _) => mentions_number(left, names) || mentions_number(right, names),
+        Condition::Compare(_, left, right, _) => {
+            mentions_number(left, names) || mentions_number(right, names)
+        }
     }
 }
 

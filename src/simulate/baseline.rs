@@ -145,7 +145,8 @@ impl Controller {
             return;
         }
         if let Some(step) = self.plan.pop_front() {
-            let step = if self.strategy.chooses_designs() { self.choose(&step, None, |_| true) } else { step };
+            let step =
+                if self.strategy.chooses_designs() { self.choose(&step, None, |_| true) } else { step };
             self.control.request_now(step, answers);
         } else if self.strategy != Strategy::None
             && self.planned_with != *self.control.beliefs().available()

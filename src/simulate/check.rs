@@ -82,7 +82,7 @@ impl Checker<'_> {
             let text = format!("`noise` is {}, but should be at least 0 and below 1", own.noise);
             self.wrong(vec!["noise".into()], text);
         }
-        if own.time_budget / own.step > 1e6 {
+        if own.step > 0.0 && own.time_budget / own.step > 1e6 {
             self.wrong(vec!["time_budget".into()], "`time_budget` is more than a million times `step`");
         }
     }
@@ -116,7 +116,8 @@ impl Checker<'_> {
                 self.wrong(path(&[]), text);
             }
             (Some(_), Some(_)) => {
-                let text = "the event has both `at` and `when`; make two events of it, or take one of them away";
+                let text =
+                    "the event has both `at` and `when`; make two events of it, or take one of them away";
                 self.wrong(path(&["when"]), text);
             }
             (Some(at), None) => {

@@ -225,7 +225,12 @@ impl World {
         let share = if whole { 1.0 - job.progress } else { (1.0 - job.progress) * step / left };
         job.progress = rounded(job.progress + share);
         self.use_up(&job.step, share, whole, events);
-        if self.settings.suave.as_ref().is_some_and(|suave| suave.inspect.eq_ignore_ascii_case(&job.step.action)) {
+        if self
+            .settings
+            .suave
+            .as_ref()
+            .is_some_and(|suave| suave.inspect.eq_ignore_ascii_case(&job.step.action))
+        {
             self.inspected = self.inspected.max(job.progress);
         }
         if whole {

@@ -187,21 +187,30 @@ impl Study {
         let wrong = |path: &[Key], text: String| wrong_at(path, Part::Value, text);
         let mut mistakes = Vec::new();
         if sections.command.is_empty() {
-            mistakes
-                .push(wrong(&["command".into()], "`command` is empty; it should begin with a command such as `plan`".to_owned()));
+            mistakes.push(wrong(
+                &["command".into()],
+                "`command` is empty; it should begin with a command such as `plan`".to_owned(),
+            ));
         }
         if sections.time_limit.is_some_and(|limit| limit.is_nan() || limit <= 0.0) {
-            mistakes.push(wrong(&["time_limit".into()], "`time_limit` should be a number of seconds above 0".to_owned()));
+            mistakes.push(wrong(
+                &["time_limit".into()],
+                "`time_limit` should be a number of seconds above 0".to_owned(),
+            ));
         }
         if !sections.rows.is_empty() && !sections.rows.starts_with('/') {
-            mistakes.push(wrong(&["rows".into()], format!("`rows` is `{}`; a JSON pointer begins with `/`", sections.rows)));
+            mistakes.push(wrong(
+                &["rows".into()],
+                format!("`rows` is `{}`; a JSON pointer begins with `/`", sections.rows),
+            ));
         }
         let mut keys: Vec<(String, Vec<Value>)> = Vec::new();
         for (key, variation) in &sections.vary {
             match values(variation) {
                 Ok(values) => keys.push((key.clone(), values)),
                 Err(text) => {
-                    mistakes.push(wrong(&["vary".into(), key.as_str().into()], format!("`vary.{key}` {text}")));
+                    mistakes
+                        .push(wrong(&["vary".into(), key.as_str().into()], format!("`vary.{key}` {text}")));
                 }
             }
         }
@@ -213,10 +222,14 @@ impl Study {
         }
         let known: BTreeSet<&str> = keys.iter().map(|(key, _)| key.as_str()).collect();
         if sections.pairs.is_some() && sections.vary.contains_key("pair") {
-            mistakes.push(wrong(&["pairs".into()], "`vary.pair` and `pairs` are two lists for one key".to_owned()));
+            mistakes.push(wrong(
+                &["pairs".into()],
+                "`vary.pair` and `pairs` are two lists for one key".to_owned(),
+            ));
         }
         let generated = sections.generate.iter().flat_map(|own| &own.run).enumerate();
-        let generated = generated.map(|(index, word)| (vec!["generate".into(), "run".into(), index.into()], word));
+        let generated =
+            generated.map(|(index, word)| (vec!["generate".into(), "run".into(), index.into()], word));
         let command = sections.command.iter().enumerate();
         for (path, word) in
             command.map(|(index, word)| (vec![Key::from("command"), index.into()], word)).chain(generated)

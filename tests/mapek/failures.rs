@@ -5,8 +5,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use metaplan::setup::Setup;
 use metaplan::encodings::Limits;
+use metaplan::setup::Setup;
 use metaplan::simulate::{Disturbance, Experiment, RandomFailure, Run, Simulation, Strategy};
 
 /// A mission with components that can fail.

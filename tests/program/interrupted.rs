@@ -30,7 +30,11 @@ fn interrupted(directory: &Path, arguments: &[&str], seconds: u32) -> Outcome {
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill").success());
     let output = child.wait_with_output().expect("it ends");
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
-    Outcome { status: output.status.code().unwrap_or(-1), stdout: text(output.stdout), stderr: text(output.stderr) }
+    Outcome {
+        status: output.status.code().unwrap_or(-1),
+        stdout: text(output.stdout),
+        stderr: text(output.stderr),
+    }
 }
 
 /// Each way to end a command early, with growing limits, until something was done; `done` counts what an answer has.
@@ -85,7 +89,8 @@ fn simulations_show_the_missions_that_are_done() {
         let (joint, none) = (of("joint"), of("none"));
         assert!(joint.len() - none.len() <= 1, "{} and {}", joint.len(), none.len());
         let count = joint.len().min(5).to_string();
-        let whole = metaplan(&[&SIMULATE[..], &["--runs", &count, "--format", "json", "--quiet"]].concat()).json();
+        let whole =
+            metaplan(&[&SIMULATE[..], &["--runs", &count, "--format", "json", "--quiet"]].concat()).json();
         assert_eq!(whole["complete"], true);
         assert_eq!(whole["runs"].as_array().expect("runs")[..], joint[..joint.len().min(5)]);
     }

@@ -116,7 +116,11 @@ fn numbers_that_are_missing_or_negative_are_warnings() {
         1,
         &["M232", "`pick` would take -10", "fd_soft_fingers", "robot.ttl:", "0 errors, 1 warning"],
     );
-    check(&[("domain.pddl", "(= ?duration 3)", "(= ?duration (- 3 5))")], 1, &["M232", "`put` would take -2", "domain.pddl:"]);
+    check(
+        &[("domain.pddl", "(= ?duration 3)", "(= ?duration (- 3 5))")],
+        1,
+        &["M232", "`put` would take -2", "domain.pddl:"],
+    );
 }
 
 /// Where no plan exists, `plan` says which numbers are missing, and `explain` why a design that is available is of no use.
@@ -126,7 +130,12 @@ fn missing_numbers_are_named_where_there_is_no_plan() {
     let here = directory.path();
     assert_eq!(metaplan_in(here, &["init", "m", "--from", "warehouse"], "").status, 0);
     edit(&here.join("m"), "problem.pddl", "(= (battery) 12)", "");
-    edit(&here.join("m"), "robot.ttl", ":time_per_metre ; t:hasValue 0.8", ":time_per_meter ; t:hasValue 0.8");
+    edit(
+        &here.join("m"),
+        "robot.ttl",
+        ":time_per_metre ; t:hasValue 0.8",
+        ":time_per_meter ; t:hasValue 0.8",
+    );
     let outcome = metaplan_in(here, &["plan", "m/mission.toml"], "");
     assert_eq!(outcome.status, 10, "{outcome:#?}");
     for words in [
@@ -139,7 +148,10 @@ fn missing_numbers_are_named_where_there_is_no_plan() {
     let answer = metaplan_in(here, &["plan", "m/mission.toml", "--format", "json"], "").json();
     let missing = answer["missing_values"].as_array().expect("a list");
     let battery = missing.iter().find(|own| own["function"] == "(battery)").expect("the battery");
-    assert_eq!((&battery["needed_by"], &battery["file"]), (&serde_json::json!(["move", "pick"]), &"m/problem.pddl".into()));
+    assert_eq!(
+        (&battery["needed_by"], &battery["file"]),
+        (&serde_json::json!(["move", "pick"]), &"m/problem.pddl".into())
+    );
     let outcome = metaplan_in(here, &["explain", "m/mission.toml", "fd_camera"], "");
     let words = "it has no estimation of time_per_metre, which move needs";
     assert!(outcome.stdout.contains(words), "{outcome:#?}");
@@ -170,7 +182,10 @@ fn numbers_that_nothing_needs_are_no_warnings() {
     for (missing, needing) in [("(= (far y z) 2)", "go"), ("(= (toll z y) 1)", "fly")] {
         let outcome = lint(&problem.replace(missing, ""));
         assert_eq!(outcome.status, 1, "{missing}: {outcome:#?}");
-        assert!(outcome.stdout.contains("M231") && outcome.stdout.contains(&format!("`{needing}`")), "{outcome:#?}");
+        assert!(
+            outcome.stdout.contains("M231") && outcome.stdout.contains(&format!("`{needing}`")),
+            "{outcome:#?}"
+        );
     }
 }
 

@@ -13,8 +13,16 @@ fn check(changes: &[(&str, &str, &str)], expected: &[(&str, &[&str])]) {
         edit(&here.join("m"), file, old, new);
     }
     let text = fs::read_to_string(here.join("m/mission.toml")).expect("text");
-    let simulate =
-        ["simulate", "m/mission.toml", "--scenario", "lidar_under_way", "--strategy", "joint", "--format", "json"];
+    let simulate = [
+        "simulate",
+        "m/mission.toml",
+        "--scenario",
+        "lidar_under_way",
+        "--strategy",
+        "joint",
+        "--format",
+        "json",
+    ];
     for arguments in [&["lint", "m/mission.toml", "--format", "json"][..], &simulate] {
         let outcome = metaplan_in(here, arguments, "");
         assert_eq!(outcome.status, 3, "{arguments:?}: {outcome:#?}");
@@ -30,7 +38,10 @@ fn check(changes: &[(&str, &str, &str)], expected: &[(&str, &[&str])]) {
             let is_it = |message: &&serde_json::Value| {
                 message["line"] == line && message["column"] == column && message["file"] == "m/mission.toml"
             };
-            let found = messages.iter().find(is_it).unwrap_or_else(|| panic!("nothing at {line}:{column}: {answer:#}"));
+            let found = messages
+                .iter()
+                .find(is_it)
+                .unwrap_or_else(|| panic!("nothing at {line}:{column}: {answer:#}"));
             let shown = found.to_string();
             for word in *words {
                 assert!(shown.contains(word), "no `{word}`: {found:#}");
@@ -64,7 +75,10 @@ fn conditions_of_events_name_what_there_is() {
 fn events_have_a_time_or_a_condition_and_do_something() {
     let event = "[[scenarios.lidar_under_way.simulation.events]]";
     check(&[(MISSION, WHEN, "")], &[(event, &["M135", "neither `at` nor `when`"])]);
-    check(&[(MISSION, WHEN, "at = 3\nwhen = \"robot_at dock\"")], &[("\"robot_at dock\"", &["both `at` and `when`"])]);
+    check(
+        &[(MISSION, WHEN, "at = 3\nwhen = \"robot_at dock\"")],
+        &[("\"robot_at dock\"", &["both `at` and `when`"])],
+    );
     check(&[(MISSION, WHEN, "at = 700")], &[("700", &["`time_budget`", "never takes place"])]);
     check(&[(MISSION, "within = 70\nfail = [\"c_lidar\"]", "within = 70")], &[(event, &["does nothing"])]);
 }
@@ -74,7 +88,11 @@ fn all_names_of_a_scenario_are_checked_at_once() {
     check(
         &[
             (MISSION, "patience = 5 ", "lifeline = \"batery\"\npatience = 0 "),
-            (MISSION, "within = 70\nfail = [\"c_lidar\"]", "within = -1\nfail = [\"c_lidra\"]\nset = { robot_at = \"dok\" }"),
+            (
+                MISSION,
+                "within = 70\nfail = [\"c_lidar\"]",
+                "within = -1\nfail = [\"c_lidra\"]\nset = { robot_at = \"dok\" }",
+            ),
         ],
         &[
             ("batery", &["P122", "did you mean `battery`?"]),
@@ -88,7 +106,11 @@ fn all_names_of_a_scenario_are_checked_at_once() {
         [[scenarios.lidar_under_way.simulation.failures]]\ncomponent = \"c_arn\"\nmean_time = 9\n\
         [scenarios.lidar_under_way.simulation.suave]\nfound = \"carries vas\"\ninspect = \"mve\"\nlength = \"distanc dock packing\"\n";
     check(
-        &[(MISSION, "within = 70\nfail = [\"c_lidar\"]", &format!("within = 70\nfail = [\"c_lidar\"]{more}"))],
+        &[(
+            MISSION,
+            "within = 70\nfail = [\"c_lidar\"]",
+            &format!("within = 70\nfail = [\"c_lidar\"]{more}"),
+        )],
         &[
             ("\"air_dst\"", &["did you mean `air_dust`?"]),
             ("-5", &["`period` is -5"]),
@@ -106,11 +128,18 @@ fn situations_that_do_not_fit_are_reported_at_once() {
     let directory = tempfile::tempdir().expect("a directory");
     let here = directory.path();
     assert_eq!(metaplan_in(here, &["init", "m", "--from", "warehouse"], "").status, 0);
-    edit(&here.join("m"), MISSION, "set = { air_dust = \"0.8\" }", "set = { air_dst = \"0.8\", robot_at = \"dok\" }");
+    edit(
+        &here.join("m"),
+        MISSION,
+        "set = { air_dust = \"0.8\" }",
+        "set = { air_dst = \"0.8\", robot_at = \"dok\" }",
+    );
     for command in ["plan", "run"] {
         let outcome = metaplan_in(here, &[command, "m/mission.toml", "--scenario", "dusty"], "");
         assert_eq!(outcome.status, 3, "{outcome:#?}");
-        for words in ["scenario `dusty`: ", "did you mean `air_dust`?", "did you mean `dock`?", "mission.toml:"] {
+        for words in
+            ["scenario `dusty`: ", "did you mean `air_dust`?", "did you mean `dock`?", "mission.toml:"]
+        {
             assert!(outcome.stderr.contains(words), "no `{words}`: {outcome:#?}");
         }
     }
@@ -119,12 +148,27 @@ fn situations_that_do_not_fit_are_reported_at_once() {
 /// A condition may stand with or without its parentheses, and be any condition of PDDL.
 #[test]
 fn conditions_mean_the_same_with_and_without_parentheses() {
-    let costs = ["robot_at dock", "(robot_at dock)", " ( robot_at  dock ) ", "(and (robot_at dock) (<= (battery) 100))"].map(|when| {
+    let costs = [
+        "robot_at dock",
+        "(robot_at dock)",
+        " ( robot_at  dock ) ",
+        "(and (robot_at dock) (<= (battery) 100))",
+    ]
+    .map(|when| {
         let directory = tempfile::tempdir().expect("a directory");
         let here = directory.path();
         assert_eq!(metaplan_in(here, &["init", "m", "--from", "warehouse"], "").status, 0);
         edit(&here.join("m"), MISSION, WHEN, &format!("when = \"{when}\""));
-        let arguments = ["simulate", "m/mission.toml", "--scenario", "lidar_under_way", "--strategy", "joint", "--format", "json"];
+        let arguments = [
+            "simulate",
+            "m/mission.toml",
+            "--scenario",
+            "lidar_under_way",
+            "--strategy",
+            "joint",
+            "--format",
+            "json",
+        ];
         let outcome = metaplan_in(here, &arguments, "");
         assert_eq!(outcome.status, 0, "{outcome:#?}");
         let run = outcome.json()["runs"][0].clone();
@@ -190,11 +234,15 @@ fn rows_that_no_answer_has_are_an_error() {
     let directory = tempfile::tempdir().expect("a directory");
     let here = directory.path();
     assert_eq!(metaplan_in(here, &["init", "m", "--from", "warehouse"], "").status, 0);
-    fs::write(here.join("study.toml"), "command = [\"plan\", \"m/mission.toml\"]\nrows = \"/step\"\n").expect("written");
+    fs::write(here.join("study.toml"), "command = [\"plan\", \"m/mission.toml\"]\nrows = \"/step\"\n")
+        .expect("written");
     assert_eq!(metaplan_in(here, &["sweep", "study.toml", "--output", "results"], "").status, 0);
     let outcome = metaplan_in(here, &["sweep", "study.toml", "--output", "results", "--merge"], "");
     assert_eq!(outcome.status, 3, "{outcome:#?}");
-    assert!(outcome.stderr.contains("study.toml:2:") && outcome.stderr.contains("did you mean `/steps`?"), "{outcome:#?}");
+    assert!(
+        outcome.stderr.contains("study.toml:2:") && outcome.stderr.contains("did you mean `/steps`?"),
+        "{outcome:#?}"
+    );
 }
 
 /// The unit of the domain's times is one of three, and a misspelt one is an error with a proposal.
@@ -203,8 +251,16 @@ fn a_unit_that_there_is_not_is_an_error() {
     let directory = tempfile::tempdir().expect("a directory");
     let here = directory.path();
     assert_eq!(metaplan_in(here, &["init", "m", "--from", "warehouse"], "").status, 0);
-    edit(&here.join("m"), MISSION, "problem = \"problem.pddl\"", "problem = \"problem.pddl\"\ntime_unit = \"minute\"");
+    edit(
+        &here.join("m"),
+        MISSION,
+        "problem = \"problem.pddl\"",
+        "problem = \"problem.pddl\"\ntime_unit = \"minute\"",
+    );
     let outcome = metaplan_in(here, &["lint", "m/mission.toml"], "");
     assert_eq!(outcome.status, 3, "{outcome:#?}");
-    assert!(outcome.stdout.contains("did you mean `minutes`?") && outcome.stdout.contains("mission.toml:"), "{outcome:#?}");
+    assert!(
+        outcome.stdout.contains("did you mean `minutes`?") && outcome.stdout.contains("mission.toml:"),
+        "{outcome:#?}"
+    );
 }

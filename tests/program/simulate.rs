@@ -137,7 +137,12 @@ fn flickering(unit: &str, settle: u32) -> Vec<Value> {
     let directory = tempfile::tempdir().expect("a directory");
     let here = directory.path();
     assert_eq!(metaplan_in(here, &["init", "m", "--from", "warehouse"], "").status, 0);
-    edit(&here.join("m"), "mission.toml", "problem = \"problem.pddl\"", &format!("problem = \"problem.pddl\"{unit}"));
+    edit(
+        &here.join("m"),
+        "mission.toml",
+        "problem = \"problem.pddl\"",
+        &format!("problem = \"problem.pddl\"{unit}"),
+    );
     let scenario = format!(
         "\n[adaptation]\nsettle = {settle}\n[scenarios.flicker.simulation]\nstep = 1\ntime_budget = 600\npatience = 5\n\
          [[scenarios.flicker.simulation.events]]\nat = 10\nfail = [\"c_lidar\"]\n\
@@ -146,8 +151,18 @@ fn flickering(unit: &str, settle: u32) -> Vec<Value> {
     let manifest = here.join("m/mission.toml");
     let text = std::fs::read_to_string(&manifest).expect("text") + &scenario;
     std::fs::write(manifest, text).expect("written");
-    let arguments =
-        ["simulate", "m/mission.toml", "--scenario", "flicker", "--strategy", "joint", "--log", "log.jsonl", "--csv", "runs.csv"];
+    let arguments = [
+        "simulate",
+        "m/mission.toml",
+        "--scenario",
+        "flicker",
+        "--strategy",
+        "joint",
+        "--log",
+        "log.jsonl",
+        "--csv",
+        "runs.csv",
+    ];
     let outcome = metaplan_in(here, &arguments, "");
     assert_eq!(outcome.status, 0, "{outcome:#?}");
     let log = std::fs::read_to_string(here.join("log.jsonl")).expect("a log");
@@ -178,23 +193,39 @@ fn the_clock_of_the_loop_goes_in_seconds() {
         }
         // Reports come every second of the domain, and sooner where an action ends.
         let (failed, back) = (failed.expect("it fails"), back.expect("it is back"));
-        assert!((failed / second - 10.0).abs() < 1.0 && (back / second - 20.0).abs() < 1.0, "{unit}: {failed}, {back}");
+        assert!(
+            (failed / second - 10.0).abs() < 1.0 && (back / second - 20.0).abs() < 1.0,
+            "{unit}: {failed}, {back}"
+        );
         let better = better.expect("a better plan is looked for");
         let waited = better - back + 1e-6;
-        assert!(waited >= f64::from(settle) && waited <= f64::from(settle) + 2.0 * second, "{unit}, {settle}: {waited}");
+        assert!(
+            waited >= f64::from(settle) && waited <= f64::from(settle) + 2.0 * second,
+            "{unit}, {settle}: {waited}"
+        );
     }
 }
 
 /// What is written of times says their unit, and SUAVE's columns are seconds.
 #[test]
 fn units_are_shown() {
-    let arguments = ["simulate", "missions/uuv.toml", "--scenario", "battery_under_way", "--strategy", "failure"];
+    let arguments =
+        ["simulate", "missions/uuv.toml", "--scenario", "battery_under_way", "--strategy", "failure"];
     let text = metaplan(&arguments).stdout;
     assert!(text.contains("reaction (minutes)"), "{text}");
     let directory = tempfile::tempdir().expect("a directory");
     let mission = root().join("missions/uuv.toml").display().to_string();
     let arguments = [
-        "simulate", &mission, "--scenario", "battery_under_way", "--strategy", "failure", "--format", "json", "--csv", "runs.csv",
+        "simulate",
+        &mission,
+        "--scenario",
+        "battery_under_way",
+        "--strategy",
+        "failure",
+        "--format",
+        "json",
+        "--csv",
+        "runs.csv",
     ];
     let answer = metaplan_in(directory.path(), &arguments, "").json();
     assert_eq!(answer["time_unit"], "minutes");
@@ -203,7 +234,10 @@ fn units_are_shown() {
     let seconds = |column: usize| row[row.len() - column].parse::<f64>().expect("a number");
     for (column, figure) in [(3, "found"), (1, "reaction")] {
         let minutes = answer["runs"][0][figure].as_f64().expect("a time");
-        assert!(minutes > 0.0 && (seconds(column) - 60.0 * minutes).abs() < 0.001, "{figure}: {csv} {answer}");
+        assert!(
+            minutes > 0.0 && (seconds(column) - 60.0 * minutes).abs() < 0.001,
+            "{figure}: {csv} {answer}"
+        );
     }
 }
 
@@ -216,8 +250,18 @@ fn greedy_control_observes_requirements() {
     assert_eq!(metaplan_in(here, &["init", "m", "--from", "warehouse"], "").status, 0);
     for strategy in ["greedy", "random"] {
         let arguments = [
-            "simulate", "m/mission.toml", "--scenario", "lidar_under_way", "--strategy", strategy, "--runs", "3", "--format", "json",
-            "--log", "log.jsonl",
+            "simulate",
+            "m/mission.toml",
+            "--scenario",
+            "lidar_under_way",
+            "--strategy",
+            strategy,
+            "--runs",
+            "3",
+            "--format",
+            "json",
+            "--log",
+            "log.jsonl",
         ];
         let answer = metaplan_in(here, &arguments, "").json();
         assert_eq!(answer["strategies"][0]["accomplished"], 3, "{strategy}: {answer:#}");
@@ -229,7 +273,10 @@ fn greedy_control_observes_requirements() {
             }
             let is_dark = arguments.contains("crossing") && arguments.contains("far_rack");
             assert!(!is_dark || configuration["f_navigate"] != "fd_camera", "{strategy}: {line}");
-            assert!(!arguments.contains("vase") || configuration["f_grasp"] != "fd_gripper", "{strategy}: {line}");
+            assert!(
+                !arguments.contains("vase") || configuration["f_grasp"] != "fd_gripper",
+                "{strategy}: {line}"
+            );
         }
     }
 }
@@ -245,7 +292,18 @@ fn greedy_control_observes_requirements_in_a_ward() {
     let directory = tempfile::tempdir().expect("a directory");
     let ward = ward.display().to_string();
     let arguments = [
-        "simulate", &ward, "--scenario", "bad_night", "--strategy", "greedy", "--runs", "2", "--format", "json", "--log", "log.jsonl",
+        "simulate",
+        &ward,
+        "--scenario",
+        "bad_night",
+        "--strategy",
+        "greedy",
+        "--runs",
+        "2",
+        "--format",
+        "json",
+        "--log",
+        "log.jsonl",
     ];
     let outcome = metaplan_in(directory.path(), &arguments, "");
     assert_eq!(outcome.json()["strategies"][0]["accomplished"], 2, "{outcome:#?}");
@@ -258,7 +316,9 @@ fn greedy_control_observes_requirements_in_a_ward() {
     ];
     let log = std::fs::read_to_string(directory.path().join("log.jsonl")).expect("a log");
     let mut requests = 0;
-    for line in log.lines().filter(|line| line.contains("\"request_action\"") || line.contains("\"configuration\"")) {
+    for line in
+        log.lines().filter(|line| line.contains("\"request_action\"") || line.contains("\"configuration\""))
+    {
         let line: Value = serde_json::from_str(line).expect("JSON");
         requests += usize::from(!line["configuration"].is_null());
         for (action, rooms, function, design) in &forbidden {
@@ -274,7 +334,8 @@ fn greedy_control_observes_requirements_in_a_ward() {
 /// A word for what was not accomplished, and why.
 #[test]
 fn what_is_not_accomplished_is_said_with_the_reason() {
-    let arguments = ["simulate", "missions/ugv.toml", "--scenario", "kinect_at_wp2", "--strategy", "none", "--runs", "2"];
+    let arguments =
+        ["simulate", "missions/ugv.toml", "--scenario", "kinect_at_wp2", "--strategy", "none", "--runs", "2"];
     let outcome = metaplan(&arguments);
     assert!(outcome.stdout.contains("none: none of 2 accomplished; 2 gave up"), "{outcome:#?}");
 }

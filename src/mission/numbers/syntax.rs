@@ -1,6 +1,8 @@
 //! Actions, conditions and effects to the numeric functions that they need.
 
-use pddl::ast::{Action, ActionBody, Assignment, Atom, Condition, Effect, Expression, Name, Term, TypeExpression};
+use pddl::ast::{
+    Action, ActionBody, Assignment, Atom, Condition, Effect, Expression, Name, Term, TypeExpression,
+};
 
 /// Variables with the objects that they stand for.
 pub(super) type Binding<'a> = Vec<(&'a Name, Name)>;
@@ -36,7 +38,10 @@ pub(super) fn grounded(atom: &Atom, binding: &Binding<'_>) -> Vec<Name> {
 }
 
 /// The parameters of an action that an atom mentions, each once; none if it mentions another variable.
-pub(super) fn variables_of<'a>(atom: &Atom, action: &'a Action) -> Option<Vec<(&'a Name, &'a TypeExpression)>> {
+pub(super) fn variables_of<'a>(
+    atom: &Atom,
+    action: &'a Action,
+) -> Option<Vec<(&'a Name, &'a TypeExpression)>> {
     let mut variables: Vec<(&Name, &TypeExpression)> = Vec::new();
     for term in &atom.arguments {
         let Term::Variable(variable) = term else { continue };
@@ -51,7 +56,9 @@ pub(super) fn variables_of<'a>(atom: &Atom, action: &'a Action) -> Option<Vec<(&
 pub(super) fn conditions(body: &ActionBody) -> Vec<&Condition> {
     match body {
         ActionBody::Instantaneous { precondition, .. } => vec![precondition],
-        ActionBody::Durative { conditions, .. } => conditions.iter().map(|(_, condition)| condition).collect(),
+        ActionBody::Durative { conditions, .. } => {
+            conditions.iter().map(|(_, condition)| condition).collect()
+        }
     }
 }
 

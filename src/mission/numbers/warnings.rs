@@ -2,12 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use ::mission::doubt_about;
-use ontology::tomasys::FunctionDesign;
 use pddl::ast::Span;
 use pddl::{Diagnostic, Severity, Source};
 
-use super::{MissingValue, NegativeDuration, Numbers};
+use super::analysis::{MissingValue, NegativeDuration, Numbers};
 use crate::message::{Message, did_you_mean};
 
 /// How many functions without a value are named before the rest is only counted.
@@ -24,24 +22,6 @@ impl Numbers<'_> {
             did_you_mean(attribute, estimated)
         );
         self.about(design, "M230", text)
-    }
-
-    fn design(&self, name: &str) -> Option<&FunctionDesign> {
-        let designs = self.mission.knowledge()?.catalogue().designs();
-        designs.iter().find(|design| design.individual.name == name)
-    }
-
-    /// A warning about a design, with its place in the knowledge base.
-    fn about(&self, design: &str, code: &str, text: String) -> Message {
-        match (self.mission.knowledge(), self.design(design)) {
-            (Some(knowledge), Some(design)) => doubt_about(knowledge, code, &design.individual.iri, text),
-            _ => Message::warning(code, text),
-        }
-    }
-
-    /// The file of the knowledge base that has a design.
-    pub(super) fn file_of(&self, design: &str) -> String {
-        self.about(design, "M230", String::new()).file.clone().unwrap_or_default()
     }
 
     pub(super) fn no_value(&self, missing: &[&MissingValue]) -> Message {
