@@ -6,9 +6,8 @@ use encodings::Limits;
 use pddl::ast::Problem;
 
 use crate::message::Message;
-use crate::mission::{Mission, Planning as _};
+use crate::mission::{Mission, Planning as _, numbers};
 use crate::setup::Setup;
-use crate::simulate::Simulation;
 
 /// How long it may take to find what the planner does not handle.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -27,6 +26,7 @@ const PATIENCE: Duration = Duration::from_secs(20);
 pub fn lint(setup: &Setup) -> Vec<Message> {
     let mission = &setup.mission;
     let mut messages: Vec<Message> = mission.warnings().cloned().collect();
+    messages.extend(numbers::doubts(mission));
     match mission.filled() {
         Ok((problem, more)) => {
             messages.extend(more);
@@ -35,13 +35,7 @@ pub fn lint(setup: &Setup) -> Vec<Message> {
         Err(errors) => messages.extend(errors),
     }
     messages.extend(setup.positions().err().into_iter().flatten());
-    for (name, scenario) in &setup.scenarios {
-        let mut wrong = Vec::new();
-        wrong.extend(scenario.apply(&mut mission.clone()).err());
-        let simulation = scenario.simulation.as_ref();
-        wrong.extend(simulation.into_iter().flat_map(|simulation| disturbances(mission, simulation)));
-        messages.extend(wrong.iter().map(|message| setup.in_scenario(name, message)));
-    }
+    messages.extend(setup.mistakes());
     in_order(messages)
 }
 
@@ -61,19 +55,4 @@ pub fn in_order(mut messages: Vec<Message>) -> Vec<Message> {
     messages.sort_by_cached_key(key);
     messages.dedup_by_key(|message| key(message));
     messages
-}
-
-/// What is wrong with what happens to a simulated robot.
-fn disturbances(mission: &Mission, simulation: &Simulation) -> Vec<Message> {
-    let mistake = simulation.mistake().map(|mistake| Message::error("M135", mistake));
-    let mut wrong: Vec<Message> = mistake.into_iter().collect();
-    let mut changed = mission.clone();
-    for event in &simulation.events {
-        let components = event.fail.iter().chain(&event.recover);
-        wrong.extend(components.filter_map(|component| changed.fail(component).err()));
-        wrong.extend(event.set.iter().filter_map(|(name, value)| changed.set(name, value).err()));
-    }
-    let random = simulation.failures.iter();
-    wrong.extend(random.filter_map(|failure| changed.fail(&failure.component).err()));
-    wrong
 }

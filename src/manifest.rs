@@ -7,10 +7,43 @@ use num_rational::BigRational;
 use schemars::{Schema, SchemaGenerator, json_schema};
 use serde::de::DeserializeOwned;
 use toml::Spanned;
+use toml::de::{DeTable, DeValue};
 
 use crate::file::{self, Kind, source};
 use crate::message::{Errors, Message, did_you_mean};
 use crate::number;
+
+/// A step of a path into a manifest: the key of a table, or the index of an entry of an array.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Key {
+    /// The key of a table.
+    Name(String),
+    /// The entry of an array, from 0.
+    Index(usize),
+}
+
+impl From<&str> for Key {
+    fn from(name: &str) -> Self {
+        Self::Name(name.to_owned())
+    }
+}
+
+impl From<usize> for Key {
+    fn from(index: usize) -> Self {
+        Self::Index(index)
+    }
+}
+
+/// What a place in a manifest is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// The value at the end of a path.
+    Value,
+    /// The key at the end of a path.
+    Key,
+    /// So many bytes from the beginning of a string; the whole string where it is not written as it is read.
+    Inside(usize),
+}
 
 /// Where a manifest was read from.
 #[derive(Debug, Clone, Default)]
@@ -74,6 +107,39 @@ impl ManifestPath {
     /// Line and column, both from 1, of what stands at an offset in bytes.
     pub fn place(&self, offset: usize) -> (usize, usize) {
         line_and_column(&self.text, offset)
+    }
+
+    /// Line and column of a place in the manifest; none for the manifest as a whole. Where a part of the path is missing, what comes
+    /// before it counts.
+    pub fn place_of(&self, path: &[Key], part: Part) -> Option<(usize, usize)> {
+        let document = DeTable::parse(&self.text).ok()?;
+        let mut span = document.span();
+        let mut value = &DeValue::Table(document.into_inner());
+        for (key, is_last) in path.iter().enumerate().map(|(index, key)| (key, index + 1 == path.len())) {
+            let next = match (value, key) {
+                (DeValue::Table(table), Key::Name(name)) => {
+                    let entry = table.get_key_value(name.as_str());
+                    entry.map(|(key, value)| {
+                        (if is_last && part == Part::Key { key.span() } else { value.span() }, value)
+                    })
+                }
+                (DeValue::Array(array), Key::Index(index)) => {
+                    array.get(*index).map(|value| (value.span(), value))
+                }
+                _ => None,
+            };
+            let Some((place, next)) = next else { break };
+            (span, value) = (place, next.get_ref());
+        }
+        let is_as_read = |text: &str| {
+            let written = self.text.get(span.clone()).unwrap_or_default();
+            written.len() == text.len() + 2 && written.get(1..=text.len()) == Some(text)
+        };
+        let inside = match (value, part) {
+            (DeValue::String(text), Part::Inside(offset)) if is_as_read(text) => offset + 1,
+            _ => 0,
+        };
+        (!path.is_empty()).then(|| self.place(span.start + inside))
     }
 
     /// That the value which stands at an offset in bytes is wrong.
@@ -165,7 +231,8 @@ fn without(text: &str, place: std::ops::Range<usize>) -> Option<String> {
 /// Which key was meant, where the message of the parser lists those that there are.
 fn meant(message: &str) -> String {
     let mut quoted = message.split('`').skip(1).step_by(2);
-    match (message.starts_with("unknown field"), quoted.next()) {
+    match (["unknown field", "unknown variant"].iter().any(|start| message.starts_with(start)), quoted.next())
+    {
         (true, Some(written)) => did_you_mean(written, quoted),
         _ => String::new(),
     }

@@ -11,12 +11,14 @@ use serde::Deserialize;
 use crate::comparison::Roles;
 use crate::file::source;
 use crate::knowledge::Knowledge;
-use crate::manifest::{self, ManifestPath};
+use crate::manifest::{self, Key, ManifestPath};
 use crate::mapek::{AdaptationSection, Settings};
 use crate::message::{Errors, Message, did_you_mean};
-use crate::mission::{BindingsSection, KnowledgeSection, Mission, PlanningSection, Scenario};
+use crate::mission::{
+    BindingsSection, KnowledgeSection, Mission, Mistake, PlanningSection, Scenario, TimeUnit,
+};
 use crate::report::{Positions, ReportSection};
-use crate::simulate::Simulation;
+use crate::simulate::{Experiment, Simulation};
 
 /// All sections of a manifest.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -57,6 +59,8 @@ pub struct Setup {
     pub description: String,
     /// How eager the adaptation loop is.
     pub settings: Settings,
+    /// The unit of the domain's times.
+    pub time_unit: TimeUnit,
     /// The symbols of the co-adaptation process, where they differ from the defaults.
     pub roles: Roles,
     /// Situations by name.
@@ -120,25 +124,80 @@ impl Setup {
             wrong
         })?;
         mission.change_warnings(|warnings| origin.quote(warnings));
-        let Sections { description, probabilistic: roles, report, scenarios, .. } = sections;
-        Ok(Self { mission, description, settings, roles, scenarios, report, origin })
+        let Sections { description, planning, probabilistic: roles, report, scenarios, .. } = sections;
+        let time_unit = planning.time_unit;
+        Ok(Self { mission, description, settings, time_unit, roles, scenarios, report, origin })
     }
 
     /// Brings the mission into a situation of the manifest.
     ///
     /// # Errors
-    /// M108, there is no such scenario; or the first of its settings that does not fit the mission.
-    pub fn apply(&mut self, scenario: &str) -> Result<(), Message> {
+    /// M108, there is no such scenario; or all of its settings that do not fit the mission.
+    pub fn apply(&mut self, scenario: &str) -> Result<(), Errors> {
+        let Some(found) = self.scenarios.get(scenario) else { return Err(self.no_scenario(scenario).into()) };
+        let mistakes = found.mistakes(&mut self.mission);
+        Errors::unless_empty(mistakes.into_iter().map(|mistake| self.in_scenario(scenario, mistake)))
+    }
+
+    /// The mission in a situation of the manifest that can be simulated, with what a simulated robot meets.
+    ///
+    /// # Errors
+    /// M108, there is no such scenario, or it says nothing about a simulation; or all that is wrong with it.
+    pub fn experiment(&self, scenario: &str) -> Result<Experiment, Errors> {
         let Some(found) = self.scenarios.get(scenario) else {
-            let known: Vec<_> = self.scenarios.keys().map(String::as_str).collect();
-            let text = format!(
-                "the mission has no scenario `{scenario}`; it has: {}{}",
-                known.join(", "),
-                did_you_mean(scenario, known.iter().copied())
-            );
-            return Err(Message::error("M108", text));
+            return Err(self.not_simulated(scenario, "there is none of that name").into());
         };
-        found.apply(&mut self.mission).map_err(|message| self.in_scenario(scenario, &message))
+        let Some(simulation) = &found.simulation else {
+            return Err(self.not_simulated(scenario, "its scenario has no `simulation` section").into());
+        };
+        self.mission.filled()?;
+        let (mission, mistakes) = self.situation(scenario, found);
+        Errors::unless_empty(mistakes)?;
+        Experiment::new(mission, self.settings.clone(), simulation.clone(), self.time_unit)
+    }
+
+    /// All that is wrong with the scenarios, each message with its place.
+    pub fn mistakes(&self) -> Vec<Message> {
+        self.scenarios.iter().flat_map(|(name, scenario)| self.situation(name, scenario).1).collect()
+    }
+
+    /// The mission in the situation of a scenario, and all that is wrong with that and with its simulation.
+    fn situation(&self, name: &str, scenario: &Scenario<Simulation>) -> (Mission, Vec<Message>) {
+        let mut mission = self.mission.clone();
+        let is_sound = mission.filled().is_ok();
+        let mut mistakes = scenario.mistakes(&mut mission);
+        if let Some(simulation) = &scenario.simulation {
+            let more = simulation.mistakes(&mission).into_iter();
+            let more = more.filter(|mistake| is_sound || !mistake.is_of_pddl());
+            let below = |mistake: Mistake| {
+                let path = std::iter::once(Key::from("simulation")).chain(mistake.path).collect();
+                Mistake { path, ..mistake }
+            };
+            mistakes.extend(more.map(below));
+        }
+        (mission, mistakes.into_iter().map(|mistake| self.in_scenario(name, mistake)).collect())
+    }
+
+    fn no_scenario(&self, name: &str) -> Message {
+        let known: Vec<_> = self.scenarios.keys().map(String::as_str).collect();
+        let text = format!(
+            "the mission has no scenario `{name}`; it has: {}{}",
+            known.join(", "),
+            did_you_mean(name, known.iter().copied())
+        );
+        Message::error("M108", text)
+    }
+
+    fn not_simulated(&self, name: &str, why: &str) -> Message {
+        let simulated = self.scenarios.iter().filter(|(_, scenario)| scenario.simulation.is_some());
+        let known: Vec<&str> = simulated.map(|(name, _)| name.as_str()).collect();
+        let others = if known.is_empty() {
+            "no scenario of this mission can".to_owned()
+        } else {
+            format!("these can: {}", known.join(", "))
+        };
+        let meant = did_you_mean(name, known.iter().copied());
+        Message::error("M108", format!("`{name}` cannot be simulated: {why}; {others}{meant}"))
     }
 
     /// Where the places lie, which only pictures ask for.
@@ -149,10 +208,16 @@ impl Setup {
         self.report.positions(&self.origin)
     }
 
-    /// What is wrong with a scenario, as a message about the manifest.
-    pub fn in_scenario(&self, name: &str, message: &Message) -> Message {
+    /// A mistake in a scenario as a message about the manifest.
+    fn in_scenario(&self, name: &str, Mistake { path, part, message }: Mistake) -> Message {
+        let path: Vec<Key> = ["scenarios".into(), name.into()].into_iter().chain(path).collect();
         let text = format!("scenario `{name}`: {}", message.message);
-        Message::at(&message.code, self.file(), None, text)
+        let wrong = Message::at(&message.code, self.file(), self.origin.place_of(&path, part), text);
+        let wrong = match &message.help {
+            Some(help) => wrong.with_help(help),
+            None => wrong,
+        };
+        self.origin.quote([wrong]).swap_remove(0)
     }
 
     /// The manifest's own name; empty for a mission without.
@@ -173,6 +238,7 @@ impl From<Mission> for Setup {
             mission,
             description: String::new(),
             settings: Settings::default(),
+            time_unit: TimeUnit::default(),
             roles: Roles::default(),
             scenarios: BTreeMap::new(),
             report: ReportSection::default(),

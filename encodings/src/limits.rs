@@ -42,6 +42,13 @@ impl Limits {
         }
     }
 
+    /// The same limits, and this long, counted from now.
+    #[must_use]
+    pub fn within(&self, time: Duration) -> Self {
+        let own = self.clone().with_time(time);
+        Self { deadline: own.deadline.into_iter().chain(self.deadline).min(), ..own }
+    }
+
     /// Lets a search store so many bytes, as it estimates them.
     #[must_use]
     pub fn with_room(mut self, bytes: usize) -> Self {

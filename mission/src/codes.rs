@@ -200,4 +200,10 @@ pub const CODES: &[[&str; 4]] = &[
         "A function that is bound to `reconfigured:ATTRIBUTE` stands in a duration, a condition, or an effect other than `increase` and `decrease`.",
         "Add it to a number in an effect, as in `(increase (total-cost) (reconfiguration))`, and let the metric have that number.",
     ],
+    [
+        "M229",
+        "An attribute is only mentioned.",
+        "An estimation, measurement or requirement is of an attribute of which nothing else is said; usually its name is misspelt.",
+        "Correct the name, or state `a t:QualityAttributeType`.",
+    ],
 ];

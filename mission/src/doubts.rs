@@ -23,7 +23,7 @@ impl Mission {
             doubts.extend(self.actions_without_schema(knowledge));
         }
         let never_named = self.never_named.iter();
-        doubts.extend(never_named.map(|(iri, text)| warning(knowledge, "M221", iri, text.clone())));
+        doubts.extend(never_named.map(|(iri, text)| doubt_about(knowledge, "M221", iri, text.clone())));
         doubts.extend(components(knowledge));
         doubts.extend(self.functions_without_value());
         doubts.extend(attributes(knowledge));
@@ -87,7 +87,7 @@ impl Mission {
                 "no action of the domain stands for <{}>, so what it requires is not asked of any{meant}",
                 action.individual.iri
             );
-            doubts.push(warning(knowledge, "M205", &action.individual.iri, text));
+            doubts.push(doubt_about(knowledge, "M205", &action.individual.iri, text));
         }
         doubts
     }
@@ -180,7 +180,7 @@ fn components(knowledge: &Knowledge) -> Vec<Message> {
                 component.iri,
                 meant.unwrap_or_default()
             );
-            doubts.push(warning(knowledge, "M207", &component.iri, text));
+            doubts.push(doubt_about(knowledge, "M207", &component.iri, text));
         } else if !required.is_empty()
             && !required.contains(component.iri.as_str())
             && other.is_empty()
@@ -190,7 +190,7 @@ fn components(knowledge: &Knowledge) -> Vec<Message> {
                 "no design requires the component <{}>, so its failure changes nothing",
                 component.iri
             );
-            doubts.push(warning(knowledge, "M208", &component.iri, text));
+            doubts.push(doubt_about(knowledge, "M208", &component.iri, text));
         }
     }
     doubts
@@ -210,11 +210,20 @@ fn attributes(knowledge: &Knowledge) -> Vec<Message> {
     let bounded: BTreeSet<&str> =
         designs.iter().flat_map(|design| &design.requirements).map(|own| own.attribute.as_str()).collect();
     let mut doubts = Vec::new();
-    for kind in view.attribute_types() {
+    let all = view.attribute_types();
+    let mentioned = |iri: &str| stated(engine, iri).0.is_empty();
+    for kind in all.iter().filter(|kind| mentioned(&kind.iri)) {
+        let others = all.iter().filter(|other| other.iri != kind.iri && !mentioned(&other.iri));
+        let meant = did_you_mean(&kind.name, others.map(|other| other.name.as_str()));
+        let text =
+            format!("the attribute <{}> is only mentioned, and nothing else is said of it{meant}", kind.iri);
+        doubts.push(doubt_about(knowledge, "M229", &kind.iri, text));
+    }
+    for kind in all {
         let used = estimated.contains(kind.name.as_str()) || bounded.contains(kind.name.as_str());
         if !used && stated(engine, &kind.iri).1.is_empty() {
             let text = format!("nothing gives the attribute <{}> a value, and nothing bounds it", kind.iri);
-            doubts.push(warning(knowledge, "M209", &kind.iri, text));
+            doubts.push(doubt_about(knowledge, "M209", &kind.iri, text));
         }
     }
     for quality in view.actions().into_iter().flat_map(|action| action.quality) {
@@ -226,14 +235,14 @@ fn attributes(knowledge: &Knowledge) -> Vec<Message> {
                 "<{}> bounds `{attribute}`, of which no design has an estimation, so every design meets it{meant}",
                 quality.individual.iri
             );
-            doubts.push(warning(knowledge, "M210", &quality.individual.iri, text));
+            doubts.push(doubt_about(knowledge, "M210", &quality.individual.iri, text));
         }
     }
     doubts
 }
 
-/// A warning with the place where a document first has the name, if one of those that were read has it.
-fn warning(knowledge: &Knowledge, code: &str, iri: &str, text: String) -> Message {
+/// A warning with the place where a document first has the name of an individual, if one of those that were read has it.
+pub fn doubt_about(knowledge: &Knowledge, code: &str, iri: &str, text: String) -> Message {
     let name = local_name(iri);
     let is_part = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == '-');
     for file in knowledge.documents() {

@@ -23,6 +23,7 @@ pub mod visible;
 pub use binding::{Bindings, atom};
 pub use called::{Names, Place};
 pub use codes::CODES;
+pub use doubts::doubt_about;
 pub use joined::Mission;
 pub use message::{Errors, Message};
 pub use native::CoAdaptation;

@@ -218,7 +218,7 @@ impl Mission {
 
     /// Brings the mission into a scenario of its manifest.
     fn scenario(&self, py: Python<'_>, name: &str) -> PyResult<()> {
-        self.change(|setup| setup.apply(name)).map_err(|message| raise_one(py, message))
+        self.change(|setup| setup.apply(name)).map_err(|messages| raise(py, &messages))
     }
 
     /// A component has failed.

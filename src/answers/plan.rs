@@ -10,6 +10,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 
 use crate::mission::Blocking;
+use crate::mission::numbers::MissingValue;
 use crate::number::exact_to_json;
 
 const PARETO: &str = "metaplan-pareto/1";
@@ -56,6 +57,23 @@ pub struct PlanAnswer {
     /// others are available.
     #[serde(skip_serializing_if = "Option::is_none")]
     blocking: Option<Vec<String>>,
+    /// Where no plan exists: numeric functions that have no value, though actions need them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    missing_values: Vec<MissingValuePart>,
+}
+
+/// A number that is missing.
+#[derive(Debug, Clone, Serialize, JsonSchema)]
+struct MissingValuePart {
+    /// The numeric function with its arguments; of a design, the attribute and the design.
+    function: String,
+    /// The actions that need it.
+    needed_by: Vec<String>,
+    /// The design that has no estimation, where it is that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    design: Option<String>,
+    /// The file that should have it.
+    file: String,
 }
 
 /// The front of several objectives.
@@ -236,6 +254,7 @@ impl PlanAnswer {
             alternatives: None,
             makespan: None,
             blocking: None,
+            missing_values: Vec::new(),
         }
     }
 
@@ -267,6 +286,19 @@ impl PlanAnswer {
             Some(Blocking::Designs(designs)) => Some(designs.clone()),
             Some(Blocking::Other) | None => None,
         };
+        self
+    }
+
+    /// Adds the numbers that are missing.
+    #[must_use]
+    pub fn with_missing_values(mut self, missing: &[MissingValue]) -> Self {
+        let part = |own: &MissingValue| MissingValuePart {
+            function: own.function.clone(),
+            needed_by: own.needed_by.clone(),
+            design: own.estimation.as_ref().map(|(design, _)| design.clone()),
+            file: own.file.clone(),
+        };
+        self.missing_values = missing.iter().map(part).collect();
         self
     }
 }

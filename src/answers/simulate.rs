@@ -3,7 +3,9 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::simulate::{Run, Sample, Strategy};
+use crate::message::Message;
+use crate::mission::TimeUnit;
+use crate::simulate::{Ending, Run, Sample, Strategy};
 
 const FORMAT: &str = "metaplan-simulate/1";
 
@@ -17,6 +19,14 @@ pub struct SimulateAnswer<'a> {
     mission: &'a str,
     /// The scenario.
     scenario: &'a str,
+    /// The unit of all times: that of the domain's times.
+    time_unit: TimeUnit,
+    /// Whether all missions that were asked for were simulated to their end.
+    complete: bool,
+    /// How many missions were asked for, over all ways of control.
+    missions: usize,
+    /// Why it is not complete (M130).
+    messages: Vec<Message>,
     /// The figures of each way of control, over all its missions.
     strategies: Vec<StrategyPart>,
     /// Each mission.
@@ -33,7 +43,7 @@ struct StrategyPart {
     accomplished: usize,
     /// The metric of accomplished missions; null where there is none.
     cost: Option<SamplePart>,
-    /// Seconds from an event that the action under way cannot go on after, to what is done about it; null without such an event.
+    /// From an event that the action under way cannot go on after, to what is done about it; null without such an event.
     reaction: Option<SamplePart>,
     /// How often a function got another design.
     reconfigurations: Option<SamplePart>,
@@ -65,9 +75,13 @@ struct RunPart {
     accomplished: bool,
     /// Whether the robot came to its end.
     lost: bool,
+    /// Whether the time budget was used up before that.
+    out_of_time: bool,
+    /// Whether the way of control gave up.
+    gave_up: bool,
     /// The mission's metric at the end.
     cost: f64,
-    /// How many seconds it took.
+    /// How long it took.
     time: f64,
     /// Actions that succeeded.
     actions: usize,
@@ -81,9 +95,9 @@ struct RunPart {
     reconfigurations: usize,
     /// How many different configurations actions were requested with.
     configurations: usize,
-    /// The mean reaction in seconds; null without an event.
+    /// The mean reaction; null without an event.
     reaction: Option<f64>,
-    /// When the pipeline was found, in seconds; null where it was not, or the mission has none.
+    /// When the pipeline was found; null where it was not, or the mission has none.
     found: Option<f64>,
     /// How much of it was inspected; null where the mission does not inspect.
     distance: Option<f64>,
@@ -96,9 +110,27 @@ impl<'a> SimulateAnswer<'a> {
             format: FORMAT,
             mission,
             scenario,
+            time_unit: TimeUnit::default(),
+            complete: true,
+            missions: runs.len(),
+            messages: Vec::new(),
             strategies: strategies.iter().map(|&strategy| StrategyPart::of(strategy, runs)).collect(),
             runs: runs.iter().map(RunPart::of).collect(),
         }
+    }
+}
+
+impl SimulateAnswer<'_> {
+    /// With the unit of its times.
+    #[must_use]
+    pub fn timed(self, time_unit: TimeUnit) -> Self {
+        Self { time_unit, ..self }
+    }
+
+    /// Of so many missions that were asked for; not complete if there is a message.
+    #[must_use]
+    pub fn of(self, missions: usize, messages: Vec<Message>) -> Self {
+        Self { missions, complete: messages.is_empty(), messages, ..self }
     }
 }
 
@@ -133,6 +165,8 @@ impl RunPart {
             seed: run.seed,
             accomplished: run.accomplished,
             lost: run.lost,
+            out_of_time: run.ending == Ending::Time,
+            gave_up: run.ending == Ending::GaveUp,
             cost: run.cost,
             time: run.time,
             actions: run.actions,

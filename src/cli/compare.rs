@@ -94,9 +94,7 @@ fn penalty(text: &str) -> Result<f64, String> {
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let so_far = Shared::new();
-    if let Some(time) = arguments.time_limit {
-        so_far.show_after(time, common);
-    }
+    so_far.show_after(arguments.time_limit, common);
     let Setup { mission, mut roles, .. } = arguments.situation.setup(&arguments.inputs, common)?;
     if let Some((component, rate)) = &arguments.loss {
         roles.loss_component = Some(component.clone());

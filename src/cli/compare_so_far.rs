@@ -1,10 +1,11 @@
 //! What a comparison has come to: all of it, or as much as was there when time was up.
 //!
-//! Comparing does not look at the clock. So a thread of its own waits for the time limit, shows what is there by then, and ends
+//! Comparing does not look at the clock. So a thread of its own waits for the time limit or for Ctrl-C, shows what is there by then, and ends
 //! the program.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -67,9 +68,16 @@ impl Shared {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
-    /// Shows what is there by then, with a message, and ends the program.
-    pub fn show_after(&self, time: Duration, common: &Common) {
-        let (limits, common, shared) = (Limits::none().with_time(time), common.clone(), self.clone());
+    /// Shows what is there when time is up, or at Ctrl-C, with a message, and ends the program. A second Ctrl-C ends it at once.
+    pub fn show_after(&self, time: Option<Duration>, common: &Common) {
+        let limits = time.map_or_else(Limits::none, |time| Limits::none().with_time(time));
+        let (common, shared, interrupt) = (common.clone(), self.clone(), limits.interrupt());
+        // If the platform refuses a handler, Ctrl-C ends the program as usual.
+        let _ = ctrlc::set_handler(move || {
+            if interrupt.swap(true, Ordering::Relaxed) {
+                std::process::exit(130);
+            }
+        });
         std::thread::spawn(move || {
             while !limits.reached() {
                 std::thread::sleep(INTERVAL);
@@ -106,11 +114,14 @@ impl SoFar {
     /// That time was up, and how much there is.
     fn message(&self) -> Message {
         let Some(of) = self.of else {
-            return Message::error("M130", "the time limit was reached before anything was compared");
+            return Message::error(
+                "M130",
+                "the time limit or an interruption came before anything was compared",
+            );
         };
         let measured = self.begun.as_ref().map_or(0, |begun| begun.candidates.len());
         let text = format!(
-            "the time limit was reached before everything was compared; what is shown is incomplete: {} of {of} \
+            "the time limit or an interruption came before everything was compared; what is shown is incomplete: {} of {of} \
              comparisons, and {measured} candidates of the next",
             self.done.len()
         );

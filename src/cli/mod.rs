@@ -171,6 +171,15 @@ fn parse() -> Cli {
     Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }
 
+/// Reads the words of another command line; those of `simulate` are returned.
+fn read(words: Vec<String>) -> Result<Option<simulate::Arguments>, clap::Error> {
+    let cli = Cli::try_parse_from(std::iter::once("metaplan".to_owned()).chain(words))?;
+    Ok(match cli.command {
+        Subcommands::Simulate(arguments) => Some(arguments),
+        _ => None,
+    })
+}
+
 fn run(cli: &Cli) -> Result<Exit, Failure> {
     let triples = matches!(cli.common.format, Format::Ntriples | Format::Turtle);
     if triples && !matches!(cli.command, Subcommands::Reason(_)) {
@@ -193,7 +202,7 @@ fn run(cli: &Cli) -> Result<Exit, Failure> {
         Subcommands::Run(arguments) => run::run(arguments, &cli.common),
         Subcommands::Journal(arguments) => journal::run(arguments, &cli.common),
         Subcommands::Simulate(arguments) => simulate::run(arguments, &cli.common),
-        Subcommands::Sweep(arguments) => sweep::run(arguments, &cli.common),
+        Subcommands::Sweep(arguments) => sweep::run(arguments, &cli.common, &read),
         Subcommands::Validate(arguments) => validate::run(arguments, &cli.common),
         Subcommands::Verify(arguments) => verify::run(arguments, &cli.common),
         Subcommands::Schema(arguments) => schema::run(arguments),

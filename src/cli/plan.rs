@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use clap::{Args, ValueEnum};
 use encodings::{Backend, Config, Limits, Plan, Semantics, Solution, Status};
 use metaplan::message::Message;
+use metaplan::mission::numbers::MissingValue;
 use metaplan::mission::{Mission, btcpp_text, plan_lines, popf_text};
 use metaplan::planner::{Planned, PlannedFront, Planner};
 use metaplan::report::Positions;
@@ -322,6 +323,7 @@ fn further(planned: &Planned<'_>, solution: &Solution, (arguments, common): (&Ar
     let others = arguments.alternatives.and(solution.plan.as_ref());
     let others = others.map(|_| alternatives::text(planned.alternatives.as_ref(), planned, columns));
     let blocking = planned.blocking.as_ref().map(|blocking| format!("{blocking}\n"));
+    let blocking = blocking.map(|text| text + &missing_text(&planned.missing_values));
     let values = objectives::values_text(planned.objectives(), &planned.values);
     statistics + &values + &makespan + &others.or(blocking).unwrap_or_default()
 }
@@ -344,6 +346,31 @@ fn show(
         PlanFormat::Plansys2 => planned.spaced().map(|plan| popf_text(&plan_lines(&plan))),
         // What `validate` executes has the designs, what the user's own domain has no place for them has not.
         PlanFormat::Ipc => planned.solution.plan.as_ref().map(Plan::to_string),
+    }
+}
+
+/// How many missing numbers are shown before the rest is only counted.
+const MISSING_SHOWN: usize = 10;
+
+/// The numbers that are missing, a line each.
+fn missing_text(missing: &[MissingValue]) -> String {
+    let line = |own: &MissingValue| {
+        let (function, actions, file) = (&own.function, own.needed_by.join(", "), &own.file);
+        match &own.estimation {
+            Some((design, attribute)) => {
+                format!("    the estimation of {attribute} of {design}, for {actions}, in {file}\n")
+            }
+            None => format!("    {function}, for {actions}, in {file}\n"),
+        }
+    };
+    let more = missing.len().saturating_sub(MISSING_SHOWN);
+    let more =
+        if more > 0 { format!("    and {more} more; `--format json` lists all\n") } else { String::new() };
+    let lines: String = missing.iter().take(MISSING_SHOWN).map(line).chain([more]).collect();
+    if lines.is_empty() {
+        lines
+    } else {
+        format!("numbers are missing without which actions cannot be done:\n{lines}")
     }
 }
 

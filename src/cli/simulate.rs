@@ -1,23 +1,27 @@
 //! `metaplan simulate`.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use clap::{Args, ValueEnum};
+use encodings::Limits;
 use metaplan::answers::{LogLine, SimulateAnswer, accomplished_cost, beside_joint, runs_of, sample};
-use metaplan::mapek::{Answer, Observation, Settings};
+use metaplan::mapek::{Answer, Observation};
 use metaplan::message::Message;
-use metaplan::mission::Mission;
+use metaplan::mission::TimeUnit;
 use metaplan::report::simulation_sheet;
 use metaplan::setup::Setup;
-use metaplan::simulate::{Run, SUAVE_COLUMNS, Sample, Simulation, Strategy, simulate};
+use metaplan::simulate::{Ending, Experiment, Run, SUAVE_COLUMNS, Sample, Strategy};
 use serde_json::Value;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::drawn::Pages;
+use crate::cli::limits::Guard;
 use crate::cli::output;
-use crate::cli::progress::Progress;
-use crate::cli::situation::consistent;
+use crate::cli::progress::{Progress, during};
+use crate::cli::situation::{consistent, scenario_failure};
+use crate::cli::values::seconds;
 
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]
@@ -37,6 +41,9 @@ pub struct Arguments {
     /// The first seed.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+    /// Stop after this many seconds with the missions that are simulated by then.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
+    time_limit: Option<Duration>,
     /// Write what was observed and answered in the first mission of each strategy, one JSON object a line.
     #[arg(long, value_name = "FILE")]
     log: Option<PathBuf>,
@@ -53,9 +60,9 @@ enum Who {
     Joint,
     /// A new joint plan when an action has failed.
     Failure,
-    /// For each function by itself the best design.
+    /// For each function by itself the cheapest design with which the action can be done.
     Greedy,
-    /// Any available design.
+    /// For each function any design with which the action can be done.
     Random,
     /// The first plan to its end.
     None,
@@ -75,86 +82,106 @@ impl Who {
 
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
-    let Setup { mut mission, settings: control, scenarios, .. } = Setup::read(&arguments.mission)?;
-    let known = || {
-        let simulated = scenarios.iter().filter(|(_, scenario)| scenario.simulation.is_some());
-        simulated.map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")
-    };
-    let scenario = scenarios.get(&arguments.scenario);
-    let Some((scenario, settings)) =
-        scenario.and_then(|scenario| Some((scenario, scenario.simulation.as_ref()?)))
-    else {
-        let name = &arguments.scenario;
-        let (known, why) = (
-            known(),
-            if scenario.is_some() {
-                "its scenario has no `simulation` section"
-            } else {
-                "there is none of that name"
-            },
-        );
-        let known = if known.is_empty() {
-            "no scenario of this mission can".to_owned()
-        } else {
-            format!("these can: {known}")
-        };
-        let text = format!("`{name}` cannot be simulated: {why}; {known}");
-        return Err(Failure::usage(Message::error("M108", text)));
-    };
-    scenario.apply(&mut mission)?;
-    output::warnings(common, mission.warnings());
-    consistent(mission.knowledge())?;
+    let guard = Guard::new(arguments.time_limit, None, common)?;
+    let mut experiment = experiment(&arguments.mission, &arguments.scenario, common)?;
+    experiment.note_doubts();
+    output::warnings(common, experiment.mission().warnings());
+    consistent(experiment.mission().knowledge())?;
     let strategies: Vec<Strategy> = if arguments.strategy.is_empty() {
         Strategy::ALL.to_vec()
     } else {
         arguments.strategy.iter().map(|who| who.strategy()).collect()
     };
-    let mut log = String::new();
-    let runs = play(&mission, &control, settings, &strategies, arguments, common, &mut log)?;
+    let limits = guard.plan();
+    let played = play(&experiment, &strategies, arguments, &limits, common)?;
+    let runs = &played.runs;
     if let Some(file) = &arguments.log {
-        output::write_file(file, &log)?;
+        output::write_file(file, &played.log)?;
     }
     if let Some(file) = &arguments.csv {
-        output::write_file(file, &csv(&runs))?;
+        output::write_file(file, &csv(runs))?;
     }
+    let mission = &experiment.mission().name;
     if arguments.pages.are_wanted() {
-        arguments.pages.write(&simulation_sheet(&mission.name, &arguments.scenario, &strategies, &runs))?;
+        arguments.pages.write(&simulation_sheet(mission, &arguments.scenario, &strategies, runs))?;
     }
+    let total = strategies.len() * arguments.runs as usize;
+    let incomplete = (runs.len() < total).then(|| {
+        let text = format!(
+            "the time limit or an interruption came before all was simulated; what is shown is incomplete: {} of {total} missions",
+            runs.len()
+        );
+        Message::error("M130", text)
+    });
     match common.format {
         Format::Json => {
-            output::json_answer(&SimulateAnswer::new(&mission.name, &arguments.scenario, &strategies, &runs));
+            let answer = SimulateAnswer::new(mission, &arguments.scenario, &strategies, runs);
+            let answer =
+                answer.timed(experiment.time_unit()).of(total, incomplete.clone().into_iter().collect());
+            output::json_answer(&answer);
         }
-        _ => output::answer(&text(&strategies, &runs)),
+        _ => {
+            output::answer(&text(&strategies, runs, experiment.time_unit()));
+            if let Some(message) = &incomplete {
+                output::failure(common, std::slice::from_ref(message));
+            }
+        }
     }
-    Ok(Exit::Done)
+    Ok(if incomplete.is_some() { Exit::NothingFound } else { Exit::Done })
 }
 
+/// What is simulated, once all that is wrong with it has been reported.
+fn experiment(mission: &Path, scenario: &str, common: &Common) -> Result<Experiment, Failure> {
+    let read = || Setup::read(mission)?.experiment(scenario);
+    during("reading", common, read).map_err(scenario_failure)
+}
+
+/// The mission and the scenario of a command line, to tell apart what is simulated.
+pub fn subject(arguments: &Arguments) -> String {
+    format!("{} {}", arguments.mission.display(), arguments.scenario)
+}
+
+/// Whether the scenario of a command line can be simulated; paths are relative to a directory.
+///
+/// # Errors
+/// All that is wrong with it.
+pub fn check(arguments: &Arguments, directory: &Path, common: &Common) -> Result<(), Failure> {
+    experiment(&directory.join(&arguments.mission), &arguments.scenario, common).map(drop)
+}
+
+/// Missions that came to their end, by strategy and seed, and what was observed and answered in the first one of each strategy.
+struct Played {
+    runs: Vec<Run>,
+    log: String,
+}
+
+/// Simulates until a limit is reached. Each seed is played with all strategies before the next, so that what is there then can be compared.
 fn play(
-    mission: &Mission,
-    control: &Settings,
-    settings: &Simulation,
+    experiment: &Experiment,
     strategies: &[Strategy],
     arguments: &Arguments,
+    limits: &Limits,
     common: &Common,
-    log: &mut String,
-) -> Result<Vec<Run>, Failure> {
+) -> Result<Played, Failure> {
     let total = strategies.len() as u64 * u64::from(arguments.runs);
     let progress = Progress::new("simulating", common);
-    let mut runs = Vec::new();
-    for &strategy in strategies {
-        for seed in (arguments.seed..).take(arguments.runs as usize) {
-            let is_first = seed == arguments.seed && arguments.log.is_some();
+    let (mut runs, mut logs) = (Vec::new(), vec![String::new(); strategies.len()]);
+    'all: for seed in (arguments.seed..).take(arguments.runs as usize) {
+        let is_first = seed == arguments.seed && arguments.log.is_some();
+        for (index, &strategy) in strategies.iter().enumerate() {
             let mut note = |observation: &Observation, answers: &[Answer]| {
                 if is_first {
-                    write_log(log, strategy, observation, answers);
+                    write_log(&mut logs[index], strategy, observation, answers);
                 }
             };
-            runs.push(simulate(mission, control, settings, strategy, seed, &mut note)?);
+            let Some(run) = experiment.run(strategy, seed, limits, &mut note)? else { break 'all };
+            runs.push((index, run));
             progress.set_message(format!("{} of {total} missions", runs.len()));
         }
     }
     progress.finish();
-    Ok(runs)
+    runs.sort_by_key(|(index, run)| (*index, run.seed));
+    Ok(Played { runs: runs.into_iter().map(|(_, run)| run).collect(), log: logs.concat() })
 }
 
 fn write_log(log: &mut String, strategy: Strategy, observation: &Observation, answers: &[Answer]) {
@@ -165,7 +192,7 @@ fn write_log(log: &mut String, strategy: Strategy, observation: &Observation, an
     }
 }
 
-fn text(strategies: &[Strategy], runs: &[Run]) -> String {
+fn text(strategies: &[Strategy], runs: &[Run], unit: TimeUnit) -> String {
     let show = |sample: Option<Sample>| {
         sample.map_or_else(
             || "none".to_owned(),
@@ -193,17 +220,39 @@ fn text(strategies: &[Strategy], runs: &[Run]) -> String {
             beside.map_or_else(String::new, |(better, worse)| format!("{better} / {worse}")),
         ]
     });
+    let reaction = format!("reaction ({unit})");
     let header = [
         "strategy",
         "accomplished",
         "cost, if accomplished",
-        "reaction",
+        &reaction,
         "failed actions",
         "reconfigurations",
         "configurations",
         "better / worse than joint",
     ];
-    output::table(&header, rows)
+    output::table(&header, rows) + &failures_text(strategies, runs)
+}
+
+/// Why missions were not accomplished, a line for each strategy that has such missions.
+fn failures_text(strategies: &[Strategy], runs: &[Run]) -> String {
+    let mut text = String::new();
+    for &strategy in strategies {
+        let count = |ending: Ending| runs_of(runs, strategy).filter(|run| run.ending == ending).count();
+        let reasons = [Ending::Time, Ending::Lost, Ending::GaveUp].map(|ending| (count(ending), ending));
+        let reasons: Vec<String> = reasons
+            .iter()
+            .filter(|(count, _)| *count > 0)
+            .map(|(count, ending)| format!("{count} {ending}"))
+            .collect();
+        let (all, done) = (runs_of(runs, strategy).count(), count(Ending::Goal));
+        if !reasons.is_empty() {
+            let done = if done == 0 { "none".to_owned() } else { done.to_string() };
+            let _ =
+                writeln!(text, "{}: {done} of {all} accomplished; {}", strategy.name(), reasons.join(", "));
+        }
+    }
+    if text.is_empty() { text } else { format!("\n{text}") }
 }
 
 fn csv(runs: &[Run]) -> String {

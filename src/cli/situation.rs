@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use metaplan::file::source;
 use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
-use metaplan::message::Message;
-use metaplan::mission::{Bindings, Mission, Names};
+use metaplan::message::{Errors, Message};
+use metaplan::mission::{Bindings, Mission, Names, numbers};
 use metaplan::planner;
 use metaplan::setup::Setup;
 use ontology::ReadOptions;
@@ -126,10 +126,7 @@ impl Situation {
                 }
                 let mut setup = Setup::read(manifest)?;
                 if let Some(name) = &self.scenario {
-                    setup.apply(name).map_err(|message| match message.code.as_str() {
-                        "M108" => Failure::usage(message),
-                        _ => message.into(),
-                    })?;
+                    setup.apply(name).map_err(scenario_failure)?;
                 }
                 setup
             }
@@ -175,9 +172,15 @@ impl Situation {
             mission.set(name, value).map_err(Failure::usage)?;
         }
         consistent(mission.knowledge())?;
-        mission.note_doubts();
+        numbers::note_doubts(mission);
         Ok(setup)
     }
+}
+
+/// A scenario that there is not is a matter of usage, one that does not fit the mission is bad input.
+pub(super) fn scenario_failure(messages: Errors) -> Failure {
+    let is_usage = messages.iter().any(|message| message.code == "M108");
+    Failure { exit: if is_usage { Exit::Usage } else { Exit::BadInput }, messages }
 }
 
 /// Reads a knowledge base and reports what is the case.

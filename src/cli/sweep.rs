@@ -1,14 +1,20 @@
 //! `metaplan sweep`.
 
-use std::path::PathBuf;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use clap::Args;
-use metaplan::message::Message;
+use clap::error::ErrorKind;
+use metaplan::message::{Errors, Message, did_you_mean};
 use metaplan::sweep::{Group, Line, Results, Shard, Study, SweepAnswer, Table, perform, read_lines};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
+use crate::cli::limits::Guard;
 use crate::cli::output;
 use crate::cli::progress::Progress;
+use crate::cli::simulate;
+use crate::cli::values::seconds;
 
 /// Arguments of `sweep`.
 #[derive(Debug, Args)]
@@ -22,11 +28,14 @@ pub struct Arguments {
     /// Only every N-th run, from the I-th on: for N processes, on any number of machines.
     #[arg(long, value_name = "I/N", default_value_t)]
     shard: Shard,
+    /// Stop after this many seconds with the runs that are done by then; `--resume` goes on.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, allow_negative_numbers = true)]
+    time_limit: Option<Duration>,
     /// Go on where the shard was when it ended.
     #[arg(long)]
     resume: bool,
     /// Run nothing: put the lines of all shards together.
-    #[arg(long, conflicts_with_all = ["shard", "resume"])]
+    #[arg(long, conflicts_with_all = ["shard", "resume", "time_limit"])]
     merge: bool,
     /// With `--merge`: write all rows as CSV.
     #[arg(long, value_name = "FILE", requires = "merge")]
@@ -36,33 +45,108 @@ pub struct Arguments {
     measured: bool,
 }
 
-/// Runs the command.
-pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
+/// Reads the words of a command line; those of `simulate` are returned.
+pub type Read<'a> = dyn Fn(Vec<String>) -> Result<Option<simulate::Arguments>, clap::Error> + 'a;
+
+/// Runs the command; the command lines of the study are read by a function.
+pub fn run(arguments: &Arguments, common: &Common, read: &Read<'_>) -> Result<Exit, Failure> {
     output::require_directory(&arguments.output)?;
+    let guard = Guard::new(arguments.time_limit, None, common)?;
     let study = Study::read(&arguments.study)?;
-    if arguments.merge { merge(arguments, &study, common) } else { sweep(arguments, &study, common) }
+    if arguments.merge {
+        return merge(arguments, &study, common);
+    }
+    check(&study, common, read)?;
+    sweep(arguments, &study, guard, common)
 }
 
-fn sweep(arguments: &Arguments, study: &Study, common: &Common) -> Result<Exit, Failure> {
+fn sweep(arguments: &Arguments, study: &Study, guard: Guard, common: &Common) -> Result<Exit, Failure> {
     let program = std::env::current_exe()
         .map_err(|error| Message::error("M152", format!("the program's own file is unknown: {error}")))?;
     let mut results = Results::open(&arguments.output, study, arguments.shard, arguments.resume)?;
+    let limits = guard.plan();
     let progress = Progress::new("sweeping", common);
     let total = study.runs(arguments.shard).count();
+    let mut messages = Vec::new();
     for run in study.runs(arguments.shard) {
         if !results.done.contains_key(&run.number) {
-            results.add(perform(&program, study, &run)?)?;
+            let line = if limits.reached() { None } else { perform(&program, study, &run, &limits)? };
+            let Some(line) = line else {
+                let text = format!(
+                    "the time limit or an interruption came before all runs were done; {} of {total} are, and `--resume` goes on",
+                    results.done.len()
+                );
+                messages.push(Message::error("M130", text));
+                break;
+            };
+            results.add(line)?;
         }
         progress.set_message(format!("{} of {total} runs", results.done.len()));
     }
     progress.finish();
     let lines: Vec<Line> = results.done.values().cloned().collect();
     let wanted = study.runs(arguments.shard).map(|run| run.number);
-    Ok(say(&SweepAnswer::new(&lines, wanted, &[]), &[], common))
+    let exit = say(&SweepAnswer::new(&lines, wanted, &[]).because(messages.clone()), &[], common);
+    if common.format != Format::Json {
+        output::warnings(common, &messages);
+    }
+    Ok(exit)
+}
+
+/// Whether all commands of a study can be run: their options, and scenarios that are simulated.
+///
+/// # Errors
+/// All that is wrong with them, once each.
+fn check(study: &Study, common: &Common, read: &Read<'_>) -> Result<(), Failure> {
+    let (mut mistakes, mut simulated): (Vec<Message>, BTreeSet<String>) = (Vec::new(), BTreeSet::new());
+    for (path, run) in study.samples() {
+        let words = study.words(&run, Path::new("{dir}"));
+        let simulation = match read(words) {
+            Ok(simulation) => simulation,
+            // A file that is to be written for the run is not there yet.
+            Err(error) if study.generates() && error.kind() == ErrorKind::ValueValidation => continue,
+            Err(error) => {
+                // What is wrong with the first run is wrong with the others, too.
+                let text = refusal(&error);
+                if mistakes.iter().all(|mistake: &Message| !mistake.message.starts_with(&text)) {
+                    mistakes.push(study.mistake(&path, &text));
+                }
+                continue;
+            }
+        };
+        if let Some(arguments) = simulation
+            && !study.generates()
+            && simulated.insert(simulate::subject(&arguments))
+        {
+            let wrong = simulate::check(&arguments, &study.directory, common).err();
+            mistakes.extend(wrong.into_iter().flat_map(|failure| failure.messages));
+        }
+    }
+    Ok(Errors::unless_empty(mistakes)?)
+}
+
+/// What the parser of the command line says, in a line.
+fn refusal(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    let lines: Vec<&str> =
+        lines.take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more")).collect();
+    lines.join("; ").trim_start_matches("error: ").replace("; tip: ", "; ")
 }
 
 fn merge(arguments: &Arguments, study: &Study, common: &Common) -> Result<Exit, Failure> {
     let lines = read_lines(&arguments.output, study)?;
+    let answers = || lines.iter().map(|line| &line.answer).filter(|answer| !answer.is_null());
+    if let Some(answer) = answers().next()
+        && answers().all(|answer| answer.pointer(study.rows()).is_none())
+    {
+        let known = answer.as_object().into_iter().flatten().map(|(key, _)| format!("/{key}"));
+        let known: Vec<String> = known.collect();
+        let meant = did_you_mean(study.rows(), known.iter().map(String::as_str));
+        let text =
+            format!("no answer has anything at `{}`{meant}; there are: {}", study.rows(), known.join(", "));
+        return Err(study.mistake(&["rows".into()], &text).into());
+    }
     let table = Table::new(&lines, study.rows(), arguments.measured);
     if let Some(file) = &arguments.csv {
         output::write_file(file, &table.to_csv())?;

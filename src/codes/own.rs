@@ -143,7 +143,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "M135",
         "A simulation cannot be run.",
-        "A number of its section is out of range.",
+        "A number of its section is out of range, a condition is malformed, a name stands for nothing, or an event can never take place.",
         "Correct what the message names.",
     ],
     [
@@ -205,6 +205,24 @@ pub const CODES: &[[&str; 4]] = &[
         "A run of a study cannot be performed.",
         "The program that writes its files fails or is not there.",
         "Run that program by hand with the arguments of the message.",
+    ],
+    [
+        "M230",
+        "A design has no estimation that an action needs.",
+        "An action uses an attribute of the designs that are chosen for it, and this design has no value of it.",
+        "Add the estimation to the design; the message proposes a name that may be misspelt.",
+    ],
+    [
+        "M231",
+        "A numeric function has no value that an action needs.",
+        "The problem states no value of it for objects for which the action would be possible.",
+        "State it in `:init`.",
+    ],
+    [
+        "M232",
+        "A duration is negative.",
+        "The domain, or a value of the problem or of the knowledge base, makes an action take less than no time.",
+        "Correct the value that the message names.",
     ],
     [
         "M301",

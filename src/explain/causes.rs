@@ -16,6 +16,7 @@ use crate::knowledge::Knowledge;
 use crate::mapek::ruled_out;
 use crate::message::Errors;
 use crate::mission::Mission;
+use crate::mission::numbers::against;
 
 /// Upper limit on the sets of alterations that are tried.
 const MAX_TRIED: usize = 2_000;
@@ -102,7 +103,8 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
         design: design.individual.name.clone(),
         functions: design.solves.iter().map(|function| function.name.clone()).collect(),
         available: design.available,
-        because: Vec::new(),
+        // Why it could not be used although it were available.
+        because: against(mission, &design.individual.name),
         causes: Vec::new(),
         ways: Vec::new(),
     };

@@ -153,6 +153,11 @@ impl Beliefs {
         self.running.as_ref().map(|running| (running.action, &running.step))
     }
 
+    /// How much of the action under way is done, from 0 to 1.
+    pub(crate) fn progress(&self) -> Option<&BigRational> {
+        self.running.as_ref().map(|running| &running.progress)
+    }
+
     /// Whether the action that is under way was asked to end.
     pub fn cancelling(&self) -> bool {
         self.running.as_ref().is_some_and(|running| running.cancelling)

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use encodings::Limits;
 use serde_json::Value;
 use tracing::info_span;
 
@@ -236,6 +237,11 @@ impl Loop {
         if changes.base == Base::Watched {
             analyze(&mut self.beliefs, &mut Vec::new());
         }
+    }
+
+    /// Ends planning when these limits are reached, besides its own time limit. What is planned then is of no use.
+    pub(crate) fn limit(&mut self, limits: Limits) {
+        self.planner.limits = limits;
     }
 
     /// The best plan for the situation as it is believed.

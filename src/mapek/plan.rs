@@ -24,6 +24,8 @@ use crate::number;
 pub(crate) struct Planner {
     /// How long one plan may take.
     pub time_limit: Option<Duration>,
+    /// When all planning ends.
+    pub limits: Limits,
     /// Plans that were made before, to be used again in this order.
     pub recorded: VecDeque<Outcome>,
     /// Plans made since the last look.
@@ -46,7 +48,7 @@ impl Planner {
     }
 
     fn solve(&mut self, ask: &Ask<'_>) -> Outcome {
-        let limits = self.time_limit.map_or_else(Limits::none, |time| Limits::none().with_time(time));
+        let limits = self.time_limit.map_or_else(|| self.limits.clone(), |time| self.limits.within(time));
         self.watch.begin();
         let outcome = self
             .live

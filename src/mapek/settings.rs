@@ -19,7 +19,7 @@ pub struct AdaptationSection {
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     minimum_benefit: Option<Spanned<toml::Value>>,
-    /// For so many seconds must a design be back before a better plan is looked for.
+    /// For so many seconds must a design be back before a better plan is looked for; of the clock, whatever the unit of the domain's times.
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     settle: Option<Spanned<toml::Value>>,

@@ -4,8 +4,10 @@
 
 mod blocking;
 mod btcpp;
+pub mod conditions;
 mod confirm;
 mod lean;
+pub mod numbers;
 mod planning;
 mod plansys2;
 mod sections;
@@ -19,5 +21,7 @@ pub use lean::lean;
 pub use planning::Planning;
 pub(crate) use planning::{ground_with, replanner};
 pub use plansys2::{PlanLine, instant, plan_lines, popf_text, spaced};
-pub use sections::{BindingsSection, KnowledgeSection, PlanningSection, Scenario};
+pub use sections::{
+    BindingsSection, KnowledgeSection, Mistake, PlanningSection, Scenario, TimeUnit, setting,
+};
 pub use steps::read_plan;

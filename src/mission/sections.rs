@@ -9,12 +9,13 @@ use ::mission::{Bindings, Mission, Names};
 use ontology::ReadOptions;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{self, MapAccess, Visitor};
-use serde::{Deserialize, Deserializer};
+use serde::{Deserialize, Deserializer, Serialize};
 use toml::Spanned;
 
 use crate::knowledge::{COADAPTATION, Sources, TOMASYS};
-use crate::manifest::ManifestPath;
+use crate::manifest::{Key, ManifestPath, Part};
 use crate::message::{Errors, Message};
+use crate::mission::conditions;
 
 /// The section `knowledge` of a manifest; paths are relative to the manifest.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -66,6 +67,43 @@ pub struct PlanningSection {
     pub domain: PathBuf,
     /// The problem file.
     pub problem: PathBuf,
+    /// The unit of the domain's times: `seconds`, `minutes` or `hours`. Simulations need it: the clock of the loop goes in seconds.
+    #[serde(default)]
+    pub time_unit: TimeUnit,
+}
+
+/// The unit of a domain's times.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum TimeUnit {
+    /// As robots have it, and most domains.
+    #[default]
+    Seconds,
+    /// 60 seconds.
+    Minutes,
+    /// 3600 seconds.
+    Hours,
+}
+
+impl TimeUnit {
+    /// How many seconds it has.
+    pub fn seconds(self) -> f64 {
+        match self {
+            Self::Seconds => 1.0,
+            Self::Minutes => 60.0,
+            Self::Hours => 3600.0,
+        }
+    }
+}
+
+impl fmt::Display for TimeUnit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Seconds => "seconds",
+            Self::Minutes => "minutes",
+            Self::Hours => "hours",
+        })
+    }
 }
 
 /// The section `bindings`.
@@ -205,18 +243,70 @@ pub struct Scenario<S> {
     pub simulation: Option<S>,
 }
 
+/// What is wrong with a part of a section, and where that part stands.
+#[derive(Debug, Clone)]
+pub struct Mistake {
+    /// The path to the part, from the section on.
+    pub path: Vec<Key>,
+    /// What of it is meant.
+    pub part: Part,
+    /// What is wrong.
+    pub message: Message,
+}
+
+impl Mistake {
+    /// Whether it was found by reading PDDL, which presupposes that the mission's own files are right.
+    pub fn is_of_pddl(&self) -> bool {
+        self.message.code.starts_with('P')
+    }
+}
+
 impl<S> Scenario<S> {
-    /// Puts the situation into effect.
+    /// Puts the situation into effect, as far as it fits the mission.
     ///
     /// # Errors
-    /// The first setting that does not fit the mission.
-    pub fn apply(&self, mission: &mut Mission) -> Result<(), Message> {
-        for component in &self.fail {
-            mission.fail(component)?;
-        }
-        self.set.iter().try_for_each(|(name, value)| match value {
-            toml::Value::String(text) => mission.set(name, text),
-            other => mission.set(name, &other.to_string()),
-        })
+    /// All that does not fit.
+    pub fn apply(&self, mission: &mut Mission) -> Result<(), Errors> {
+        Errors::unless_empty(self.mistakes(mission).into_iter().map(|mistake| mistake.message))
     }
+
+    /// As [`Scenario::apply`]; returns all that does not fit, with its place.
+    pub fn mistakes(&self, mission: &mut Mission) -> Vec<Mistake> {
+        let mut mistakes = Vec::new();
+        // Of a mission that is wrong itself it is not known what there is.
+        let is_sound = mission.filled().is_ok();
+        for (index, component) in self.fail.iter().enumerate() {
+            let wrong = mission.fail(component).err();
+            mistakes.extend(wrong.map(|message| Mistake {
+                path: vec!["fail".into(), index.into()],
+                part: Part::Value,
+                message,
+            }));
+        }
+        for (name, value) in &self.set {
+            let value = match value {
+                toml::Value::String(text) => text.clone(),
+                other => other.to_string(),
+            };
+            let path = || vec!["set".into(), name.as_str().into()];
+            mistakes
+                .extend(setting(mission, name, &value, path).filter(|wrong| is_sound || !wrong.is_of_pddl()));
+        }
+        mistakes
+    }
+}
+
+/// Sets a value; returns what is wrong with it.
+pub fn setting(
+    mission: &mut Mission,
+    name: &str,
+    value: &str,
+    path: impl FnOnce() -> Vec<Key>,
+) -> Option<Mistake> {
+    if let Err(message) = mission.set(name, value) {
+        let part = if message.code == "M102" { Part::Value } else { Part::Key };
+        return Some(Mistake { path: path(), part, message });
+    }
+    let wrong = conditions::setting(mission, name, value)?;
+    Some(Mistake { path: path(), part: Part::Value, message: wrong })
 }

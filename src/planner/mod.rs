@@ -17,6 +17,7 @@ use pddl::ast::Problem;
 use crate::answers::Preparation;
 use crate::knowledge::Knowledge;
 use crate::message::{Errors, Message};
+use crate::mission::numbers::missing_values;
 use crate::mission::{Mission, Planning as _, Reading, blocking, confirm, lean};
 use crate::planner::objectives::{Objectives, fault};
 use crate::planner::planned::Ground;
@@ -233,6 +234,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         planned.alternatives = others;
         if planned.solution.status == Status::Unsolvable {
             planned.blocking = blocking(planned.mission, &planned.problem, &config);
+            planned.missing_values = missing_values(planned.mission);
         }
         Ok(planned)
     }
@@ -285,6 +287,7 @@ impl<'m, 'r> Planner<'m, 'r> {
             values,
             alternatives: None,
             blocking: None,
+            missing_values: Vec::new(),
             too_large: Vec::new(),
             preparation: Preparation { ground, ..Preparation::default() },
             mission,

@@ -8,6 +8,7 @@ use pddl::ast::Problem;
 use crate::answers::{Objective, ParetoAnswer, PlanAnswer, Preparation};
 use crate::certificate::{self, Contents};
 use crate::message::Message;
+use crate::mission::numbers::MissingValue;
 use crate::mission::{Blocking, Mission, Planning as _, Reading, spaced};
 use crate::planner::objectives::Objectives;
 use crate::report::{Positions, Seen, front_sheet, plan_picture};
@@ -36,6 +37,8 @@ pub struct Planned<'m> {
     pub alternatives: Option<Alternatives>,
     /// Which designs keep the mission from having a plan, if it is proved that there is none.
     pub blocking: Option<Blocking>,
+    /// If it is proved that there is no plan: numeric functions without a value that actions need.
+    pub missing_values: Vec<MissingValue>,
     /// Why it was planned by search alone, in exact numbers; empty if it was not.
     pub too_large: Vec<Message>,
     /// How long things took before the search; that of reading is the caller's to add.
@@ -103,6 +106,7 @@ impl Planned<'_> {
             .with_alternatives(self.alternatives.as_ref())
             .with_makespan(makespan.as_ref())
             .with_blocking(self.blocking.as_ref())
+            .with_missing_values(&self.missing_values)
     }
 
     /// Writes all that is needed to check the answer into a directory that does not exist yet; `metaplan verify` checks it.

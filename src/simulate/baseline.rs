@@ -5,10 +5,13 @@
 //!
 //! - *none* follows its first plan, and gives up when an action fails;
 //! - *failure* plans anew, jointly, when an action has failed, as PLANTA does \[1\];
-//! - *greedy* takes of the available designs of each function the one with which the action at hand costs least by itself, at
-//!   each request and when a design is lost, as MROS takes the one of greatest utility \[2\]; its task is planned
-//!   anew when an action has failed;
-//! - *random* takes any available design instead.
+//! - *greedy* takes for each function, one after the other, the admissible design with which the action at hand costs least by itself, at
+//!   each request and when a design is lost, as MROS takes the one of greatest utility among those that fulfil the requirements \[2\];
+//!   its task is planned anew when an action has failed;
+//! - *random* takes any admissible design instead.
+//!
+//! What is admissible is said by [`Admission`]. Where no design is, the action keeps that of its plan if it is available, and otherwise gets
+//! an available one; it may be done later. If the action cannot be done with what was chosen, but with the designs of its plan, it gets those.
 //!
 //! \[1\] Rezende Silva et al., PLANTA, 2025. \[2\] Bozhinoski et al., MROS, Advanced Robotics 36, 2022.
 
@@ -16,10 +19,12 @@ use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
 use num_rational::BigRational;
-use pddl::ast::Direction;
+use pddl::ast::{Direction, Problem};
 use pddl::validate::{advance, metric_after};
 
 use crate::mapek::{Answer, Event, Loop, Observation, PlannedStep};
+use crate::mission::Mission;
+use crate::simulate::admissible::Admission;
 
 /// Who decides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,9 +33,9 @@ pub enum Strategy {
     Joint,
     /// The first plan to its end.
     None,
-    /// Any available design.
+    /// For each function any design with which the action can be done.
     Random,
-    /// For each function by itself the best design.
+    /// For each function by itself the cheapest design with which the action can be done.
     Greedy,
     /// A new joint plan when an action has failed.
     Failure,
@@ -140,7 +145,8 @@ impl Controller {
             return;
         }
         if let Some(step) = self.plan.pop_front() {
-            let step = if self.strategy.chooses_designs() { self.choose(&step, |_| true) } else { step };
+            let step =
+                if self.strategy.chooses_designs() { self.choose(&step, None, |_| true) } else { step };
             self.control.request_now(step, answers);
         } else if self.strategy != Strategy::None
             && self.planned_with != *self.control.beliefs().available()
@@ -155,57 +161,78 @@ impl Controller {
         }
     }
 
-    /// The same action with designs as the strategy chooses them for some functions.
-    fn choose(&mut self, step: &PlannedStep, concerns: impl Fn(&str) -> bool) -> PlannedStep {
+    /// The same action with designs as the strategy chooses them for some functions; `done` is how much of it is done, if it is under way.
+    fn choose(
+        &mut self,
+        step: &PlannedStep,
+        done: Option<&BigRational>,
+        concerns: impl Fn(&str) -> bool,
+    ) -> PlannedStep {
+        let mission = self.control.beliefs().mission();
+        let mut problem = mission.problem().clone();
+        mission.fill(&mut problem);
         let mut chosen = step.clone();
-        for (function, _) in &step.configuration {
-            if !concerns(function) {
+        let functions = step.configuration.iter().map(|(function, _)| function.as_str());
+        let functions: Vec<&str> = functions.filter(|function| concerns(function)).collect();
+        for (index, function) in functions.iter().enumerate() {
+            let designs = self.control.designs_for(function);
+            let undecided = &functions[index + 1..];
+            let admission = Admission::new(mission.domain(), &problem, &chosen, done, undecided);
+            let admits = |design: &&String| admission.admits(&chosen.with_design(function, design));
+            let admissible: Vec<String> = designs.iter().filter(admits).cloned().collect();
+            let is_kept = admissible.is_empty()
+                && chosen.design(function).is_some_and(|design| designs.iter().any(|own| own == design));
+            if is_kept {
                 continue;
             }
-            let designs = self.control.designs_for(function);
+            let designs = if admissible.is_empty() { designs } else { admissible };
             let design = match self.strategy {
                 Strategy::Random if !designs.is_empty() => {
                     Some(designs[self.random.usize(..designs.len())].clone())
                 }
                 Strategy::Random => None,
-                _ => self.cheapest(&chosen, function, &designs),
+                _ => cheapest(mission, &problem, (&chosen, function), &designs),
             };
             if let Some(design) = design {
                 chosen = chosen.with_design(function, &design);
             }
         }
-        chosen
-    }
-
-    /// The design with which the action costs least by itself, whether or not it can be done; of equals the first.
-    fn cheapest(&self, step: &PlannedStep, function: &str, designs: &[String]) -> Option<String> {
-        let mission = self.control.beliefs().mission();
-        let mut problem = mission.problem().clone();
-        mission.fill(&mut problem);
-        let maximize = problem.metric.as_ref().is_some_and(|metric| metric.direction == Direction::Maximize);
-        let cost = |design: &String| -> Option<BigRational> {
-            let step = step.with_design(function, design).to_plan_step();
-            let advance = advance(mission.domain(), &problem, &step, true).ok()?;
-            let mut after = problem.clone();
-            advance.apply(&mut after.init);
-            let cost = metric_after(mission.domain(), &after, &advance.duration)?;
-            Some(if maximize { -cost } else { cost })
-        };
-        let costs = designs.iter().filter_map(|design| Some((cost(design)?, design)));
-        costs.min_by(|left, right| left.0.cmp(&right.0)).map(|(_, design)| design.clone())
+        // Designs that were chosen one after the other need not go together, and those of the plan do.
+        let whole = Admission::new(mission.domain(), &problem, step, done, &[]);
+        if !whole.admits(&chosen) && whole.admits(step) { step.clone() } else { chosen }
     }
 
     /// Chooses anew where the action under way has lost a design.
     fn replace_lost(&mut self, answers: &mut Vec<Answer>) {
         let known = self.control.beliefs();
         let Some((_, step)) = known.running() else { return };
-        let step = step.clone();
+        let (step, done) = (step.clone(), known.progress().cloned());
         let available = known.available().clone();
         let is_lost =
             |function: &str| step.design(function).is_some_and(|design| !available.contains(design));
         if step.configuration.iter().any(|(function, _)| is_lost(function)) {
-            let chosen = self.choose(&step, is_lost);
+            let chosen = self.choose(&step, done.as_ref(), is_lost);
             self.control.reconfigure_now(chosen, answers);
         }
     }
+}
+
+/// The design with which the action costs least by itself, whether or not it can be done; of equals the first.
+fn cheapest(
+    mission: &Mission,
+    problem: &Problem,
+    (step, function): (&PlannedStep, &str),
+    designs: &[String],
+) -> Option<String> {
+    let maximize = problem.metric.as_ref().is_some_and(|metric| metric.direction == Direction::Maximize);
+    let cost = |design: &String| -> Option<BigRational> {
+        let step = step.with_design(function, design).to_plan_step();
+        let advance = advance(mission.domain(), problem, &step, true).ok()?;
+        let mut after = problem.clone();
+        advance.apply(&mut after.init);
+        let cost = metric_after(mission.domain(), &after, &advance.duration)?;
+        Some(if maximize { -cost } else { cost })
+    };
+    let costs = designs.iter().filter_map(|design| Some((cost(design)?, design)));
+    costs.min_by(|left, right| left.0.cmp(&right.0)).map(|(_, design)| design.clone())
 }

@@ -1,12 +1,14 @@
 //! A mission with a simulated robot: how ways of control fare in the same world.
 //!
-//! [`simulate`] runs one mission to its end, by the goal, by the end of the robot, or by the end of the time. The figures
+//! An [`Experiment`] runs one mission to its end, by the goal, by the end of the robot, or by the end of the time. The figures
 //! are those of the mission (accomplished, its metric), those that SUAVE reports \[1\], and how undecided the control was
 //! (reconfigurations, distinct configurations).
 //!
 //! - \[1\] Rezende Silva et al., SUAVE: an exemplar for self-adaptive underwater vehicles, SEAMS 2023.
 
+mod admissible;
 mod baseline;
+mod check;
 mod report;
 mod settings;
 mod statistics;
@@ -15,53 +17,112 @@ mod world;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
+use encodings::Limits;
+
 use crate::mapek::{Answer, Command, Event, Loop, Observation, Settings};
 use crate::message::{Errors, Message};
-use crate::mission::Mission;
+use crate::mission::{Mission, TimeUnit, numbers};
 
 pub use baseline::Strategy;
-pub use report::{Run, SUAVE_COLUMNS};
+pub use report::{Ending, Run, SUAVE_COLUMNS};
 pub use settings::{Disturbance, RandomFailure, Signal, Simulation, Suave};
 pub use statistics::Sample;
 
 use baseline::Controller;
+use check::Watched;
 use world::World;
 
-/// The seconds of a loop's clock in a unit of the domain's time: a minute, as the shipped missions have it.
-const SECONDS: f64 = 60.0;
-
-/// Runs one mission with a loop that is as eager as `control` says; `log` hears of every observation and every answer, at its time in seconds.
+/// A mission with what a simulated robot meets, to be run again and again.
 ///
-/// # Errors
-/// The mission or the scenario does not fit.
-pub fn simulate(
-    mission: &Mission,
-    control: &Settings,
-    settings: &Simulation,
-    strategy: Strategy,
-    seed: u64,
-    log: &mut dyn FnMut(&Observation, &[Answer]),
-) -> Result<Run, Errors> {
-    if let Some(mistake) = settings.mistake() {
-        return Err(vec![Message::error("M135", format!("the simulation cannot be run: {mistake}"))].into());
+/// ```
+/// use std::path::Path;
+/// use metaplan::{encodings::Limits, setup::Setup, simulate::Strategy};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let experiment = Setup::read(Path::new("missions/ugv.toml"))?.experiment("kinect_at_wp2")?;
+/// let run = experiment.run(Strategy::Joint, 1, &Limits::none(), &mut |_, _| {})?;
+/// assert!(run.is_some_and(|run| run.accomplished));
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Debug, Clone)]
+pub struct Experiment {
+    mission: Mission,
+    control: Settings,
+    simulation: Simulation,
+    watched: Watched,
+    time_unit: TimeUnit,
+}
+
+impl Experiment {
+    /// A mission in the situation of a scenario, with a loop that is as eager as `control` says. `time_unit` is that of the domain's times:
+    /// the clock of the loop goes in seconds.
+    ///
+    /// # Errors
+    /// All that is wrong with the simulation.
+    pub fn new(
+        mission: Mission,
+        control: Settings,
+        simulation: Simulation,
+        time_unit: TimeUnit,
+    ) -> Result<Self, Errors> {
+        let (watched, mistakes) = simulation.watched(&mission);
+        Errors::unless_empty(mistakes.into_iter().map(|mistake| mistake.message))?;
+        Ok(Self { mission, control, simulation, watched, time_unit })
     }
-    let control = Loop::new(mission.clone(), control.clone())?;
-    let mut stage = Stage {
-        world: World::new(mission.clone(), settings.clone(), seed),
-        controller: Controller::new(strategy, control, seed),
-        configuration: BTreeMap::new(),
-        configurations: BTreeSet::new(),
-        upset: None,
-        run: Run { strategy, seed, ..Run::default() },
-    };
-    stage.play(settings, log)?;
-    Ok(stage.finish())
+
+    /// The mission at its beginning.
+    pub fn mission(&self) -> &Mission {
+        &self.mission
+    }
+
+    /// Adds to the warnings of the mission what may be other than meant in its situation.
+    pub fn note_doubts(&mut self) {
+        numbers::note_doubts(&mut self.mission);
+    }
+
+    /// The unit of all times but those of the log.
+    pub fn time_unit(&self) -> TimeUnit {
+        self.time_unit
+    }
+
+    /// Runs the mission once; `log` hears of every observation and every answer, at its time in seconds. None if a limit was reached before
+    /// the end: what has happened until then is no result.
+    ///
+    /// # Errors
+    /// The mission cannot be planned for.
+    pub fn run(
+        &self,
+        strategy: Strategy,
+        seed: u64,
+        limits: &Limits,
+        log: &mut dyn FnMut(&Observation, &[Answer]),
+    ) -> Result<Option<Run>, Errors> {
+        let mut control = Loop::new(self.mission.clone(), self.control.clone())?;
+        control.limit(limits.clone());
+        let world = World::new(self.mission.clone(), self.simulation.clone(), self.watched.clone(), seed);
+        let mut stage = Stage {
+            world,
+            controller: Controller::new(strategy, control, seed),
+            second: self.time_unit.seconds(),
+            time_budget: self.simulation.time_budget,
+            configuration: BTreeMap::new(),
+            configurations: BTreeSet::new(),
+            upset: None,
+            run: Run { strategy, seed, time_unit: self.time_unit, ..Run::default() },
+        };
+        let ending = stage.play(limits, log)?;
+        Ok(ending.map(|ending| stage.finish(ending)))
+    }
 }
 
 /// A world, who controls it, and what is noted of both.
 struct Stage {
     world: World,
     controller: Controller,
+    /// The seconds in a unit of the domain's time.
+    second: f64,
+    time_budget: f64,
     configuration: BTreeMap<String, String>,
     configurations: BTreeSet<BTreeMap<String, String>>,
     /// Since when the action under way cannot go on, with nothing done about it.
@@ -70,11 +131,12 @@ struct Stage {
 }
 
 impl Stage {
+    /// Runs to the end of the mission; none if a limit comes first.
     fn play(
         &mut self,
-        settings: &Simulation,
+        limits: &Limits,
         log: &mut dyn FnMut(&Observation, &[Answer]),
-    ) -> Result<(), Message> {
+    ) -> Result<Option<Ending>, Message> {
         let mut queue: VecDeque<Event> = self.world.first_look()?.into();
         // What is seen at first is known before the first plan.
         let early: Vec<Event> = queue.drain(..).collect();
@@ -85,24 +147,42 @@ impl Stage {
         queue.extend(early);
         loop {
             while let Some(event) = queue.pop_front() {
+                // A plan that was cut short by a limit would lead to another mission.
+                if limits.reached() {
+                    return Ok(None);
+                }
                 self.count(&event);
                 let observation = Observation { time: Some(self.now()), ..Observation::from(event.clone()) };
                 let answers = self.controller.handle(event, self.now());
                 log(&observation, &answers);
                 self.take(&answers, &mut queue);
             }
-            let over =
-                self.world.time >= settings.time_budget || self.controller.is_done() || self.world.lost;
-            if self.world.reached() || over {
-                return Ok(());
+            if limits.reached() {
+                return Ok(None);
+            }
+            if let Some(ending) = self.ending() {
+                return Ok(Some(ending));
             }
             queue.extend(self.world.pass()?);
             self.look();
         }
     }
 
+    /// Why the mission is over, if it is.
+    fn ending(&self) -> Option<Ending> {
+        if self.world.reached() {
+            Some(Ending::Goal)
+        } else if self.world.lost {
+            Some(Ending::Lost)
+        } else if self.controller.is_done() {
+            Some(Ending::GaveUp)
+        } else {
+            (self.world.time >= self.time_budget).then_some(Ending::Time)
+        }
+    }
+
     fn now(&self) -> Duration {
-        Duration::from_secs_f64(self.world.time * SECONDS)
+        Duration::from_secs_f64(self.world.time * self.second)
     }
 
     fn count(&mut self, event: &Event) {
@@ -139,10 +219,11 @@ impl Stage {
         }
     }
 
-    fn finish(self) -> Run {
+    fn finish(self, ending: Ending) -> Run {
         Run {
-            accomplished: self.world.reached(),
+            accomplished: ending == Ending::Goal,
             lost: self.world.lost,
+            ending,
             cost: self.world.cost(),
             time: self.world.time,
             found: self.world.found,

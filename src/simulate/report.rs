@@ -1,10 +1,38 @@
 //! The figures of one simulated mission, also in the columns of SUAVE.
 
+use std::fmt;
+
+use crate::mission::TimeUnit;
 use crate::simulate::baseline::Strategy;
 
-/// The columns that SUAVE writes, as it names them; its seconds are the domain's time units here.
+/// The columns that SUAVE writes, as it names them, in seconds.
 pub const SUAVE_COLUMNS: [&str; 4] =
     ["pipeline found", "time searching pipeline (s)", "distance inspected (m)", "mean reaction time (s)"];
+
+/// Why a simulated mission is over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ending {
+    /// The goal was reached.
+    Goal,
+    /// The time budget was used up.
+    Time,
+    /// The lifeline came to 0.
+    Lost,
+    /// The strategy gave up.
+    GaveUp,
+}
+
+/// In a few words, of several missions.
+impl fmt::Display for Ending {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Goal => "reached the goal",
+            Self::Time => "used up the time budget",
+            Self::Lost => "lost the robot",
+            Self::GaveUp => "gave up",
+        })
+    }
+}
 
 /// What a simulated mission has come to. Times are in the domain's time unit.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,6 +45,10 @@ pub struct Run {
     pub accomplished: bool,
     /// Whether the robot came to its end.
     pub lost: bool,
+    /// Why it is over.
+    pub ending: Ending,
+    /// The unit of its times.
+    pub time_unit: TimeUnit,
     /// The mission's metric at the end.
     pub cost: f64,
     /// How long it took.
@@ -48,6 +80,8 @@ impl Default for Run {
             seed: 0,
             accomplished: false,
             lost: false,
+            ending: Ending::Time,
+            time_unit: TimeUnit::default(),
             cost: 0.0,
             time: 0.0,
             actions: 0,
@@ -79,14 +113,18 @@ impl Run {
         };
         [
             if self.found.is_some() { "True" } else { "False" }.to_owned(),
-            short(self.found.unwrap_or(self.time)),
+            self.in_seconds(self.found.unwrap_or(self.time)),
             short(distance),
             self.reaction(),
         ]
     }
 
     fn reaction(&self) -> String {
-        self.mean_reaction().map_or_else(|| "no event".to_owned(), short)
+        self.mean_reaction().map_or_else(|| "no event".to_owned(), |reaction| self.in_seconds(reaction))
+    }
+
+    fn in_seconds(&self, time: f64) -> String {
+        short(time * self.time_unit.seconds())
     }
 
     /// Whether this is the better outcome: a mission that is accomplished before one that is not, then the lower cost.

@@ -5,12 +5,12 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// How a scenario is simulated. Times are in the domain's time unit.
+/// How a scenario is simulated. Times are in the domain's time unit (`planning.time_unit`).
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Simulation {
-    /// The time from one report to the next.
+    /// The time from one report to the next, in the domain's time unit, as all times of the section.
     pub step: f64,
     /// The mission is given up after this time.
     pub time_budget: f64,
@@ -19,7 +19,7 @@ pub struct Simulation {
     /// Actions take up to this share longer or shorter than expected.
     #[serde(default)]
     pub noise: f64,
-    /// The function of the problem that ends the mission when it comes to nothing.
+    /// The numeric function that ends the mission when it comes to 0, such as `battery`.
     #[serde(default)]
     pub lifeline: Option<String>,
     /// What happens once.
@@ -36,17 +36,17 @@ pub struct Simulation {
     pub suave: Option<Suave>,
 }
 
-/// Something that happens once: at a time, or when a fact holds for the first time.
+/// Something that happens once: at a time, or when a condition holds for the first time.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Disturbance {
-    /// When.
+    /// When; an event has either this or `when`.
     #[serde(default)]
     pub at: Option<f64>,
-    /// The fact, as `predicate arguments`.
+    /// The condition: a fact as `predicate arguments` or `(predicate arguments)`, or any condition of PDDL, such as `(< (battery) 20)`.
     #[serde(default)]
     pub when: Option<String>,
-    /// So much later than the fact, or later by a random part of it.
+    /// So much later than that at most, by a random part of it.
     #[serde(default)]
     pub within: f64,
     /// Components that fail.
@@ -94,11 +94,11 @@ pub struct RandomFailure {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Suave {
-    /// The fact that the pipeline is found.
+    /// The fact that the pipeline is found, as `when` of an event.
     pub found: String,
     /// The action that inspects it.
     pub inspect: String,
-    /// The function that says how long it is.
+    /// The numeric function that says how long it is.
     pub length: String,
 }
 
@@ -117,19 +117,5 @@ impl Simulation {
             failures: Vec::new(),
             suave: None,
         }
-    }
-
-    /// What is wrong with the numbers, if something is.
-    pub fn mistake(&self) -> Option<String> {
-        let positive = [("step", self.step), ("time_budget", self.time_budget), ("patience", self.patience)];
-        let wrong = positive.into_iter().find(|(_, value)| !(value.is_finite() && *value > 0.0));
-        let noise = !(0.0..1.0).contains(&self.noise);
-        let many = self.time_budget / self.step > 1e6;
-        wrong
-            .map(|(name, value)| format!("`{name}` is {value}, but should be positive"))
-            .or_else(|| {
-                noise.then(|| format!("`noise` is {}, but should be at least 0 and below 1", self.noise))
-            })
-            .or_else(|| many.then(|| "`time_budget` is more than a million times `step`".to_owned()))
     }
 }

@@ -9,13 +9,14 @@ use std::cell::OnceCell;
 
 use num_rational::BigRational;
 use ontology::tomasys::change::Status;
-use pddl::ast::Problem;
-use pddl::validate::{advance, metric_after};
+use pddl::ast::{Condition, Domain, Problem};
+use pddl::validate::{Options, PlanText, advance, metric_after, validate};
 
 use crate::mapek::{Command, Effect, Event, PlannedStep, resume};
 use crate::message::Message;
 use crate::mission::Mission;
 use crate::number;
+use crate::simulate::check::Watched;
 use crate::simulate::settings::{Disturbance, Simulation};
 
 /// Times and shares are rounded to this part of a unit.
@@ -49,6 +50,7 @@ pub struct World {
     /// Its problem with what the knowledge base contributes, once that is asked for.
     filled: OnceCell<Problem>,
     settings: Simulation,
+    watched: Watched,
     seed: u64,
     /// Since the start of the mission, in the domain's time unit.
     pub time: f64,
@@ -76,7 +78,7 @@ fn rounded(value: f64) -> f64 {
 
 impl World {
     /// A robot at the beginning of its mission.
-    pub fn new(truth: Mission, settings: Simulation, seed: u64) -> Self {
+    pub fn new(truth: Mission, settings: Simulation, watched: Watched, seed: u64) -> Self {
         let mut random = fastrand::Rng::with_seed(seed);
         let phases =
             settings.signals.iter().map(|signal| signal.phase.unwrap_or_else(|| random.f64())).collect();
@@ -109,6 +111,7 @@ impl World {
             truth,
             filled: OnceCell::new(),
             settings,
+            watched,
             seed,
             time: 0.0,
             job: None,
@@ -222,7 +225,12 @@ impl World {
         let share = if whole { 1.0 - job.progress } else { (1.0 - job.progress) * step / left };
         job.progress = rounded(job.progress + share);
         self.use_up(&job.step, share, whole, events);
-        if self.settings.suave.as_ref().is_some_and(|suave| suave.inspect == job.step.action) {
+        if self
+            .settings
+            .suave
+            .as_ref()
+            .is_some_and(|suave| suave.inspect.eq_ignore_ascii_case(&job.step.action))
+        {
             self.inspected = self.inspected.max(job.progress);
         }
         if whole {
@@ -253,33 +261,35 @@ impl World {
         advance.apply(&mut init);
         self.change().set_init(init);
         for change in &advance.values {
+            let lifeline = self.watched.lifeline.as_ref();
+            let is_lifeline = lifeline.is_some_and(|own| own.eq_ignore_ascii_case(&change.text));
+            self.lost |= is_lifeline && change.after <= BigRational::default();
             let name = change.text.trim_matches(['(', ')']).to_owned();
-            if self.settings.lifeline.as_ref() == Some(&name) && change.after <= BigRational::default() {
-                self.lost = true;
-            }
             if !whole {
                 events.push(Event::Fact { name, value: number::decimal(&change.after) });
             }
         }
     }
 
-    /// Notes when something is found, and when what waits for a fact takes place.
+    /// Notes when something is found, and when what waits for a condition takes place.
     fn look(&mut self) {
-        if let Some(suave) = &self.settings.suave
-            && self.found.is_none()
-            && self.truth.holds(&suave.found)
-        {
+        if self.found.is_none() && self.watched.found.as_ref().is_some_and(|found| self.holds(found)) {
             self.found = Some(self.time);
         }
         for (index, event) in self.settings.events.iter().enumerate() {
-            if let Some(fact) = event.when.as_ref().filter(|_| self.times[index].is_none())
-                && self.truth.holds(fact)
-            {
+            let condition = self.watched.events[index].as_ref().filter(|_| self.times[index].is_none());
+            if condition.is_some_and(|condition| self.holds(condition)) {
                 let seed = self.seed.wrapping_add(index as u64 + 1);
                 let delay = fastrand::Rng::with_seed(seed).f64() * event.within;
                 self.times[index] = Some(rounded(self.time + delay));
             }
         }
+    }
+
+    /// Whether a condition holds now.
+    fn holds(&self, condition: &Condition) -> bool {
+        let goal = condition.clone();
+        is_valid(self.truth.domain(), &Problem { goal, constraints: Vec::new(), ..self.filled().clone() })
     }
 
     fn disturb(&mut self, events: &mut Vec<Event>) -> Result<(), Message> {
@@ -342,10 +352,7 @@ impl World {
 
     /// Whether the goal holds.
     pub fn reached(&self) -> bool {
-        let problem = self.filled();
-        let empty = pddl::validate::PlanText::default();
-        pddl::validate::validate(self.truth.domain(), problem, &empty, &pddl::validate::Options::default())
-            .valid
+        is_valid(self.truth.domain(), self.filled())
     }
 
     /// The mission's metric so far; the time without one.
@@ -356,8 +363,12 @@ impl World {
 
     /// How much was inspected, in the unit of the length; none where the mission does not inspect.
     pub fn distance(&self) -> Option<f64> {
-        let suave = self.settings.suave.as_ref()?;
-        let length = self.truth.value(&suave.length)?;
+        let length = self.truth.value(self.watched.length.as_ref()?)?;
         Some(number::to_f64(&length) * self.inspected)
     }
+}
+
+/// Whether the empty plan solves a problem.
+fn is_valid(domain: &Domain, problem: &Problem) -> bool {
+    validate(domain, problem, &PlanText::default(), &Options::default()).valid
 }

@@ -6,6 +6,7 @@ use serde_json::{Map, Value};
 
 use super::results::{FORMAT, Line};
 use super::table::Group;
+use crate::message::Message;
 use crate::simulate::Sample;
 
 /// How far a shard, or a study, has come; and means over repetitions where shards were merged.
@@ -24,6 +25,8 @@ pub struct SweepAnswer {
     timed_out: usize,
     /// Runs that are not done, the first hundred of them.
     missing: Vec<usize>,
+    /// Why it was ended before all runs were done, if a limit did that (M130).
+    messages: Vec<Message>,
     /// With `--merge`: rows that differ in numbers and seeds only.
     groups: Vec<GroupPart>,
 }
@@ -78,8 +81,15 @@ impl SweepAnswer {
             failed: lines.iter().filter(|line| line.answer.is_null()).count(),
             timed_out: lines.iter().filter(|line| line.timed_out).count(),
             missing: missing.take(100).collect(),
+            messages: Vec::new(),
             groups: groups.iter().map(GroupPart::of).collect(),
         }
+    }
+
+    /// With why it was ended before all runs were done.
+    #[must_use]
+    pub fn because(self, messages: Vec<Message>) -> Self {
+        Self { messages, ..self }
     }
 
     /// Whether all runs are done, each with an answer.

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use encodings::Limits;
 use serde_json::Value;
 
 use super::results::Line;
@@ -17,11 +18,16 @@ const LOOK: Duration = Duration::from_millis(5);
 /// So many characters of standard error are kept.
 const KEPT: usize = 2000;
 
-/// Performs a run with a program, and waits for its end.
+/// Performs a run with a program, and waits for its end; none if a limit is reached before, and the run is ended then.
 ///
 /// # Errors
 /// The program, or the one that generates files, cannot be run.
-pub fn perform(program: &Path, study: &Study, run: &Planned) -> Result<Line, Message> {
+pub fn perform(
+    program: &Path,
+    study: &Study,
+    run: &Planned,
+    limits: &Limits,
+) -> Result<Option<Line>, Message> {
     let failed = |what: &str, error: &dyn std::fmt::Display| {
         Message::error("M152", format!("run {}: {what}: {error}", run.number))
     };
@@ -41,7 +47,11 @@ pub fn perform(program: &Path, study: &Study, run: &Planned) -> Result<Line, Mes
             return Err(failed(generator, &format!("{}\n{}", output.status, text.trim_end())));
         }
     }
-    let mut child = Command::new(program)
+    let mut command = Command::new(program);
+    // Ctrl-C is for this program, which ends the run: what a run would answer to it is not what the study asks for.
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut command, 0);
+    let mut child = command
         .args(study.words(run, folder.path()))
         .current_dir(&study.directory)
         .stdin(Stdio::null())
@@ -50,9 +60,10 @@ pub fn perform(program: &Path, study: &Study, run: &Planned) -> Result<Line, Mes
         .spawn()
         .map_err(|error| failed(&program.display().to_string(), &error))?;
     let (out, errors) = (reader(child.stdout.take()), reader(child.stderr.take()));
-    let (status, timed_out) = wait(&mut child, study.time_limit().map(Duration::from_secs_f64), begun)
+    let ended = wait(&mut child, study.time_limit().map(Duration::from_secs_f64), begun, limits)
         .map_err(|error| failed("its end", &error))?;
     let (out, errors) = (out.join().unwrap_or_default(), errors.join().unwrap_or_default());
+    let Some((status, timed_out)) = ended else { return Ok(None) };
     let answer: Value = serde_json::from_str(&out).unwrap_or_default();
     let message = if answer.is_null() {
         let from = errors.char_indices().rev().nth(KEPT - 1).map_or(0, |(at, _)| at);
@@ -61,7 +72,7 @@ pub fn perform(program: &Path, study: &Study, run: &Planned) -> Result<Line, Mes
         String::new()
     };
     let seconds = (begun.elapsed().as_secs_f64() * 1000.0).round() / 1000.0;
-    Ok(Line { run: run.number, vary: run.vary.clone(), status, timed_out, seconds, answer, message })
+    Ok(Some(Line { run: run.number, vary: run.vary.clone(), status, timed_out, seconds, answer, message }))
 }
 
 /// Reads to the end in a thread of its own: who waits for two pipes in turns may wait for ever.
@@ -76,16 +87,22 @@ fn reader(pipe: Option<impl Read + Send + 'static>) -> std::thread::JoinHandle<S
     })
 }
 
-/// Waits for the end of a process, and ends it at its time limit.
-fn wait(child: &mut Child, limit: Option<Duration>, begun: Instant) -> std::io::Result<(Option<i32>, bool)> {
+/// Waits for the end of a process, and ends it at its time limit, which is its result, or when other limits are reached: none.
+fn wait(
+    child: &mut Child,
+    limit: Option<Duration>,
+    begun: Instant,
+    limits: &Limits,
+) -> std::io::Result<Option<(Option<i32>, bool)>> {
     loop {
         if let Some(status) = child.try_wait()? {
-            return Ok((status.code(), false));
+            return Ok(Some((status.code(), false)));
         }
-        if limit.is_some_and(|limit| begun.elapsed() >= limit) {
+        let is_late = limit.is_some_and(|limit| begun.elapsed() >= limit);
+        if is_late || limits.reached() {
             child.kill()?;
             child.wait()?;
-            return Ok((None, true));
+            return Ok(is_late.then_some((None, true)));
         }
         std::thread::sleep(LOOK);
     }

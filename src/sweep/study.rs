@@ -11,8 +11,8 @@ use serde_json::{Map, Value, json};
 use sha2::{Digest as _, Sha256};
 
 use crate::comparison::Coadaptation;
-use crate::manifest::{self, ManifestPath};
-use crate::message::{Errors, Message};
+use crate::manifest::{self, Key, ManifestPath, Part};
+use crate::message::{Errors, Message, did_you_mean};
 use crate::setup::Setup;
 
 /// More runs than that are a mistake.
@@ -128,6 +128,7 @@ pub struct Study {
     pub digest: String,
     /// Keys with their values, the last one varies fastest.
     keys: Vec<(String, Vec<Value>)>,
+    origin: ManifestPath,
 }
 
 /// One run of a study.
@@ -180,23 +181,37 @@ impl Study {
     /// It cannot be read, is not a study, varies what cannot be varied, or its pairs have no places.
     pub fn read(file: &Path) -> Result<Self, Errors> {
         let (sections, place): (Sections, ManifestPath) = manifest::read(file)?;
-        let wrong = |text: String| Message::at("M150", place.file(), None, text);
+        let wrong_at = |path: &[Key], part: Part, text: String| {
+            Message::at("M150", place.file(), place.place_of(path, part), text)
+        };
+        let wrong = |path: &[Key], text: String| wrong_at(path, Part::Value, text);
         let mut mistakes = Vec::new();
         if sections.command.is_empty() {
-            mistakes
-                .push(wrong("`command` is empty; it should begin with a command such as `plan`".to_owned()));
+            mistakes.push(wrong(
+                &["command".into()],
+                "`command` is empty; it should begin with a command such as `plan`".to_owned(),
+            ));
         }
         if sections.time_limit.is_some_and(|limit| limit.is_nan() || limit <= 0.0) {
-            mistakes.push(wrong("`time_limit` should be a number of seconds above 0".to_owned()));
+            mistakes.push(wrong(
+                &["time_limit".into()],
+                "`time_limit` should be a number of seconds above 0".to_owned(),
+            ));
         }
         if !sections.rows.is_empty() && !sections.rows.starts_with('/') {
-            mistakes.push(wrong(format!("`rows` is `{}`; a JSON pointer begins with `/`", sections.rows)));
+            mistakes.push(wrong(
+                &["rows".into()],
+                format!("`rows` is `{}`; a JSON pointer begins with `/`", sections.rows),
+            ));
         }
         let mut keys: Vec<(String, Vec<Value>)> = Vec::new();
         for (key, variation) in &sections.vary {
             match values(variation) {
                 Ok(values) => keys.push((key.clone(), values)),
-                Err(text) => mistakes.push(wrong(format!("`vary.{key}` {text}"))),
+                Err(text) => {
+                    mistakes
+                        .push(wrong(&["vary".into(), key.as_str().into()], format!("`vary.{key}` {text}")));
+                }
             }
         }
         if let Some(pairs) = &sections.pairs {
@@ -207,17 +222,34 @@ impl Study {
         }
         let known: BTreeSet<&str> = keys.iter().map(|(key, _)| key.as_str()).collect();
         if sections.pairs.is_some() && sections.vary.contains_key("pair") {
-            mistakes.push(wrong("`vary.pair` and `pairs` are two lists for one key".to_owned()));
+            mistakes.push(wrong(
+                &["pairs".into()],
+                "`vary.pair` and `pairs` are two lists for one key".to_owned(),
+            ));
         }
-        let generator = sections.generate.iter().flat_map(|own| &own.run);
-        for word in sections.command.iter().chain(generator) {
+        let generated = sections.generate.iter().flat_map(|own| &own.run).enumerate();
+        let generated =
+            generated.map(|(index, word)| (vec!["generate".into(), "run".into(), index.into()], word));
+        let command = sections.command.iter().enumerate();
+        for (path, word) in
+            command.map(|(index, word)| (vec![Key::from("command"), index.into()], word)).chain(generated)
+        {
             for name in placeholders(word).filter(|name| *name != "dir" && !known.contains(name)) {
-                mistakes.push(wrong(format!("`{{{name}}}` stands for a key that is not varied")));
+                let meant = did_you_mean(name, known.iter().copied());
+                let text = format!("`{{{name}}}` stands for a key that is not varied{meant}");
+                mistakes.push(wrong(&path, text));
+            }
+        }
+        for (index, name) in sections.repetitions.iter().enumerate() {
+            if sections.repetitions != seeds() && !known.contains(name.as_str()) {
+                let meant = did_you_mean(name, known.iter().copied());
+                let text = format!("`{name}` is not a key that is varied, so nothing repeats it{meant}");
+                mistakes.push(wrong(&["repetitions".into(), index.into()], text));
             }
         }
         let runs = keys.iter().try_fold(1_usize, |runs, (_, values)| runs.checked_mul(values.len()));
         if runs.is_none_or(|runs| runs > MOST_RUNS) {
-            mistakes.push(wrong(format!("the study has more than {MOST_RUNS} runs")));
+            mistakes.push(wrong(&[], format!("the study has more than {MOST_RUNS} runs")));
         }
         if !mistakes.is_empty() {
             return Err(place.quote(mistakes).into());
@@ -227,7 +259,36 @@ impl Study {
             _ => PathBuf::from("."),
         };
         let digest = digest(&sections, &keys, &directory);
-        Ok(Self { sections, directory, digest, keys })
+        Ok(Self { sections, directory, digest, keys, origin: place })
+    }
+
+    /// A mistake in the study's file, at the end of a path.
+    pub fn mistake(&self, path: &[Key], text: &str) -> Message {
+        let place = self.origin.place_of(path, Part::Value);
+        self.origin.quote([Message::at("M150", self.origin.file(), place, text)]).swap_remove(0)
+    }
+
+    /// The first run, and for each value of each key a run that differs from the first one by this value only, with the path to what makes
+    /// it different. Of numbers from one to another and of pairs only the last one.
+    pub fn samples(&self) -> Vec<(Vec<Key>, Planned)> {
+        if self.is_empty() {
+            return Vec::new();
+        }
+        let mut samples = vec![(vec!["command".into()], self.planned(0))];
+        let mut stride = 1;
+        for (key, values) in self.keys.iter().rev() {
+            let is_list = matches!(self.sections.vary.get(key), Some(Variation::List(_)));
+            let first = if is_list { 1 } else { values.len().saturating_sub(1).max(1) };
+            let path = |index: usize| vec!["vary".into(), key.as_str().into(), index.into()];
+            samples.extend((first..values.len()).map(|index| (path(index), self.planned(index * stride))));
+            stride *= values.len();
+        }
+        samples
+    }
+
+    /// Whether a program writes files for each run, so that they are not there before.
+    pub fn generates(&self) -> bool {
+        self.sections.generate.is_some()
     }
 
     /// How many runs it has.

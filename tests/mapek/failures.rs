@@ -5,8 +5,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use metaplan::encodings::Limits;
 use metaplan::setup::Setup;
-use metaplan::simulate::{Disturbance, RandomFailure, Run, Simulation, Strategy, simulate};
+use metaplan::simulate::{Disturbance, Experiment, RandomFailure, Run, Simulation, Strategy};
 
 /// A mission with components that can fail.
 struct Robot {
@@ -131,10 +132,13 @@ struct Comparison {
 
 /// Plays a scenario with all ways of control: the loop's figures, and the comparison with each other way.
 fn play(setup: &Setup, settings: &Simulation, seeds: u64) -> (String, Vec<Comparison>) {
+    let (mission, control) = (setup.mission.clone(), setup.settings.clone());
+    let experiment = Experiment::new(mission, control, settings.clone(), setup.time_unit);
+    let experiment = experiment.unwrap_or_else(|errors| panic!("{errors}"));
     let runs = |strategy: Strategy| -> Vec<Run> {
         let run = |seed| {
-            simulate(&setup.mission, &setup.settings, settings, strategy, seed, &mut |_, _| {})
-                .expect("it is simulated")
+            let run = experiment.run(strategy, seed, &Limits::none(), &mut |_, _| {});
+            run.expect("it is simulated").expect("there is no limit")
         };
         (1..=seeds).map(run).collect()
     };

@@ -77,6 +77,118 @@ fn what_meets_nothing_is_a_warning() {
     );
 }
 
+/// Numbers that make a design or an action useless: `lint` has the place, and `plan` warns, too.
+#[test]
+fn numbers_that_are_missing_or_negative_are_warnings() {
+    let misspelt = (
+        "robot.ttl",
+        ":fd_lidar a t:FunctionDesign ; t:solvesF :f_navigate ;\n    t:requiresC :c_lidar ;\n    t:hasQAestimation\n        \
+         [ a t:QAvalue ; t:isQAtype :time_per_metre ; t:hasValue 1.0 ] ,\n        [ a t:QAvalue ; t:isQAtype :energy_per_metre",
+        ":fd_lidar a t:FunctionDesign ; t:solvesF :f_navigate ;\n    t:requiresC :c_lidar ;\n    t:hasQAestimation\n        \
+         [ a t:QAvalue ; t:isQAtype :time_per_metre ; t:hasValue 1.0 ] ,\n        [ a t:QAvalue ; t:isQAtype :energy_per_meter",
+    );
+    check(
+        &[misspelt],
+        1,
+        &[
+            "M229",
+            "energy_per_meter> is only mentioned",
+            "M230",
+            "`fd_lidar` has no estimation of `energy_per_metre`, which `move` needs",
+            "did you mean `energy_per_meter`?",
+            "robot.ttl:",
+            "0 errors, 2 warnings",
+        ],
+    );
+    let one = "(= (distance dock packing) 4)";
+    check(
+        &[("problem.pddl", one, "")],
+        1,
+        &["M231", "`(distance dock packing)` has no value", "`move`", "problem.pddl:", "0 errors, 1 warning"],
+    );
+    check(
+        &[("problem.pddl", "(= (battery) 12)", "")],
+        1,
+        &["M231", "`(battery)` has no value", "`move`, `pick`", "0 errors, 1 warning"],
+    );
+    check(
+        &[("robot.ttl", ":grasp_time ; t:hasValue 10.0", ":grasp_time ; t:hasValue -10.0")],
+        1,
+        &["M232", "`pick` would take -10", "fd_soft_fingers", "robot.ttl:", "0 errors, 1 warning"],
+    );
+    check(
+        &[("domain.pddl", "(= ?duration 3)", "(= ?duration (- 3 5))")],
+        1,
+        &["M232", "`put` would take -2", "domain.pddl:"],
+    );
+}
+
+/// Where no plan exists, `plan` says which numbers are missing, and `explain` why a design that is available is of no use.
+#[test]
+fn missing_numbers_are_named_where_there_is_no_plan() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let here = directory.path();
+    assert_eq!(metaplan_in(here, &["init", "m", "--from", "warehouse"], "").status, 0);
+    edit(&here.join("m"), "problem.pddl", "(= (battery) 12)", "");
+    edit(
+        &here.join("m"),
+        "robot.ttl",
+        ":time_per_metre ; t:hasValue 0.8",
+        ":time_per_meter ; t:hasValue 0.8",
+    );
+    let outcome = metaplan_in(here, &["plan", "m/mission.toml"], "");
+    assert_eq!(outcome.status, 10, "{outcome:#?}");
+    for words in [
+        "it is not for designs",
+        "    (battery), for move, pick, in m/problem.pddl",
+        "    the estimation of time_per_metre of fd_camera, for move, in m/robot.ttl",
+    ] {
+        assert!(outcome.stdout.contains(words), "no `{words}`: {outcome:#?}");
+    }
+    let answer = metaplan_in(here, &["plan", "m/mission.toml", "--format", "json"], "").json();
+    let missing = answer["missing_values"].as_array().expect("a list");
+    let battery = missing.iter().find(|own| own["function"] == "(battery)").expect("the battery");
+    assert_eq!(
+        (&battery["needed_by"], &battery["file"]),
+        (&serde_json::json!(["move", "pick"]), &"m/problem.pddl".into())
+    );
+    let outcome = metaplan_in(here, &["explain", "m/mission.toml", "fd_camera"], "");
+    let words = "it has no estimation of time_per_metre, which move needs";
+    assert!(outcome.stdout.contains(words), "{outcome:#?}");
+}
+
+/// Domains in which a function is left out on purpose, of places between which there is no way, and of a place to itself.
+#[test]
+fn numbers_that_nothing_needs_are_no_warnings() {
+    let domain = "(define (domain d) (:requirements :typing :numeric-fluents) (:types place)
+        (:predicates (at ?p - place) (road ?a ?b - place)) (:functions (far ?a ?b - place) (spent) (toll ?a ?b - place) (started))
+        (:action go :parameters (?a ?b - place) :precondition (and (at ?a) (road ?a ?b))
+          :effect (and (not (at ?a)) (at ?b) (increase (spent) (far ?a ?b))))
+        (:action fly :parameters (?a ?b - place) :precondition (and (at ?a) (> (toll ?a ?b) 0))
+          :effect (and (not (at ?a)) (at ?b) (assign (started) 3)))
+        (:action end :parameters (?a - place) :precondition (and (at ?a) (> (started) 2)) :effect (not (at ?a))))";
+    let problem = "(define (problem p) (:domain d) (:objects x y z - place)
+        (:init (at x) (road x y) (road y z) (road z y) (= (far z y) 2) (= (far x y) 3) (= (far y z) 2) (= (spent) 0)
+          (= (toll x y) 1) (= (toll y x) 1) (= (toll x z) 1) (= (toll z x) 1) (= (toll y z) 1) (= (toll z y) 1))
+        (:goal (at z)) (:metric minimize (spent)))";
+    let directory = tempfile::tempdir().expect("a directory");
+    let lint = |problem: &str| {
+        std::fs::write(directory.path().join("d.pddl"), domain).expect("written");
+        std::fs::write(directory.path().join("p.pddl"), problem).expect("written");
+        metaplan_in(directory.path(), &["lint", "d.pddl", "p.pddl"], "")
+    };
+    let outcome = lint(problem);
+    assert_eq!((outcome.status, outcome.stdout.as_str()), (0, "nothing to complain about\n"), "{outcome:#?}");
+    for (missing, needing) in [("(= (far y z) 2)", "go"), ("(= (toll z y) 1)", "fly")] {
+        let outcome = lint(&problem.replace(missing, ""));
+        assert_eq!(outcome.status, 1, "{missing}: {outcome:#?}");
+        assert!(
+            outcome.stdout.contains("M231") && outcome.stdout.contains(&format!("`{needing}`")),
+            "{outcome:#?}"
+        );
+    }
+}
+
 #[test]
 fn all_errors_of_all_files_are_told_at_once() {
     let broken = ("robot.ttl", ":f_grasp a t:Function .", ":f_grasp a t:Function");

@@ -17,6 +17,7 @@ mod explain_causes;
 mod export;
 mod help;
 mod init;
+mod interrupted;
 mod journal;
 mod limits;
 mod lint;
@@ -24,6 +25,7 @@ mod live;
 mod manifest;
 mod maps;
 mod messages;
+mod mistakes;
 mod mutation;
 mod names;
 #[cfg(target_os = "linux")]

@@ -3,9 +3,10 @@
 use std::path::Path;
 use std::time::Duration;
 
+use metaplan::encodings::Limits;
 use metaplan::mapek::{Loop, Observation};
 use metaplan::setup::Setup;
-use metaplan::simulate::{Strategy, simulate};
+use metaplan::simulate::Strategy;
 use serde_json::{Value, json};
 
 /// Missions and scenarios that can be simulated.
@@ -24,10 +25,8 @@ fn setup(mission: &str) -> Setup {
 /// So many lines at most: the enrolment, and what a simulated robot observes; with what a loop of its own answers to each. The time is that
 /// of the robot.
 pub(super) fn play(mission: &str, scenario: &str, seed: u64, most: usize) -> (Vec<String>, Vec<Vec<Value>>) {
-    let mut own = setup(mission);
-    let settings = own.scenarios[scenario].simulation.clone().expect("it can be simulated");
+    let own = setup(mission).experiment(scenario).unwrap_or_else(|errors| panic!("{errors}"));
     let mut events = vec![json!({"event": "enrol", "mission": mission}).to_string()];
-    own.scenarios[scenario].apply(&mut own.mission).expect("it fits");
     let mut is_first = true;
     let mut log = |observation: &Observation, _: &[_]| {
         // The first entry stands for the beginning.
@@ -35,8 +34,7 @@ pub(super) fn play(mission: &str, scenario: &str, seed: u64, most: usize) -> (Ve
             events.push(observation.to_json().to_string());
         }
     };
-    simulate(&own.mission, &own.settings, &settings, Strategy::Joint, seed, &mut log)
-        .unwrap_or_else(|errors| panic!("{errors}"));
+    own.run(Strategy::Joint, seed, &Limits::none(), &mut log).unwrap_or_else(|errors| panic!("{errors}"));
     events.truncate(most);
     let answers = alone(mission, &events);
     (events, answers)

@@ -1,0 +1,104 @@
+//! Conditions and numeric functions that a manifest names, as text, to what the mission's domain and problem declare.
+
+use pddl::ast::{Atom, Condition, Expression, Term};
+
+use ::mission::Mission;
+
+use crate::message::{Errors, Message};
+
+/// What is wrong with a text, and where in it: in bytes, none where that is not known.
+#[derive(Debug, Clone)]
+pub struct Fault {
+    /// The beginning of what is wrong.
+    pub offset: Option<usize>,
+    /// What is wrong with it.
+    pub message: Message,
+}
+
+/// A condition, such as `(robot_at dock)` or `(< (battery) 20)`. One atom may stand without its parentheses.
+///
+/// # Errors
+/// It is malformed, or names a predicate, a function or an object that the mission does not have.
+pub fn condition(mission: &Mission, text: &str) -> Result<Condition, Vec<Fault>> {
+    let is_bare = !text.trim_start().starts_with('(');
+    let open = if is_bare { "(" } else { "" };
+    let close = if is_bare { ")" } else { "" };
+    let before = format!("(define (problem goal) (:domain {}) (:goal {open}", mission.domain().name.name);
+    let closed = text.chars().fold(Some(0_usize), |depth, c| match c {
+        '(' => depth.map(|depth| depth + 1),
+        ')' => depth.and_then(|depth| depth.checked_sub(1)),
+        _ => depth,
+    });
+    if text.trim().is_empty() || closed != Some(0) {
+        let text = format!(
+            "`{text}` is not a condition; write one such as `(robot_at dock)`, with its parentheses in pairs"
+        );
+        return Err(vec![Fault { offset: None, message: Message::error("M135", text) }]);
+    }
+    mission
+        .goal(&format!("{open}{text}{close}"))
+        .map_err(|errors| faults(errors, text, before.chars().count()))
+}
+
+/// A numeric function with its arguments, such as `(battery)`; the parentheses may be left out.
+///
+/// # Errors
+/// It is malformed, or names a function or an object that the mission does not have.
+pub fn function(mission: &Mission, text: &str) -> Result<Atom, Vec<Fault>> {
+    let mut problem = mission.problem().clone();
+    mission.fill(&mut problem);
+    let before = usize::from(!text.trim_start().starts_with('('));
+    let metric = mission.objective(&problem, text).map_err(|errors| faults(errors, text, before))?;
+    match metric.expression {
+        Expression::Fluent(atom) => Ok(atom),
+        _ => {
+            let text =
+                format!("`{text}` is not one numeric function with its arguments, such as `(battery)`");
+            Err(vec![Fault { offset: None, message: Message::error("M135", text) }])
+        }
+    }
+}
+
+/// What is wrong with the objects that a setting names which [`Mission::set`] has accepted: there are none of their names, or they have other
+/// types.
+pub(super) fn setting(mission: &Mission, name: &str, value: &str) -> Option<Message> {
+    if mission.knowledge().is_some_and(|knowledge| knowledge.has_attribute(name.trim())) {
+        return None;
+    }
+    let is_truth = ["true", "false"].iter().any(|truth| value.trim().eq_ignore_ascii_case(truth));
+    let text = match (mission.is_function(name), is_truth) {
+        (true, _) => format!("(>= ({name}) 0)"),
+        (false, true) => format!("({name})"),
+        (false, false) => format!("({name} {})", value.trim()),
+    };
+    condition(mission, &text).err()?.into_iter().next().map(|fault| fault.message)
+}
+
+/// A ground atom as the validator writes it: `(distance a b)`.
+pub fn written(atom: &Atom) -> String {
+    let words = atom.arguments.iter().map(|term| match term {
+        Term::Constant(identifier) | Term::Variable(identifier) => identifier.name.as_str(),
+    });
+    let words: Vec<&str> = std::iter::once(atom.predicate.name.as_str()).chain(words).collect();
+    format!("({})", words.join(" "))
+}
+
+/// Messages about a text that stands in a line of its own, behind so many characters.
+fn faults(errors: Errors, text: &str, before: usize) -> Vec<Fault> {
+    // What stands elsewhere is not about the text; a parenthesis that was added stands for its beginning.
+    let is_own =
+        |error: &Message| error.line != Some(1) || error.column.is_none_or(|column| column >= before);
+    let fault = |error: Message| {
+        let offset = error.column.filter(|_| error.line == Some(1)).and_then(|column| {
+            let characters = column.saturating_sub(before + 1);
+            text.char_indices().map(|(at, _)| at).nth(characters)
+        });
+        let message = Message::error(&error.code, &error.message);
+        let message = match &error.help {
+            Some(help) => message.with_help(help),
+            None => message,
+        };
+        Fault { offset, message }
+    };
+    errors.into_iter().filter(is_own).map(fault).collect()
+}

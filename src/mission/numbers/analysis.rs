@@ -1,0 +1,400 @@
+//! A mission to the numeric functions that lack a value, and to durations below 0.
+//!
+//! For each numeric function that an action needs, the objects are tried for which the action is possible as far as the facts say that no
+//! action changes (three-valued evaluation of its conditions, as in grounding). A mission may leave out numbers of what can never
+//! happen, so a missing value is worth a warning only where the function has no arguments, where three quarters of the objects have a
+//! value, or two thirds of those that one such fact is about, as `(lit_aisle a b)` is for `(distance a b)`; and of designs always.
+
+use std::cell::Cell;
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+
+use ::mission::{Mission, doubt_about};
+use num_rational::BigRational;
+use num_traits::Zero as _;
+use ontology::tomasys::FunctionDesign;
+use pddl::TypeHierarchy;
+use pddl::ast::{
+    Action, ActionBody, Arithmetic, Assignment, Comparison, Condition, Domain, Effect, Expression,
+    InitialElement, Name, Problem, Term, TypeExpression,
+};
+
+use super::syntax::{
+    Binding, conditions, constants, effects, grounded, grows, in_expression, known, needed, object,
+    variables_of, walk,
+};
+
+use crate::message::Message;
+use crate::mission::conditions::written;
+use crate::number;
+
+/// How many conditions are evaluated before what is left stays unchecked.
+const BUDGET: usize = 50_000;
+
+/// A numeric function with its arguments that has no value, though actions need it.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct MissingValue {
+    /// The function with its arguments, as the domain writes it: `(distance a b)`; of a design, `(ATTRIBUTE DESIGN)`.
+    pub function: String,
+    /// The actions that need it.
+    pub needed_by: Vec<String>,
+    /// The design whose estimation is missing, and the attribute, where it is that.
+    pub estimation: Option<(String, String)>,
+    /// The file that should have it.
+    pub file: String,
+    pub(super) symbol: String,
+    /// Nothing gives the function a value for any arguments.
+    pub(super) is_silent: bool,
+    /// It is hardly left out on purpose.
+    pub(super) is_likely: bool,
+}
+
+/// Functions without a value, with whether that is hardly on purpose, and the actions that need them.
+type Needed = BTreeMap<(Name, Vec<Name>), (bool, BTreeSet<String>)>;
+
+/// A duration that is negative.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct NegativeDuration {
+    pub(super) action: String,
+    pub(super) duration: String,
+    /// The values below 0 that it comes from, in words.
+    pub(super) causes: Vec<String>,
+    pub(super) design: Option<String>,
+}
+
+/// What is known of a mission's numbers before anything has happened.
+pub(super) struct Numbers<'m> {
+    pub(super) mission: &'m Mission,
+    pub(super) domain: &'m Domain,
+    problem: Problem,
+    types: TypeHierarchy,
+    /// Predicates that actions, axioms or the robot change.
+    dynamic: HashSet<Name>,
+    /// Functions that actions change, and those that actions give a value.
+    changed: HashSet<Name>,
+    assigned: HashSet<Name>,
+    facts: HashMap<Name, HashSet<Vec<Name>>>,
+    values: HashMap<Name, HashMap<Vec<Name>, BigRational>>,
+    designs: BTreeSet<String>,
+    budget: Cell<usize>,
+}
+
+impl<'m> Numbers<'m> {
+    pub(super) fn new(mission: &'m Mission) -> Self {
+        let domain = mission.domain();
+        let mut problem = mission.problem().clone();
+        mission.fill(&mut problem);
+        let mut facts: HashMap<Name, HashSet<Vec<Name>>> = HashMap::new();
+        let mut values: HashMap<Name, HashMap<Vec<Name>, BigRational>> = HashMap::new();
+        let mut dynamic: HashSet<Name> =
+            domain.derived.iter().map(|axiom| axiom.head.identifier.name.clone()).collect();
+        let predicates = domain.predicates.iter().map(|declared| &declared.identifier.name);
+        dynamic.extend(predicates.filter(|name| mission.bindings().is_availability(name)).cloned());
+        for element in &problem.init {
+            match element {
+                InitialElement::Fact(atom) => {
+                    facts.entry(atom.predicate.name.clone()).or_default().insert(constants(atom));
+                }
+                InitialElement::Value(atom, value, _) => {
+                    let own = values.entry(atom.predicate.name.clone()).or_default();
+                    own.insert(constants(atom), value.clone());
+                }
+                InitialElement::Timed(_, atom, ..) => drop(dynamic.insert(atom.predicate.name.clone())),
+                InitialElement::NegatedFact(_) => {}
+            }
+        }
+        let (mut changed, mut assigned) = (HashSet::new(), HashSet::new());
+        for effect in domain.actions.iter().flat_map(|action| effects(&action.body)) {
+            walk(effect, &mut |effect| match effect {
+                Effect::Add(atom) | Effect::Delete(atom) => drop(dynamic.insert(atom.predicate.name.clone())),
+                Effect::Assign(kind, target, ..) => {
+                    changed.insert(target.predicate.name.clone());
+                    if *kind == Assignment::Assign {
+                        assigned.insert(target.predicate.name.clone());
+                    }
+                }
+                _ => {}
+            });
+        }
+        let knowledge = mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
+        let designs = knowledge.map(|design| design.individual.name.clone()).collect();
+        let (types, budget) = (TypeHierarchy::of(domain), Cell::new(BUDGET));
+        Self { mission, domain, problem, types, dynamic, changed, assigned, facts, values, designs, budget }
+    }
+
+    pub(super) fn check(&self) -> (Vec<MissingValue>, Vec<NegativeDuration>) {
+        let mut missing = Needed::new();
+        let mut negative = BTreeSet::new();
+        if !self.domain.functions.is_empty() {
+            for action in &self.domain.actions {
+                self.missing(action, &mut missing);
+            }
+        }
+        for action in &self.domain.actions {
+            self.negative_durations(action, &mut negative);
+        }
+        let missing = missing.into_iter().map(|((function, arguments), (is_likely, actions))| MissingValue {
+            is_likely,
+            ..self.described(&function, &arguments, actions)
+        });
+        (missing.collect(), negative.into_iter().collect())
+    }
+
+    fn described(&self, function: &Name, arguments: &[Name], actions: BTreeSet<String>) -> MissingValue {
+        let words: Vec<&str> = arguments.iter().map(Name::as_str).collect();
+        let needed_by = actions.into_iter().collect();
+        let is_silent = !self.values.contains_key(function) && !self.assigned.contains(function);
+        let symbol = function.to_string();
+        if let [design] = words[..]
+            && self.designs.contains(design)
+        {
+            let attribute = self.attribute(function);
+            return MissingValue {
+                function: format!("({attribute} {design})"),
+                needed_by,
+                file: self.file_of(design),
+                estimation: Some((design.to_owned(), attribute)),
+                symbol,
+                is_silent,
+                is_likely: false,
+            };
+        }
+        let function = std::iter::once(function.as_str()).chain(words).collect::<Vec<_>>().join(" ");
+        MissingValue {
+            function: format!("({function})"),
+            needed_by,
+            estimation: None,
+            file: self.mission.problem_source().name().to_owned(),
+            symbol,
+            is_silent,
+            is_likely: false,
+        }
+    }
+
+    /// The attribute that a function of a design is the estimation of.
+    fn attribute(&self, function: &Name) -> String {
+        let mut bound = self.mission.bindings().written().iter();
+        let bound = bound.find(|(symbol, _)| Name::new(symbol) == *function);
+        let attribute = bound.and_then(|(_, query)| query.strip_prefix("estimation:"));
+        let attribute = attribute.unwrap_or(function.as_str());
+        attribute.strip_prefix("fd_").unwrap_or(attribute).to_owned()
+    }
+
+    /// Notes the functions that an action needs and that have no value.
+    fn missing(&self, action: &Action, missing: &mut Needed) {
+        let conditions = conditions(&action.body);
+        let mut checked = HashSet::new();
+        for atom in needed(action) {
+            let function = &atom.predicate.name;
+            let is_own =
+                function.as_str().eq_ignore_ascii_case("total-cost") || !checked.insert(written(atom));
+            // What an action gives a value may be without one before, unless it is a stock that grows or shrinks.
+            let is_stock = || self.domain.actions.iter().any(|action| grows(action, function));
+            if is_own || (self.assigned.contains(function) && !is_stock()) {
+                continue;
+            }
+            let Some(variables) = variables_of(atom, action) else { continue };
+            let names: Vec<&Name> = variables.iter().map(|(name, _)| *name).collect();
+            let (mut without, mut count) = (Vec::new(), 0_usize);
+            self.each(&variables, &conditions, &mut Vec::new(), &mut |binding| {
+                let arguments = grounded(atom, binding);
+                // From a place to itself there is no distance.
+                let is_apart = arguments.iter().collect::<HashSet<_>>().len() == arguments.len();
+                count += usize::from(is_apart);
+                if is_apart && !self.values.get(function).is_some_and(|own| own.contains_key(&arguments)) {
+                    let is_linked =
+                        conditions.iter().any(|condition| self.is_linked(condition, &names, binding));
+                    without.push((arguments, is_linked));
+                }
+            });
+            let (is_third, is_few) = (3 * without.len() <= count, 4 * without.len() <= count);
+            for (arguments, is_linked) in without {
+                let is_design = arguments.len() == 1 && self.designs.contains(arguments[0].as_str());
+                let is_likely = names.is_empty() || is_few || is_linked && (is_third || is_design);
+                let own = missing.entry((function.clone(), arguments)).or_insert((false, BTreeSet::new()));
+                own.0 |= is_likely;
+                own.1.insert(action.identifier.name.to_string());
+            }
+        }
+    }
+
+    /// Notes durations below 0 that follow from values that nothing changes.
+    fn negative_durations(&self, action: &Action, negative: &mut BTreeSet<NegativeDuration>) {
+        let ActionBody::Durative { duration, .. } = &action.body else { return };
+        let conditions = conditions(&action.body);
+        let is_upper =
+            |operator| matches!(operator, Comparison::Equal | Comparison::LessOrEqual | Comparison::Less);
+        for constraint in duration.iter().filter(|constraint| is_upper(constraint.operator)) {
+            let mut fluents = Vec::new();
+            in_expression(&constraint.expression, &mut fluents);
+            let mut variables: Vec<(&Name, &TypeExpression)> = Vec::new();
+            if !fluents.iter().all(|atom| {
+                let own = variables_of(atom, action);
+                let is_known = own.is_some() && !self.changed.contains(&atom.predicate.name);
+                for variable in own.into_iter().flatten() {
+                    if !variables.iter().any(|(name, _)| *name == variable.0) {
+                        variables.push(variable);
+                    }
+                }
+                is_known
+            }) {
+                continue;
+            }
+            self.each(&variables, &conditions, &mut Vec::new(), &mut |binding| {
+                let value = self.value(&constraint.expression, binding);
+                let Some(value) = value.filter(|value| *value < BigRational::zero()) else { return };
+                let mut design = None;
+                let mut causes: Vec<String> = Vec::new();
+                for atom in &fluents {
+                    let arguments = grounded(atom, binding);
+                    let own = self.values.get(&atom.predicate.name).and_then(|own| own.get(&arguments));
+                    let Some(value) = own.filter(|value| **value < BigRational::zero()) else { continue };
+                    let of = self.described(&atom.predicate.name, &arguments, BTreeSet::new());
+                    let name = match of.estimation {
+                        Some((of, attribute)) => {
+                            design.get_or_insert(of.clone());
+                            format!("`{attribute}` of `{of}`")
+                        }
+                        None => format!("`{}`", of.function),
+                    };
+                    causes.push(format!("{name} is {}", number::decimal(value)));
+                }
+                // One is enough for each cause.
+                let is_told = |own: &NegativeDuration| {
+                    own.action == action.identifier.name.as_str() && own.causes == causes
+                };
+                if !negative.iter().any(is_told) {
+                    negative.insert(NegativeDuration {
+                        action: action.identifier.name.to_string(),
+                        duration: number::decimal(&value),
+                        causes,
+                        design: design.clone(),
+                    });
+                }
+            });
+        }
+    }
+
+    /// Visits all objects for some variables for which the conditions may hold.
+    fn each<'a>(
+        &self,
+        variables: &[(&'a Name, &'a TypeExpression)],
+        conditions: &[&Condition],
+        binding: &mut Binding<'a>,
+        visit: &mut dyn FnMut(&Binding<'a>),
+    ) {
+        let Some((variable, r#type)) = variables.get(binding.len()) else { return visit(binding) };
+        let objects = self.domain.constants.iter().chain(&self.problem.objects);
+        let mut seen = HashSet::new();
+        for object in objects.filter(|object| self.types.fits(&object.r#type, r#type)) {
+            let left = self.budget.get();
+            if left == 0 {
+                return;
+            }
+            self.budget.set(left - 1);
+            if !seen.insert(&object.identifier.name) {
+                continue;
+            }
+            binding.push((variable, object.identifier.name.clone()));
+            if conditions.iter().all(|condition| self.truth(condition, binding) != Some(false)) {
+                self.each(variables, conditions, binding, visit);
+            }
+            binding.pop();
+        }
+    }
+
+    /// Whether a condition holds whatever actions change; none where that depends on them, or on variables that are open.
+    fn truth(&self, condition: &Condition, binding: &Binding<'_>) -> Option<bool> {
+        match condition {
+            Condition::And(parts) => parts
+                .iter()
+                .try_fold(Some(true), |all, part| match self.truth(part, binding) {
+                    Some(false) => Err(()),
+                    Some(true) => Ok(all),
+                    None => Ok(None),
+                })
+                .unwrap_or(Some(false)),
+            Condition::Or(parts) => parts
+                .iter()
+                .try_fold(Some(false), |any, part| match self.truth(part, binding) {
+                    Some(true) => Err(()),
+                    Some(false) => Ok(any),
+                    None => Ok(None),
+                })
+                .unwrap_or(Some(true)),
+            Condition::Not(inner) => self.truth(inner, binding).map(|holds| !holds),
+            Condition::Imply(premise, conclusion) => {
+                match (self.truth(premise, binding), self.truth(conclusion, binding)) {
+                    (Some(false), _) | (_, Some(true)) => Some(true),
+                    (Some(true), conclusion) => conclusion,
+                    (None, _) => None,
+                }
+            }
+            Condition::Atom(atom) => {
+                let arguments =
+                    known(atom, binding).filter(|_| !self.dynamic.contains(&atom.predicate.name))?;
+                Some(self.facts.get(&atom.predicate.name).is_some_and(|own| own.contains(&arguments)))
+            }
+            Condition::Equal(left, right, _) => Some(object(left, binding)? == object(right, binding)?),
+            Condition::Compare(..) | Condition::Exists(..) | Condition::ForAll(..) => None,
+        }
+    }
+
+    /// Whether a fact that no action changes and by which the action is possible is about all these variables.
+    fn is_linked(&self, condition: &Condition, variables: &[&Name], binding: &Binding<'_>) -> bool {
+        match condition {
+            Condition::And(parts) | Condition::Or(parts) => {
+                parts.iter().any(|part| self.is_linked(part, variables, binding))
+            }
+            Condition::Atom(atom) if self.truth(condition, binding) == Some(true) => {
+                variables.iter().all(|variable| {
+                    let is_it = |term: &Term| matches!(term, Term::Variable(own) if own.name == **variable);
+                    atom.arguments.iter().any(is_it)
+                })
+            }
+            _ => false,
+        }
+    }
+
+    pub(super) fn design(&self, name: &str) -> Option<&FunctionDesign> {
+        let designs = self.mission.knowledge()?.catalogue().designs();
+        designs.iter().find(|design| design.individual.name == name)
+    }
+
+    /// A warning about a design, with its place in the knowledge base.
+    pub(super) fn about(&self, design: &str, code: &str, text: String) -> Message {
+        match (self.mission.knowledge(), self.design(design)) {
+            (Some(knowledge), Some(design)) => doubt_about(knowledge, code, &design.individual.iri, text),
+            _ => Message::warning(code, text),
+        }
+    }
+
+    /// The file of the knowledge base that has a design.
+    fn file_of(&self, design: &str) -> String {
+        self.about(design, "M230", String::new()).file.clone().unwrap_or_default()
+    }
+
+    fn value(&self, expression: &Expression, binding: &Binding<'_>) -> Option<BigRational> {
+        match expression {
+            Expression::Number(value, _) => Some(value.clone()),
+            Expression::Fluent(atom) => {
+                self.values.get(&atom.predicate.name)?.get(&known(atom, binding)?).cloned()
+            }
+            Expression::Operation(operation, parts, _) => {
+                let values: Option<Vec<BigRational>> =
+                    parts.iter().map(|part| self.value(part, binding)).collect();
+                let mut values = values?.into_iter();
+                let first = values.next()?;
+                if parts.len() == 1 {
+                    return Some(if *operation == Arithmetic::Subtract { -first } else { first });
+                }
+                values.try_fold(first, |left, right| match operation {
+                    Arithmetic::Add => Some(left + right),
+                    Arithmetic::Subtract => Some(left - right),
+                    Arithmetic::Multiply => Some(left * right),
+                    Arithmetic::Divide => (!right.is_zero()).then(|| left / right),
+                })
+            }
+            Expression::Duration(_) | Expression::TotalTime(_) => None,
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! Numbers that a mission lacks, or that cannot be meant: what keeps actions and designs from ever being used, though no file is wrong.
+
+mod analysis;
+mod syntax;
+mod warnings;
+
+use std::collections::BTreeMap;
+
+use ::mission::Mission;
+
+pub use analysis::MissingValue;
+
+use crate::message::Message;
+use analysis::Numbers;
+
+/// Adds to the warnings of a mission what may be other than meant, once its situation is complete: [`Mission::doubts`], and for missions
+/// with a knowledge base [`doubts`].
+pub fn note_doubts(mission: &mut Mission) {
+    mission.note_doubts();
+    if mission.knowledge().is_some() {
+        let doubts = doubts(mission);
+        mission.change_warnings(|warnings| warnings.into_iter().chain(doubts).collect());
+    }
+}
+
+/// Warnings about numbers that are missing and about durations below 0.
+pub fn doubts(mission: &Mission) -> Vec<Message> {
+    let numbers = Numbers::new(mission);
+    let (missing, negative) = numbers.check();
+    // Functions without any value have a warning of their own (M206).
+    let missing: Vec<MissingValue> =
+        missing.into_iter().filter(|own| !own.is_silent && own.is_likely).collect();
+    let estimations = missing.iter().filter_map(|own| Some((own, own.estimation.as_ref()?)));
+    let mut doubts: Vec<Message> =
+        estimations.map(|(own, (design, attribute))| numbers.no_estimation(own, design, attribute)).collect();
+    let mut values: BTreeMap<&str, Vec<&MissingValue>> = BTreeMap::new();
+    for own in missing.iter().filter(|own| own.estimation.is_none()) {
+        values.entry(&own.symbol).or_default().push(own);
+    }
+    doubts.extend(values.values().map(|missing| numbers.no_value(missing)));
+    doubts.extend(negative.iter().map(|own| numbers.negative(own)));
+    doubts
+}
+
+/// The numeric functions that have no value and that actions need: those that are hardly left out on purpose, and otherwise all.
+pub fn missing_values(mission: &Mission) -> Vec<MissingValue> {
+    let all = Numbers::new(mission).check().0;
+    let is_told = |own: &MissingValue| own.is_likely || own.is_silent;
+    let is_any = all.iter().any(is_told);
+    all.into_iter().filter(|own| !is_any || is_told(own)).collect()
+}
+
+/// Why a design can never be used though it may be available, in sentences.
+pub fn against(mission: &Mission, design: &str) -> Vec<String> {
+    let (missing, negative) = Numbers::new(mission).check();
+    let missing = missing.iter().filter_map(|own| {
+        let (of, attribute) = own.estimation.as_ref()?;
+        (of == design)
+            .then(|| format!("it has no estimation of {attribute}, which {} needs", own.needed_by.join(", ")))
+    });
+    let negative = negative.iter().filter(|own| own.design.as_deref() == Some(design));
+    let negative =
+        negative.map(|own| format!("with it {} would take {}, less than no time", own.action, own.duration));
+    missing.chain(negative).collect()
+}

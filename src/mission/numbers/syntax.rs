@@ -1,0 +1,138 @@
+//! Actions, conditions and effects to the numeric functions that they need.
+
+use pddl::ast::{
+    Action, ActionBody, Assignment, Atom, Condition, Effect, Expression, Name, Term, TypeExpression,
+};
+
+/// Variables with the objects that they stand for.
+pub(super) type Binding<'a> = Vec<(&'a Name, Name)>;
+
+pub(super) fn constants(atom: &Atom) -> Vec<Name> {
+    atom.arguments.iter().map(name_of).cloned().collect()
+}
+
+pub(super) fn name_of(term: &Term) -> &Name {
+    match term {
+        Term::Constant(identifier) | Term::Variable(identifier) => &identifier.name,
+    }
+}
+
+/// The object that a term stands for.
+pub(super) fn object<'a>(term: &'a Term, binding: &'a Binding<'_>) -> Option<&'a Name> {
+    match term {
+        Term::Constant(constant) => Some(&constant.name),
+        Term::Variable(variable) => {
+            binding.iter().find(|(name, _)| **name == variable.name).map(|(_, object)| object)
+        }
+    }
+}
+
+/// The arguments of an atom, if they are all known.
+pub(super) fn known(atom: &Atom, binding: &Binding<'_>) -> Option<Vec<Name>> {
+    atom.arguments.iter().map(|term| object(term, binding).cloned()).collect()
+}
+
+/// The arguments of an atom whose variables are all bound.
+pub(super) fn grounded(atom: &Atom, binding: &Binding<'_>) -> Vec<Name> {
+    known(atom, binding).unwrap_or_default()
+}
+
+/// The parameters of an action that an atom mentions, each once; none if it mentions another variable.
+pub(super) fn variables_of<'a>(
+    atom: &Atom,
+    action: &'a Action,
+) -> Option<Vec<(&'a Name, &'a TypeExpression)>> {
+    let mut variables: Vec<(&Name, &TypeExpression)> = Vec::new();
+    for term in &atom.arguments {
+        let Term::Variable(variable) = term else { continue };
+        let parameter = action.parameters.iter().find(|own| own.identifier.name == variable.name)?;
+        if !variables.iter().any(|(name, _)| **name == variable.name) {
+            variables.push((&parameter.identifier.name, &parameter.r#type));
+        }
+    }
+    Some(variables)
+}
+
+pub(super) fn conditions(body: &ActionBody) -> Vec<&Condition> {
+    match body {
+        ActionBody::Instantaneous { precondition, .. } => vec![precondition],
+        ActionBody::Durative { conditions, .. } => {
+            conditions.iter().map(|(_, condition)| condition).collect()
+        }
+    }
+}
+
+pub(super) fn effects(body: &ActionBody) -> Vec<&Effect> {
+    match body {
+        ActionBody::Instantaneous { effect, .. } => vec![effect],
+        ActionBody::Durative { effects, .. } => effects.iter().map(|(_, effect)| effect).collect(),
+    }
+}
+
+/// Visits all parts of an effect that have no parts.
+pub(super) fn walk<'a>(effect: &'a Effect, visit: &mut dyn FnMut(&'a Effect)) {
+    match effect {
+        Effect::And(parts) => parts.iter().for_each(|part| walk(part, visit)),
+        Effect::ForAll(_, inner) | Effect::When(_, inner) => walk(inner, visit),
+        other => visit(other),
+    }
+}
+
+/// Whether an action adds to a function, or takes from it.
+pub(super) fn grows(action: &Action, function: &Name) -> bool {
+    let mut found = false;
+    for effect in effects(&action.body) {
+        walk(effect, &mut |effect| {
+            found |= matches!(effect, Effect::Assign(kind, target, ..)
+                if *kind != Assignment::Assign && target.predicate.name == *function);
+        });
+    }
+    found
+}
+
+/// The functions without whose values an action is never possible.
+pub(super) fn needed(action: &Action) -> Vec<&Atom> {
+    let mut needed = Vec::new();
+    if let ActionBody::Durative { duration, .. } = &action.body {
+        duration.iter().for_each(|constraint| in_expression(&constraint.expression, &mut needed));
+    }
+    for condition in conditions(&action.body) {
+        in_condition(condition, &mut needed);
+    }
+    for effect in effects(&action.body) {
+        in_effect(effect, &mut needed);
+    }
+    needed
+}
+
+/// Comparisons that have to hold.
+pub(super) fn in_condition<'a>(condition: &'a Condition, needed: &mut Vec<&'a Atom>) {
+    match condition {
+        Condition::And(parts) => parts.iter().for_each(|part| in_condition(part, needed)),
+        Condition::Compare(_, left, right, _) => {
+            in_expression(left, needed);
+            in_expression(right, needed);
+        }
+        _ => {}
+    }
+}
+
+/// Effects that always take place.
+pub(super) fn in_effect<'a>(effect: &'a Effect, needed: &mut Vec<&'a Atom>) {
+    match effect {
+        Effect::And(parts) => parts.iter().for_each(|part| in_effect(part, needed)),
+        Effect::Assign(kind, target, expression, _) => {
+            needed.extend(Some(target).filter(|_| *kind != Assignment::Assign));
+            in_expression(expression, needed);
+        }
+        _ => {}
+    }
+}
+
+pub(super) fn in_expression<'a>(expression: &'a Expression, needed: &mut Vec<&'a Atom>) {
+    match expression {
+        Expression::Fluent(atom) => needed.push(atom),
+        Expression::Operation(_, parts, _) => parts.iter().for_each(|part| in_expression(part, needed)),
+        Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => {}
+    }
+}

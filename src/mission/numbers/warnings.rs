@@ -1,0 +1,69 @@
+//! Missing numbers and negative durations as warnings, with the file and the place where they can be mended.
+
+use std::collections::BTreeSet;
+
+use pddl::ast::Span;
+use pddl::{Diagnostic, Severity, Source};
+
+use super::analysis::{MissingValue, NegativeDuration, Numbers};
+use crate::message::{Message, did_you_mean};
+
+/// How many functions without a value are named before the rest is only counted.
+const NAMED: usize = 3;
+
+/// The warnings.
+impl Numbers<'_> {
+    pub(super) fn no_estimation(&self, own: &MissingValue, design: &str, attribute: &str) -> Message {
+        let individual = self.design(design);
+        let estimated = individual.iter().flat_map(|known| known.estimations.keys().map(String::as_str));
+        let text = format!(
+            "the design `{design}` has no estimation of `{attribute}`, which {} needs, so it can never be used there{}",
+            quoted(&own.needed_by),
+            did_you_mean(attribute, estimated)
+        );
+        self.about(design, "M230", text)
+    }
+
+    pub(super) fn no_value(&self, missing: &[&MissingValue]) -> Message {
+        let names: Vec<String> =
+            missing.iter().take(NAMED).map(|own| format!("`{}`", own.function)).collect();
+        let more = missing.len().saturating_sub(NAMED);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let actions: BTreeSet<&String> = missing.iter().flat_map(|own| &own.needed_by).collect();
+        let actions: Vec<String> = actions.into_iter().cloned().collect();
+        let have = if missing.len() == 1 { "has" } else { "have" };
+        let text = format!(
+            "{}{more} {have} no value, so {} can never be done where it is needed",
+            names.join(", "),
+            quoted(&actions)
+        );
+        let help = format!("state it in `:init`: `(= {} NUMBER)`", missing[0].function);
+        let source = self.mission.problem_source();
+        let start = source.text().find("(:init").map_or(0, |at| u32::try_from(at).unwrap_or_default());
+        at(source, Span { start, end: start + "(:init".len() as u32 }, "M231", text).with_help(help)
+    }
+
+    pub(super) fn negative(&self, own: &NegativeDuration) -> Message {
+        let because =
+            if own.causes.is_empty() { String::new() } else { format!(" ({})", own.causes.join(", ")) };
+        let text = format!(
+            "`{}` would take {}, less than no time{because}, so it can never be done so",
+            own.action, own.duration
+        );
+        if let Some(design) = &own.design {
+            return self.about(design, "M232", text);
+        }
+        let mut actions = self.domain.actions.iter().map(|action| &action.identifier);
+        let span = actions.find(|action| action.name.as_str() == own.action).map(|action| action.span);
+        at(self.mission.domain_source(), span.unwrap_or_default(), "M232", text)
+    }
+}
+
+fn at(source: &Source, span: Span, code: &'static str, text: String) -> Message {
+    let diagnostic = Diagnostic::new(source, span, Severity::Warning, code, text);
+    Message::from_pddl(&[diagnostic], &[source]).swap_remove(0)
+}
+
+fn quoted(names: &[String]) -> String {
+    names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+}

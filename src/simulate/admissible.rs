@@ -1,0 +1,98 @@
+//! Designs with which an action can be done now, for ways of control that choose them function by function.
+//!
+//! A design is *admissible* for a function of an action if it is available and all conditions of the action hold now with it: that it keeps the
+//! bounds of the action in its context (`t:requiresQuality`), that the battery suffices, and whatever else the action asks for. Conditions
+//! that mention the design of a function for which none has been chosen yet do not count: they are checked when that is chosen.
+
+use num_rational::BigRational;
+use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Expression, Name, Problem, Term};
+use pddl::validate::advance;
+
+use crate::mapek::{PlannedStep, resume};
+
+/// The conditions of an action that can be checked before all its designs are chosen.
+pub(super) struct Admission<'p> {
+    domain: Domain,
+    problem: &'p Problem,
+}
+
+impl<'p> Admission<'p> {
+    /// For a step of which so much is done; the designs of some functions are still to be chosen.
+    pub(super) fn new(
+        domain: &Domain,
+        problem: &'p Problem,
+        step: &PlannedStep,
+        done: Option<&BigRational>,
+        undecided: &[&str],
+    ) -> Self {
+        let mut domain = done.map_or_else(|| domain.clone(), |done| resume(domain, step, done));
+        let is_undecided =
+            |word: &String| undecided.iter().any(|function| step.design(function) == Some(word.as_str()));
+        let name = Name::new(&step.action);
+        for action in domain.actions.iter_mut().filter(|action| action.identifier.name == name) {
+            if action.parameters.len() == step.arguments.len() {
+                let open = action.parameters.iter().zip(&step.arguments);
+                let open: Vec<Name> = open
+                    .filter(|(_, argument)| is_undecided(argument))
+                    .map(|(parameter, _)| parameter.identifier.name.clone())
+                    .collect();
+                leave_open(action, &open);
+            }
+        }
+        Self { domain, problem }
+    }
+
+    /// Whether the step can be done as far as its designs are chosen.
+    pub(super) fn admits(&self, step: &PlannedStep) -> bool {
+        advance(&self.domain, self.problem, &step.to_plan_step(), false).is_ok()
+    }
+}
+
+/// Takes the conditions away that mention certain parameters.
+fn leave_open(action: &mut Action, open: &[Name]) {
+    match &mut action.body {
+        ActionBody::Instantaneous { precondition, .. } => drop_open(precondition, open),
+        ActionBody::Durative { conditions, .. } => {
+            conditions.iter_mut().for_each(|(_, condition)| drop_open(condition, open));
+        }
+    }
+}
+
+fn drop_open(condition: &mut Condition, open: &[Name]) {
+    match condition {
+        Condition::And(parts) => parts.iter_mut().for_each(|part| drop_open(part, open)),
+        other if mentions(other, open) => *other = Condition::And(Vec::new()),
+        _ => {}
+    }
+}
+
+fn mentions(condition: &Condition, names: &[Name]) -> bool {
+    match condition {
+        Condition::And(parts) | Condition::Or(parts) => parts.iter().any(|part| mentions(part, names)),
+        Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
+            mentions(inner, names)
+        }
+        Condition::Imply(left, right) => mentions(left, names) || mentions(right, names),
+        Condition::Atom(atom) => is_about(atom, names),
+        Condition::Equal(left, right, _) => [left, right].into_iter().any(|term| is_one_of(term, names)),
+        Condition::Compare(_, left, right, _) => {
+            mentions_number(left, names) || mentions_number(right, names)
+        }
+    }
+}
+
+fn mentions_number(expression: &Expression, names: &[Name]) -> bool {
+    match expression {
+        Expression::Fluent(atom) => is_about(atom, names),
+        Expression::Operation(_, parts, _) => parts.iter().any(|part| mentions_number(part, names)),
+        Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => false,
+    }
+}
+
+fn is_about(atom: &Atom, names: &[Name]) -> bool {
+    atom.arguments.iter().any(|term| is_one_of(term, names))
+}
+
+fn is_one_of(term: &Term, names: &[Name]) -> bool {
+    matches!(term, Term::Variable(variable) if names.contains(&variable.name))
+}

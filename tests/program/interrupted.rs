@@ -1,0 +1,134 @@
+//! Commands that do one thing after another: at a time limit and at Ctrl-C they answer with what is done, and say that it is not all.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use serde_json::{Value, json};
+
+use crate::common::{Outcome, metaplan, metaplan_in, root};
+
+/// Limits in seconds: on a machine with much else to do the first of them may end before anything is done.
+const SECONDS: [u32; 4] = [5, 15, 60, 180];
+
+const SIMULATE: [&str; 6] =
+    ["simulate", "missions/ugv.toml", "--scenario", "kinect_comes_and_goes", "--strategy", "joint"];
+
+/// Runs a command, interrupts it after some seconds, and waits for its end.
+#[cfg(unix)]
+fn interrupted(directory: &Path, arguments: &[&str], seconds: u32) -> Outcome {
+    let child = Command::new(env!("CARGO_BIN_EXE_metaplan"))
+        .args(arguments)
+        .current_dir(directory)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    std::thread::sleep(Duration::from_secs(seconds.into()));
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill").success());
+    let output = child.wait_with_output().expect("it ends");
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
+    Outcome {
+        status: output.status.code().unwrap_or(-1),
+        stdout: text(output.stdout),
+        stderr: text(output.stderr),
+    }
+}
+
+/// Each way to end a command early, with growing limits, until something was done; `done` counts what an answer has.
+fn check(directory: &Path, arguments: &[&str], status: i32, done: impl Fn(&Value) -> usize) -> Vec<Value> {
+    let json = ["--format", "json", "--quiet"];
+    let by_limit = |seconds: u32| {
+        let limit = seconds.to_string();
+        metaplan_in(directory, &[arguments, &["--time-limit", &limit], &json].concat(), "")
+    };
+    let mut ways: Vec<Box<dyn Fn(u32) -> Outcome + '_>> = vec![Box::new(by_limit)];
+    #[cfg(unix)]
+    if !is_ignored() {
+        ways.push(Box::new(|seconds| interrupted(directory, &[arguments, &json].concat(), seconds)));
+    }
+    let answers = ways.iter().map(|way| {
+        let found = SECONDS.iter().find_map(|&seconds| {
+            let outcome = way(seconds);
+            // While files are read there is nothing to show.
+            let answer: Value = serde_json::from_str(&outcome.stdout).ok()?;
+            let is_some = answer["format"] != "metaplan-error/1" && done(&answer) > 0;
+            assert!(!is_some || outcome.status == status, "{outcome:#?}");
+            is_some.then_some(answer)
+        });
+        found.unwrap_or_else(|| panic!("{arguments:?} never shows anything"))
+    });
+    let answers: Vec<Value> = answers.collect();
+    for answer in &answers {
+        assert_eq!(answer["messages"][0]["code"], "M130", "{answer:#}");
+    }
+    answers
+}
+
+/// Whether what a shell has started in the background ignores Ctrl-C.
+#[cfg(unix)]
+fn is_ignored() -> bool {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0) & 2 != 0
+}
+
+#[test]
+fn simulations_show_the_missions_that_are_done() {
+    let arguments = [&SIMULATE[..], &["--strategy", "none", "--runs", "100000"]].concat();
+    let count = |answer: &Value| answer["runs"].as_array().map_or(0, Vec::len);
+    for answer in check(&root(), &arguments, 12, count) {
+        assert_eq!((&answer["complete"], &answer["missions"]), (&json!(false), &json!(200_000)));
+        let of = |strategy: &str| -> Vec<Value> {
+            let runs = answer["runs"].as_array().expect("runs").iter();
+            runs.filter(|run| run["strategy"] == strategy).cloned().collect()
+        };
+        // Each seed with all strategies before the next one; and what is there is what a run without a limit has.
+        let (joint, none) = (of("joint"), of("none"));
+        assert!(joint.len() - none.len() <= 1, "{} and {}", joint.len(), none.len());
+        let count = joint.len().min(5).to_string();
+        let whole =
+            metaplan(&[&SIMULATE[..], &["--runs", &count, "--format", "json", "--quiet"]].concat()).json();
+        assert_eq!(whole["complete"], true);
+        assert_eq!(whole["runs"].as_array().expect("runs")[..], joint[..joint.len().min(5)]);
+    }
+    let text = metaplan(&[&SIMULATE[..], &["--runs", "100000", "--time-limit", "3"]].concat());
+    assert_eq!(text.status, 12, "{text:#?}");
+    assert!(text.stderr.contains("M130"), "{text:#?}");
+}
+
+#[test]
+fn studies_keep_the_runs_that_are_done_and_go_on() {
+    let folder = tempfile::tempdir().expect("a directory");
+    let mission = root().join("missions/ugv.toml");
+    let study = format!(
+        "command = ['simulate', '{}', '--scenario', 'kinect_at_wp2', '--strategy', 'joint']\nrows = '/runs'\n\
+         [vary]\nseed = {{ from = 1, to = 100000 }}\n",
+        mission.display()
+    );
+    fs::write(folder.path().join("study.toml"), study).expect("written");
+    let sweep = ["sweep", "study.toml", "--output", "results", "--resume"];
+    let count = |answer: &Value| answer["done"].as_u64().map_or(0, |done| done as usize);
+    let answers = check(folder.path(), &sweep, 1, count);
+    assert!(answers.windows(2).all(|pair| count(&pair[0]) <= count(&pair[1])), "{answers:#?}");
+    // No run that was ended counts as done.
+    for answer in &answers {
+        assert_eq!((&answer["failed"], &answer["timed_out"]), (&json!(0), &json!(0)), "{answer:#}");
+    }
+    let lines = fs::read_to_string(folder.path().join("results/shard-0001-of-0001.jsonl")).expect("lines");
+    for line in lines.lines().skip(1) {
+        let line: Value = serde_json::from_str(line).expect("JSON");
+        assert_eq!((&line["status"], &line["answer"]["complete"]), (&json!(0), &json!(true)), "{line}");
+    }
+}
+
+#[test]
+fn comparisons_show_what_is_compared() {
+    let arguments = ["compare", "missions/camara_like.toml", "--no-battery", "--pairs", "1000"];
+    let count = |answer: &Value| answer["comparisons"].as_array().map_or(0, Vec::len);
+    for answer in check(&root(), &arguments, 12, count) {
+        assert_eq!(answer["complete"], false);
+    }
+}
