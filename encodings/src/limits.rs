@@ -37,7 +37,7 @@ impl Limits {
     pub fn half(&self) -> Self {
         let left = self.deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
         match left {
-            Some(left) => self.clone().with_time(left / 2),
+            Some(left) => self.clone().with_time(left.mul_f64(0.5)),
             None => self.clone(),
         }
     }

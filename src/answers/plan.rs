@@ -58,7 +58,7 @@ pub struct PlanAnswer {
     #[serde(skip_serializing_if = "Option::is_none")]
     blocking: Option<Vec<String>>,
     /// Where no plan exists: numeric functions that have no value, though actions need them.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     missing_values: Vec<MissingValuePart>,
 }
 

@@ -7,7 +7,7 @@
 //! search comes first, in which a label stands for all that cost no less and have no more of anything. A label without a path to the goal in *its* graph shows
 //! that none of those has one. The second search, which tells all states apart, expands only what the first one has not ruled out.
 //!
-//! [1] J. Lee, M. Katz, S. Sohrabi: On K* search for top-k planning, SoCS 2023; H. Aljazzar, S. Leue: K*: a heuristic search algorithm for
+//! [1] J. Lee, M. Katz, S. Sohrabi: On K* search for top-k planning, 2023; H. Aljazzar, S. Leue: K*: a heuristic search algorithm for
 //! finding the k shortest paths, Artificial Intelligence 175, 2011.
 
 use std::cell::OnceCell;

@@ -48,7 +48,7 @@ impl<'g> Paths<'g> {
 
     /// The edges of a label from which a goal can be reached.
     pub(super) fn edges(&self, label: u32) -> impl Iterator<Item = &'g Edge> + use<'_, 'g> {
-        let (from, to) = (self.first[label as usize], self.first[label as usize + 1]);
+        let (from, to) = (self.first[label as usize], self.first[(label as usize).saturating_add(1)]);
         self.graph.edges[from..to].iter().filter(|edge| self.graph.alive[edge.to as usize])
     }
 
@@ -77,7 +77,7 @@ impl<'g> Paths<'g> {
         let mut fruitful = vec![false];
         while let Some(branch) = branches.last_mut() {
             let left = length.saturating_sub(path.len());
-            let end = self.first[branch.label as usize + 1];
+            let end = self.first[(branch.label as usize).saturating_add(1)];
             if left == 0 || branch.next == end {
                 let is_goal = left == 0 && self.graph.goals[branch.label as usize];
                 if is_goal {
