@@ -220,10 +220,10 @@ impl PendingDirectory {
 
 #[cfg(unix)]
 mod system {
+    use std::fs::{File, Metadata};
+    use std::io;
     use std::os::fd::AsFd as _;
     use std::os::unix::fs::{MetadataExt as _, PermissionsExt as _, fchown};
-
-    use super::{File, Metadata, io};
 
     pub(super) fn stdout() -> io::Result<File> {
         io::stdout().as_fd().try_clone_to_owned().map(File::from)
@@ -255,9 +255,9 @@ mod system {
 
 #[cfg(windows)]
 mod system {
+    use std::fs::{File, Metadata};
+    use std::io;
     use std::os::windows::io::AsHandle as _;
-
-    use super::{File, Metadata, io};
 
     pub(super) fn stdout() -> io::Result<File> {
         io::stdout().as_handle().try_clone_to_owned().map(File::from)
