@@ -57,9 +57,9 @@ pub struct PlanAnswer {
     /// others are available.
     #[serde(skip_serializing_if = "Option::is_none")]
     blocking: Option<Vec<String>>,
-    /// Where no plan exists: numeric functions that have no value, though actions need them.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    missing_values: Vec<MissingValuePart>,
+    /// Where no plan exists: numeric functions that have no value, though actions need them, if there are any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    missing_values: Option<Vec<MissingValuePart>>,
 }
 
 /// A number that is missing.
@@ -254,7 +254,7 @@ impl PlanAnswer {
             alternatives: None,
             makespan: None,
             blocking: None,
-            missing_values: Vec::new(),
+            missing_values: None,
         }
     }
 
@@ -298,7 +298,8 @@ impl PlanAnswer {
             design: own.estimation.as_ref().map(|(design, _)| design.clone()),
             file: own.file.clone(),
         };
-        self.missing_values = missing.iter().map(part).collect();
+        let parts: Vec<MissingValuePart> = missing.iter().map(part).collect();
+        self.missing_values = Some(parts).filter(|parts| !parts.is_empty());
         self
     }
 }
