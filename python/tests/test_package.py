@@ -50,7 +50,8 @@ mission.plan(time=5)
 
 def mypy(*words):
     pytest.importorskip("mypy", reason="mypy is not there")
-    command = [sys.executable, "-m", "mypy", "--strict", "--config-file", PACKAGE / "pyproject.toml", *words]
+    cache = ROOT / "target/python/mypy"
+    command = [sys.executable, "-m", "mypy", "--strict", "--config-file", PACKAGE / "pyproject.toml", "--cache-dir", cache, *words]
     return subprocess.run(command, cwd=PACKAGE, capture_output=True, text=True, check=False)
 
 
