@@ -66,6 +66,7 @@ struct SamplePart {
 }
 
 #[derive(Debug, Clone, Serialize, JsonSchema)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a field of the format")]
 struct RunPart {
     /// The way of control.
     strategy: &'static str,

@@ -8,6 +8,7 @@ use encodings::Limits;
 use num_rational::BigRational;
 use ontology::tomasys::change::Status as Component;
 use ontology::tomasys::{FunctionDesign, Requirement};
+use std::cmp::Ordering;
 
 use crate::explain::parts::{Alteration, BestPlan, Change, Repair, Target};
 use crate::explain::solve::best;
@@ -310,11 +311,9 @@ fn targets<'a>(bounds: impl Iterator<Item = &'a Requirement>, from: &BigRational
 /// Values at a bound and beyond it, seen from a value.
 fn around(bound: &BigRational, from: &BigRational) -> Vec<Target> {
     let bound = bound.clone();
-    if *from < bound {
-        vec![Target::AtLeast(bound.clone()), Target::Above(bound)]
-    } else if *from > bound {
-        vec![Target::AtMost(bound.clone()), Target::Below(bound)]
-    } else {
-        vec![Target::Below(bound.clone()), Target::Above(bound)]
+    match from.cmp(&bound) {
+        Ordering::Less => vec![Target::AtLeast(bound.clone()), Target::Above(bound)],
+        Ordering::Greater => vec![Target::AtMost(bound.clone()), Target::Below(bound)],
+        Ordering::Equal => vec![Target::Below(bound.clone()), Target::Above(bound)],
     }
 }

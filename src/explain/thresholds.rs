@@ -48,7 +48,7 @@ pub fn smallest_changes(
         hear(&attribute);
         for upwards in [false, true] {
             match tried.first_threshold(&attribute, &from, upwards)? {
-                Outcome::Found(change) => found.changes.push(change),
+                Outcome::Found(change) => found.changes.push(*change),
                 Outcome::None => {}
                 Outcome::AtLimit => return Ok(found),
             }
@@ -58,7 +58,7 @@ pub fn smallest_changes(
         hear(&function);
         for upwards in [false, true] {
             match tried.bisected(&function, &from, upwards)? {
-                Outcome::Found(change) => found.changes.push(change),
+                Outcome::Found(change) => found.changes.push(*change),
                 Outcome::None => {}
                 Outcome::AtLimit => return Ok(found),
             }
@@ -76,7 +76,7 @@ pub(super) fn measured(knowledge: &Knowledge) -> Vec<(String, BigRational)> {
 
 /// What came of looking for a change in one direction.
 enum Outcome {
-    Found(Change),
+    Found(Box<Change>),
     None,
     AtLimit,
 }
@@ -109,7 +109,7 @@ impl Tried<'_> {
         for target in thresholds(self.mission, attribute, from, upwards) {
             let Some(then) = self.with(attribute, &target.example())? else { return Ok(Outcome::AtLimit) };
             if self.is_other(&then) {
-                return Ok(Outcome::Found(change(attribute, from, target, None, then)));
+                return Ok(Outcome::Found(Box::new(change(attribute, from, target, None, then))));
             }
         }
         Ok(Outcome::None)
@@ -168,18 +168,18 @@ impl Tried<'_> {
             let Some(plan) = self.with(function, &before)? else { return Ok(Outcome::AtLimit) };
             if !self.is_other(&plan) {
                 let to = if upwards { Target::AtLeast(bound) } else { Target::AtMost(bound) };
-                return Ok(Outcome::Found(change(function, from, to, Some(little()), at)));
+                return Ok(Outcome::Found(Box::new(change(function, from, to, Some(little()), at))));
             }
         } else {
             let Some(plan) = self.with(function, &beyond)? else { return Ok(Outcome::AtLimit) };
             if self.is_other(&plan) {
                 let to = if upwards { Target::Above(bound) } else { Target::Below(bound) };
-                return Ok(Outcome::Found(change(function, from, to, Some(little()), plan)));
+                return Ok(Outcome::Found(Box::new(change(function, from, to, Some(little()), plan))));
             }
         }
         let within = high - low;
         let to = if upwards { Target::AtLeast(other) } else { Target::AtMost(other) };
-        Ok(Outcome::Found(change(function, from, to, Some(within), then)))
+        Ok(Outcome::Found(Box::new(change(function, from, to, Some(within), then))))
     }
 }
 

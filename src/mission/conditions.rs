@@ -24,10 +24,10 @@ pub fn condition(mission: &Mission, text: &str) -> Result<Condition, Vec<Fault>>
     let open = if is_bare { "(" } else { "" };
     let close = if is_bare { ")" } else { "" };
     let before = format!("(define (problem goal) (:domain {}) (:goal {open}", mission.domain().name.name);
-    let closed = text.chars().fold(Some(0_usize), |depth, c| match c {
-        '(' => depth.map(|depth| depth + 1),
-        ')' => depth.and_then(|depth| depth.checked_sub(1)),
-        _ => depth,
+    let closed = text.chars().try_fold(0_usize, |depth, c| match c {
+        '(' => depth.checked_add(1),
+        ')' => depth.checked_sub(1),
+        _ => Some(depth),
     });
     if text.trim().is_empty() || closed != Some(0) {
         let text = format!(
@@ -49,14 +49,11 @@ pub fn function(mission: &Mission, text: &str) -> Result<Atom, Vec<Fault>> {
     mission.fill(&mut problem);
     let before = usize::from(!text.trim_start().starts_with('('));
     let metric = mission.objective(&problem, text).map_err(|errors| faults(errors, text, before))?;
-    match metric.expression {
-        Expression::Fluent(atom) => Ok(atom),
-        _ => {
-            let text =
-                format!("`{text}` is not one numeric function with its arguments, such as `(battery)`");
-            Err(vec![Fault { offset: None, message: Message::error("M135", text) }])
-        }
+    if let Expression::Fluent(atom) = metric.expression {
+        return Ok(atom);
     }
+    let text = format!("`{text}` is not one numeric function with its arguments, such as `(battery)`");
+    Err(vec![Fault { offset: None, message: Message::error("M135", text) }])
 }
 
 /// What is wrong with the objects that a setting names which [`Mission::set`] has accepted: there are none of their names, or they have other

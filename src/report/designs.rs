@@ -82,9 +82,10 @@ pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> V
     let Some(design) = design else { return Vec::new() };
     let Causes { causes, are_all_needed } = causes(knowledge, design);
     let count = causes.len();
-    let introduction = match are_all_needed {
-        true => format!("{count} causes rule it out, and all of them have to go before it is available:"),
-        false => format!("{count} causes rule it out:"),
+    let introduction = if are_all_needed {
+        format!("{count} causes rule it out, and all of them have to go before it is available:")
+    } else {
+        format!("{count} causes rule it out:")
     };
     let introduction = (count > 1).then(|| Reason { text: introduction, supports: Vec::new() });
     // Where neither a component nor a measurement is a cause, what follows from the knowledge as it is.

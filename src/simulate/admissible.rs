@@ -53,7 +53,9 @@ fn leave_open(action: &mut Action, open: &[Name]) {
     match &mut action.body {
         ActionBody::Instantaneous { precondition, .. } => drop_open(precondition, open),
         ActionBody::Durative { conditions, .. } => {
-            conditions.iter_mut().for_each(|(_, condition)| drop_open(condition, open));
+            for (_, condition) in conditions {
+                drop_open(condition, open);
+            }
         }
     }
 }

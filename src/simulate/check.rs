@@ -42,7 +42,7 @@ impl Simulation {
             ..Watched::default()
         };
         if let Some(lifeline) = &self.lifeline {
-            watched.lifeline = checker.function(vec!["lifeline".into()], lifeline);
+            watched.lifeline = checker.function(&["lifeline".into()], lifeline);
         }
         for (index, signal) in self.signals.iter().enumerate() {
             checker.signal(index, signal);
@@ -159,11 +159,11 @@ impl Checker<'_> {
     }
 
     /// Checks the name of a numeric function; returns the function as the validator writes it.
-    fn function(&mut self, path: Vec<Key>, text: &str) -> Option<String> {
+    fn function(&mut self, path: &[Key], text: &str) -> Option<String> {
         match conditions::function(self.mission, text) {
             Ok(atom) => Some(written(&atom)),
             Err(faults) => {
-                self.faults(&path, faults);
+                self.faults(path, faults);
                 None
             }
         }
@@ -210,7 +210,7 @@ impl Checker<'_> {
             let meant = did_you_mean(&suave.inspect, actions());
             self.wrong(path("inspect"), format!("the domain has no action `{}`{meant}", suave.inspect));
         }
-        let length = self.function(path("length"), &suave.length);
+        let length = self.function(&path("length"), &suave.length);
         watched.length = length.map(|length| length.trim_matches(['(', ')']).to_owned());
     }
 }

@@ -5,7 +5,7 @@
 //! kept, its directory is not writable, it is a mount point, or it is named by a descriptor (`/dev/fd/3`). Vim's `backupcopy=auto`
 //! draws the same line. If overwriting fails, the former content is restored.
 
-use std::fs::{File, Metadata, OpenOptions};
+use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
 

@@ -94,7 +94,9 @@ pub(super) fn grows(action: &Action, function: &Name) -> bool {
 pub(super) fn needed(action: &Action) -> Vec<&Atom> {
     let mut needed = Vec::new();
     if let ActionBody::Durative { duration, .. } = &action.body {
-        duration.iter().for_each(|constraint| in_expression(&constraint.expression, &mut needed));
+        for constraint in duration {
+            in_expression(&constraint.expression, &mut needed);
+        }
     }
     for condition in conditions(&action.body) {
         in_condition(condition, &mut needed);
