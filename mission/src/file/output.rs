@@ -5,7 +5,7 @@
 //! kept, its directory is not writable, it is a mount point, or it is named by a descriptor (`/dev/fd/3`). Vim's `backupcopy=auto`
 //! draws the same line. If overwriting fails, the former content is restored.
 
-use std::fs::{File, Metadata, OpenOptions};
+use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
 
@@ -65,7 +65,7 @@ pub fn create(path: &Path) -> io::Result<(File, Pending)> {
     };
     let (target, is_descriptor) = followed(path)?;
     let Some(existing) = existing else {
-        return pending(temporary(&target)?, target, None);
+        return Ok(pending(temporary(&target)?, target, None));
     };
     // A file that is protected against writing is not replaced either.
     let mut writable = OpenOptions::new();
@@ -73,10 +73,10 @@ pub fn create(path: &Path) -> io::Result<(File, Pending)> {
     let old = writable.clone().read(true).open(path).or_else(|_| writable.open(path))?;
     let replacement =
         if is_descriptor || has_other_links(&existing) { None } else { temporary(&target).ok() };
-    match replacement.filter(|file| adopt(file.as_file(), &existing).is_ok()) {
+    Ok(match replacement.filter(|file| adopt(file.as_file(), &existing).is_ok()) {
         Some(replacement) => pending(replacement, target, Some(InPlace { old, is_certain: false })),
         None => pending(NamedTempFile::new()?, target, Some(InPlace { old, is_certain: true })),
-    }
+    })
 }
 
 /// A file that is written, and not yet visible under its name.
@@ -116,9 +116,9 @@ impl Pending {
     }
 }
 
-fn pending(file: NamedTempFile, target: PathBuf, old: Option<InPlace>) -> io::Result<(File, Pending)> {
+fn pending(file: NamedTempFile, target: PathBuf, old: Option<InPlace>) -> (File, Pending) {
     let (file, temporary) = file.into_parts();
-    Ok((file, Pending(Some((temporary, target, old)))))
+    (file, Pending(Some((temporary, target, old))))
 }
 
 /// Overwrites a file with the content of another one. If that fails, the former content is restored.
