@@ -218,7 +218,7 @@ pub fn decimal(value: &num_rational::BigRational) -> String {
 }
 
 /// A number with what is counted, in the singular or in the plural: `1 conflict`, `2 conflicts`.
-pub fn counted<N: std::fmt::Display + PartialEq + From<u8>>(count: N, noun: &str) -> String {
+pub fn counted<N: Copy + std::fmt::Display + PartialEq + From<u8>>(count: N, noun: &str) -> String {
     let ending = if count == N::from(1) { "" } else { "s" };
     format!("{count} {noun}{ending}")
 }

@@ -113,18 +113,14 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         );
         Message::error("M130", text)
     });
-    match common.format {
-        Format::Json => {
-            let answer = SimulateAnswer::new(mission, &arguments.scenario, &strategies, runs);
-            let answer =
-                answer.timed(experiment.time_unit()).of(total, incomplete.clone().into_iter().collect());
-            output::json_answer(&answer);
-        }
-        _ => {
-            output::answer(&text(&strategies, runs, experiment.time_unit()));
-            if let Some(message) = &incomplete {
-                output::failure(common, std::slice::from_ref(message));
-            }
+    if common.format == Format::Json {
+        let answer = SimulateAnswer::new(mission, &arguments.scenario, &strategies, runs);
+        let answer = answer.timed(experiment.time_unit()).of(total, incomplete.clone().into_iter().collect());
+        output::json_answer(&answer);
+    } else {
+        output::answer(&text(&strategies, runs, experiment.time_unit()));
+        if let Some(message) = &incomplete {
+            output::failure(common, std::slice::from_ref(message));
         }
     }
     Ok(if incomplete.is_some() { Exit::NothingFound } else { Exit::Done })

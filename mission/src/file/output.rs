@@ -73,10 +73,10 @@ pub fn create(path: &Path) -> io::Result<(File, Pending)> {
     let old = writable.clone().read(true).open(path).or_else(|_| writable.open(path))?;
     let replacement =
         if is_descriptor || has_other_links(&existing) { None } else { temporary(&target).ok() };
-    match replacement.filter(|file| adopt(file.as_file(), &existing).is_ok()) {
-        Some(replacement) => Ok(pending(replacement, target, Some(InPlace { old, is_certain: false }))),
-        None => Ok(pending(NamedTempFile::new()?, target, Some(InPlace { old, is_certain: true }))),
-    }
+    Ok(match replacement.filter(|file| adopt(file.as_file(), &existing).is_ok()) {
+        Some(replacement) => pending(replacement, target, Some(InPlace { old, is_certain: false })),
+        None => pending(NamedTempFile::new()?, target, Some(InPlace { old, is_certain: true })),
+    })
 }
 
 /// A file that is written, and not yet visible under its name.
