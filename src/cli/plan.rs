@@ -314,7 +314,7 @@ fn beside(planned: &Planned<'_>, arguments: &Arguments, common: &Common) -> Stri
 /// What people read below the verdict.
 fn further(planned: &Planned<'_>, solution: &Solution, (arguments, common): (&Arguments, &Common)) -> String {
     let statistics =
-        common.verbose.then(|| statistics_text(solution, &planned.preparation)).unwrap_or_default();
+        if common.verbose { statistics_text(solution, &planned.preparation) } else { String::new() };
     let overlaps = solution.plan.as_ref().filter(|_| planned.overlaps());
     let makespan = overlaps.map_or_else(String::new, |plan| format!("makespan {}\n", plan.makespan()));
     let columns = arguments.columns();
