@@ -32,7 +32,8 @@ impl Limits {
         self
     }
 
-    /// The same limits with half of the time that is left, so that something can follow. The flag is shared.
+    /// Returns the same limits with half of the remaining time, so that time remains for a later task. The flag is
+    /// shared.
     #[must_use]
     pub fn half(&self) -> Self {
         let left = self.deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));

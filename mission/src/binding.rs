@@ -300,7 +300,7 @@ impl Fill<'_> {
         }
     }
 
-    /// Adds a fact, unless it is about an individual that is left out.
+    /// Adds a fact, unless one of its arguments is an individual without a PDDL name.
     fn fact(&mut self, predicate: &Name, arguments: &[&str]) {
         if arguments.iter().all(|argument| is_pddl_name(argument)) {
             self.problem.init.push(InitialElement::Fact(atom(predicate, arguments)));
@@ -442,7 +442,8 @@ pub fn atom(predicate: &Name, arguments: &[&str]) -> Atom {
     }
 }
 
-/// Returns `true` if an object may have this name: letters of any script, digits, `-`, `_` and `.`, and nothing that is not seen.
+/// Returns `true` if an object may have this name: letters of any script, digits, `-`, `_` and `.`, and no invisible
+/// characters.
 pub(super) fn is_pddl_name(name: &str) -> bool {
     let allowed =
         |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c) || !c.is_ascii() && !c.is_whitespace();

@@ -40,8 +40,9 @@ impl Source {
         Self { name: name.into(), text, line_starts }
     }
 
-    /// The bytes `bytes` of the file `name`: UTF-16 where they begin with its byte order mark, as `>` of Windows PowerShell writes
-    /// files, and else UTF-8. What is neither becomes U+FFFD, as comments of older files are often Latin-1.
+    /// Decodes the bytes of the file `name`: as UTF-16 if they begin with its byte order mark, and otherwise as
+    /// UTF-8. `>` of Windows PowerShell writes UTF-16 files. Invalid sequences become U+FFFD, since comments of older
+    /// files are often Latin-1.
     pub fn from_bytes(name: impl Into<String>, bytes: &[u8]) -> Self {
         match bytes {
             [0xff, 0xfe, rest @ ..] => Self::new(name, utf16(rest, u16::from_le_bytes)),

@@ -38,7 +38,7 @@ pub(crate) fn curve(plan: &Plan, curve: &Curve, span: &Span, canvas: Canvas) -> 
         (frame.axis(top, top + HEIGHT))
         (values_axis(&scale, (canvas.left, frame.width - RIGHT)))
         @let place = canvas.name_place(top, top + HEIGHT / 2.0 + 4.0);
-        // The numbers of the axis stand between a name at the left and the curve.
+        // The numbers of the axis are between the name on the left and the curve.
         @let aside = if canvas.has_names_above { 0.0 } else { 48.0 };
         text class="label" x=(px(place.x - aside)) y=(px(place.y)) text-anchor=(place.anchor) {
             title { (curve.name) }

@@ -300,6 +300,6 @@ pub struct Group {
     pub values: Vec<(f64, String)>,
     /// Their mean, and half the width of its interval.
     pub mean: Option<(f64, f64)>,
-    /// The reason why there are no values, where there are none: `0 of 20 accomplished`.
+    /// Text shown for a group without values, such as `0 of 20 accomplished`.
     pub nothing: String,
 }

@@ -1,4 +1,4 @@
-//! The frame of pictures: how wide they are, where names of rows stand, and the axis from left to right.
+//! Frame of a picture: its width, the positions of row names, and the horizontal axis.
 
 use std::collections::BTreeMap;
 
@@ -14,14 +14,14 @@ const WIDEST: f64 = 16_000.0;
 /// The height of a name above its row.
 const NAME: f64 = 14.0;
 
-/// The paper of a picture. All lengths are in pixels.
+/// Dimensions of a picture. All lengths are in pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Canvas {
     /// The width of the picture, if it does not have to be wider.
     pub(crate) width: f64,
-    /// Where what is drawn begins: the numbers of axes are left of it.
+    /// Left edge of the drawing area. The numbers of vertical axes are to its left.
     pub(crate) left: f64,
-    /// Names of rows stand above them in place of left of them, which leaves more of the width.
+    /// Whether the names of rows are above them instead of to their left, which leaves more width.
     pub(crate) has_names_above: bool,
     /// The least width of a step of a plan.
     pub(crate) step: f64,
@@ -32,15 +32,16 @@ pub(crate) struct Canvas {
 /// A picture in a file of its own.
 pub(crate) const FILE: Canvas =
     Canvas { width: 826.0, left: 170.0, has_names_above: false, step: 60.0, apart: 46.0 };
-/// Pictures in a page, the widest first: the first that fits its column is shown. `page.css` has the same widths.
+/// Canvases of the pictures in a page, the widest first. The first one that fits its column is shown. `page.css` has
+/// the same widths.
 pub(crate) const PAGE: [Canvas; 3] = [WIDE, COLUMN, TELEPHONE];
-/// Pictures of two plans beside each other in a page.
+/// Canvases of the pictures of two plans that a page shows side by side.
 pub(crate) const PAIR: [Canvas; 2] = [COLUMN, TELEPHONE];
 /// The whole width of a page.
 const WIDE: Canvas = Canvas { width: 1146.0, left: 170.0, has_names_above: false, step: 4.0, apart: 20.0 };
-/// Half of that.
+/// Half the width of a page.
 const COLUMN: Canvas = Canvas { width: 560.0, left: 60.0, has_names_above: true, step: 4.0, apart: 20.0 };
-/// A telephone held upright.
+/// A telephone in portrait orientation.
 const TELEPHONE: Canvas = Canvas { width: 328.0, left: 60.0, has_names_above: true, step: 4.0, apart: 20.0 };
 
 impl Canvas {
@@ -54,7 +55,7 @@ impl Canvas {
         if self.has_names_above { NAME } else { 0.0 }
     }
 
-    /// Where the name of a row stands: its end left of the row, whose base line is given, or its start above the row.
+    /// Position of a row's name: its end to the left of the row, on the base line `base`, or its start above the row.
     pub(crate) fn name_place(&self, top: f64, base: f64) -> NamePlace {
         if self.has_names_above {
             NamePlace { x: self.left, y: top - 4.0, anchor: "start", room: self.inner() }
@@ -64,19 +65,19 @@ impl Canvas {
     }
 }
 
-/// A place for the name of a row.
+/// Position of a row's name.
 pub(crate) struct NamePlace {
     pub(crate) x: f64,
     pub(crate) y: f64,
-    /// Which end of the text is there.
+    /// The end of the text at this position, as SVG's `text-anchor`: `start` or `end`.
     pub(crate) anchor: &'static str,
-    /// The width of the longest name.
+    /// Maximum width of the name.
     pub(crate) room: f64,
 }
 
-/// What the axes of plans beside each other share, so that one scale serves all of them.
+/// Ranges shared by the axes of plans that are shown side by side, so that one scale serves all of them.
 pub(crate) struct Span {
-    /// The number of steps of the plan that has most.
+    /// Number of steps of the plan with most steps.
     steps: usize,
     /// The latest end.
     until: f64,

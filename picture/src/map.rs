@@ -1,6 +1,6 @@
 //! The places of a mission, the ways between them, and the way that a plan takes, coloured by configuration.
 //!
-//! Ways there and back lie beside each other, each with an arrow and, at the outer side of the arrow, the numbers of its steps.
+//! Ways there and back are drawn side by side. Each has an arrow, with the numbers of its steps on the outer side.
 
 use std::collections::BTreeMap;
 
@@ -56,14 +56,14 @@ type Line = (Point, Point);
 struct Leg {
     from: usize,
     to: usize,
-    /// From 1.
+    /// Numbers of the steps, from 1.
     steps: Vec<usize>,
     /// The configuration of each step.
     names: Vec<String>,
     shape: Shape,
 }
 
-/// How a leg is drawn: a line, or a loop around `centre`, with an arrow on it.
+/// Drawing of a leg: a line, or a loop around `centre`, with an arrow on it.
 struct Shape {
     line: Line,
     centre: Option<Point>,
@@ -87,7 +87,7 @@ pub(crate) fn map(plan: &Plan, map: &Map, palette: &Palette, canvas: Canvas) -> 
     let loops = legs.iter().filter_map(|leg| leg.shape.centre).map(|centre| square(centre, LOOP));
     let arrows = legs.iter().map(|leg| square(leg.shape.arrow, SIDE));
     let mut taken: Vec<Taken> = dots.chain(loops).chain(arrows).collect();
-    // Numbers have fewer places to stand than names, so that they come first.
+    // Numbers have fewer possible positions than names, so they are placed first.
     let numbers: Vec<_> = legs.iter().map(|leg| number(leg, &legs, (limits, &lines), &mut taken)).collect();
     let labels = names(map, &points, &legs, (limits, &lines), &mut taken);
     let moves: usize = legs.iter().map(|leg| leg.steps.len()).sum();
@@ -184,8 +184,9 @@ fn numbers(leg: &Leg) -> String {
     numbers.join(",") + if leg.steps.len() > 3 { "…" } else { "" }
 }
 
-/// Where the numbers of a leg stand, as the left end of their base line: nearer to its own arrow than to all others, without touching what is
-/// there, and if possible no line. The place is taken then.
+/// Position of the numbers of a leg: the left end of their base line. It is nearer to the leg's own arrow than to all
+/// others. The numbers touch nothing that is already placed, and cross no line if possible. Their space is marked as
+/// taken.
 fn number(
     leg: &Leg,
     legs: &[Leg],
@@ -293,7 +294,7 @@ fn room(
     (limits, lines): (Taken, &[Line]),
     taken: &mut Vec<Taken>,
 ) -> Option<Point> {
-    // Farther away only where a line would cross a name that is near.
+    // Farther away only where a line would cross a nearby name.
     let places = [reach, reach + FARTHER].into_iter().flat_map(|reach| {
         let beside = [(x + reach, y), (x - reach - width, y)];
         let across = [y - reach - LINE / 2.0, y + reach + LINE / 2.0].into_iter();
@@ -306,8 +307,8 @@ fn room(
     choose(places, (limits, lines), taken)
 }
 
-/// The left end of the base line of a text in the first of these rectangles that is free, and if possible crossed by no line. The rectangle is
-/// taken then.
+/// Left end of the base line of a text in the first free rectangle, preferably one that no line crosses. The
+/// rectangle is marked as taken.
 fn choose(
     places: impl Iterator<Item = Taken>,
     (limits, lines): (Taken, &[Line]),

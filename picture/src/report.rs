@@ -80,7 +80,7 @@ fn plan_pictures(plan: &Plan, prefix: &str, palette: &Palette) -> Vec<(String, S
     files
 }
 
-/// The axes of two plans beside each other: one scale, where both have the same kind of axis.
+/// Axis ranges of two plans that are shown side by side: shared if both have the same kind of axis.
 fn spans(before: &Plan, after: &Plan) -> [Span; 2] {
     let both = [before, after];
     both.map(|own| if before.axis == after.axis { Span::of(&both) } else { Span::of(&[own]) })

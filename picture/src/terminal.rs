@@ -9,23 +9,25 @@ use crate::scale::number;
 const LEAST: usize = 60;
 /// A step has at least so many columns.
 const COLUMN: usize = 4;
-/// A step has at least so many columns in a picture that is not to scale, the mark of its beginning included.
+/// Minimum number of columns of a step in a picture that is not to scale, including the mark of its beginning.
 const NARROW: usize = 7;
-/// A picture has at most so many bands below each other: more are no overview.
+/// Maximum number of bands below each other; more would give no overview.
 const BANDS: usize = 6;
 /// Names of lanes are shortened to this.
 const NAME: usize = 24;
 
-/// From which column to which a step is drawn; steps of one line.
+/// Steps of one line, each with the columns at which it begins and ends.
 type Columns = Vec<(usize, (usize, usize))>;
 
 impl Plan {
-    /// The plan drawn in this number of columns; none where they are too few, where actions overlap, or where it takes too many lines.
+    /// Draws the plan in this number of columns. Returns `None` if the columns are too few, if actions overlap, or if
+    /// the picture takes too many lines.
     ///
-    /// Steps are as wide as they are long where each has room for that. Otherwise short ones are wider, and a plan of many steps
-    /// continues below; the numbers of the axis are right in any case.
+    /// Steps are as wide as they are long if each has enough columns at that scale. Otherwise short steps are wider,
+    /// and a plan of many steps continues below. The numbers of the axis are right in both cases.
     ///
-    /// Names are as they are given: whoever writes them to a terminal makes them visible first.
+    /// Names are printed as they are given. Callers that write to a terminal have to make invisible characters
+    /// visible first.
     pub fn text(&self, columns: usize) -> Option<String> {
         let mut lanes: BTreeMap<&str, Vec<(usize, &str)>> = BTreeMap::new();
         for (index, step) in self.steps.iter().enumerate() {
@@ -53,7 +55,8 @@ impl Plan {
         Some(bands.join("\n"))
     }
 
-    /// The columns of the steps: one line, or several where they need more room. None for plans that lines cannot show.
+    /// Columns of the steps: in one line, or in several if they need more space. Returns `None` for plans that lines
+    /// cannot show.
     fn bands(&self, room: usize) -> Option<Vec<Columns>> {
         let starts = self.steps.iter().skip(1).map(|step| step.start);
         let is_sequence = self.steps.iter().zip(starts).all(|(step, next)| step.end <= next + 1e-9);
@@ -74,7 +77,8 @@ impl Plan {
         })
     }
 
-    /// From which column to which each step is drawn by one scale; none where that leaves too little room for some.
+    /// Columns at which each step begins and ends at one scale. Returns `None` if a step has fewer than [`COLUMN`]
+    /// columns then.
     fn to_scale(&self, room: usize) -> Option<Vec<(usize, usize)>> {
         let end = self.steps.iter().map(|step| step.end).fold(0.0, f64::max);
         let column = |at: f64| if end > 0.0 { (at / end * room as f64).round() as usize } else { 0 };
@@ -83,7 +87,7 @@ impl Plan {
         is_wide.then_some(places)
     }
 
-    /// Steps side by side, each with the least room, and the remaining room by their durations.
+    /// Places steps side by side with their minimum widths, and distributes the remaining columns by their durations.
     fn widened(&self, steps: std::ops::Range<usize>, room: usize) -> Columns {
         let duration = |index: usize| (self.steps[index].end - self.steps[index].start).max(0.0);
         let all: f64 = steps.clone().map(duration).sum();
@@ -127,7 +131,7 @@ impl Plan {
         for (column, value) in marks {
             let text = number(value);
             let free = length(&line) + usize::from(!line.is_empty());
-            // The last number ends where the picture does.
+            // The last number ends at the right edge of the picture.
             let column = column.min(room.saturating_sub(length(&text)));
             if column >= free {
                 line += &" ".repeat(column - length(&line));

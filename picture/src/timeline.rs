@@ -20,9 +20,9 @@ const GAP: f64 = 8.0;
 const TOP: f64 = 6.0;
 /// What takes no time is drawn so wide.
 const LEAST: f64 = 3.0;
-/// A shortened name has at least so many characters, the ellipsis included.
+/// Minimum number of characters of a shortened name, including the ellipsis.
 const SHORTEST: usize = 5;
-/// Numbers may come nearer to the ends of a bar than names, by so many pixels in all.
+/// Number of pixels, for both ends of a bar together, by which numbers may come nearer to them than names.
 const SLACK: f64 = 5.0;
 
 /// A bar of a lane.
@@ -140,7 +140,8 @@ fn draw_bar(bar: &Bar<'_>, top: f64, (class, is_action): (&str, bool), about: &s
     let room = bar.to - bar.from - margin - 3.0;
     let number = (bar.step + 1).to_string();
     let mut text = fit(bar.text, room);
-    // A stump of a name says less than the number of the step, which map and table have, too, or than the colour of a design.
+    // A name shortened further is less informative than the number of the step, which map and table have, too, or
+    // than the colour of a design.
     if text != bar.text && text.chars().count() < SHORTEST {
         text = if is_action && width(&number) <= room + SLACK { number } else { String::new() };
     }

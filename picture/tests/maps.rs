@@ -1,4 +1,4 @@
-//! Maps: each number stands at the arrow of its own direction, whatever way a plan takes.
+//! Maps: each number is at the arrow of its own direction, whatever way a plan takes.
 
 use metaplan_picture::{Map, Place, Plan, Report, Step};
 use roxmltree::{Document, Node};
@@ -8,7 +8,7 @@ type Point = (f64, f64);
 /// The width of a character and the height of a line in the pictures' font.
 const CHARACTER: (f64, f64) = (6.75, 13.0);
 
-/// What is drawn of the moves between two places in one direction.
+/// Drawing of the moves between two places in one direction.
 struct Leg {
     from: String,
     to: String,
@@ -200,7 +200,7 @@ fn places_at_one_position_are_told_apart() {
     let moves = [(0, 1), (1, 2), (2, 1), (2, 3), (3, 4), (4, 2)];
     for (drawing, text) in drawings(&plan(&positions, &moves, &["fd_a"])) {
         let document = Document::parse(&text).expect("XML");
-        // Not each number has room among so many arrows; none may stand at another one.
+        // There is not enough space for all numbers here, but no number may be at another leg's arrow.
         check(&drawing, document.root(), &moves);
         let circles = document.descendants().filter(|node| node.attribute("data-place").is_some());
         let at = |node: Node<'_, '_>| {

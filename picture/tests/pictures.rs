@@ -273,7 +273,8 @@ fn long_plans_are_scrolled() {
     assert_eq!(page.matches("-timeline-2-title").count(), 0);
 }
 
-/// Plans beside each other have one axis: the same time is at the same place, and the later half of the longer one is shown.
+/// Plans shown side by side share one axis: equal times are at equal positions, and the later half of the longer plan
+/// is shown.
 #[test]
 fn before_and_after_share_one_axis() {
     let mut report = report(14, "");
@@ -349,7 +350,7 @@ fn short_bars_have_the_number_of_their_step() {
     assert!(narrow.contains(">30<") || narrow.contains("move p29"), "the long one is named");
 }
 
-/// A group without values says why, and has no axis that would mean nothing.
+/// A group without values shows the reason, and has no axis, which would mean nothing.
 #[test]
 fn nothing_is_said_in_words() {
     let group = |values: Vec<(f64, String)>| Group {

@@ -1,4 +1,4 @@
-//! What is known of other cheapest plans, and the choices that plans share.
+//! Other cheapest plans that are known, and the choices that all cheapest plans share.
 
 use crate::lifted::ObjectId;
 use crate::number::dense;
@@ -6,24 +6,25 @@ use crate::plan::Plan;
 use crate::plan::ground::GroundStep;
 use crate::task::{Argument, Task};
 
-/// What is known of the other cheapest plans.
+/// Other cheapest plans of a task, and the choices that every cheapest plan makes.
 #[derive(Debug, Clone)]
 pub struct Alternatives {
-    /// Plans that cost as much as the first one; not the first one itself.
+    /// Plans with the cost of the first plan, without the first plan itself.
     pub plans: Vec<Plan>,
     /// Whether it is proved that there are no others.
     pub complete: bool,
-    /// For each step of the first plan which of its choices every cheapest plan makes at that step; none if a limit was
-    /// reached, or if cheapest plans may be longer than any that was looked for.
+    /// For each step of the first plan, the choices that every cheapest plan makes at that step. `None` if a limit
+    /// was reached, if cheapest plans may be longer than the longest one that was searched for, if the task has
+    /// waits, or if only an external solver claims the result.
     pub forced: Option<Vec<Forced>>,
 }
 
 /// Choices at a step that are the same in every cheapest plan.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Forced {
-    /// Whether the action is, with its arguments apart from designs.
+    /// Whether the action is the same, designs among its arguments apart.
     pub action: bool,
-    /// The functions whose design is.
+    /// The functions whose design is the same.
     pub functions: Vec<String>,
 }
 
@@ -45,7 +46,8 @@ impl Choice {
     }
 }
 
-/// Whether two steps have the same operator, or one has the design of a slot of the other.
+/// Returns `true` if both steps have the same operator, or, with a slot, if `other` also uses the design that `one`
+/// has in that slot.
 pub(super) fn shares(task: &Task, one: &GroundStep, other: &GroundStep, slot: Option<u32>) -> bool {
     match slot {
         None => other.operator == one.operator,
@@ -62,7 +64,7 @@ fn design(task: &Task, step: &GroundStep, position: usize) -> (usize, u32) {
     (usage.slot.index(), usage.designs[step.choice[position] as usize])
 }
 
-/// The choices that all cheapest plans make, in names, step by step.
+/// Names of the choices that all cheapest plans make, for each step of the first plan.
 pub(super) fn forced(task: &Task, first: &[GroundStep], choices: &[Choice]) -> Vec<Forced> {
     let of_step = |(at, step): (usize, &GroundStep)| {
         let is_shared = |slot: Option<u32>| choices.contains(&Choice { step: at, slot });

@@ -1,9 +1,12 @@
 //! Further cheapest plans by the SAT solver.
 //!
-//! The formula "a plan that costs at most the optimum", with as many steps as such a plan can have, is solved again and again, each
-//! plan excluded that was found before. What every cheapest plan has in common is its backbone [1]: asked for a plan that
-//! differs from the first one in at least one of the choices left, the solver names one, which rules out where the two
-//! differ, or proves that there is none. Equal designs and objects are not taken for one another here.
+//! The formula "a plan that costs at most the optimum", with as many steps as such a plan can have, is solved
+//! repeatedly. Each time, the plans found before are excluded.
+//!
+//! The choices that every cheapest plan makes are the backbone of that formula [1]. The solver is queried for a plan
+//! that differs from the first one in at least one of the remaining candidates. Such a plan rules out the candidates
+//! in which it differs; unsatisfiability proves that all remaining candidates are shared. Equal designs or objects
+//! count as different here.
 //!
 //! [1] J. Marques-Silva, M. Janota, I. Lynce: On computing backbones of propositional theories, ECAI 2010.
 
@@ -17,7 +20,8 @@ use crate::plan::ground::{GroundPlan, GroundStep, replay};
 use crate::sat::{Answer, Backend, Lit, Solver};
 use crate::task::Task;
 
-/// Looks for at most `most` cheapest plans besides `first`. None if the formula could not be built within the limits.
+/// Searches for at most `most` cheapest plans other than `first`. Returns `None` if the formula cannot be built
+/// within the limits.
 pub(super) fn by_formula(
     context: Context<'_>,
     bounds: &Bounds,
@@ -28,7 +32,7 @@ pub(super) fn by_formula(
     let task = context.task;
     let window = bounds.window(context, Some(first.cost), config.horizon).ok()?;
     let is_complete = window.steps.is_some_and(|steps| steps <= window.allowed.len());
-    // Nobody has checked what a program says of a formula without a model.
+    // An external solver's claim that a formula is unsatisfiable has not been verified.
     let complete = is_complete && !matches!(config.backend, Backend::Program { .. });
     let allowed = if is_complete || config.horizon.is_some() {
         window.allowed
@@ -47,10 +51,10 @@ pub(super) fn by_formula(
     let plan =
         |steps: &[GroundStep]| decode(context, &GroundPlan { steps: steps.to_vec(), cost: first.cost });
     let mut found = vec![first.steps.clone()];
-    // What differs in waits only is one plan to its reader.
+    // Plans that differ only in waits are one plan for the reader.
     let mut plans = vec![plan(&first.steps)];
     let mut exhausted = false;
-    // Excludes the plans that are known as long as it is assumed.
+    // Literal that excludes the known plans while it is assumed.
     let others = run.encoding.formula.fresh(Meaning::Others);
     while plans.len() <= most && !exhausted {
         if let Some(known) = found.last() {
@@ -83,14 +87,14 @@ struct Run<'a> {
 }
 
 impl Run<'_> {
-    /// Excludes a plan if the literal holds.
+    /// Adds a clause that excludes a plan if `literal` holds.
     fn exclude(&mut self, plan: &[GroundStep], literal: Lit) {
         let mut clause = self.encoding.other_than(plan);
         clause.push(!literal);
         self.solver.add_clause(&clause);
     }
 
-    /// A plan of the formula under assumptions.
+    /// Solves the formula under assumptions, and decodes the plan.
     fn solve(&mut self, assumptions: &[Lit]) -> (Answer, Option<Vec<GroundStep>>) {
         let answer = self.solver.solve(assumptions);
         if answer != Answer::Satisfiable {
@@ -102,7 +106,8 @@ impl Run<'_> {
         (answer, is_plan.then_some(steps))
     }
 
-    /// Which choices of the first plan all cheapest plans make; some of them are known.
+    /// Choices of the first plan that all cheapest plans make. The plans in `known` narrow the candidates before the
+    /// first query. Returns `None` if the solver gives no answer.
     fn forced(&mut self, first: &[GroundStep], known: &[Vec<GroundStep>]) -> Option<Vec<Choice>> {
         let mut choices = Choice::all(first);
         for plan in known {

@@ -1,11 +1,14 @@
-//! The graph of all cheapest plans: the states that such plans pass through, and the steps between them.
+//! Graph of all cheapest plans: the states that such plans pass through, and the steps between them.
 //!
-//! A state that a cheapest plan passes through has been reached at the least cost at which it can be reached, so each state is expanded once, and
-//! a path from the initial state to a goal is a cheapest plan. This is how K\* and its successors represent top-k plans [1].
+//! A cheapest plan reaches each of its states at the least cost at which that state can be reached. So each state is
+//! expanded once, and every path from the initial state to a goal is a cheapest plan. K\* and its successors
+//! represent top-k plans in this way [1].
 //!
-//! Expanding every state whose estimate admits a cheapest plan would be too much where resources tell states apart. So a label-setting
-//! search comes first, in which a label stands for all that cost no less and have no more of anything. A label without a path to the goal in *its* graph shows
-//! that none of those has one. The second search, which tells all states apart, expands only what the first one has not ruled out.
+//! Where resources distinguish many states, expanding every state whose estimate admits a cheapest plan is too much
+//! work. So a label-setting search comes first. Each of its labels represents all states that cost no less and have
+//! no more of any resource. If no path in *its* graph leads from a label to the goal, no cheapest plan passes through
+//! a state that the label represents. The second search distinguishes all states, and expands only those that the
+//! first search has not ruled out.
 //!
 //! [1] J. Lee, M. Katz, S. Sohrabi: On K* search for top-k planning, 2023; H. Aljazzar, S. Leue: K*: a heuristic search algorithm for
 //! finding the k shortest paths, Artificial Intelligence 175, 2011.
@@ -29,7 +32,7 @@ use crate::task::{OperatorId, State, Task};
 
 /// Upper limit on the combinations of designs of one operator.
 const MAX_CHOICES: usize = 20_000;
-/// Number of labels after which the second search is asked for the first time whether it has found enough.
+/// Number of labels at which the second search first checks whether the graph contains enough plans.
 const FEW: usize = 50_000;
 
 /// A step from one label to another.
@@ -53,14 +56,14 @@ pub(super) struct Graph {
     pub(super) alive: Vec<bool>,
     /// Whether every cheapest plan is a path.
     pub(super) is_complete: bool,
-    /// Whether every path to a goal is a plan: labels stand for no other states.
+    /// Whether every path to a goal is a plan, because each label represents a single state.
     pub(super) is_exact: bool,
 }
 
-/// A graph is grown from the initial state, whose label is the first.
+/// Label of the initial state, from which every graph grows.
 pub(super) const ROOT: u32 = 0;
 
-/// Asks of an unfinished graph whether enough plans are in it.
+/// Predicate on an unfinished graph: returns `true` if it contains enough plans.
 pub(super) type IsEnough<'e> = dyn FnMut(&Graph) -> bool + 'e;
 
 /// The graph of the plans that cost `cost`, which is what a cheapest plan costs. None if an operator has too many combinations of designs, or earns
@@ -83,35 +86,36 @@ pub(super) fn cheapest(
     Some(graph)
 }
 
-/// What is equal for two labels that can be compared: finite-domain values, and numbers.
+/// Key of comparable labels: their finite-domain values, and the numbers that are not compared.
 type Place = (Box<[u32]>, Box<[Int]>);
 
-/// States with the cost at which they were reached.
+/// Labels: states with the costs at which they were reached.
 struct Labels {
     all: Vec<(State, Int)>,
     places: FxHashMap<Place, Vec<u32>>,
-    /// The numbers that are compared; the others are equal at a place.
+    /// Positions of the numbers that are compared, with their directions. All other numbers are part of the
+    /// [`Place`].
     compared: Vec<(usize, Asked)>,
     basic: usize,
 }
 
-/// The relation of a state to the labels that are known.
+/// Relation of a state to the known labels.
 enum Known {
-    /// One costs less, and has no less of anything.
+    /// A label costs less, and is no worse in any compared number.
     Beaten,
-    /// One costs the same, and has no less of anything.
+    /// A label costs the same, and is no worse in any compared number.
     Covered(u32),
     New,
 }
 
 impl Labels {
-    /// A label stands for what has no more of resources.
+    /// Creates labels each of which also represents the states that are no better in any compared number.
     fn comparing(task: &Task) -> Self {
         let asked = directions(task).into_iter().enumerate();
         Self::new(task, asked.filter(|(_, asked)| !(asked.up && asked.down)).collect())
     }
 
-    /// A label stands for its state.
+    /// Creates labels each of which represents a single state.
     fn exact(task: &Task) -> Self {
         Self::new(task, Vec::new())
     }
@@ -133,7 +137,7 @@ impl Labels {
         })
     }
 
-    /// The labels that are no worse than a state.
+    /// Labels that are no worse than a state, each with whether it is cheaper.
     fn no_worse<'l>(
         &'l self,
         place: &Place,
@@ -166,7 +170,7 @@ impl Labels {
     }
 }
 
-/// The combinations of designs of an operator that are tried, with their costs; none if there are too many.
+/// Combinations of designs of an operator, with their costs. `None` if there are too many.
 type Choices = OnceCell<Option<Priced<Int>>>;
 
 struct Search<'a> {
@@ -175,12 +179,12 @@ struct Search<'a> {
     cost: Int,
     index: OperatorIndex,
     monotone: bool,
-    /// By operator: those that none dominates, and all.
+    /// By operator: the undominated combinations, and all combinations.
     best: Vec<Choices>,
     all: Vec<Choices>,
 }
 
-/// Why a search has no graph.
+/// Reason why an expansion has ended early.
 enum Stopped {
     /// An operator has too many combinations of designs.
     TooMany,
@@ -194,14 +198,15 @@ impl From<Interrupted> for Stopped {
     }
 }
 
-/// What may be reached, and from where.
+/// A graph under construction.
 struct Growth {
     labels: Labels,
     edges: Vec<Edge>,
     steps: Vec<GroundStep>,
     numbers: FxHashMap<GroundStep, u32>,
     goals: Vec<bool>,
-    /// The estimate of the whole, the cost (the dearest first), and the label.
+    /// Open list: the estimate for the whole plan (0 in the second search), the cost (the highest first), and the
+    /// label.
     open: BinaryHeap<Reverse<(Int, Reverse<Int>, u32)>>,
     is_complete: bool,
 }
@@ -228,7 +233,7 @@ impl Growth {
         Graph { edges, steps, goals, alive, is_complete: self.is_complete, is_exact }
     }
 
-    /// Roughly the memory that is taken, in bytes.
+    /// Approximate memory use, in bytes.
     fn bytes(&self) -> usize {
         let label = self.labels.all.first().map_or(0, |(state, _)| {
             let words = state.values.len().saturating_mul(8);
@@ -239,7 +244,7 @@ impl Growth {
     }
 }
 
-/// The labels from which a goal can be reached.
+/// By label: whether a goal can be reached from it.
 fn alive(edges: &[Edge], goals: &[bool]) -> Vec<bool> {
     let mut before: Vec<u32> = (0..dense(edges.len())).collect();
     before.sort_by_key(|position| edges[*position as usize].to);
@@ -269,8 +274,10 @@ impl<'a> Search<'a> {
         Some(Self { context, bounds, cost, index, monotone, best: choices(), all: choices() })
     }
 
-    /// Grows a graph from the initial state. None if an operator has too many combinations of designs. With a guide, each label is a state of its own,
-    /// and what a dead label of the guide stands for is left out.
+    /// Grows a graph from the initial state until it is complete, a limit is reached, or `is_enough` returns `true`.
+    /// Returns `None` if an operator has too many combinations of designs. With a guide (the labels of the first
+    /// search, and whether a goal can be reached from each of them), every label is a single state, and the states
+    /// that a dead label of the guide represents are omitted.
     fn explore(
         &self,
         labels: Labels,
@@ -334,7 +341,7 @@ impl<'a> Search<'a> {
             } else {
                 undominated(operator, self.monotone, false, limits)?
             };
-            // Nobody else sets it.
+            // The cell is empty, so that this does not fail.
             let _ = cell.set(own);
         }
         cell.get().and_then(Option::as_ref).ok_or(Stopped::TooMany)
@@ -367,7 +374,8 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// The label of a state that was reached at some cost; none if no cheapest plan passes through it like this.
+    /// Label of a state that was reached at some cost, added if necessary. Returns `None` if no cheapest plan reaches
+    /// the state at this cost.
     fn reach(
         &self,
         growth: &mut Growth,
@@ -387,14 +395,14 @@ impl<'a> Search<'a> {
         }
         growth.goals.push(cost == self.cost && self.context.task.is_goal(&state));
         let id = growth.labels.add(place, state, cost);
-        // The second search goes deep, so that it has some plans soon.
+        // The second search expands costly states first, so that it reaches some goals early.
         let first = if guide.is_some() { 0 } else { estimate };
         growth.open.push(Reverse((first, Reverse(cost), id)));
         Some(id)
     }
 }
 
-/// Whether the first search shows that no cheapest plan passes through a state that was reached at this cost.
+/// Returns `true` if the first search shows that no cheapest plan reaches the state at this cost.
 fn is_ruled_out((labels, alive): (&Labels, &[bool]), state: &State, cost: Int) -> bool {
     let place = labels.place(state);
     labels.no_worse(&place, state, cost).any(|(id, is_cheaper)| is_cheaper || !alive[id as usize])

@@ -1,8 +1,8 @@
-//! Further cheapest plans, and which choices all of them share.
+//! Further cheapest plans, and the choices that all of them share.
 //!
-//! `graph` finds all states that cheapest plans pass through, and the steps between them, by search; `paths` lists plans of that graph. Where
-//! search cannot, or must not, answer, `formula` asks the SAT solver for one plan after the other. Equal designs and objects are not taken
-//! for one another here.
+//! `graph` searches for all states that cheapest plans pass through, and the steps between them. `paths` lists the
+//! plans of that graph. Where search does not apply or is disabled, `formula` queries the SAT solver for one plan
+//! after the other. Equal designs or objects count as different here.
 
 mod choices;
 mod formula;
@@ -26,8 +26,8 @@ use paths::{End, Paths};
 
 pub use choices::{Alternatives, Forced};
 
-/// Looks for at most `most` cheapest plans besides that of an optimal solution, those with the fewest steps first. At a limit, those that are
-/// known by then are the answer. None if the solution is not optimal.
+/// Searches for at most `most` cheapest plans other than that of an optimal solution, those with the fewest steps
+/// first. At a limit, returns the plans found until then. Returns `None` if the solution is not optimal.
 pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Config) -> Option<Alternatives> {
     let first = solution.ground.as_ref().filter(|_| solution.status == Status::Optimal)?;
     let context = Context::new(task, &config.limits);
@@ -41,7 +41,7 @@ pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Conf
     by_graph.or_else(|| by_formula(context, &bounds, first, most, config)).or(Some(unknown))
 }
 
-/// The other cheapest plans by search; none if the task does not suit it.
+/// Other cheapest plans by graph search. Returns `None` if the task does not suit the search.
 fn by_graph(context: Context<'_>, bounds: &Bounds, first: &GroundPlan, most: usize) -> Option<Alternatives> {
     let task = context.task;
     let mut is_enough = |graph: &Graph| List::new(context, first, most, graph).0.is_full();
@@ -62,12 +62,12 @@ struct List {
 }
 
 impl List {
-    /// The plans of a graph, and whether there are others.
+    /// Lists the plans of a graph, and returns whether there may be others.
     fn new(context: Context<'_>, first: &GroundPlan, most: usize, graph: &Graph) -> (Self, End) {
         let mut list = Self { plans: Vec::new(), most };
         let own = decode(context, first);
         let end = Paths::new(graph).each(&mut |steps| {
-            // Of an unfinished graph some paths need more of a resource than there is.
+            // If a label represents several states, some paths need more of a resource than is available.
             if !graph.is_exact && replay(context.task, &steps).is_none_or(|(_, cost)| cost != first.cost) {
                 return true;
             }
@@ -87,7 +87,7 @@ impl List {
     }
 }
 
-/// The choices of a plan that all cheapest plans make.
+/// Choices of a plan that all cheapest plans make.
 fn shared(task: &Task, first: &[GroundStep], graph: &Graph) -> Vec<Choice> {
     let layers = Paths::new(graph).layers(first.len());
     let mut choices = Choice::all(first);

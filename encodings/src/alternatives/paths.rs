@@ -5,10 +5,10 @@ use rustc_hash::FxHashSet;
 use crate::alternatives::graph::{Edge, Graph, ROOT};
 use crate::plan::ground::GroundStep;
 
-/// Upper limit on the edges that are followed.
+/// Upper limit on the number of edges that are followed.
 const MAX_WORK: usize = 2_000_000;
 
-/// How an enumeration has ended.
+/// Result of an enumeration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum End {
     /// There are no further paths.
@@ -22,7 +22,7 @@ pub(super) struct Paths<'g> {
     graph: &'g Graph,
     /// By label, the position of its first edge; at the end, the number of edges.
     first: Vec<usize>,
-    /// Labels from which no path with so many steps leads to a goal.
+    /// Labels with a number of steps such that no path of that length leads from the label to a goal.
     dead: FxHashSet<(u32, usize)>,
     work: usize,
 }
@@ -46,7 +46,7 @@ impl<'g> Paths<'g> {
         Self { graph, first, dead: FxHashSet::default(), work: MAX_WORK }
     }
 
-    /// The edges of a label from which a goal can be reached.
+    /// Edges of a label to labels from which a goal can be reached.
     pub(super) fn edges(&self, label: u32) -> impl Iterator<Item = &'g Edge> + use<'_, 'g> {
         let (from, to) = (self.first[label as usize], self.first[(label as usize).saturating_add(1)]);
         self.graph.edges[from..to].iter().filter(|edge| self.graph.alive[edge.to as usize])
@@ -69,11 +69,11 @@ impl<'g> Paths<'g> {
         End::Stopped
     }
 
-    /// Visits the paths with so many steps.
+    /// Visits the paths with `length` steps.
     fn each_of(&mut self, length: usize, visit: &mut dyn FnMut(Vec<GroundStep>) -> bool) -> End {
         let mut path: Vec<u32> = Vec::new();
         let mut branches = vec![Branch { label: ROOT, next: self.first[ROOT as usize] }];
-        // Whether a goal was reached below each branch.
+        // For each branch: whether a goal was reached below it.
         let mut fruitful = vec![false];
         while let Some(branch) = branches.last_mut() {
             let left = length.saturating_sub(path.len());
@@ -113,7 +113,7 @@ impl<'g> Paths<'g> {
         End::Exhausted
     }
 
-    /// The number of steps of a longest path; none if there is a cycle.
+    /// Number of steps of a longest path. Returns `None` if there is a cycle.
     fn longest(&self) -> Option<usize> {
         let labels = self.graph.goals.len();
         let mut into = vec![0_usize; labels];
@@ -148,7 +148,8 @@ impl<'g> Paths<'g> {
         (left == 0).then(|| ends.map(|(depth, _)| *depth).max().unwrap_or(0))
     }
 
-    /// The steps that cheapest plans make at each of the first so many positions; none from where on some of them have ended.
+    /// For each of the first `length` positions, the steps that cheapest plans make there. The entries are `None`
+    /// from the position on at which a cheapest plan has ended.
     pub(super) fn layers(&self, length: usize) -> Vec<Option<Vec<&'g GroundStep>>> {
         let mut layer: Vec<u32> = vec![ROOT];
         let mut layers = Vec::new();

@@ -14,7 +14,7 @@ const INITIAL: usize = 20_000;
 pub(super) struct Kept(Arc<(Domain, Problem, GroundConfig)>);
 
 impl Kept {
-    /// None if the problem is large.
+    /// Clones the files. Returns `None` if the problem has too many initial elements.
     pub(super) fn new(domain: &Domain, problem: &Problem, config: &GroundConfig) -> Option<Self> {
         let is_small = problem.init.len() <= INITIAL;
         is_small.then(|| Self(Arc::new((domain.clone(), problem.clone(), config.clone()))))

@@ -23,7 +23,8 @@ const SOON: usize = 10_000;
 /// How many situations the greedy search evaluates at its first turn, and how many the exact one looks at then.
 const GREEDY: usize = 5_000;
 const EXACT: usize = 20_000;
-/// How many turns the search for plans of actions one after another has where a plan is known: the best of those is an upper bound.
+/// Number of rounds in which the search for sequential plans runs although a plan is known. Its best plan is an upper
+/// bound.
 const WHOLE: usize = 2;
 
 /// Searches until nothing better is left, a limit is reached, or both have had so many turns. `record` hears of each better plan and of what none can get below.

@@ -1,10 +1,11 @@
-//! Plans of actions one after another, and then at the earliest times: the first plan of a task that does not ask for overlap, and an upper
-//! bound for all others.
+//! Sequential plans, moved to the earliest times: the first plan of a task that does not require overlap, and an
+//! upper bound on the cost of a best plan for all other tasks.
 //!
-//! Such plans are those of the task that is planned for where actions do not overlap. The searches for that have more to go
-//! by: fewer variables with more values, landmarks, pairs of facts that lead nowhere, objects that are interchangeable. What they find is executed
-//! like any sequence, and its times overlap where they can. So each plan that is given is one of the overlapping task: what does not fit it, such as an action
-//! that timed initial literals would cut short, is left out.
+//! These plans solve the task in which actions do not overlap. Searches for that task are better informed: it has
+//! fewer variables with more values, landmarks, mutexes and interchangeable objects. Each resulting sequence is
+//! executed like any other sequence, so that its actions overlap where they can. So every plan that is returned is
+//! one of the overlapping task. A sequence that is not, for example because a timed initial literal would interrupt
+//! an action, is dropped.
 
 use std::cell::OnceCell;
 
@@ -137,7 +138,7 @@ pub(super) struct Seeker<'w> {
     exact: Exact<'w>,
     /// How many states the latter may store by now.
     stored: usize,
-    /// What the best plan costs where actions do not overlap.
+    /// Lowest known cost of a plan without overlap.
     known: Option<Int>,
 }
 
@@ -154,7 +155,8 @@ impl<'w> Seeker<'w> {
         Self { whole, limits, satisficer, exact: Exact::Later, stored: 0, known: None }
     }
 
-    /// Goes on for so many shares of work: the better of two plans whose sequences can be executed.
+    /// Continues both searches for `share` units of work. Returns the better one of their plans whose sequences can
+    /// be executed.
     pub(super) fn run(
         &mut self,
         of: (&Concurrent, &Expansion<'_>),

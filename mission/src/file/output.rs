@@ -92,7 +92,7 @@ struct InPlace {
 }
 
 impl Pending {
-    /// Nothing is left to do.
+    /// An output that is already complete: committing it does nothing.
     fn written() -> Self {
         Self(None)
     }

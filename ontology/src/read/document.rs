@@ -32,7 +32,7 @@ pub(crate) fn decoded<'a>(bytes: &'a [u8], name: &str) -> Result<Cow<'a, [u8]>, 
 /// Refuses a document that is in none of the syntaxes.
 ///
 /// # Errors
-/// What it looks like.
+/// The document is in another syntax, which the error names.
 pub(crate) fn require_syntax(text: &[u8], name: &str) -> Result<(), Errors> {
     match foreign::recognized(text) {
         Some(what) => {

@@ -45,8 +45,8 @@ pub struct CourseMoment {
     pub values: Vec<(String, BigRational)>,
     /// What its conditions demand of numbers, here and until it ends.
     pub bounds: Vec<NumberBound>,
-    /// The value of the problem's metric if the plan ended now; none without a metric, or where it is undefined, as one that counts
-    /// violated preferences is before the end.
+    /// The value of the problem's metric if the plan ended now. `None` without a metric, or where it is undefined.
+    /// For example, a metric that counts violated preferences is undefined before the end.
     pub metric: Option<BigRational>,
 }
 
