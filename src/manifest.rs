@@ -34,14 +34,15 @@ impl From<usize> for Key {
     }
 }
 
-/// What a place in a manifest is about.
+/// Part of the entry at the end of a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
     /// The value at the end of a path.
     Value,
     /// The key at the end of a path.
     Key,
-    /// So many bytes from the beginning of a string; the whole string where it is not written as it is read.
+    /// The position at this number of bytes from the beginning of a string. It is the whole string if the file does
+    /// not contain the string literally.
     Inside(usize),
 }
 
@@ -109,8 +110,8 @@ impl ManifestPath {
         line_and_column(&self.text, offset)
     }
 
-    /// Line and column of a place in the manifest; none for the manifest as a whole. Where a part of the path is missing, what comes
-    /// before it counts.
+    /// Line and column of a place in the manifest. Returns `None` for the manifest as a whole. If a part of the path
+    /// is missing, returns the place of the part before it.
     pub fn place_of(&self, path: &[Key], part: Part) -> Option<(usize, usize)> {
         let document = DeTable::parse(&self.text).ok()?;
         let mut span = document.span();

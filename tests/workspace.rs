@@ -1,4 +1,4 @@
-//! What `cargo test` in the root does not test: the members of the workspace that are not default members.
+//! Members of the workspace that `cargo test` in the root does not test, since they are not default members.
 //!
 //! One line of its output names them and the commands that test them.
 

@@ -43,7 +43,7 @@ impl Limits {
         }
     }
 
-    /// The same limits, and this long, counted from now.
+    /// Returns the same limits with a deadline at most this long from now.
     #[must_use]
     pub fn within(&self, time: Duration) -> Self {
         let own = self.clone().with_time(time);

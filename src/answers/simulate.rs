@@ -128,7 +128,8 @@ impl SimulateAnswer<'_> {
         Self { time_unit, ..self }
     }
 
-    /// Of so many missions that were asked for; not complete if there is a message.
+    /// Sets the number of missions that were requested, and messages. The answer is not complete if there is a
+    /// message.
     #[must_use]
     pub fn of(self, missions: usize, messages: Vec<Message>) -> Self {
         Self { missions, complete: messages.is_empty(), messages, ..self }

@@ -1,7 +1,7 @@
-//! What a comparison has come to: all of it, or as much as was there when time was up.
+//! Results of a comparison: all of them, or those that are available at the time limit.
 //!
-//! Comparing does not look at the clock. So a thread of its own waits for the time limit or for Ctrl-C, shows what is there by then, and ends
-//! the program.
+//! The comparison does not check the clock. So a separate thread waits for the time limit or for Ctrl-C, shows the
+//! results that are available then, and ends the program.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -68,7 +68,8 @@ impl Shared {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
-    /// Shows what is there when time is up, or at Ctrl-C, with a message, and ends the program. A second Ctrl-C ends it at once.
+    /// Shows the available results at the time limit or at Ctrl-C, with a message, and ends the program. A second
+    /// Ctrl-C ends it at once.
     pub fn show_after(&self, time: Option<Duration>, common: &Common) {
         let limits = time.map_or_else(Limits::none, |time| Limits::none().with_time(time));
         let (common, shared, interrupt) = (common.clone(), self.clone(), limits.interrupt());

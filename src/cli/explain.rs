@@ -171,7 +171,7 @@ fn alteration_text(alteration: &Alteration, about: bool) -> String {
     }
 }
 
-/// What follows about a design without planning.
+/// Text of an explanation by reasoning alone.
 fn why_text(why: &Availability) -> String {
     let functions = why.functions.join(", ");
     let state = if why.available { "is available" } else { "is not available" };
@@ -189,7 +189,7 @@ fn why_text(why: &Availability) -> String {
     text
 }
 
-/// What plans show about a design.
+/// Text of an explanation by planning.
 fn design_text(found: &DesignExplanation) -> String {
     let DesignExplanation { availability, best, .. } = found;
     let mut text = String::new();
@@ -221,7 +221,7 @@ fn design_text(found: &DesignExplanation) -> String {
     text + &repairs_text(found)
 }
 
-/// What would make a design available, or unavailable.
+/// Text of the alterations that make a design available, or unavailable.
 fn repairs_text(found: &DesignExplanation) -> String {
     let DesignExplanation { availability, best, repairs, .. } = found;
     let mut text = String::new();
@@ -254,7 +254,7 @@ fn repairs_text(found: &DesignExplanation) -> String {
     text
 }
 
-/// What would change the plan.
+/// Text of the changes that lead to another plan.
 fn changes_text(found: &SmallestChanges) -> String {
     let SmallestChanges { best, changes, complete, .. } = found;
     let mut text = match (&best.cost, best.proved) {
@@ -272,7 +272,7 @@ fn changes_text(found: &SmallestChanges) -> String {
         (false, _) => text += "the smallest changes that lead to another plan\n",
     }
     for change in changes {
-        // What is exact to a millionth needs no word.
+        // A bound that is exact to a millionth is not marked as approximate.
         let about = change.within.as_ref().is_some_and(|within| *within > millionth());
         let cost = cost_text(&change.then, best);
         let _ = writeln!(text, "{}: {cost}", alteration_text(&change.alteration, about));

@@ -1,9 +1,9 @@
 //! Time limits and signals, from the first file read to the last proof.
 //!
-//! While a mission is read and reasoned about there is no answer that could be saved, so that a signal ends the program at
-//! once, and a thread of its own ends it when time is up, unless an answer is being written. That is all for commands that do not
-//! plan. Where something is planned, the planner listens from then on: it answers with the best plan so
-//! far, and a second signal ends the program at once.
+//! While a mission is read and reasoned about, there is no answer to save. So a signal ends the program at once, and
+//! a separate thread ends it at the time limit, unless an answer is being written. Commands that do not plan need
+//! nothing else. In commands that plan, the planner handles the first signal from then on, and returns the best plan
+//! found until then. A second signal ends the program at once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -34,7 +34,7 @@ impl TimeLimit {
     /// Begins to measure time.
     ///
     /// # Errors
-    /// None that depend on time alone.
+    /// Does not occur: only a memory limit can be refused.
     pub(super) fn guard(&self, common: &Common) -> Result<Guard, Failure> {
         Guard::new(self.time_limit, None, common)
     }
@@ -106,7 +106,7 @@ fn give_up_late(limits: Limits, has_read: Arc<AtomicBool>, common: Common) {
             }
             std::thread::sleep(INTERVAL);
         }
-        // Who writes an answer by now has it.
+        // A thread that writes an answer holds this lock, and completes the answer.
         let _stdout = std::io::stdout().lock();
         if !output::has_begun() && !has_read.swap(true, Ordering::Relaxed) {
             let text = "a limit was reached before there was anything to show";

@@ -171,7 +171,7 @@ fn parse() -> Cli {
     Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }
 
-/// Reads the words of another command line; those of `simulate` are returned.
+/// Parses another command line. Returns the arguments of `simulate`, and `None` for other commands.
 fn read(words: Vec<String>) -> Result<Option<simulate::Arguments>, clap::Error> {
     let cli = Cli::try_parse_from(std::iter::once("metaplan".to_owned()).chain(words))?;
     Ok(match cli.command {

@@ -52,8 +52,8 @@ pub fn answer_lost() -> bool {
     ANSWER_LOST.load(Ordering::Relaxed)
 }
 
-/// Returns `true` if an answer, or a part of one, is being written or has been written. Who holds the lock of standard output gets an
-/// answer that stays so.
+/// Returns `true` if an answer, or a part of one, is being written or has been written. The result stays valid while
+/// the caller holds the lock of standard output.
 pub fn has_begun() -> bool {
     HAS_BEGUN.load(Ordering::Relaxed)
 }
@@ -123,7 +123,7 @@ pub fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
     file::write(path, text).map_err(Failure::from)
 }
 
-/// The file that `--output` names; none for standard output, which is `-`, too.
+/// The file that `--output` names. Returns `None` for standard output, which `-` means, too.
 pub fn file_named(output: Option<&PathBuf>) -> Option<&Path> {
     output.map(PathBuf::as_path).filter(|path| !file::is_stdout(path))
 }
@@ -147,7 +147,8 @@ pub fn require_directory(path: &Path) -> Result<(), Failure> {
     Err(Failure::usage(Message::error("M107", text)))
 }
 
-/// The number of columns that answers may take: `COLUMNS`, or the width of the terminal; none where the answer goes elsewhere.
+/// Number of columns for answers: `COLUMNS`, or the width of the terminal. Returns `None` if neither is known, or if
+/// it is 0.
 pub fn columns() -> Option<u16> {
     let wanted = std::env::var("COLUMNS").ok().and_then(|columns| columns.trim().parse().ok());
     let of_terminal = || {

@@ -181,23 +181,23 @@ impl Arguments {
         Ok(())
     }
 
-    /// The file for the answer; none for standard output.
+    /// The file for the answer. Returns `None` for standard output.
     fn file(&self) -> Option<&Path> {
         output::file_named(self.output.as_ref())
     }
 
-    /// How the plan is written.
+    /// Returns the format in which the plan is written.
     fn form(&self, common: &Common) -> PlanFormat {
         match (self.plan_format, common.format) {
             (Some(format), _) => format,
             (None, Format::Json) => PlanFormat::Json,
-            // No format of plans has several of them.
+            // No plan format can hold several plans.
             (None, _) if self.file().is_some() && self.alternatives.is_none() => PlanFormat::Ipc,
             (None, _) => PlanFormat::Table,
         }
     }
 
-    /// The number of columns for tables; a file has no width.
+    /// Number of columns for tables. Returns `None` for files, which have no width.
     fn columns(&self) -> Option<u16> {
         if self.file().is_some() { None } else { output::columns() }
     }
@@ -302,7 +302,7 @@ fn finish(
     Ok(())
 }
 
-/// What there is to report beside a file: the verdict, and what the file has no place for.
+/// Text that is printed if the plan goes to a file: the verdict, and whatever the file's format cannot hold.
 fn beside(planned: &Planned<'_>, arguments: &Arguments, common: &Common) -> String {
     let verdict = format!("{}\n", planned.solution.verdict());
     match arguments.form(common) {
@@ -313,7 +313,7 @@ fn beside(planned: &Planned<'_>, arguments: &Arguments, common: &Common) -> Stri
     }
 }
 
-/// What people read below the verdict.
+/// Text below the verdict.
 fn further(planned: &Planned<'_>, solution: &Solution, (arguments, common): (&Arguments, &Common)) -> String {
     let statistics =
         if common.verbose { statistics_text(solution, &planned.preparation) } else { String::new() };
@@ -349,7 +349,7 @@ fn show(
     }
 }
 
-/// How many missing numbers are shown before the rest is only counted.
+/// Maximum number of missing values that are listed; further ones are only counted.
 const MISSING_SHOWN: usize = 10;
 
 /// The numbers that are missing, a line each.

@@ -31,7 +31,7 @@ pub(super) fn answer_text(name: &str, solution: &Solution, columns: Option<u16>)
     text
 }
 
-/// How an answer was found, for `--verbose`.
+/// Text about the search for an answer, for `--verbose`.
 pub(super) fn statistics_text(solution: &Solution, preparation: &Preparation) -> String {
     let statistics = &solution.statistics;
     let families: Vec<_> =

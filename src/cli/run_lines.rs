@@ -93,7 +93,7 @@ fn next_text(reader: &mut Box<dyn BufRead>) -> io::Result<Option<Line>> {
     loop {
         let Some(bytes) = read_line(reader)? else { return Ok(None) };
         let text = String::from_utf8_lossy(&bytes);
-        // A byte order mark stands before the first line, and before others where files were joined.
+        // A byte order mark precedes the first line, and also later lines where files were concatenated.
         let text = text.trim_start_matches('\u{feff}').trim_ascii();
         if !text.is_empty() {
             return Ok(Some(Line { text: text.to_owned(), now: None }));

@@ -126,32 +126,34 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(if incomplete.is_some() { Exit::NothingFound } else { Exit::Done })
 }
 
-/// What is simulated, once all that is wrong with it has been reported.
+/// Reads a mission and a scenario for simulation. Fails with all mistakes in the scenario.
 fn experiment(mission: &Path, scenario: &str, common: &Common) -> Result<Experiment, Failure> {
     let read = || Setup::read(mission)?.experiment(scenario);
     during("reading", common, read).map_err(scenario_failure)
 }
 
-/// The mission and the scenario of a command line, to tell apart what is simulated.
+/// Text that identifies the mission and the scenario of a command line.
 pub fn subject(arguments: &Arguments) -> String {
     format!("{} {}", arguments.mission.display(), arguments.scenario)
 }
 
-/// Whether the scenario of a command line can be simulated; paths are relative to a directory.
+/// Checks whether the scenario of a command line can be simulated. Paths are relative to `directory`.
 ///
 /// # Errors
-/// All that is wrong with it.
+/// All mistakes in the scenario.
 pub fn check(arguments: &Arguments, directory: &Path, common: &Common) -> Result<(), Failure> {
     experiment(&directory.join(&arguments.mission), &arguments.scenario, common).map(drop)
 }
 
-/// Missions that came to their end, by strategy and seed, and what was observed and answered in the first one of each strategy.
+/// Missions simulated to their end, by strategy and seed, and a log of the observations and answers of the first
+/// mission of each strategy.
 struct Played {
     runs: Vec<Run>,
     log: String,
 }
 
-/// Simulates until a limit is reached. Each seed is played with all strategies before the next, so that what is there then can be compared.
+/// Simulates until a limit is reached. Each seed is simulated with all strategies before the next seed, so that
+/// partial results are comparable.
 fn play(
     experiment: &Experiment,
     strategies: &[Strategy],
@@ -230,7 +232,7 @@ fn text(strategies: &[Strategy], runs: &[Run], unit: TimeUnit) -> String {
     output::table(&header, rows) + &failures_text(strategies, runs)
 }
 
-/// Why missions were not accomplished, a line for each strategy that has such missions.
+/// Reasons why missions were not accomplished, with a line for each strategy that has such missions.
 fn failures_text(strategies: &[Strategy], runs: &[Run]) -> String {
     let mut text = String::new();
     for &strategy in strategies {

@@ -177,7 +177,7 @@ impl Situation {
     }
 }
 
-/// A scenario that there is not is a matter of usage, one that does not fit the mission is bad input.
+/// An unknown scenario is a usage error; a scenario that does not fit the mission is bad input.
 pub(super) fn scenario_failure(messages: Errors) -> Failure {
     let is_usage = messages.iter().any(|message| message.code == "M108");
     Failure { exit: if is_usage { Exit::Usage } else { Exit::BadInput }, messages }

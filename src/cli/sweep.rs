@@ -93,20 +93,20 @@ fn sweep(arguments: &Arguments, study: &Study, guard: Guard, common: &Common) ->
     Ok(exit)
 }
 
-/// Whether all commands of a study can be run: their options, and scenarios that are simulated.
+/// Checks whether all commands of a study can be run: their options, and the scenarios that they simulate.
 ///
 /// # Errors
-/// All that is wrong with them, once each.
+/// All mistakes in them, each once.
 fn check(study: &Study, common: &Common, read: &Read<'_>) -> Result<(), Failure> {
     let (mut mistakes, mut simulated): (Vec<Message>, BTreeSet<String>) = (Vec::new(), BTreeSet::new());
     for (path, run) in study.samples() {
         let words = study.words(&run, Path::new("{dir}"));
         let simulation = match read(words) {
             Ok(simulation) => simulation,
-            // A file that is to be written for the run is not there yet.
+            // A file that is generated for the run does not exist yet.
             Err(error) if study.generates() && error.kind() == ErrorKind::ValueValidation => continue,
             Err(error) => {
-                // What is wrong with the first run is wrong with the others, too.
+                // A mistake in the first run is repeated in the others.
                 let text = refusal(&error);
                 if mistakes.iter().all(|mistake: &Message| !mistake.message.starts_with(&text)) {
                     mistakes.push(study.mistake(&path, &text));
@@ -125,7 +125,7 @@ fn check(study: &Study, common: &Common, read: &Read<'_>) -> Result<(), Failure>
     Ok(Errors::unless_empty(mistakes)?)
 }
 
-/// What the parser of the command line says, in a line.
+/// Message of the command-line parser, in one line.
 fn refusal(error: &clap::Error) -> String {
     let text = error.to_string();
     let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());

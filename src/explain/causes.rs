@@ -1,8 +1,11 @@
-//! What rules a design out, and the smallest sets of alterations after which it is available.
+//! Causes that rule a design out, and the smallest sets of alterations that make it available.
 //!
-//! Sets of alterations are tried
-//! from the smallest on, by reasoning in a copy of the knowledge, so that each set that is listed was seen to suffice, and none
-//! contains another one. What is still concluded once all of a set but one alteration has come true is the work of that cause. These are the diagnoses of R. Reiter: A theory of diagnosis from first principles, Artificial Intelligence 32, 1987.
+//! Sets of alterations are tried in ascending order of size, by reasoning in a copy of the knowledge. So each listed
+//! set is known to suffice, and contains no other listed set. These sets are the diagnoses of \[1\]. Each alteration
+//! of such a set removes one cause. The conclusions that remain once all other alterations of the set have come true
+//! are due to that cause.
+//!
+//! \[1\] R. Reiter: A theory of diagnosis from first principles, Artificial Intelligence 32, 1987.
 
 use encodings::Limits;
 use num_rational::BigRational;
@@ -22,7 +25,7 @@ use crate::mission::numbers::against;
 /// Upper limit on the sets of alterations that are tried.
 const MAX_TRIED: usize = 2_000;
 
-/// What follows about one design, without planning.
+/// Availability of one design, as derived without planning.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Availability {
@@ -36,19 +39,20 @@ pub struct Availability {
     pub because: Vec<String>,
     /// Each failed component and each measurement that has a part in that.
     pub causes: Vec<Cause>,
-    /// Where it is not available: the smallest sets of alterations that make it available, each of which suffices if all of it comes true, and none without
-    /// one of its parts. Where it is available: what each makes it unavailable by itself.
+    /// If the design is not available: the smallest sets of alterations that make it available. Each set suffices if
+    /// all of its alterations come true, and no proper subset suffices. If the design is available: single
+    /// alterations, each of which makes it unavailable.
     pub ways: Vec<Vec<Alteration>>,
 }
 
 /// Something that has a part in ruling a design out.
 #[derive(Debug, Clone)]
 pub struct Cause {
-    /// What would have to be otherwise for this cause to go; others may be left.
+    /// The alteration that removes this cause; other causes may remain.
     pub alteration: Alteration,
     /// The rules and facts by which the design is ruled out once the other alterations of a smallest set have come true.
     pub because: Vec<String>,
-    /// The knowledge in which these have come true, for those who look closer.
+    /// Knowledge in which these other alterations have come true, for further analysis.
     pub knowledge: Knowledge,
 }
 
@@ -76,7 +80,8 @@ pub fn causes(knowledge: &Knowledge, design: &FunctionDesign) -> Causes {
     Causes { causes: causes_of(knowledge, design, &ways), are_all_needed: ways.len() == 1 }
 }
 
-/// The causes that smallest sets of alterations show: with all others of a set repaired, what is left is the work of one.
+/// Causes in the smallest sets of alterations. Once all other alterations of a set have come true, the remaining
+/// conclusions are due to one cause.
 fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alteration>]) -> Vec<Cause> {
     let mut causes: Vec<Cause> = Vec::new();
     for (way, own) in ways.iter().flat_map(|way| way.iter().map(move |own| (way, own))) {
@@ -94,17 +99,17 @@ fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alterat
 fn ways(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Vec<Alteration>> {
     let candidates = candidates(knowledge, design);
     let ways = repairs(knowledge, design, &candidates);
-    // Rules may look at what the design itself does not need.
+    // Rules may depend on more than the design itself requires.
     if ways.is_empty() { repairs(knowledge, design, &all_candidates(knowledge, candidates)) } else { ways }
 }
 
-/// What follows about a design.
+/// Derives the availability of a design without planning.
 pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availability {
     let mut availability = Availability {
         design: design.individual.name.clone(),
         functions: design.solves.iter().map(|function| function.name.clone()).collect(),
         available: design.available,
-        // Why it could not be used although it were available.
+        // Reasons why the design could not be used even if it were available.
         because: against(mission, &design.individual.name),
         causes: Vec::new(),
         ways: Vec::new(),
@@ -140,7 +145,7 @@ fn repairs(
     };
     let all: Vec<&Alteration> = candidates.iter().collect();
     let without = |own: &Alteration| all.iter().copied().filter(|other| *other != own).collect::<Vec<_>>();
-    // What nothing else makes up for is in every set.
+    // An alteration that no others can replace is in every set.
     let (needed, rest): (Vec<&Alteration>, Vec<&Alteration>) = if suffice(&all) {
         all.iter().copied().partition(|own| !suffice(&without(own)))
     } else {
@@ -168,7 +173,7 @@ fn repairs(
     found.into_iter().map(|set| set.into_iter().cloned().collect()).collect()
 }
 
-/// The subsets of so many elements that are not empty, as positions: smaller ones first, then in lexicographic order.
+/// Non-empty subsets of `count` elements, as positions: smaller subsets first, then in lexicographic order.
 fn subsets(count: usize) -> impl Iterator<Item = Vec<usize>> {
     (1..=count).flat_map(move |size| {
         std::iter::successors(Some((0..size).collect::<Vec<usize>>()), move |last| {
@@ -182,7 +187,7 @@ fn subsets(count: usize) -> impl Iterator<Item = Vec<usize>> {
     })
 }
 
-/// A part of a set that suffices and none of whose parts does, by deletion.
+/// Minimal subset that suffices, found by deletion: none of its proper subsets suffices.
 fn minimal<'a>(
     mut set: Vec<&'a Alteration>,
     suffice: &dyn Fn(&[&'a Alteration]) -> bool,
@@ -197,7 +202,8 @@ fn minimal<'a>(
     set
 }
 
-/// Knowledge in which alterations have come true; none if a rule runs away.
+/// Knowledge in which the alterations have come true. Returns `None` if an alteration fails, for example because the
+/// rules do not terminate.
 fn altered<'a>(
     knowledge: &Knowledge,
     alterations: impl IntoIterator<Item = &'a Alteration>,
@@ -250,8 +256,8 @@ pub(super) fn singly(mission: &Mission, repairs: &[Repair], limits: &Limits) -> 
     Ok(changes)
 }
 
-/// What could change whether a design is available: its components, and measurements that it depends on, where its requirements and
-/// estimations begin or cease to hold.
+/// Alterations that may change whether a design is available: of its components, and of measurements that it depends
+/// on, to the values at which its requirements and estimations begin or cease to hold.
 fn candidates(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Alteration> {
     let is_own = |component: &str| design.components.iter().any(|own| own.iri == component);
     let mut all = components(knowledge, design.available, &is_own);
@@ -270,7 +276,7 @@ fn candidates(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Alteration>
     all
 }
 
-/// The same, of all that has failed and of all requirements that are broken.
+/// Adds alterations of all failed components and of all violated requirements to the candidates.
 fn all_candidates(knowledge: &Knowledge, mut all: Vec<Alteration>) -> Vec<Alteration> {
     let designs = knowledge.view().function_designs();
     let more = designs.iter().flat_map(|design| candidates(knowledge, design));

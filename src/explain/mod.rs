@@ -1,10 +1,10 @@
-//! Why a design is available or not, why it is chosen or not, and what would have to be measured for another answer.
+//! Explanations: why a design is available or not, why it is chosen or not, and which changes lead to another plan.
 //!
-//! "Why is it not available?" is answered by reasoning alone: [`availability`]. "Why not this one?" is answered by planning
-//! again: with the design in question as the only one for its functions, and, if
-//! it is not available, as if it were. The difference of the metrics is what the answer is worth. "What would change
-//! it?" is answered by trying the values at which a requirement begins or ceases to hold, and, for values of the problem such as
-//! a battery, by bisection between a value with the same plan and one with another.
+//! "Why is it not available?" is answered by reasoning alone: [`availability`]. "Why not this one?" is answered by
+//! planning again with the design as the only one for its functions, as if it were available. The difference of the
+//! metrics is the price of this design. "What would change the plan?" is answered by trying the values at which a
+//! requirement begins or ceases to hold. For values of the problem, such as a battery, bisection is used between a
+//! value with the same plan and one with another.
 
 mod causes;
 mod parts;
@@ -32,13 +32,14 @@ pub use thresholds::{SmallestChanges, smallest_changes};
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct DesignExplanation {
-    /// What follows without planning.
+    /// Availability, as derived without planning.
     pub availability: Availability,
     /// The best plan for the mission as it is.
     pub best: BestPlan,
     /// The steps of the best plan that use it, from 1.
     pub used: Vec<usize>,
-    /// The best plan in which no other design solves its functions; as if it were available if it is not.
+    /// The best plan in which no other design solves its functions. If the design is not available, it is planned as
+    /// if it were.
     pub alone: BestPlan,
     /// The best plan without it.
     pub without: BestPlan,
@@ -101,7 +102,7 @@ pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignEx
 }
 
 impl Availability {
-    /// Adds what plans show; `hear` is told what is being planned.
+    /// Adds the results of planning. `hear` is called with the name of each plan before that is computed.
     ///
     /// # Errors
     /// The mission cannot be planned for.

@@ -1,4 +1,4 @@
-//! What an explanation consists of: plans, and what would have to be otherwise for them.
+//! Parts of explanations: plans, and the alterations that lead to them.
 
 use num_rational::BigRational;
 
@@ -8,22 +8,23 @@ use crate::mapek::PlannedStep;
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct BestPlan {
-    /// The metric of the best plan, in its unit; none where no plan is known.
+    /// The metric of the best plan, in its unit. `None` if no plan is known.
     pub cost: Option<BigRational>,
-    /// Whether that is proved: without a cost, that there is no plan. If not, a limit was reached.
+    /// Whether the cost is proved to be the lowest or, without a cost, whether it is proved that there is no plan. If
+    /// not, a limit was reached.
     pub proved: bool,
     /// The plan.
     pub steps: Vec<PlannedStep>,
 }
 
-/// Something that is otherwise than it is now.
+/// A difference from the current situation.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Alteration {
     /// The attribute, function or component.
     pub name: String,
-    /// Its value now; none for a component.
+    /// The current value. `None` for a component.
     pub from: Option<BigRational>,
-    /// What it would have to be.
+    /// The value or the state after the alteration.
     pub to: Target,
 }
 
@@ -32,7 +33,7 @@ pub struct Alteration {
 pub struct Repair {
     /// All of them.
     pub alterations: Vec<Alteration>,
-    /// The answer then.
+    /// The best plan in that situation.
     pub then: BestPlan,
 }
 
@@ -40,17 +41,17 @@ pub struct Repair {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Change {
-    /// What has to be otherwise.
+    /// The alteration.
     pub alteration: Alteration,
-    /// How far the bound may be from the exact one; none if it is exact.
+    /// Upper limit on the error of the bound. `None` if the bound is exact.
     pub within: Option<BigRational>,
     /// Of a change of a design's availability, whether it suffices by itself.
     pub suffices: bool,
-    /// The answer then.
+    /// The best plan in that situation.
     pub then: BestPlan,
 }
 
-/// What a value would have to be.
+/// Value or state after an alteration.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Target {
     /// At least this.
@@ -68,7 +69,8 @@ pub enum Target {
 }
 
 impl Target {
-    /// A value that is as asked for, as near as can be told apart; 0 for components.
+    /// A value that meets the target: the bound itself, or, if the bound is strict, a value beyond it by `little()`.
+    /// Returns 0 for components.
     pub(super) fn example(&self) -> BigRational {
         let little = little();
         match self {
@@ -80,7 +82,7 @@ impl Target {
     }
 }
 
-/// What is near enough.
+/// Smallest difference between values that are distinguished: one millionth.
 pub(super) fn little() -> BigRational {
     BigRational::new(1.into(), 1_000_000.into())
 }

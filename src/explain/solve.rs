@@ -8,7 +8,7 @@ use crate::message::Errors;
 use crate::mission::{Mission, ground_with};
 use crate::number;
 
-/// The best plan for a mission as it is, or the best so far if a limit is reached.
+/// Computes the best plan for a mission as it is. At a limit, returns the best plan found until then.
 ///
 /// # Errors
 /// The mission cannot be planned for.
@@ -16,7 +16,7 @@ pub fn best(mission: &Mission, limits: &Limits) -> Result<BestPlan, Errors> {
     solve(mission, limits, &|_, available| available)
 }
 
-/// The best plan where `allowed` says, of each design and whether it is available, whether it may be used.
+/// Computes the best plan with the designs for which `allowed` returns `true`, given the name and whether it is available.
 pub(super) fn solve(
     mission: &Mission,
     limits: &Limits,
@@ -24,7 +24,7 @@ pub(super) fn solve(
 ) -> Result<BestPlan, Errors> {
     let (mut problem, _) = mission.filled()?;
     let domain = mission.allow(&mut problem, allowed);
-    // Other questions are to be answered, too.
+    // Later queries need time, too.
     let limits = &limits.half();
     let task = match ground_with(mission, &domain, &problem, &[], limits) {
         Ok(task) => task,

@@ -11,7 +11,7 @@ use crate::message::Errors;
 use crate::mission::Mission;
 use crate::number;
 
-/// How finely values are told apart, as a part of the value, before a number with fewer digits is tried.
+/// Bisection ends at the value divided by this number; then a number with fewer digits is tried.
 const FINENESS: i64 = 1000;
 
 /// The smallest changes that lead to another plan.
@@ -26,8 +26,9 @@ pub struct SmallestChanges {
     pub complete: bool,
 }
 
-/// For each measured attribute and each value of the problem the smallest changes, upwards and downwards, that lead to
-/// another plan; at a limit, those that are known by then. `hear` is told what is being tried.
+/// Searches for the smallest changes, upwards and downwards, of each measured attribute and each value of the problem
+/// that lead to another plan. At a limit, returns those found until then. `hear` is called with the name of each
+/// value before it is varied.
 ///
 /// # Errors
 /// The mission cannot be planned for.
@@ -74,14 +75,14 @@ pub(super) fn measured(knowledge: &Knowledge) -> Vec<(String, BigRational)> {
     measurements.filter_map(|measurement| Some((measurement.attribute, measurement.value?))).collect()
 }
 
-/// What came of looking for a change in one direction.
+/// Result of the search for a change in one direction.
 enum Outcome {
     Found(Box<Change>),
     None,
     AtLimit,
 }
 
-/// What is tried, and compared with the best plan.
+/// A mission whose values are varied, and its best plan for comparison.
 struct Tried<'a> {
     mission: &'a Mission,
     base: BestPlan,
@@ -89,14 +90,14 @@ struct Tried<'a> {
 }
 
 impl Tried<'_> {
-    /// The best plan with another value; none at a limit.
+    /// The best plan with another value. Returns `None` at a limit.
     fn with(&self, name: &str, value: &BigRational) -> Result<Option<BestPlan>, Errors> {
         let mut other = self.mission.clone();
         other.set(name, &number::decimal(value))?;
         Ok(Some(best(&other, self.limits)?).filter(|plan| plan.proved))
     }
 
-    /// Whether another plan is the answer.
+    /// Returns `true` if a plan differs from the best plan of the mission as it is.
     fn is_other(&self, plan: &BestPlan) -> bool {
         let steps = |plan: &BestPlan| -> Vec<_> {
             plan.steps.iter().map(|step| (step.action.clone(), step.arguments.clone())).collect()
@@ -150,7 +151,8 @@ impl Tried<'_> {
         self.simplest(function, from, (same, value), then)
     }
 
-    /// The bound between a value with the same plan and one with another: the number with the fewest digits, if the plan changes there.
+    /// The bound between a value with the same plan and one with another. It is the number with the fewest digits if
+    /// the plan changes there.
     fn simplest(
         &self,
         function: &str,

@@ -153,7 +153,7 @@ impl Beliefs {
         self.running.as_ref().map(|running| (running.action, &running.step))
     }
 
-    /// How much of the action under way is done, from 0 to 1.
+    /// Share of the action under way that is done, from 0 to 1.
     pub(crate) fn progress(&self) -> Option<&BigRational> {
         self.running.as_ref().map(|running| &running.progress)
     }

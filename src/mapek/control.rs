@@ -239,7 +239,8 @@ impl Loop {
         }
     }
 
-    /// Ends planning when these limits are reached, besides its own time limit. What is planned then is of no use.
+    /// Sets limits at which planning ends, in addition to its own time limit. A plan that these limits cut short must
+    /// not be used.
     pub(crate) fn limit(&mut self, limits: Limits) {
         self.planner.limits = limits;
     }

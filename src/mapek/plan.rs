@@ -24,7 +24,7 @@ use crate::number;
 pub(crate) struct Planner {
     /// How long one plan may take.
     pub time_limit: Option<Duration>,
-    /// When all planning ends.
+    /// Limits at which all planning ends.
     pub limits: Limits,
     /// Plans that were made before, to be used again in this order.
     pub recorded: VecDeque<Outcome>,

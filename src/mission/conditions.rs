@@ -6,12 +6,12 @@ use ::mission::Mission;
 
 use crate::message::{Errors, Message};
 
-/// What is wrong with a text, and where in it: in bytes, none where that is not known.
+/// A fault in a text, with its place.
 #[derive(Debug, Clone)]
 pub struct Fault {
-    /// The beginning of what is wrong.
+    /// Byte offset of the fault. `None` if it is not known.
     pub offset: Option<usize>,
-    /// What is wrong with it.
+    /// Message about the fault.
     pub message: Message,
 }
 
@@ -56,8 +56,8 @@ pub fn function(mission: &Mission, text: &str) -> Result<Atom, Vec<Fault>> {
     Err(vec![Fault { offset: None, message: Message::error("M135", text) }])
 }
 
-/// What is wrong with the objects that a setting names which [`Mission::set`] has accepted: there are none of their names, or they have other
-/// types.
+/// Message about the objects in a setting that [`Mission::set`] has accepted: they do not exist, or have other types.
+/// Returns `None` without such a fault.
 pub(super) fn setting(mission: &Mission, name: &str, value: &str) -> Option<Message> {
     if mission.knowledge().is_some_and(|knowledge| knowledge.has_attribute(name.trim())) {
         return None;
@@ -80,9 +80,9 @@ pub fn written(atom: &Atom) -> String {
     format!("({})", words.join(" "))
 }
 
-/// Messages about a text that stands in a line of its own, behind so many characters.
+/// Faults of a text that was parsed as a line of its own, after a prefix of `before` characters.
 fn faults(errors: Errors, text: &str, before: usize) -> Vec<Fault> {
-    // What stands elsewhere is not about the text; a parenthesis that was added stands for its beginning.
+    // Faults in the prefix are not about the text. A fault at a parenthesis that was added has the place of the text's first character.
     let is_own =
         |error: &Message| error.line != Some(1) || error.column.is_none_or(|column| column >= before);
     let fault = |error: Message| {

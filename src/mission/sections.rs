@@ -86,7 +86,7 @@ pub enum TimeUnit {
 }
 
 impl TimeUnit {
-    /// How many seconds it has.
+    /// Number of seconds in this unit.
     pub fn seconds(self) -> f64 {
         match self {
             Self::Seconds => 1.0,
@@ -243,14 +243,14 @@ pub struct Scenario<S> {
     pub simulation: Option<S>,
 }
 
-/// What is wrong with a part of a section, and where that part stands.
+/// A mistake in a part of a section, with its place.
 #[derive(Debug, Clone)]
 pub struct Mistake {
-    /// The path to the part, from the section on.
+    /// Path to the part, relative to the section.
     pub path: Vec<Key>,
-    /// What of it is meant.
+    /// The part of the entry at the end of the path.
     pub part: Part,
-    /// What is wrong.
+    /// Message about the mistake.
     pub message: Message,
 }
 
@@ -262,18 +262,18 @@ impl Mistake {
 }
 
 impl<S> Scenario<S> {
-    /// Puts the situation into effect, as far as it fits the mission.
+    /// Applies the situation, as far as it fits the mission.
     ///
     /// # Errors
-    /// All that does not fit.
+    /// All settings that do not fit.
     pub fn apply(&self, mission: &mut Mission) -> Result<(), Errors> {
         Errors::unless_empty(self.mistakes(mission).into_iter().map(|mistake| mistake.message))
     }
 
-    /// As [`Scenario::apply`]; returns all that does not fit, with its place.
+    /// Applies the situation as [`Scenario::apply`] does. Returns all settings that do not fit, with their places.
     pub fn mistakes(&self, mission: &mut Mission) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
-        // Of a mission that is wrong itself it is not known what there is.
+        // If the mission itself is faulty, the names that it declares are not known.
         let is_sound = mission.filled().is_ok();
         for (index, component) in self.fail.iter().enumerate() {
             let wrong = mission.fail(component).err();

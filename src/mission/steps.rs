@@ -11,10 +11,10 @@ use ::mission::Mission;
 
 use crate::message::{Errors, Message};
 
-/// The steps of a plan: as text with a step on each line, or a `metaplan-plan/1` document.
+/// Reads the steps of a plan: text with a step on each line, or a `metaplan-plan/1` document.
 ///
 /// # Errors
-/// All lines that are not steps; M111, what is wrong with the document, or that it is a table.
+/// All lines that are not steps; M111 if the document is faulty, or if the text is a table.
 pub fn read_plan(source: &Source, mission: &Mission) -> Result<PlanText, Errors> {
     if source.text().trim_start().starts_with('{') {
         return json_plan(source, mission);

@@ -23,7 +23,7 @@ use crate::planner::objectives::{Objectives, fault};
 use crate::planner::planned::Ground;
 pub use crate::planner::planned::{Planned, PlannedFront};
 
-/// Hears what is being done once a plan is proved.
+/// Callback that receives a short description of the work after the best plan is proved.
 type Stage<'a> = dyn FnMut(&str) + 'a;
 
 /// Hears of a better plan or a better bound.
@@ -137,7 +137,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         self
     }
 
-    /// Hears what is being done when planning goes on after the best plan is proved, in a few words.
+    /// Sets the callback for work that follows the proof of the best plan. It receives a short description.
     #[must_use]
     pub fn on_stage(mut self, stage: impl FnMut(&str) + 'r) -> Self {
         self.stage = Box::new(stage);

@@ -75,7 +75,7 @@ impl Planned<'_> {
         &self.problem
     }
 
-    /// Whether a limit of time or memory has been reached, or an interruption was asked for.
+    /// Whether a limit of time or memory has been reached, or an interruption has been requested.
     pub fn is_at_limit(&self) -> bool {
         self.limits.reached()
     }

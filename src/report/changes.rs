@@ -12,7 +12,7 @@ use crate::report::designs::because;
 /// What a component's or an attribute's state is called where nobody says any.
 const UNSAID: &str = "not said";
 
-/// The cost of a plan, or why there is none.
+/// The cost of a plan, or the reason for the lack of a plan.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Cost {
     /// The metric, as text.
@@ -135,7 +135,7 @@ fn plans(before: &Plan, after: &Plan, costs: &[Cost; 2]) -> Vec<String> {
     vec![text]
 }
 
-/// How two plans with these costs differ.
+/// Sentences about the differences between two plans with these costs.
 fn both(before: &Plan, after: &Plan, [old_cost, new_cost]: [&str; 2]) -> Vec<String> {
     let mut texts = Vec::new();
     if old_cost == new_cost {
@@ -158,7 +158,8 @@ fn both(before: &Plan, after: &Plan, [old_cost, new_cost]: [&str; 2]) -> Vec<Str
     texts
 }
 
-/// How many actions of a plan are also in the plan before, each as often as it is in both; with which designs, does not count here.
+/// Sentence with the number of actions that both plans have. An action counts as often as it is in both plans. Its
+/// designs do not matter.
 fn kept(before: &Plan, after: &Plan) -> String {
     let mut old: Vec<&str> = before.steps.iter().map(|step| step.label.as_str()).collect();
     let in_both = after.steps.iter().filter(|step| {

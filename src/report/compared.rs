@@ -141,7 +141,7 @@ pub fn simulation_sheet(mission: &str, scenario: &str, strategies: &[Strategy], 
     }
 }
 
-/// How many of some missions reached their goal, in a sentence.
+/// Sentence with the number of missions that reached their goal.
 fn accomplished(done: usize, all: usize) -> String {
     match (done, all) {
         (0, 1) => "The mission was not accomplished.".to_owned(),
@@ -153,7 +153,8 @@ fn accomplished(done: usize, all: usize) -> String {
     }
 }
 
-/// Why a strategy with this number of missions has no costs; short enough for a telephone.
+/// Text for a strategy that has no costs, since none of its missions was accomplished. It is short enough for a
+/// telephone.
 fn none_accomplished(missions: usize) -> String {
     format!("0 of {missions} accomplished")
 }

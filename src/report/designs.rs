@@ -67,7 +67,7 @@ fn required(requirement: &Requirement, measurements: &[Measurement]) -> String {
     }
 }
 
-/// Why a design can be selected or not: every cause.
+/// All reasons for the availability of a design: every cause that rules it out, if it is not available.
 pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> Vec<Reason> {
     if available {
         let text = "nothing says that it is not realisable, and nothing that it is not available".to_owned();

@@ -31,8 +31,9 @@ pub(super) fn curves(scene: Scene<'_>, plan: &Plan, steps: &[Step], axis: Axis) 
     std::iter::once(cost).chain(numbers(&course, steps, axis)).collect()
 }
 
-/// The metric of the problem if the plan ended after each start and end of an action; none where that is undefined or does not lead to the cost of
-/// the plan, such as for the remainder of a mission, whose cost does not count what was spent before.
+/// Values of the problem's metric if the plan ended after each start and end of an action. Returns `None` if a value
+/// is undefined, or if the last value is not the cost of the plan. For example, the cost of the remainder of a
+/// mission does not include earlier costs.
 fn metric(scene: Scene<'_>, plan: &Plan, course: &Course, axis: Axis) -> Option<Vec<(f64, f64)>> {
     let first = metric_after(scene.domain, scene.problem, &BigRational::default())?;
     let mut points = vec![(0.0, number::to_f64(&first))];
@@ -43,8 +44,8 @@ fn metric(scene: Scene<'_>, plan: &Plan, course: &Course, axis: Axis) -> Option<
     ((last - cost).abs() <= 1e-6 * cost.abs().max(1.0)).then_some(points)
 }
 
-/// What the plan has cost after each step. What belongs to no step is spent evenly over time where actions overlap, since the makespan
-/// does not add up from steps, and before the first step otherwise.
+/// Cost of the plan after each step. If actions overlap, costs that belong to no step are spread evenly over time,
+/// since the makespan is not a sum over steps. Otherwise they are added before the first step.
 fn spent(plan: &Plan, steps: &[Step], axis: Axis) -> Vec<(f64, f64)> {
     let costs = plan.steps.iter().map(|step| step.cost.to_f64());
     let other = plan.cost.to_f64() - costs.clone().sum::<f64>();
@@ -61,7 +62,7 @@ fn spent(plan: &Plan, steps: &[Step], axis: Axis) -> Vec<(f64, f64)> {
     points
 }
 
-/// Adds the value from a place on; the last value at one place counts.
+/// Appends a point, or replaces the value of the last point if that is not before `at`.
 fn set(points: &mut Vec<(f64, f64)>, at: f64, value: f64) {
     match points.last_mut() {
         Some(last) if last.0 >= at => last.1 = value,

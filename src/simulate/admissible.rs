@@ -1,8 +1,8 @@
 //! Designs with which an action can be done now, for ways of control that choose them function by function.
 //!
-//! A design is *admissible* for a function of an action if it is available and all conditions of the action hold now with it: that it keeps the
-//! bounds of the action in its context (`t:requiresQuality`), that the battery suffices, and whatever else the action asks for. Conditions
-//! that mention the design of a function for which none has been chosen yet do not count: they are checked when that is chosen.
+//! A design is *admissible* for a function of an action if it is available and all conditions of the action hold now with
+//! this design. They include the bounds of the action in its context (`t:requiresQuality`), and that the battery suffices.
+//! Conditions that mention the design of another function are omitted while that design is not chosen, and are checked once it is.
 
 use num_rational::BigRational;
 use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Expression, Name, Problem, Term};
@@ -17,7 +17,8 @@ pub(super) struct Admission<'p> {
 }
 
 impl<'p> Admission<'p> {
-    /// For a step of which so much is done; the designs of some functions are still to be chosen.
+    /// Conditions of a step. `done` is the share of the step that is done, if it is under way. Conditions that mention
+    /// the designs of the functions in `undecided` are omitted.
     pub(super) fn new(
         domain: &Domain,
         problem: &'p Problem,
@@ -48,7 +49,7 @@ impl<'p> Admission<'p> {
     }
 }
 
-/// Takes the conditions away that mention certain parameters.
+/// Removes the conditions that mention certain parameters.
 fn leave_open(action: &mut Action, open: &[Name]) {
     match &mut action.body {
         ActionBody::Instantaneous { precondition, .. } => drop_open(precondition, open),

@@ -4,14 +4,15 @@
 //! in when they plan and in who chooses designs:
 //!
 //! - *none* follows its first plan, and gives up when an action fails;
-//! - *failure* plans anew, jointly, when an action has failed, as PLANTA does \[1\];
+//! - *failure* plans again, jointly, when an action has failed, as PLANTA does \[1\];
 //! - *greedy* takes for each function, one after the other, the admissible design with which the action at hand costs least by itself, at
 //!   each request and when a design is lost, as MROS takes the one of greatest utility among those that fulfil the requirements \[2\];
-//!   its task is planned anew when an action has failed;
+//!   its task is planned again when an action has failed;
 //! - *random* takes any admissible design instead.
 //!
-//! What is admissible is said by [`Admission`]. Where no design is, the action keeps that of its plan if it is available, and otherwise gets
-//! an available one; it may be done later. If the action cannot be done with what was chosen, but with the designs of its plan, it gets those.
+//! [`Admission`] defines which designs are admissible. If no design is, the action keeps that of its plan if it is
+//! available, and otherwise gets an available one; the action may become possible later. If the action is not
+//! possible with the chosen designs, but with those of its plan, it gets the designs of its plan.
 //!
 //! \[1\] Rezende Silva et al., PLANTA, 2025. \[2\] Bozhinoski et al., MROS, Advanced Robotics 36, 2022.
 

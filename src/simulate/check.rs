@@ -8,32 +8,32 @@ use crate::message::{Message, did_you_mean};
 use crate::mission::conditions::{self, Fault, written};
 use crate::mission::{Mission, Mistake, setting};
 
-/// What a scenario waits for, parsed.
+/// Parsed conditions and functions of a simulation.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Watched {
-    /// The condition of each event, in their order; none for an event with a time.
+    /// The condition of each event, in their order. `None` for an event with a time.
     pub(super) events: Vec<Option<Condition>>,
     /// The function that ends the mission, as the validator writes it.
     pub(super) lifeline: Option<String>,
-    /// That the pipeline is found.
+    /// The condition that the pipeline is found.
     pub(super) found: Option<Condition>,
-    /// The function that says how long the pipeline is, without parentheses.
+    /// The function for the length of the pipeline, without parentheses.
     pub(super) length: Option<String>,
 }
 
-/// Collects what is wrong.
+/// Collector of mistakes.
 struct Checker<'m> {
     mission: &'m Mission,
     mistakes: Vec<Mistake>,
 }
 
 impl Simulation {
-    /// All that is wrong with the section for a mission that is in the scenario's situation.
+    /// All mistakes in the section, for a mission in the scenario's situation.
     pub fn mistakes(&self, mission: &Mission) -> Vec<Mistake> {
         self.watched(mission).1
     }
 
-    /// What the scenario waits for, and all that is wrong with it.
+    /// Conditions and functions of the simulation, and all mistakes in it.
     pub(super) fn watched(&self, mission: &Mission) -> (Watched, Vec<Mistake>) {
         let mut checker = Checker { mission, mistakes: Vec::new() };
         checker.numbers(self);
@@ -87,7 +87,7 @@ impl Checker<'_> {
         }
     }
 
-    /// A number that is above 0.
+    /// Checks that a number is above 0.
     fn positive(&mut self, path: Vec<Key>, value: f64) {
         if !(value.is_finite() && value > 0.0) {
             let text = format!("{} is {value}, but should be positive", last(&path));
@@ -95,7 +95,7 @@ impl Checker<'_> {
         }
     }
 
-    /// A number that is at least 0.
+    /// Checks that a number is at least 0.
     fn not_negative(&mut self, path: Vec<Key>, value: f64) {
         if !(value.is_finite() && value >= 0.0) {
             let text = format!("{} is {value}, but should be at least 0", last(&path));

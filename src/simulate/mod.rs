@@ -55,11 +55,11 @@ pub struct Experiment {
 }
 
 impl Experiment {
-    /// A mission in the situation of a scenario, with a loop that is as eager as `control` says. `time_unit` is that of the domain's times:
-    /// the clock of the loop goes in seconds.
+    /// A mission in the situation of a scenario, controlled by a loop with the settings `control`. `time_unit` is the
+    /// unit of the domain's times; the clock of the loop is in seconds.
     ///
     /// # Errors
-    /// All that is wrong with the simulation.
+    /// All mistakes in the simulation.
     pub fn new(
         mission: Mission,
         control: Settings,
@@ -76,7 +76,7 @@ impl Experiment {
         &self.mission
     }
 
-    /// Adds to the warnings of the mission what may be other than meant in its situation.
+    /// Adds warnings about probable mistakes in the mission's situation.
     pub fn note_doubts(&mut self) {
         numbers::note_doubts(&mut self.mission);
     }
@@ -86,8 +86,8 @@ impl Experiment {
         self.time_unit
     }
 
-    /// Runs the mission once; `log` hears of every observation and every answer, at its time in seconds. None if a limit was reached before
-    /// the end: what has happened until then is no result.
+    /// Runs the mission once. `log` is called with every observation and its answers, with times in seconds. Returns
+    /// `None` if a limit was reached before the end, since a part of a mission is not a result.
     ///
     /// # Errors
     /// The mission cannot be planned for.
@@ -131,7 +131,7 @@ struct Stage {
 }
 
 impl Stage {
-    /// Runs to the end of the mission; none if a limit comes first.
+    /// Runs to the end of the mission. Returns `None` if a limit is reached first.
     fn play(
         &mut self,
         limits: &Limits,
@@ -147,7 +147,7 @@ impl Stage {
         queue.extend(early);
         loop {
             while let Some(event) = queue.pop_front() {
-                // A plan that was cut short by a limit would lead to another mission.
+                // A plan that a limit cut short would lead to a different mission.
                 if limits.reached() {
                     return Ok(None);
                 }
@@ -168,7 +168,7 @@ impl Stage {
         }
     }
 
-    /// Why the mission is over, if it is.
+    /// Reason why the mission is over. Returns `None` if it continues.
     fn ending(&self) -> Option<Ending> {
         if self.world.reached() {
             Some(Ending::Goal)

@@ -9,20 +9,20 @@ use crate::simulate::baseline::Strategy;
 pub const SUAVE_COLUMNS: [&str; 4] =
     ["pipeline found", "time searching pipeline (s)", "distance inspected (m)", "mean reaction time (s)"];
 
-/// Why a simulated mission is over.
+/// Reason why a simulated mission is over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ending {
     /// The goal was reached.
     Goal,
     /// The time budget was used up.
     Time,
-    /// The lifeline came to 0.
+    /// The lifeline reached 0.
     Lost,
     /// The strategy gave up.
     GaveUp,
 }
 
-/// In a few words, of several missions.
+/// Short text about several missions with this ending.
 impl fmt::Display for Ending {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
@@ -45,7 +45,7 @@ pub struct Run {
     pub accomplished: bool,
     /// Whether the robot came to its end.
     pub lost: bool,
-    /// Why it is over.
+    /// Reason why the mission is over.
     pub ending: Ending,
     /// The unit of its times.
     pub time_unit: TimeUnit,

@@ -18,7 +18,8 @@ const LOOK: Duration = Duration::from_millis(5);
 /// So many characters of standard error are kept.
 const KEPT: usize = 2000;
 
-/// Performs a run with a program, and waits for its end; none if a limit is reached before, and the run is ended then.
+/// Performs a run with a program, and waits for its end. Returns `None` if a limit is reached first; the run is ended
+/// then.
 ///
 /// # Errors
 /// The program, or the one that generates files, cannot be run.
@@ -48,7 +49,8 @@ pub fn perform(
         }
     }
     let mut command = Command::new(program);
-    // Ctrl-C is for this program, which ends the run: what a run would answer to it is not what the study asks for.
+    // This program handles Ctrl-C and ends the run. An interrupted run would give a partial answer, which the study
+    // does not want.
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     let mut child = command
@@ -87,7 +89,8 @@ fn reader(pipe: Option<impl Read + Send + 'static>) -> std::thread::JoinHandle<S
     })
 }
 
-/// Waits for the end of a process, and ends it at its time limit, which is its result, or when other limits are reached: none.
+/// Waits for the end of a process. At its own time limit, the process is ended, and that is its result. At another
+/// limit, it is ended, and `None` is returned.
 fn wait(
     child: &mut Child,
     limit: Option<Duration>,

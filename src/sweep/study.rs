@@ -268,8 +268,8 @@ impl Study {
         self.origin.quote([Message::at("M150", self.origin.file(), place, text)]).swap_remove(0)
     }
 
-    /// The first run, and for each value of each key a run that differs from the first one by this value only, with the path to what makes
-    /// it different. Of numbers from one to another and of pairs only the last one.
+    /// The first run, and for each value of each key a run that differs from the first one in this value only, with
+    /// the path to that value. Ranges of numbers and pairs contribute their last value only.
     pub fn samples(&self) -> Vec<(Vec<Key>, Planned)> {
         if self.is_empty() {
             return Vec::new();

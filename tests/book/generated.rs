@@ -38,7 +38,7 @@ pub fn trials() -> Vec<Trial> {
 
 /// Compares a generated part of a page with what it is generated from.
 fn check(page: &str, name: &str, content: &str) -> Result<(), Failed> {
-    // Several parts stand in one page, and each of them rewrites the whole page.
+    // Several tests rewrite the same page as a whole.
     static WRITING: Mutex<()> = Mutex::new(());
     let _guard = WRITING.lock();
     let path = root().join(page);

@@ -39,7 +39,7 @@ fn help(command: &[&str]) -> String {
 fn subcommands(help: &str) -> Vec<(String, String)> {
     let Some((_, rest)) = help.split_once("\nCommands:\n") else { return Vec::new() };
     let lines = rest.lines().take_while(|line| !line.is_empty());
-    // What a command does may take several lines, the further ones farther in.
+    // The description of a command may take several lines; further lines are indented more.
     let lines = lines.filter_map(|line| line.strip_prefix("  ").filter(|line| !line.starts_with(' ')));
     let named = lines.filter_map(|line| line.split_once("  "));
     let named = named.map(|(name, about)| (name.to_owned(), about.trim().to_owned()));

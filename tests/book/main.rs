@@ -74,7 +74,7 @@ fn pages() -> Vec<String> {
     pages
 }
 
-/// Runs the pages of the book one after another in one copy of the project, as somebody does who reads the whole book.
+/// Runs the pages of the book one after another in one copy of the project, as for a reader of the whole book.
 fn pages_in_one_clone() -> Result<(), Failed> {
     let summary = std::fs::read_to_string(root().join("docs/SUMMARY.md")).expect("the summary");
     let links = summary.lines().filter_map(|line| line.split_once("](")?.1.split_once(')'));

@@ -6,7 +6,7 @@ use pulldown_cmark::{CodeBlockKind, Event, Options, Parser, Tag, TagEnd};
 
 use crate::common::root;
 
-/// How a block is checked.
+/// Kind of a block, which determines the check.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Kind {
     Console,
@@ -63,7 +63,7 @@ pub const FIXTURES: [Fixture; 1] = [Fixture {
     ],
 }];
 
-/// The directory of shared data, beside the project.
+/// The directory of shared data, a sibling of the project's directory.
 pub fn shared() -> PathBuf {
     root().join("../shared")
 }

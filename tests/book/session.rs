@@ -13,7 +13,7 @@ use tempfile::TempDir;
 use crate::common::{copy_folder, root, verifier, without_progress};
 use crate::page::{Block, FIXTURES, Kind, shared};
 
-/// A character that no program prints: it stands before and after each status.
+/// A character that no program prints. The script prints it before and after each status.
 const SEPARATOR: char = '\u{1e}';
 
 pub struct Session {

@@ -9,7 +9,8 @@ use serde_json::{Value, json};
 use crate::common::{copy_folder, edit, metaplan, metaplan_in, root};
 use crate::probabilistic::shared;
 
-/// The hospital of a newcomer, with its larger problem if `large`; none where the reports of newcomers are not at hand.
+/// A copy of the mission `ward`, with its larger problem if `large`. Returns `None` if the shared data are not
+/// available.
 fn ward(large: bool) -> Option<tempfile::TempDir> {
     let folder = shared("field3/newcomer3/ward")?;
     let directory = tempfile::tempdir().expect("a directory");
@@ -118,7 +119,7 @@ fn a_front_at_a_limit_has_the_points_that_were_found() {
     assert!(answer["status"] != "optimal" && answer["points"].is_array(), "{answer:#}");
 }
 
-/// Commands that have nothing to show before their end say so when time is up.
+/// Commands that have nothing to show before their end report that at the time limit.
 #[test]
 fn every_command_that_may_take_long_has_a_time_limit() {
     let ugv = "ontology/kb/ugv.ttl";

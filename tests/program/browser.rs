@@ -219,8 +219,8 @@ fn the_page_of_a_run_works_in_a_browser() {
     run.end();
 }
 
-/// The headline says that there is no plan as long as there is none, and no longer: as it happens, for who comes later, when most lines are gone,
-/// and at the end.
+/// The headline says that there is no plan exactly while this is the case: for a client that watches, for a client
+/// that connects after most lines were discarded, and at the end.
 #[test]
 fn a_run_that_has_a_plan_again_says_so() {
     let Some(browser) = browser() else { return };
@@ -252,7 +252,7 @@ fn a_run_that_has_a_plan_again_says_so() {
     is(&run, &told, true, &format!("{action} (the run has ended)"), cost);
     let notes = (0..2500).map(|_| json!({"event": "note", "text": "x"}).to_string());
     run.tell(notes, 2505);
-    // What was heard first is forgotten; who comes now is told how things are.
+    // The first lines have been discarded. A client that connects now receives the current state.
     let mut late: Vec<String> = Vec::new();
     for _ in 0..50 {
         let is_last = |news: &Value| news["said"]["answer"] == "handled" && news["said"]["line"] == 2505;

@@ -64,7 +64,7 @@ fn what_would_change_the_plan() {
     let answer = explain(&["missions/uuv.toml"]);
     let found = changes(&answer);
     assert_eq!(found[0], json!(["water_visibility", "below", 3.25, 34]));
-    // 77 percent and a reserve of 10 are needed; the bound is told to a millionth.
+    // 77 percent and a reserve of 10 are needed. The bound is exact to a millionth.
     assert_eq!(found[1][2], json!(87), "{answer:#}");
 }
 

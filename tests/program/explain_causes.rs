@@ -144,7 +144,8 @@ impl World {
         fail.chain(set).collect()
     }
 
-    /// The minimal sets of names that have to be otherwise, each with the best effort then: all subsets are tried.
+    /// Minimal sets of names whose alteration makes the design available, each with the best effort then. All subsets
+    /// are tried.
     fn repairs(&self, design: &Design) -> BTreeSet<(BTreeSet<String>, Option<u64>)> {
         let broken: Vec<Bound> =
             design.bounds.iter().copied().filter(|bound| !bound.holds(&self.measured)).collect();

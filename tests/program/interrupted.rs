@@ -1,4 +1,5 @@
-//! Commands that do one thing after another: at a time limit and at Ctrl-C they answer with what is done, and say that it is not all.
+//! Commands with several results: at a time limit and at Ctrl-C they show the results that are complete, and say that
+//! others are missing.
 
 use std::fs;
 use std::path::Path;

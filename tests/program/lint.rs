@@ -123,7 +123,8 @@ fn numbers_that_are_missing_or_negative_are_warnings() {
     );
 }
 
-/// Where no plan exists, `plan` says which numbers are missing, and `explain` why a design that is available is of no use.
+/// Without a plan, `plan` names the missing numbers, and `explain` gives them as the reason why an available design
+/// cannot be used.
 #[test]
 fn missing_numbers_are_named_where_there_is_no_plan() {
     let directory = tempfile::tempdir().expect("a directory");
@@ -157,7 +158,7 @@ fn missing_numbers_are_named_where_there_is_no_plan() {
     assert!(outcome.stdout.contains(words), "{outcome:#?}");
 }
 
-/// Domains in which a function is left out on purpose, of places between which there is no way, and of a place to itself.
+/// Domains that omit values on purpose: between places without a way, and from a place to itself.
 #[test]
 fn numbers_that_nothing_needs_are_no_warnings() {
     let domain = "(define (domain d) (:requirements :typing :numeric-fluents) (:types place)

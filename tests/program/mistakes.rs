@@ -1,4 +1,4 @@
-//! Scenarios and studies that refer to what there is not: all of it is reported with its place, and nothing is simulated.
+//! Scenarios and studies with unknown names: all mistakes are reported with their places, and nothing is simulated.
 
 use std::fs;
 
@@ -122,7 +122,7 @@ fn all_names_of_a_scenario_are_checked_at_once() {
     );
 }
 
-/// What `plan` and `run` take of a scenario is checked as a whole, too.
+/// `plan` and `run` also report all mistakes in the parts of a scenario that they use.
 #[test]
 fn situations_that_do_not_fit_are_reported_at_once() {
     let directory = tempfile::tempdir().expect("a directory");
@@ -145,7 +145,7 @@ fn situations_that_do_not_fit_are_reported_at_once() {
     }
 }
 
-/// A condition may stand with or without its parentheses, and be any condition of PDDL.
+/// A condition may be written with or without its parentheses, and be any condition of PDDL.
 #[test]
 fn conditions_mean_the_same_with_and_without_parentheses() {
     let costs = [

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::common::{copy_of_mission, edit, metaplan, metaplan_in, root};
 
-/// Drawings of each picture of a page, for columns of different widths; two beside another plan.
+/// Number of drawings of each picture of a page, for columns of different widths. Plans shown side by side have two.
 const DRAWINGS: usize = 3;
 /// What a page may take, in bytes.
 const LARGEST: usize = 500_000;
@@ -80,7 +80,7 @@ fn before_and_after_stand_side_by_side_with_the_reasons() {
     }
 }
 
-/// Where there is no plan, what is compared says so, and nothing about a plan that is not there.
+/// Without a plan, the comparison says so, and makes no statement about the missing plan.
 #[test]
 fn no_plan_is_said_in_plain_words() {
     let outcome = metaplan(&["report", "missions/ugv.toml", "--set", "battery=1"]);

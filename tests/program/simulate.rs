@@ -206,7 +206,7 @@ fn the_clock_of_the_loop_goes_in_seconds() {
     }
 }
 
-/// What is written of times says their unit, and SUAVE's columns are seconds.
+/// Times are shown with their unit, and SUAVE's columns are in seconds.
 #[test]
 fn units_are_shown() {
     let arguments =
@@ -241,8 +241,9 @@ fn units_are_shown() {
     }
 }
 
-/// What an action asks for in its context, in the words of the tutorial's knowledge base: no light in the dark aisle, and a gentle grip for what
-/// is fragile. Greedy control asks for no design that cannot do it, and gets done what can be done.
+/// Requirements of actions in their contexts, as in the tutorial's knowledge base: no light in the dark aisle, and a
+/// gentle grip for fragile items. The strategies request no design that violates them, and complete every possible
+/// action.
 #[test]
 fn greedy_control_observes_requirements() {
     let directory = tempfile::tempdir().expect("a directory");

@@ -206,7 +206,8 @@ fn a_plan_in_a_file_is_one_that_is_read() {
             assert!(refused.stderr.contains("M111") && refused.stderr.contains("--plan-format ipc"));
         }
     }
-    // What no format of plans holds goes beside the file, or into it as people read it.
+    // Content that no plan format can hold is printed to standard error, or is written to the file as it would be to
+    // standard output.
     let unsolvable = metaplan(&["plan", "missions/uuv.toml", "--set", "water_visibility=1", "-o", &file]);
     assert_eq!(unsolvable.status, 10);
     let shown = metaplan(&["plan", "missions/uuv.toml", "--set", "water_visibility=1"]);

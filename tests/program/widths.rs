@@ -1,4 +1,4 @@
-//! Tables and help fit into `COLUMNS`; where the answer goes to no terminal, tables are as wide as they are.
+//! Tables and help fit into `COLUMNS`. Without a terminal, tables are not wrapped.
 
 use std::process::Command;
 
@@ -20,14 +20,14 @@ fn width(text: &str) -> usize {
     text.lines().map(|line| line.chars().count()).max().unwrap_or(0)
 }
 
-/// All words of all lines, whatever line they stand in.
+/// All words of a text, sorted.
 fn words(text: &str) -> Vec<&str> {
     let mut words: Vec<&str> = text.split_whitespace().collect();
     words.sort_unstable();
     words
 }
 
-/// All characters that are seen.
+/// All visible characters.
 fn characters(text: &str) -> Vec<char> {
     let mut characters: Vec<char> = text.chars().filter(|character| !character.is_whitespace()).collect();
     characters.sort_unstable();
@@ -51,7 +51,7 @@ fn tables_fit_into_the_columns() {
         let table = |text: &str| text.split("\n\n").next().unwrap_or_default().to_owned();
         assert!(width(&table(&wide)) > columns, "{arguments:?} is narrow anyway:\n{wide}");
         assert!(width(&table(&narrow)) <= columns, "{arguments:?}:\n{narrow}");
-        // Words are broken only where the longest ones do not fit beside each other.
+        // Words are broken only if the longest words of the columns do not fit next to each other.
         if fits {
             assert_eq!(words(&wide), words(&narrow), "{arguments:?}");
         } else {
@@ -84,7 +84,7 @@ fn help_fits_into_a_line() {
     for name in names.iter().filter(|name| **name != "help") {
         for (columns, most) in [(None, 80), (Some("60"), 60), (Some("100"), 100), (Some("300"), 100)] {
             let help = answer(&["help", name], columns);
-            // What is to be typed has no place to be broken at.
+            // Command lines to type are not wrapped.
             let is_text = |line: &&str| !line.starts_with("Usage:") && !line.starts_with("  metaplan ");
             let wide: Vec<&str> =
                 help.lines().filter(is_text).filter(|line| line.chars().count() > most).collect();

@@ -4,7 +4,7 @@
 //! expanded once, and every path from the initial state to a goal is a cheapest plan. K\* and its successors
 //! represent top-k plans in this way [1].
 //!
-//! Where resources distinguish many states, expanding every state whose estimate admits a cheapest plan is too much
+//! If resources distinguish many states, expanding every state whose estimate admits a cheapest plan is too much
 //! work. So a label-setting search comes first. Each of its labels represents all states that cost no less and have
 //! no more of any resource. If no path in *its* graph leads from a label to the goal, no cheapest plan passes through
 //! a state that the label represents. The second search distinguishes all states, and expands only those that the
@@ -66,8 +66,8 @@ pub(super) const ROOT: u32 = 0;
 /// Predicate on an unfinished graph: returns `true` if it contains enough plans.
 pub(super) type IsEnough<'e> = dyn FnMut(&Graph) -> bool + 'e;
 
-/// The graph of the plans that cost `cost`, which is what a cheapest plan costs. None if an operator has too many combinations of designs, or earns
-/// something.
+/// Graph of the plans that cost `cost`, which must be the cost of a cheapest plan. Returns `None` if an operator has too
+/// many combinations of designs, or a negative cost.
 pub(super) fn cheapest(
     context: Context<'_>,
     bounds: &Bounds,
@@ -77,7 +77,7 @@ pub(super) fn cheapest(
     let search = Search::new(context, bounds, cost)?;
     let guide = Labels::comparing(context.task);
     let (guide, graph) = search.explore(guide, None, &mut |_| false)?;
-    // The second search could only end at the same limit.
+    // The second search would reach the same limit.
     if !graph.is_complete {
         return Some(graph);
     }

@@ -55,7 +55,7 @@ fn by_graph(context: Context<'_>, bounds: &Bounds, first: &GroundPlan, most: usi
     Some(Alternatives { plans: list.plans, complete, forced })
 }
 
-/// Plans as their reader sees them, the first one apart. What differs in waits only is one plan.
+/// Decoded plans other than the first one. Plans that differ only in waits are one plan.
 struct List {
     plans: Vec<Plan>,
     most: usize,

@@ -1,9 +1,11 @@
-//! A mission to the numeric functions that lack a value, and to durations below 0.
+//! Analysis of the numeric functions of a mission that lack a value, and of durations below 0.
 //!
-//! For each numeric function that an action needs, the objects are tried for which the action is possible as far as the facts say that no
-//! action changes (three-valued evaluation of its conditions, as in grounding). A mission may leave out numbers of what can never
-//! happen, so a missing value is worth a warning only where the function has no arguments, where three quarters of the objects have a
-//! value, or two thirds of those that one such fact is about, as `(lit_aisle a b)` is for `(distance a b)`; and of designs always.
+//! For each numeric function that an action needs, the analysis enumerates the objects for which the action is
+//! possible according to the facts that no action changes (three-valued evaluation of its conditions, as in
+//! grounding). A mission may omit numbers for what can never happen. So a missing value causes a warning only if the
+//! function has no arguments, if three quarters of the objects have a value, or if two thirds of the objects that one
+//! such fact is about have one. For example, `(lit_aisle a b)` is about the objects of `(distance a b)`. A missing
+//! value of a design always causes a warning.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
@@ -27,7 +29,7 @@ use crate::message::Message;
 use crate::mission::conditions::written;
 use crate::number;
 
-/// How many conditions are evaluated before what is left stays unchecked.
+/// Number of conditions that are evaluated before the remaining ones stay unchecked.
 const BUDGET: usize = 50_000;
 
 /// A numeric function with its arguments that has no value, though actions need it.
@@ -37,18 +39,18 @@ pub struct MissingValue {
     pub function: String,
     /// The actions that need it.
     pub needed_by: Vec<String>,
-    /// The design whose estimation is missing, and the attribute, where it is that.
+    /// The design whose estimation is missing, and the attribute, if the number is an estimation.
     pub estimation: Option<(String, String)>,
     /// The file that should have it.
     pub file: String,
     pub(super) symbol: String,
-    /// Nothing gives the function a value for any arguments.
+    /// Whether the function has no value for any arguments.
     pub(super) is_silent: bool,
-    /// It is hardly left out on purpose.
+    /// Whether the value is probably not omitted on purpose.
     pub(super) is_likely: bool,
 }
 
-/// Functions without a value, with whether that is hardly on purpose, and the actions that need them.
+/// Functions without a value, each with whether that is probably a mistake, and with the actions that need it.
 type Needed = BTreeMap<(Name, Vec<Name>), (bool, BTreeSet<String>)>;
 
 /// A duration that is negative.
@@ -61,7 +63,7 @@ pub(super) struct NegativeDuration {
     pub(super) design: Option<String>,
 }
 
-/// What is known of a mission's numbers before anything has happened.
+/// Facts about a mission's numbers in the initial state.
 pub(super) struct Numbers<'m> {
     pub(super) mission: &'m Mission,
     pub(super) domain: &'m Domain,
@@ -179,7 +181,7 @@ impl<'m> Numbers<'m> {
         attribute.strip_prefix("fd_").unwrap_or(attribute).to_owned()
     }
 
-    /// Notes the functions that an action needs and that have no value.
+    /// Collects the functions that an action needs and that have no value.
     fn missing(&self, action: &Action, missing: &mut Needed) {
         let conditions = conditions(&action.body);
         let mut checked = HashSet::new();
@@ -187,7 +189,7 @@ impl<'m> Numbers<'m> {
             let function = &atom.predicate.name;
             let is_own =
                 function.as_str().eq_ignore_ascii_case("total-cost") || !checked.insert(written(atom));
-            // What an action gives a value may be without one before, unless it is a stock that grows or shrinks.
+            // A function that an action assigns may lack a value before, unless actions increase or decrease it.
             let is_stock = || self.domain.actions.iter().any(|action| grows(action, function));
             if is_own || (self.assigned.contains(function) && !is_stock()) {
                 continue;
@@ -217,7 +219,7 @@ impl<'m> Numbers<'m> {
         }
     }
 
-    /// Notes durations below 0 that follow from values that nothing changes.
+    /// Collects durations below 0 that follow from values that nothing changes.
     fn negative_durations(&self, action: &Action, negative: &mut BTreeSet<NegativeDuration>) {
         let ActionBody::Durative { duration, .. } = &action.body else { return };
         let conditions = conditions(&action.body);
@@ -302,7 +304,8 @@ impl<'m> Numbers<'m> {
         }
     }
 
-    /// Whether a condition holds whatever actions change; none where that depends on them, or on variables that are open.
+    /// Truth of a condition in every state. Returns `None` if it depends on actions, or on variables that are not
+    /// bound.
     fn truth(&self, condition: &Condition, binding: &Binding<'_>) -> Option<bool> {
         match condition {
             Condition::And(parts) => parts

@@ -1,4 +1,5 @@
-//! Numbers that a mission lacks, or that cannot be meant: what keeps actions and designs from ever being used, though no file is wrong.
+//! Numbers that a mission lacks, or that cannot be intended. They prevent actions and designs from ever being used,
+//! although no file is malformed.
 
 mod analysis;
 mod syntax;
@@ -13,8 +14,8 @@ pub use analysis::MissingValue;
 use crate::message::Message;
 use analysis::Numbers;
 
-/// Adds to the warnings of a mission what may be other than meant, once its situation is complete: [`Mission::doubts`], and for missions
-/// with a knowledge base [`doubts`].
+/// Adds warnings about probable mistakes to a mission, once its situation is complete: [`Mission::doubts`], and for
+/// missions with a knowledge base [`doubts`].
 pub fn note_doubts(mission: &mut Mission) {
     mission.note_doubts();
     if mission.knowledge().is_some() {
@@ -42,7 +43,8 @@ pub fn doubts(mission: &Mission) -> Vec<Message> {
     doubts
 }
 
-/// The numeric functions that have no value and that actions need: those that are hardly left out on purpose, and otherwise all.
+/// Numeric functions without a value that actions need: those that are probably omitted by mistake, and all of them
+/// if no omission seems to be one.
 pub fn missing_values(mission: &Mission) -> Vec<MissingValue> {
     let all = Numbers::new(mission).check().0;
     let is_told = |own: &MissingValue| own.is_likely || own.is_silent;
@@ -50,7 +52,7 @@ pub fn missing_values(mission: &Mission) -> Vec<MissingValue> {
     all.into_iter().filter(|own| !is_any || is_told(own)).collect()
 }
 
-/// Why a design can never be used though it may be available, in sentences.
+/// Reasons why a design can never be used although it may be available, as sentences.
 pub fn against(mission: &Mission, design: &str) -> Vec<String> {
     let (missing, negative) = Numbers::new(mission).check();
     let missing = missing.iter().filter_map(|own| {

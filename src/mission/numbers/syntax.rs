@@ -1,10 +1,10 @@
-//! Actions, conditions and effects to the numeric functions that they need.
+//! Numeric functions that actions, conditions and effects need.
 
 use pddl::ast::{
     Action, ActionBody, Assignment, Atom, Condition, Effect, Expression, Name, Term, TypeExpression,
 };
 
-/// Variables with the objects that they stand for.
+/// Variables with the objects that they are bound to.
 pub(super) type Binding<'a> = Vec<(&'a Name, Name)>;
 
 pub(super) fn constants(atom: &Atom) -> Vec<Name> {
@@ -17,7 +17,7 @@ pub(super) fn name_of(term: &Term) -> &Name {
     }
 }
 
-/// The object that a term stands for.
+/// The object that a term denotes. Returns `None` if its variable is not bound.
 pub(super) fn object<'a>(term: &'a Term, binding: &'a Binding<'_>) -> Option<&'a Name> {
     match term {
         Term::Constant(constant) => Some(&constant.name),
@@ -27,7 +27,7 @@ pub(super) fn object<'a>(term: &'a Term, binding: &'a Binding<'_>) -> Option<&'a
     }
 }
 
-/// The arguments of an atom, if they are all known.
+/// The arguments of an atom. Returns `None` unless all of its variables are bound.
 pub(super) fn known(atom: &Atom, binding: &Binding<'_>) -> Option<Vec<Name>> {
     atom.arguments.iter().map(|term| object(term, binding).cloned()).collect()
 }
@@ -37,7 +37,7 @@ pub(super) fn grounded(atom: &Atom, binding: &Binding<'_>) -> Vec<Name> {
     known(atom, binding).unwrap_or_default()
 }
 
-/// The parameters of an action that an atom mentions, each once; none if it mentions another variable.
+/// The distinct parameters of an action that an atom mentions. Returns `None` if the atom mentions another variable.
 pub(super) fn variables_of<'a>(
     atom: &Atom,
     action: &'a Action,
@@ -69,7 +69,7 @@ pub(super) fn effects(body: &ActionBody) -> Vec<&Effect> {
     }
 }
 
-/// Visits all parts of an effect that have no parts.
+/// Visits all parts of an effect that are not composed of others.
 pub(super) fn walk<'a>(effect: &'a Effect, visit: &mut dyn FnMut(&'a Effect)) {
     match effect {
         Effect::And(parts) => parts.iter().for_each(|part| walk(part, visit)),

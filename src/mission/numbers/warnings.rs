@@ -1,4 +1,4 @@
-//! Missing numbers and negative durations as warnings, with the file and the place where they can be mended.
+//! Warnings about missing numbers and negative durations, with the file and the place where they can be corrected.
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,7 @@ use pddl::{Diagnostic, Severity, Source};
 use super::analysis::{MissingValue, NegativeDuration, Numbers};
 use crate::message::{Message, did_you_mean};
 
-/// How many functions without a value are named before the rest is only counted.
+/// Maximum number of functions without a value that a warning names; further ones are only counted.
 const NAMED: usize = 3;
 
 /// The warnings.
