@@ -41,8 +41,8 @@ pub enum Part {
     Value,
     /// The key at the end of a path.
     Key,
-    /// The position at this number of bytes from the beginning of a string. It is the whole string if the file does
-    /// not contain the string literally.
+    /// The position at this number of bytes from the beginning of a string. It is the beginning of the string if the
+    /// file does not contain the text of the string literally.
     Inside(usize),
 }
 
@@ -110,8 +110,8 @@ impl ManifestPath {
         line_and_column(&self.text, offset)
     }
 
-    /// Line and column of a place in the manifest. Returns `None` for the manifest as a whole. If a part of the path
-    /// is missing, returns the place of the part before it.
+    /// Line and column of a place in the manifest. Returns `None` for the manifest as a whole, or if it cannot be
+    /// parsed. If a part of the path is missing, returns the place of the part before it.
     pub fn place_of(&self, path: &[Key], part: Part) -> Option<(usize, usize)> {
         let document = DeTable::parse(&self.text).ok()?;
         let mut span = document.span();

@@ -186,7 +186,7 @@ fn numbers(leg: &Leg) -> String {
 
 /// Position of the numbers of a leg: the left end of their base line. It is nearer to the leg's own arrow than to all
 /// others. The numbers touch nothing that is already placed, and cross no line if possible. Their space is marked as
-/// taken.
+/// taken. Returns `None` if no position is free.
 fn number(
     leg: &Leg,
     legs: &[Leg],

@@ -276,7 +276,7 @@ fn candidates(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Alteration>
     all
 }
 
-/// Adds alterations of all failed components and of all violated requirements to the candidates.
+/// Adds alterations of all failed components, and of the measurements that any design depends on, to the candidates.
 fn all_candidates(knowledge: &Knowledge, mut all: Vec<Alteration>) -> Vec<Alteration> {
     let designs = knowledge.view().function_designs();
     let more = designs.iter().flat_map(|design| candidates(knowledge, design));
@@ -298,7 +298,8 @@ fn components(knowledge: &Knowledge, working: bool, is_own: &dyn Fn(&str) -> boo
     all.map(|component| Alteration { name: component.individual.name, from: None, to: to.clone() }).collect()
 }
 
-/// The values from which on all requirements on an attribute hold, or one does not.
+/// Values from which on all requirements on an attribute hold or, with `hold` (they hold now), one of them is
+/// violated.
 fn targets<'a>(bounds: impl Iterator<Item = &'a Requirement>, from: &BigRational, hold: bool) -> Vec<Target> {
     let (mut least, mut most): (Vec<&BigRational>, Vec<&BigRational>) = (Vec::new(), Vec::new());
     for requirement in bounds {

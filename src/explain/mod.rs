@@ -102,7 +102,8 @@ pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignEx
 }
 
 impl Availability {
-    /// Adds the results of planning. `hear` is called with the name of each plan before that is computed.
+    /// Adds the results of planning. `hear` is called with a short description of each planning query before that
+    /// starts.
     ///
     /// # Errors
     /// The mission cannot be planned for.

@@ -184,7 +184,7 @@ impl Mouth {
         self.say(Said::Known(designs));
     }
 
-    /// Whether there is a plan to be seen now; with the number of the action under way.
+    /// Publishes whether a plan exists now, and the number of the action under way.
     pub(super) fn planned(&self, exists: bool, under_way: Option<u64>) {
         self.say(Said::Planned { exists, under_way });
     }

@@ -273,7 +273,7 @@ impl<S> Scenario<S> {
     /// Applies the situation as [`Scenario::apply`] does. Returns all settings that do not fit, with their places.
     pub fn mistakes(&self, mission: &mut Mission) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
-        // If the mission itself is faulty, the names that it declares are not known.
+        // If the mission's own files are faulty, errors of PDDL may not be caused by the settings.
         let is_sound = mission.filled().is_ok();
         for (index, component) in self.fail.iter().enumerate() {
             let wrong = mission.fail(component).err();

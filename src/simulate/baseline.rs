@@ -162,7 +162,8 @@ impl Controller {
         }
     }
 
-    /// The same action with designs as the strategy chooses them for some functions; `done` is how much of it is done, if it is under way.
+    /// The action with the designs that the strategy chooses for the functions in `concerns`. `done` is the share of
+    /// the action that is done, if it is under way.
     fn choose(
         &mut self,
         step: &PlannedStep,
@@ -198,7 +199,8 @@ impl Controller {
                 chosen = chosen.with_design(function, &design);
             }
         }
-        // Designs that were chosen one after the other need not go together, and those of the plan do.
+        // Designs that are chosen one after the other may not be possible together. Then those of the plan are used
+        // if they are.
         let whole = Admission::new(mission.domain(), &problem, step, done, &[]);
         if !whole.admits(&chosen) && whole.admits(step) { step.clone() } else { chosen }
     }
@@ -218,7 +220,8 @@ impl Controller {
     }
 }
 
-/// The design with which the action costs least by itself, whether or not it can be done; of equals the first.
+/// The design with which the action costs least by itself, whether or not the action is possible. Of equal designs,
+/// the first.
 fn cheapest(
     mission: &Mission,
     problem: &Problem,

@@ -271,7 +271,7 @@ impl World {
         }
     }
 
-    /// Notes when something is found, and when what waits for a condition takes place.
+    /// Records when the pipeline is found, and schedules events whose conditions hold for the first time.
     fn look(&mut self) {
         if self.found.is_none() && self.watched.found.as_ref().is_some_and(|found| self.holds(found)) {
             self.found = Some(self.time);

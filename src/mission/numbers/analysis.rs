@@ -2,10 +2,10 @@
 //!
 //! For each numeric function that an action needs, the analysis enumerates the objects for which the action is
 //! possible according to the facts that no action changes (three-valued evaluation of its conditions, as in
-//! grounding). A mission may omit numbers for what can never happen. So a missing value causes a warning only if the
-//! function has no arguments, if three quarters of the objects have a value, or if two thirds of the objects that one
-//! such fact is about have one. For example, `(lit_aisle a b)` is about the objects of `(distance a b)`. A missing
-//! value of a design always causes a warning.
+//! grounding). A mission may omit numbers for what can never happen. So a missing value causes a warning only in
+//! these cases: the function has no parameters of the action as arguments; three quarters of the objects have a
+//! value; or such a fact is about the same objects, and either two thirds of the objects have a value or the object
+//! is a design. For example, `(lit_aisle a b)` is about the objects of `(distance a b)`.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
@@ -304,8 +304,8 @@ impl<'m> Numbers<'m> {
         }
     }
 
-    /// Truth of a condition in every state. Returns `None` if it depends on actions, or on variables that are not
-    /// bound.
+    /// Truth of a condition in every state. Returns `None` if it depends on actions or on variables that are not
+    /// bound, or if it contains comparisons or quantifiers that decide it.
     fn truth(&self, condition: &Condition, binding: &Binding<'_>) -> Option<bool> {
         match condition {
             Condition::And(parts) => parts
