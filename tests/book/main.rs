@@ -1,8 +1,8 @@
 //! The README and the book: every block of every page is run as a reader would run it, or compared with the file that it shows.
 //!
 //! Each page is one test, run in a shell in a fresh copy of the project, with `metaplan` and `metaplan-verify` in the path. By default these
-//! are the programs that cargo has built for the tests; with `METAPLAN_PROGRAMS=DIR` in the environment they are those of `cargo install`
-//! in that directory, as `.ci/newcomer` has it.
+//! are the programs that cargo has built for the tests; with `METAPLAN_PROGRAMS=DIR` in the environment, `metaplan` is the program that
+//! `cargo install` has put into that directory, as in `.ci/newcomer`.
 //!
 //! The fence of a block, and the comment before the block, say how it is checked:
 //!
