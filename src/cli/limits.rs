@@ -34,8 +34,11 @@ impl TimeLimit {
     /// Begins to measure time.
     ///
     /// # Errors
-    /// Does not occur: only a memory limit can be refused.
+    /// The time limit is 0: it has been reached before anything was read.
     pub(super) fn guard(&self, common: &Common) -> Result<Guard, Failure> {
+        if self.time_limit.is_some_and(|limit| limit.is_zero()) {
+            return Err(Failure { exit: Exit::NothingFound, messages: nothing_to_show().into() });
+        }
         Guard::new(self.time_limit, None, common)
     }
 }
@@ -97,6 +100,10 @@ impl Guard {
     }
 }
 
+fn nothing_to_show() -> Message {
+    Message::error("M130", "a limit was reached before there was anything to show")
+}
+
 /// Reading does not look at the limits.
 fn give_up_late(limits: Limits, has_read: Arc<AtomicBool>, common: Common) {
     std::thread::spawn(move || {
@@ -109,8 +116,7 @@ fn give_up_late(limits: Limits, has_read: Arc<AtomicBool>, common: Common) {
         // A thread that writes an answer holds this lock, and completes the answer.
         let _stdout = std::io::stdout().lock();
         if !output::has_begun() && !has_read.swap(true, Ordering::Relaxed) {
-            let text = "a limit was reached before there was anything to show";
-            output::failure(&common, &[Message::error("M130", text)]);
+            output::failure(&common, &[nothing_to_show()]);
             std::process::exit(Exit::NothingFound as i32);
         }
     });
