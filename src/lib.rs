@@ -22,6 +22,7 @@ pub mod live;
 pub mod manifest;
 pub mod mapek;
 pub mod mission;
+mod narrow;
 mod number;
 pub mod planner;
 pub mod recording;

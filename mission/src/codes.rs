@@ -141,12 +141,6 @@ pub const CODES: &[[&str; 4]] = &[
         "Check the name in both.",
     ],
     [
-        "M214",
-        "A value of a template's problem does not fit.",
-        "The problem states something that the knowledge base has otherwise.",
-        "Change one of the two.",
-    ],
-    [
         "M215",
         "A predicate of a template is not concluded.",
         "The domain asks for an `inferred-…` predicate for which the knowledge base has no property or class.",

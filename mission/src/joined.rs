@@ -1,6 +1,6 @@
 //! A mission: what the robot is (a knowledge base) and what it has to do (PDDL), joined.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
 
 use pddl::ast::{Condition, Direction, Domain, Metric, Name, Problem, Term};
 use pddl::{self, Severity, Source};
@@ -79,8 +79,7 @@ impl Mission {
         };
         let (mut domain, mut problem, mut warnings) = (domain, problem, warnings);
         let planta = knowledge.as_ref().and_then(|knowledge| {
-            let facts = (knowledge.engine(), knowledge.stated());
-            let (planta, completed, more) = Planta::new(knowledge.terms()?, &domain, &mut problem, facts);
+            let (planta, completed, more) = Planta::new(knowledge.terms()?, &domain, &mut problem);
             domain = completed;
             warnings.extend(more);
             Some(planta)
@@ -202,18 +201,9 @@ impl Mission {
         Err(messages.into())
     }
 
-    /// The domain and the problem as other planners get them: those of [`Mission::filled`], and for a domain in PLANTA's form all
-    /// rules as derived predicates, none of them decided.
-    ///
-    /// # Errors
-    /// As [`Mission::filled`].
-    pub fn merged(&self) -> Result<(Domain, Problem, Vec<Message>), Errors> {
-        let (filled, warnings) = self.filled()?;
-        let merged = self.planta.as_ref().zip(self.knowledge.as_ref()).and_then(|(planta, knowledge)| {
-            planta.merged(&self.problem, (knowledge.engine(), knowledge.stated()))
-        });
-        let (domain, problem) = merged.unwrap_or_else(|| (self.domain.clone(), filled));
-        Ok((domain, problem, warnings))
+    /// The predicates about which the knowledge base says something, if it completes the domain (PLANTA's form); none otherwise.
+    pub fn completed_predicates(&self) -> Option<&HashSet<Name>> {
+        self.planta.as_ref().map(Planta::known)
     }
 
     /// A condition as it is shown to people: a plain domain is completed with predicates that its author does not know. That a design

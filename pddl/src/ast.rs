@@ -93,6 +93,13 @@ pub struct Identifier {
     pub span: Span,
 }
 
+/// A name that stands in no file.
+impl From<Name> for Identifier {
+    fn from(name: Name) -> Self {
+        Self { name, span: Span::default() }
+    }
+}
+
 /// The type of a typed-list entry: one name, or `either` of several; empty means `object`, written or not.
 #[derive(Debug, Clone, Default)]
 pub struct TypeExpression {
@@ -458,6 +465,17 @@ pub enum InitialElement {
     Value(Atom, BigRational, Span),
     /// `(at TIME LITERAL)`: a timed initial literal; the flag is false for a negated one.
     Timed(BigRational, Atom, bool, Span),
+}
+
+impl InitialElement {
+    /// Returns the predicate and the arguments of a fact; none for other elements.
+    pub fn fact(&self) -> Option<(Name, Vec<Name>)> {
+        let Self::Fact(atom) = self else { return None };
+        let name = |term: &Term| match term {
+            Term::Variable(own) | Term::Constant(own) => own.name.clone(),
+        };
+        Some((atom.predicate.name.clone(), atom.arguments.iter().map(name).collect()))
+    }
 }
 
 /// `(:metric DIRECTION EXPRESSION)`.

@@ -250,23 +250,3 @@ fn problems_of_plansys2_are_solved() {
         assert_eq!(found.map(|items| items.len()), expected, "{name}");
     }
 }
-
-/// The sessions of docs/ros.md. In the second one nobody says which designs there are.
-#[test]
-fn the_book_shows_what_popf_says() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the project");
-    let page = std::fs::read_to_string(root.join("docs/ros.md")).expect("a page");
-    let example = root.join("ros/examples/nav2");
-    let file = |name: &str| example.join(name).to_str().expect("UTF-8").to_owned();
-    let shown = |command: &str| {
-        let (_, rest) = page.split_once(&format!("$ {command}\n")).expect("the page shows the command");
-        rest.split_once("```").expect("the block ends").0
-    };
-    let [domain, problem, mission] = ["domain.pddl", "problem.pddl", "mission.toml"].map(file);
-    let output = popf(&["--mission", &mission, &domain, &problem], &[]);
-    let command = "cd ros/examples/nav2 && popf --mission mission.toml domain.pddl problem.pddl";
-    assert_eq!(String::from_utf8_lossy(&output.stdout), shown(command));
-
-    let output = popf(&[&domain, &problem], &[]);
-    assert_eq!(String::from_utf8_lossy(&output.stdout), shown("popf domain.pddl problem.pddl"));
-}

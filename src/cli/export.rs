@@ -65,14 +65,12 @@ enum Setting {
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let _guard = arguments.time.guard(common)?;
     let Setup { mission, roles, .. } = arguments.situation.setup(&arguments.inputs, common)?;
+    let (problem, warnings) = mission.filled()?;
+    output::warnings(common, mission.warnings().chain(&warnings));
     if !matches!(arguments.target, Language::Pddl) {
-        let (problem, warnings) = mission.filled()?;
-        output::warnings(common, mission.warnings().chain(&warnings));
         return process(arguments, common, &mission, &problem, &roles);
     }
-    let (domain, problem, warnings) = mission.merged()?;
-    output::warnings(common, mission.warnings().chain(&warnings));
-    let (domain, problem) = portable(&domain, &problem);
+    let (domain, problem) = portable(mission.domain(), &problem);
     let (domain, problem) = (print_domain(&domain), print_problem(&problem));
     match output::file_named(arguments.output.as_ref()) {
         Some(directory) => {

@@ -1,4 +1,7 @@
 //! A mission to a ground task, and its plans as the domain's file writes them.
+
+use std::borrow::Cow;
+
 use encodings::{Concurrent, ExactTask, GroundConfig, Limits, Plan, Replanner, Task};
 use num_rational::BigRational;
 use pddl::ast::{Domain, Metric, Name, Problem};
@@ -7,9 +10,14 @@ use pddl::{Diagnostic, Severity};
 use ::mission::Mission;
 
 use crate::message::{Errors, Message};
+use crate::narrow::narrowed;
 
 /// Planning for a mission.
 pub trait Planning {
+    /// Returns the domain and the problem that are grounded for a filled problem. They have the same plans as the mission's own, and are
+    /// smaller if its knowledge base completes its domain.
+    fn narrowed<'m>(&'m self, problem: &'m Problem) -> (Cow<'m, Domain>, Cow<'m, Problem>);
+
     /// Grounds a problem that [`Mission::filled`] has made, to be measured by some objectives in place of its metric
     /// if there are any.
     ///
@@ -48,6 +56,10 @@ pub trait Planning {
 }
 
 impl Planning for Mission {
+    fn narrowed<'m>(&'m self, problem: &'m Problem) -> (Cow<'m, Domain>, Cow<'m, Problem>) {
+        narrowed(self, self.domain(), problem)
+    }
+
     fn ground(&self, problem: &Problem, objectives: &[Metric], limits: &Limits) -> Result<Task, Errors> {
         ground_with(self, self.domain(), problem, objectives, limits)
     }
@@ -58,7 +70,8 @@ impl Planning for Mission {
         objectives: &[Metric],
         limits: &Limits,
     ) -> Result<ExactTask, Errors> {
-        encodings::ground_exact(self.domain(), problem, &config(self, objectives, limits))
+        let (domain, problem) = self.narrowed(problem);
+        encodings::ground_exact(&domain, &problem, &config(self, objectives, limits))
             .map_err(|errors| messages(self, &errors))
     }
 
@@ -69,7 +82,8 @@ impl Planning for Mission {
         separation: &BigRational,
         limits: &Limits,
     ) -> Result<Concurrent, Errors> {
-        encodings::ground_concurrent(self.domain(), problem, &config(self, objectives, limits), separation)
+        let (domain, problem) = self.narrowed(problem);
+        encodings::ground_concurrent(&domain, &problem, &config(self, objectives, limits), separation)
             .map_err(|errors| messages(self, &errors))
     }
 
@@ -94,12 +108,17 @@ pub(crate) fn ground_with(
     objectives: &[Metric],
     limits: &Limits,
 ) -> Result<Task, Errors> {
-    encodings::ground(domain, problem, &config(mission, objectives, limits))
+    let (domain, problem) = narrowed(mission, domain, problem);
+    encodings::ground(&domain, &problem, &config(mission, objectives, limits))
         .map_err(|errors| messages(mission, &errors))
 }
 
 /// A planner for filled problems that are like this one; none if the mission is not suited.
 pub(crate) fn replanner(mission: &Mission, problem: &Problem, limits: &Limits) -> Option<Replanner> {
+    // Narrowing depends on the facts of a problem, so that each problem has another domain.
+    if mission.completed_predicates().is_some() {
+        return None;
+    }
     let predicates = mission.domain().predicates.iter().map(|declared| &declared.identifier.name);
     let available: Vec<Name> = if mission.knowledge().is_some() {
         predicates.filter(|name| mission.bindings().is_availability(name)).cloned().collect()

@@ -334,6 +334,11 @@ impl Task {
 
     /// Everything, state by state.
     pub fn explore(&self) -> Reached {
+        self.explore_within(20_000).expect("few states")
+    }
+
+    /// As [`Task::explore`]; none if there are more states than that.
+    pub fn explore_within(&self, limit: usize) -> Option<Reached> {
         let changed = self.changed();
         let fixed = self.initial.iter().filter(|(name, _)| !changed.contains(*name));
         let fixed = self.closed(fixed.map(|(name, rows)| (name.clone(), rows.clone())).collect(), false);
@@ -374,13 +379,15 @@ impl Task {
                     }
                 }
             }
-            assert!(seen.len() < 20_000, "too many states for plain enumeration");
+            if seen.len() > limit {
+                return None;
+            }
             if next.is_empty() {
                 break;
             }
             layer = next;
         }
-        reached
+        Some(reached)
     }
 }
 

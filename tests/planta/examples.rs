@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use metaplan::mission::Planning;
 use pddl::ast::{Domain, Problem};
 use pddl::{portable, print_domain, print_problem};
 use serde_json::Value;
@@ -98,21 +99,17 @@ const LARGE: [&str; 2] = ["suave", "testFeatures/otherConstantsInDomain"];
 /// The planned task, the export and the converter's files say the same of every state that can be reached.
 fn compare(Example { name, input, created, least }: &Example) {
     let mission = input.mission();
-    let (domain, problem, _) = mission.merged().unwrap_or_else(|messages| panic!("{}", shown(&messages)));
-    let (domain, problem) = written(&domain, &problem);
-    let exported = Task::new(&domain, &problem).explore();
     let (filled, _) = mission.filled().unwrap_or_else(|messages| panic!("{}", shown(&messages)));
-    let own = Task::new(mission.domain(), &filled).explore();
-    let declared: BTreeSet<String> = mission
-        .domain()
-        .predicates
-        .iter()
-        .map(|own| own.identifier.name.to_string().to_ascii_lowercase())
-        .collect();
+    let (domain, problem) = written(mission.domain(), &filled);
+    let exported = Task::new(&domain, &problem).explore();
+    let (domain, problem) = mission.narrowed(&filled);
+    let narrowed = Task::new(&domain, &problem).explore();
+    let declared: BTreeSet<String> =
+        domain.predicates.iter().map(|own| own.identifier.name.to_string().to_ascii_lowercase()).collect();
     // What is decided beforehand is what follows in every state.
     let kept = |predicate: &str| declared.contains(predicate) && !predicate.starts_with("possible-");
-    assert_eq!(atoms(&own, &kept), atoms(&exported, &kept), "{name}: the planned task and the export");
-    assert_eq!(own.steps, exported.steps, "{name}: the planned task and the export");
+    assert_eq!(atoms(&narrowed, &kept), atoms(&exported, &kept), "{name}: the narrowed task and the export");
+    assert_eq!(narrowed.steps, exported.steps, "{name}: the narrowed task and the export");
     assert_eq!(planned(input), exported.least, "{name}");
     if let Least::Broken(reason) = least {
         assert!(!reason.is_empty());

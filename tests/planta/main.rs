@@ -4,4 +4,5 @@
 mod brute;
 mod examples;
 mod files;
+mod random;
 mod situations;

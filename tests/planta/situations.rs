@@ -5,6 +5,7 @@ use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use metaplan::mission::Planning;
 use pddl::ast::{InitialElement, Problem, Term};
 use serde_json::Value;
 
@@ -81,12 +82,12 @@ fn a_situation_is_that_of_the_merged_files() {
         if let Some(value) = visibility {
             mission.set("water_visibility", value).expect("an attribute");
         }
-        let (domain, problem, _) = mission.merged().expect("files");
-        let merged = Task::new(&domain, &problem).explore();
         let (filled, _) = mission.filled().expect("a problem");
-        let own = Task::new(mission.domain(), &filled).explore();
-        assert_eq!(own.steps, merged.steps, "{failed:?} {visibility:?}");
-        assert_eq!(own.least, merged.least, "{failed:?} {visibility:?}");
+        let exported = Task::new(mission.domain(), &filled).explore();
+        let (domain, problem) = mission.narrowed(&filled);
+        let narrowed = Task::new(&domain, &problem).explore();
+        assert_eq!(narrowed.steps, exported.steps, "{failed:?} {visibility:?}");
+        assert_eq!(narrowed.least, exported.least, "{failed:?} {visibility:?}");
     }
 }
 

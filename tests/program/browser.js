@@ -1,6 +1,6 @@
-// Asks the page in the frame what is wrong with it, and writes the answer into the page around it.
-addEventListener("load", () => {
-  const frame = document.getElementById("page"), page = frame.contentDocument, wrong = [];
+// Returns what is wrong with the page in a frame, and what it shows.
+const inspect = frame => {
+  const page = frame.contentDocument, wrong = [];
   const shown = own => own.checkVisibility();
   const name = own => `${own.tagName} ${(own.textContent || "").trim().slice(0, 40)}`;
   const overlaps = (all, what) => {
@@ -77,10 +77,14 @@ addEventListener("load", () => {
   if (before.length && after.length && JSON.stringify(before) !== JSON.stringify(after)) wrong.push(`two axes: ${before} | ${after}`);
   const pictures = [...page.querySelectorAll("svg[role=img]")].filter(shown);
   for (const own of pictures) if (!own.querySelector("title")) wrong.push("a picture without a title");
-  document.getElementById("found").textContent = JSON.stringify({
+  return {
     wrong, unfolding: details.length, pictures: pictures.length, done: [...page.querySelectorAll(".bar.done")].filter(shown).length,
     axis: after[0], about: page.getElementById("plan-about")?.textContent,
     numbers: [...page.querySelectorAll(".leg text")].filter(shown).map(own => own.textContent),
     now: [...page.querySelectorAll(".bar.now")].filter(shown).map(own => own.dataset.step), status: page.getElementById("status")?.textContent,
-  });
+  };
+};
+// Writes an answer for each frame into the page around them.
+addEventListener("load", () => {
+  document.getElementById("found").textContent = JSON.stringify([...document.querySelectorAll("iframe")].map(inspect));
 });

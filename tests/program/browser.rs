@@ -56,30 +56,33 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('"', "&quot;")
 }
 
-/// Opens a page by itself and at each width, and asks what is wrong with it.
+/// Opens a page at each width, in frames of one page since the start of a browser takes seconds, and asserts that nothing is wrong with it. Returns
+/// what it shows at the last width.
 fn check(browser: &Path, name: &str, page: &str) -> Value {
     let folder = tempfile::tempdir().expect("a folder");
-    let own = folder.path().join("page.html");
-    std::fs::write(&own, page).expect("the page is written");
-    let (console, _) = open(browser, &own, folder.path());
-    assert!(console.is_empty(), "{name}: {console:#?}");
-    let mut last = Value::Null;
-    for width in WIDTHS {
-        let around = format!(
-            "<!DOCTYPE html><html><body style=\"margin:0\"><iframe id=\"page\" style=\"border:0;width:{width}px;height:900px\" \
-             srcdoc=\"{}\"></iframe><pre id=\"found\"></pre><script>{QUESTIONS}</script></body></html>",
+    let frames = WIDTHS.map(|width| {
+        format!(
+            "<iframe style=\"border:0;width:{width}px;height:900px\" srcdoc=\"{}\"></iframe>",
             escaped(page)
-        );
-        let outer = folder.path().join("around.html");
-        std::fs::write(&outer, around).expect("the page is written");
-        let (console, document) = open(browser, &outer, folder.path());
-        assert!(console.is_empty(), "{name} at {width}: {console:#?}");
-        let found = document.rsplit("<pre id=\"found\">").next().and_then(|rest| rest.split("</pre>").next());
-        let found = found.expect("an answer").replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&");
-        last = serde_json::from_str(&found).unwrap_or_else(|error| panic!("{name}: {error}: {found}"));
-        assert_eq!(last["wrong"], Value::Array(Vec::new()), "{name} at {width} pixels");
+        )
+    });
+    let around = format!(
+        "<!DOCTYPE html><html><body style=\"margin:0\">{}<pre id=\"found\"></pre><script>{QUESTIONS}</script></body></html>",
+        frames.concat()
+    );
+    let outer = folder.path().join("around.html");
+    std::fs::write(&outer, around).expect("the page is written");
+    let (console, document) = open(browser, &outer, folder.path());
+    assert!(console.is_empty(), "{name}: {console:#?}");
+    let answers = document.rsplit("<pre id=\"found\">").next().and_then(|rest| rest.split("</pre>").next());
+    let answers = answers.expect("answers").replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&");
+    let mut answers: Vec<Value> =
+        serde_json::from_str(&answers).unwrap_or_else(|error| panic!("{name}: {error}: {answers}"));
+    assert_eq!(answers.len(), WIDTHS.len(), "{name}");
+    for (answer, width) in answers.iter().zip(WIDTHS) {
+        assert_eq!(answer["wrong"], Value::Array(Vec::new()), "{name} at {width} pixels");
     }
-    last
+    answers.pop().expect("an answer")
 }
 
 fn page(arguments: &[&str]) -> String {

@@ -27,7 +27,8 @@ fn code_lines(text: &str) -> usize {
 
 /// The rows of the table: folders and files without their ending, and the figure.
 fn rows(page: &str) -> Vec<(Vec<String>, usize)> {
-    let table = page.split("| room | lines | what is believed |\n").nth(1).expect("a table of rooms");
+    let table =
+        page.split("| part | lines | checked how | trusted why |\n").nth(1).expect("a table of parts");
     let rows = table.lines().skip(1).take_while(|line| line.starts_with('|'));
     rows.map(|row| {
         let cells: Vec<&str> = row.trim_matches('|').split('|').map(str::trim).collect();

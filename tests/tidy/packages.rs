@@ -46,6 +46,20 @@ fn who_must_be_believed_links_nothing_that_plans() {
     assert_eq!(found("metaplan", &PLANNERS), PLANNERS);
 }
 
+/// Narrowing is a matter of the planner: the facade has it, which no checker is linked with, and only grounding uses it.
+#[test]
+fn only_grounding_narrows_tasks() {
+    let files = crate::files();
+    let is_use = |text: &str| text.contains("narrow::");
+    let users = files.iter().filter(|(name, text)| name != "tests/tidy/packages.rs" && is_use(text));
+    assert_eq!(users.map(|(name, _)| name.as_str()).collect::<Vec<_>>(), ["src/mission/planning.rs"]);
+    for module in ["clause", "fold", "possible", "settle"] {
+        let places = files.iter().filter(|(name, _)| name.ends_with(&format!("/{module}.rs")));
+        let places: Vec<&str> = places.map(|(name, _)| name.as_str()).collect();
+        assert_eq!(places, [format!("src/narrow/{module}.rs")], "{module}");
+    }
+}
+
 /// Numbers are exact: what does not fit is a fault, also in a release build, and in packages that are still to come.
 #[test]
 fn own_packages_check_for_overflows_in_releases() {

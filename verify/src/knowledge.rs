@@ -149,6 +149,15 @@ fn replayed(written: &KnowledgeFiles<'_>) -> Result<(Knowledge, String, Origin),
     Ok((knowledge, said, origin))
 }
 
+/// The code that joins knowledge and PDDL, which the planner runs, too.
+fn shared(mission: &Mission) -> &'static str {
+    match (mission.adaptation(), mission.completed_predicates()) {
+        (Some(_), _) => "the bindings, and the explicit form of the plain domain",
+        (None, Some(_)) => "the completion of PLANTA's form",
+        (None, None) => "the bindings",
+    }
+}
+
 fn filled(
     knowledge: Knowledge,
     origin: &Origin,
@@ -177,5 +186,5 @@ fn filled(
     }
     // The metric is the only thing that a user chooses with each plan.
     let metric = if own == expected { "" } else { ", with another metric than the mission's" };
-    Ok(format!("the problem is what follows{metric}"))
+    Ok(format!("the problem is what follows{metric}; on trust: {}", shared(&mission)))
 }

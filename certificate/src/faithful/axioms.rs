@@ -3,6 +3,7 @@
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::faithful::key::Key;
+use crate::faithful::relation::Relation;
 
 #[derive(Debug, Default)]
 pub(super) struct Axioms {
@@ -10,6 +11,8 @@ pub(super) struct Axioms {
     pub(super) may: FxHashSet<Key>,
     /// Those that hold in every one.
     pub(super) must: FxHashSet<Key>,
+    /// All derived atoms that may hold, and possibly more: an upper bound, from which the objects of variables are taken.
+    pub(super) bound: Relation,
     /// Those that depend on themselves and are variables of the task. All others are what their rules say.
     pub(super) linked: FxHashSet<Key>,
     /// Predicates and functions on which a derived predicate depends.

@@ -1,5 +1,5 @@
-//! The objects that a variable can stand for where a condition holds: those that an equality, a fact that never changes, or an atom of
-//! the witness gives it. With any other object the condition is false in every state of the witness.
+//! The objects that a variable can stand for where a condition holds: those that an equality, a fact that never changes, an atom of
+//! the witness, or a derived atom that may hold gives it. With any other object the condition is false in every state of the witness.
 
 use std::collections::BTreeSet;
 
@@ -49,17 +49,18 @@ impl Reader<'_> {
     fn in_atom(&self, name: &Name, atom: &Atom, hidden: &[&Name]) -> Option<BTreeSet<u32>> {
         let place = atom.arguments.iter().position(|term| is(term, name))?;
         let symbol = self.world.symbol(&atom.predicate.name).ok()?;
-        if self.world.rules(symbol).is_some() {
-            return None;
-        }
         let known: Vec<Option<u32>> = atom.arguments.iter().map(|term| self.known(term, hidden)).collect();
         let fits = |row: &[u32]| {
             row.len() == known.len()
                 && row.iter().zip(&known).all(|(own, known)| known.is_none_or(|known| known == *own))
         };
         let of = |row: &[u32]| row.get(place).copied().filter(|_| fits(row));
+        let given = known.iter().enumerate().find_map(|(place, own)| Some((place, (*own)?)));
+        if self.world.rules(symbol).is_some() {
+            let rows = || self.axioms.bound.rows(symbol, given).filter_map(|key| of(&key.1)).collect();
+            return (!self.is_touched(symbol)).then(rows);
+        }
         if !self.world.changes(symbol) {
-            let given = known.iter().enumerate().find_map(|(place, own)| Some((place, (*own)?)));
             return Some(self.world.rows(symbol, given).into_iter().filter_map(|row| of(row)).collect());
         }
         // What the start of the action adds, the witness of the state before need not have.

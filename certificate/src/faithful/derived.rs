@@ -24,6 +24,7 @@ pub(super) fn axioms(
     if axioms.reads.is_empty() {
         return Ok(axioms);
     }
+    bound(world, invariant, &mut axioms)?;
     let bodies = bodies(world, invariant, &axioms)?;
     // Each set is sound if the other one is, and each gets better with the other one.
     loop {
@@ -35,6 +36,7 @@ pub(super) fn axioms(
             break;
         }
     }
+    axioms.bound = axioms.may.iter().cloned().collect();
     let circular = circular(&axioms, &bodies);
     axioms.linked = linked.iter().filter(|key| circular.contains(*key)).cloned().collect();
     Ok(axioms)
@@ -63,24 +65,53 @@ fn circular<'b>(axioms: &Axioms, bodies: &'b [(Key, Formula)]) -> FxHashSet<&'b 
     }
 }
 
+/// An upper bound of the derived atoms that may hold: the least fixpoint in which everything that is not a positive atom is possible.
+fn bound(world: &World<'_>, invariant: &Invariant, axioms: &mut Axioms) -> Result<(), Cause> {
+    let mut symbols: Vec<u32> = world.derived().map(|(symbol, _)| symbol).collect();
+    symbols.sort_unstable();
+    // The derived predicates that grew in the last round; in the first round every rule is evaluated.
+    let mut grown: Option<FxHashSet<u32>> = None;
+    loop {
+        let mut heads = Vec::new();
+        for symbol in &symbols {
+            for rule in world.rules(*symbol).unwrap_or_default() {
+                let mut read = FxHashSet::default();
+                in_condition(world, &rule.condition, &mut read)?;
+                if grown.as_ref().is_some_and(|grown| grown.is_disjoint(&read)) {
+                    continue;
+                }
+                let mut reader = Reader::new(world, invariant, axioms);
+                let names: Vec<_> = rule.head.parameters.iter().map(|own| &own.identifier.name).collect();
+                reader.each(&rule.head.parameters, Some(&rule.condition), &mut |own| {
+                    let objects = names.iter().map(|name| own.binding[name]).collect();
+                    let key = (*symbol, objects);
+                    if !own.axioms.bound.contains(&key) && own.is_possible(&rule.condition)? {
+                        heads.push(key);
+                    }
+                    Ok(true)
+                })?;
+            }
+        }
+        let mut more = FxHashSet::default();
+        for key in heads {
+            let symbol = key.0;
+            if axioms.bound.insert(key) {
+                more.insert(symbol);
+            }
+            if axioms.bound.len() > ATOM_LIMIT {
+                return Err(Cause::TooMany { what: "derived atoms".into(), limit: ATOM_LIMIT });
+            }
+        }
+        if more.is_empty() {
+            return Ok(());
+        }
+        grown = Some(more);
+    }
+}
+
 /// Derived atoms with the conditions under which they hold, in terms of atoms of both kinds.
 fn bodies(world: &World<'_>, invariant: &Invariant, axioms: &Axioms) -> Result<Vec<(Key, Formula)>, Cause> {
-    let mut heads: FxHashSet<Key> = FxHashSet::default();
-    for (symbol, rules) in world.derived() {
-        for rule in rules {
-            let mut reader = Reader::new(world, invariant, axioms);
-            let names: Vec<_> = rule.head.parameters.iter().map(|own| &own.identifier.name).collect();
-            reader.each(&rule.head.parameters, Some(&rule.condition), &mut |own| {
-                let objects = names.iter().map(|name| own.binding[name]).collect();
-                heads.insert((symbol, objects));
-                if heads.len() > ATOM_LIMIT {
-                    return Err(Cause::TooMany { what: "derived atoms".into(), limit: ATOM_LIMIT });
-                }
-                Ok(true)
-            })?;
-        }
-    }
-    let mut heads: Vec<Key> = heads.into_iter().collect();
+    let mut heads: Vec<Key> = axioms.bound.atoms().cloned().collect();
     heads.sort_unstable();
     let body = |key: Key| {
         let mut reader = Reader::new(world, invariant, axioms);

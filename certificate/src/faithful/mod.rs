@@ -36,6 +36,7 @@ mod lengths;
 mod linear;
 mod reader;
 mod reads;
+mod relation;
 mod timeline;
 mod translation;
 mod verdict;

@@ -192,10 +192,10 @@ impl<'r> Reader<'r> {
 
     fn derived(&mut self, key: Key, holds: bool) -> Result<Formula, Cause> {
         if self.opaque {
-            return Ok(Formula::Atom(key, holds));
+            let may_hold = self.axioms.bound.contains(&key);
+            return Ok(if may_hold { Formula::Atom(key, holds) } else { Formula::truth(!holds) });
         }
-        let touched = self.applied.truths.keys().chain(self.applied.changes.keys());
-        if !self.axioms.depends(key.0, touched.map(|key| key.0)) {
+        if !self.is_touched(key.0) {
             if let Some(known) = self.axioms.known(&key) {
                 return Ok(Formula::truth(known == holds));
             }
@@ -205,6 +205,62 @@ impl<'r> Reader<'r> {
         }
         let formula = self.unfold(&key)?;
         Ok(if holds { formula } else { formula.negated() })
+    }
+
+    /// Returns `true` if a derived predicate depends on what the start of the action has changed, so that the witness says nothing of it.
+    pub(super) fn is_touched(&self, symbol: u32) -> bool {
+        let touched = self.applied.truths.keys().chain(self.applied.changes.keys());
+        self.axioms.depends(symbol, touched.map(|key| key.0))
+    }
+
+    /// Returns `false` if a condition holds in no state of the witness: negations, implications and comparisons that change are
+    /// taken to be possible.
+    pub(super) fn is_possible(&mut self, condition: &'r Condition) -> Result<bool, Cause> {
+        self.count()?;
+        match condition {
+            Condition::And(parts) => {
+                for part in parts {
+                    if !self.is_possible(part)? {
+                        return Ok(false);
+                    }
+                }
+                Ok(true)
+            }
+            Condition::Or(parts) => {
+                for part in parts {
+                    if self.is_possible(part)? {
+                        return Ok(true);
+                    }
+                }
+                Ok(false)
+            }
+            Condition::Exists(bound, inner) => {
+                let mut possible = false;
+                self.each(bound, Some(inner), &mut |own| {
+                    possible = own.is_possible(inner)?;
+                    Ok(!possible)
+                })?;
+                Ok(possible)
+            }
+            Condition::Atom(atom) => {
+                let key = self.world.key(atom, &self.binding)?;
+                Ok(if self.world.rules(key.0).is_some() {
+                    self.axioms.bound.contains(&key)
+                } else {
+                    !self::atom(self.world, self.invariant, key, true).is(false)
+                })
+            }
+            Condition::Equal(left, right, _) => self.equal(left, right),
+            Condition::Not(inner) => Ok(match &**inner {
+                Condition::Equal(left, right, _) => !self.equal(left, right)?,
+                Condition::Atom(atom) if !self.world.is_derived(atom) => {
+                    let key = self.world.key(atom, &self.binding)?;
+                    !self::atom(self.world, self.invariant, key, false).is(false)
+                }
+                _ => true,
+            }),
+            Condition::Imply(..) | Condition::ForAll(..) | Condition::Compare(..) => Ok(true),
+        }
     }
 
     /// The condition under which a derived atom holds.

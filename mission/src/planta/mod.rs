@@ -3,40 +3,31 @@
 //! PLANTA \[1\] keeps what robots are in OWL and lets its domains ask for it by names: `(solvesF ?fd ?f)` for what the knowledge base
 //! states, `(inferred-Fd_realisability ?fd false_boolean)` for what is stated or follows. Its `OWLToPDDL` \[2\] writes the rest into
 //! the files before each planning: types, constants, predicates, axioms and rules as derived predicates, assertions as initial
-//! facts, and how numbers compare. This room does the same inside, with the same names.
-//!
-//! What depends on nothing that an action changes is decided here, once for a situation (`fold`): its derived predicates become
-//! initial facts.
+//! facts, and how numbers compare. This module does the same inside, with the same names.
 //!
 //! \[1\] G. Rezende Silva et al.: PLANTA, `kas-lab/suave_planta` and `kas-lab/navigation_planta`.
 //! \[2\] `remaro-network/dlToPlanning`.
 
 mod axioms;
-mod clause;
 mod complete;
-mod fold;
 mod mentioned;
 mod names;
-mod possible;
-mod settle;
 mod swrl;
 mod syntax;
 mod terms;
 
-use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::collections::{BTreeSet, HashSet};
 use std::sync::Arc;
 
 use ontology::Ontology;
-use pddl::ast::{Domain, InitialElement, Name, Problem, Term, TypeExpression};
-use pddl::{Source, TypeHierarchy};
+use pddl::ast::{Domain, InitialElement, Name, Problem, Term};
+use pddl::{Mentioned, Source};
 use rules::{Engine, Fact, Literal, Value};
 
 use crate::message::{Message, did_you_mean};
 use complete::drop_repeated;
-use fold::Folded;
 use names::{EQUAL, LESS, NUMBER_TYPES, UNGROUND, UNREALISABLE};
-use settle::Guards;
-use syntax::{Said, atom, identifier, object, spelled, typed};
+use syntax::{Fact as PddlFact, atom, identifier, object};
 pub use terms::Terms;
 
 /// What an ontology adds to a domain in general, if the domain asks for it: it mentions predicates that it does not declare, and
@@ -58,13 +49,8 @@ pub(crate) struct Planta {
     terms: Arc<Terms>,
     /// The type of numbers.
     number: Name,
-    /// What is taken for granted of facts that actions change.
-    guards: Guards,
     /// The predicates that the knowledge base or a comparison of numbers has something to say of.
     known: HashSet<Name>,
-    folded: Folded,
-    /// The completed domain with all axioms.
-    whole: Option<Arc<Domain>>,
 }
 
 impl Planta {
@@ -73,12 +59,11 @@ impl Planta {
         terms: &Arc<Terms>,
         domain: &Domain,
         problem: &mut Problem,
-        (engine, stated): (&Engine, Vec<Fact>),
     ) -> (Self, Domain, Vec<Message>) {
         let mut own = Terms::clone(terms);
         let mut warnings = std::mem::take(&mut own.warnings);
         warnings.extend(drop_repeated(domain, problem));
-        let mentioned = mentioned::Mentioned::by_domain(domain).and_problem(problem);
+        let mentioned = Mentioned::by_domain(domain).and_problem(problem);
         let types = mentioned::types(domain, problem);
         let known = |r#type: &&&str| types.contains(&Name::new(r#type));
         let number = Name::new(NUMBER_TYPES.iter().find(known).unwrap_or(&NUMBER_TYPES[0]));
@@ -90,22 +75,13 @@ impl Planta {
         // The domain's own axioms come last, as they do in what `OWLToPDDL` writes.
         let rules = own.derived.iter().cloned().chain(std::mem::take(&mut completed.derived));
         completed.derived = rules.collect();
-        let mut guards = settle::guards(domain, &mentioned.changed, &mentioned.timed);
-        let derived = own.derived.clone();
         let known = own.predicates.keys().cloned().chain([LESS, EQUAL].map(Name::new)).collect();
-        let (terms, folded) = (Arc::new(own), Folded::default());
-        let mut planta = Self { terms, number, guards: Guards::new(), known, folded, whole: None };
-        guards.retain(|(predicate, _, class)| planta.is_known(predicate) && planta.is_known(class));
-        let mut facts: BTreeSet<Said> = planta.stated(engine, stated.into_iter()).collect();
-        facts.extend(planta.said(problem));
-        guards.retain(|guard| facts.iter().all(|fact| settle::keeps(fact, guard, &facts)));
-        let known = planta.known.iter().cloned().collect();
-        planta.folded = Folded::new(&derived, domain, (&mentioned.changed, &mentioned.timed), &guards, known);
-        planta.guards = guards;
-        planta.whole = Some(Arc::new(completed.clone()));
-        planta.folded.shorten(&mut completed);
-        mentioned::keep_asked(&mut completed, problem);
-        (planta, completed, warnings)
+        (Self { terms: Arc::new(own), number, known }, completed, warnings)
+    }
+
+    /// The predicates about which the knowledge base or a comparison of numbers says something.
+    pub(crate) fn known(&self) -> &HashSet<Name> {
+        &self.known
     }
 
     /// Predicates that a completed domain asks for and that neither it nor the knowledge base has.
@@ -122,20 +98,7 @@ impl Planta {
         unknown.collect()
     }
 
-    /// The completed domain with all axioms, and a problem with what is stated, from which they conclude all else: as `OWLToPDDL`
-    /// writes them.
-    pub(crate) fn merged(
-        &self,
-        problem: &Problem,
-        (engine, stated): (&Engine, Vec<Fact>),
-    ) -> Option<(Domain, Problem)> {
-        let (whole, mut problem) = (Domain::clone(self.whole.as_ref()?), problem.clone());
-        let plain = Self { folded: Folded::default(), guards: Guards::new(), ..self.clone() };
-        plain.fill(&whole, &mut problem, engine, stated.into_iter());
-        Some((whole, problem))
-    }
-
-    /// Adds to a problem what is stated now, how numbers compare, and what follows whatever the robot does; returns warnings.
+    /// Adds to a problem what is stated now and how numbers compare; returns warnings.
     pub(crate) fn fill(
         &self,
         domain: &Domain,
@@ -143,9 +106,9 @@ impl Planta {
         engine: &Engine,
         stated: impl Iterator<Item = Fact>,
     ) -> Vec<Message> {
-        let mut facts: BTreeSet<Said> = self.stated(engine, stated).collect();
-        let mut messages = self.replace_values(problem, &facts);
-        let said: BTreeSet<Said> = self.said(problem).collect();
+        let mut facts: BTreeSet<PddlFact> = self.stated(engine, stated).collect();
+        let messages = self.replace_values(problem, &facts);
+        let said: BTreeSet<PddlFact> = self.said(problem).collect();
         let constants = domain.constants.iter().chain(&problem.objects);
         let mut known: BTreeSet<Name> = constants.map(|object| object.identifier.name.clone()).collect();
         for name in facts.iter().flat_map(|(_, arguments)| arguments) {
@@ -155,19 +118,6 @@ impl Planta {
             }
         }
         facts.extend(Self::comparisons(domain, &known));
-        let hierarchy = TypeHierarchy::of(domain);
-        let mut types: BTreeMap<&Name, Vec<&TypeExpression>> = BTreeMap::new();
-        for declared in domain.constants.iter().chain(&problem.objects) {
-            types.entry(&declared.identifier.name).or_default().push(&declared.r#type);
-        }
-        let is_of = |object: &Name, wanted: &Name| {
-            let wanted = typed(Some(wanted.clone()));
-            types.get(object).is_some_and(|own| own.iter().any(|own| hierarchy.fits(own, &wanted)))
-        };
-        let stated: BTreeSet<Said> = facts.union(&said).cloned().collect();
-        let folded = self.folded.facts(&stated, &known, &is_of);
-        facts.extend(folded);
-        messages.extend(self.unguarded(&facts, &said));
         problem.init.extend(facts.difference(&said).map(|(predicate, arguments)| {
             let arguments = arguments.iter().map(|name| Term::Constant(identifier(name.clone())));
             InitialElement::Fact(atom(predicate.clone(), arguments.collect()))
@@ -186,18 +136,13 @@ impl Planta {
         let (predicate, no) = (Name::new(UNREALISABLE), self.terms.literals.name(&Literal::Boolean(false)));
         let mut domain = domain.clone();
         domain.derived.retain(|own| own.head.identifier.name != predicate);
-        let bound = possible::possible(&predicate);
-        let is_bounded = domain.predicates.iter().any(|own| own.identifier.name == bound);
         for (design, available) in designs.filter(|(design, _)| *design != UNGROUND) {
             let arguments = vec![names::plain(design), no.clone()];
             let own = Some((predicate.clone(), arguments.clone()));
-            problem.init.retain(|element| spelled(element) != own);
+            problem.init.retain(|element| element.fact() != own);
             if !available {
                 let arguments: Vec<Term> =
                     arguments.into_iter().map(|name| Term::Constant(identifier(name))).collect();
-                if is_bounded {
-                    problem.init.push(InitialElement::Fact(atom(bound.clone(), arguments.clone())));
-                }
                 problem.init.push(InitialElement::Fact(atom(predicate.clone(), arguments)));
             }
         }
@@ -210,40 +155,21 @@ impl Planta {
     }
 
     /// What a problem states of such predicates: all else is of maps and tasks, and there may be very much of it.
-    fn said(&self, problem: &Problem) -> impl Iterator<Item = Said> {
+    fn said(&self, problem: &Problem) -> impl Iterator<Item = PddlFact> {
         let is_known = |element: &&InitialElement| match element {
             InitialElement::Fact(atom) => self.is_known(&atom.predicate.name),
             _ => false,
         };
-        problem.init.iter().filter(is_known).filter_map(spelled)
+        problem.init.iter().filter(is_known).filter_map(InitialElement::fact)
     }
 
     /// What is stated, in PDDL.
-    fn stated(&self, engine: &Engine, stated: impl Iterator<Item = Fact>) -> impl Iterator<Item = Said> {
+    fn stated(&self, engine: &Engine, stated: impl Iterator<Item = Fact>) -> impl Iterator<Item = PddlFact> {
         stated.filter_map(|fact| self.fact(&fact, engine))
     }
 
-    /// Facts that actions change and of which not all is stated that the actions ask for: the domain was completed without them.
-    fn unguarded(&self, facts: &BTreeSet<Said>, said: &BTreeSet<Said>) -> Vec<Message> {
-        let all: BTreeSet<Said> = facts.union(said).cloned().collect();
-        let mut messages = Vec::new();
-        for fact in &all {
-            for guard @ (_, position, class) in &self.guards {
-                if !settle::keeps(fact, guard, &all) {
-                    let (predicate, arguments) = fact;
-                    let text = format!(
-                        "`{}` is related by `{predicate}`, and nothing states that it is a `{class}`, as the actions ask",
-                        arguments[*position]
-                    );
-                    messages.push(Message::error("M214", text));
-                }
-            }
-        }
-        messages
-    }
-
     /// A statement in PDDL; none if it is of nothing that the ontology names.
-    fn fact(&self, fact: &Fact, engine: &Engine) -> Option<Said> {
+    fn fact(&self, fact: &Fact, engine: &Engine) -> Option<PddlFact> {
         let symbols = engine.symbols();
         let predicate = self.terms.symbols.get(symbols.value(fact.predicate).as_name()?)?.clone();
         let name = |symbol: &rules::Symbol| match symbols.value(*symbol) {
@@ -254,7 +180,7 @@ impl Planta {
     }
 
     /// Of properties that have one value only, that of the knowledge base counts.
-    fn replace_values(&self, problem: &mut Problem, facts: &BTreeSet<Said>) -> Vec<Message> {
+    fn replace_values(&self, problem: &mut Problem, facts: &BTreeSet<PddlFact>) -> Vec<Message> {
         let mut warnings = Vec::new();
         problem.init.retain(|element| {
             let InitialElement::Fact(atom) = element else { return true };
@@ -263,7 +189,7 @@ impl Planta {
             {
                 return true;
             }
-            let Some((predicate, arguments)) = spelled(element) else { return true };
+            let Some((predicate, arguments)) = element.fact() else { return true };
             let [subject, value] = &arguments[..] else { return true };
             let other = facts.iter().find(|(own, stated)| *own == predicate && stated[0] == *subject);
             match other {
@@ -282,7 +208,7 @@ impl Planta {
     }
 
     /// How the numbers that there are compare, if anything asks for it.
-    fn comparisons(domain: &Domain, known: &BTreeSet<Name>) -> Vec<Said> {
+    fn comparisons(domain: &Domain, known: &BTreeSet<Name>) -> Vec<PddlFact> {
         let declared =
             |name: &str| domain.predicates.iter().any(|own| own.identifier.name == Name::new(name));
         if !declared(LESS) && !declared(EQUAL) {

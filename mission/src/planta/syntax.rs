@@ -1,12 +1,11 @@
 //! Parts of PDDL that stand in no file.
 
 use pddl::ast::{
-    Atom, Condition, Declaration, Derived, Identifier, InitialElement, Name, Span, Term, TypeExpression,
-    TypedName,
+    Atom, Condition, Declaration, Derived, Identifier, Name, Span, Term, TypeExpression, TypedName,
 };
 
-/// A fact by name.
-pub(super) type Said = (Name, Vec<Name>);
+/// A ground fact: predicate and arguments.
+pub(super) type Fact = (Name, Vec<Name>);
 
 pub(super) fn identifier(name: Name) -> Identifier {
     Identifier { name, span: Span::default() }
@@ -46,13 +45,4 @@ pub(super) fn typed(r#type: Option<Name>) -> TypeExpression {
 
 pub(super) fn object(name: Name, r#type: Option<Name>) -> TypedName {
     TypedName { identifier: identifier(name), r#type: typed(r#type) }
-}
-
-/// A fact of an initial state as names.
-pub(super) fn spelled(element: &InitialElement) -> Option<Said> {
-    let InitialElement::Fact(atom) = element else { return None };
-    let name = |term: &Term| match term {
-        Term::Variable(own) | Term::Constant(own) => own.name.clone(),
-    };
-    Some((atom.predicate.name.clone(), atom.arguments.iter().map(name).collect()))
 }

@@ -8,11 +8,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use pddl::ast::{ActionBody, Atom, Condition, Declaration, Derived, Domain, Effect, Name, Term};
+use pddl::ast::{
+    ActionBody, Atom, Condition, Declaration, Derived, Domain, Effect, Name, Term, TypeExpression, TypedName,
+};
 
+use super::Fact;
 use super::clause::{Clause, Literal};
 use super::settle::{additions, classes, same};
-use super::syntax::{Said, identifier, untyped};
 
 /// A fact that an action may add.
 #[derive(Debug, Clone)]
@@ -48,6 +50,8 @@ impl Possible {
     ) -> Self {
         let mut free = timed.clone();
         free.extend(open.iter().filter(|(_, own)| own.is_none()).map(|(name, _)| name.clone()));
+        // What a settled predicate holds of is computed before the bounds; an open one may hold of more things in other states.
+        let varying: BTreeSet<Name> = changed.iter().chain(open.keys()).cloned().collect();
         let mut all = Vec::new();
         for action in &domain.actions {
             let (asked, effects): (Vec<&Condition>, Vec<&Effect>) = match &action.body {
@@ -57,7 +61,7 @@ impl Possible {
                     effects.iter().map(|(_, own)| own).collect(),
                 ),
             };
-            let asked = classes(&asked, changed);
+            let asked = classes(&asked, &varying);
             let mut added = Vec::new();
             for effect in effects {
                 additions(effect, &[], &mut added);
@@ -103,10 +107,10 @@ impl Possible {
         self.clauses.iter()
     }
 
-    /// Facts that actions may add, where so much is stated.
-    pub fn added(&self, stated: &BTreeSet<Said>) -> BTreeSet<Said> {
+    /// Facts that actions may add, given the facts that hold in every state: those that are stated, and those of settled predicates.
+    pub fn added(&self, fixed: &BTreeSet<Fact>) -> BTreeSet<Fact> {
         let members = |class: &Name| -> BTreeSet<Name> {
-            let own = stated.iter().filter(|(name, row)| name == class && row.len() == 1);
+            let own = fixed.iter().filter(|(name, row)| name == class && row.len() == 1);
             own.map(|(_, row)| row[0].clone()).collect()
         };
         let mut facts = BTreeSet::new();
@@ -132,7 +136,7 @@ impl Possible {
     }
 
     /// The bounds of the predicates, from all that can be derived.
-    pub fn bounds(&self, derived: BTreeSet<Said>) -> impl Iterator<Item = Said> {
+    pub fn bounds(&self, derived: BTreeSet<Fact>) -> impl Iterator<Item = Fact> {
         let own = derived.into_iter().filter(|(name, _)| self.bounded.contains(name));
         own.map(|(name, row)| (possible(&name), row))
     }
@@ -146,9 +150,9 @@ impl Possible {
             .cloned()
             .collect();
         for own in declared {
-            let names: Vec<&str> = own.parameters.iter().map(|own| own.identifier.name.as_str()).collect();
-            let parameters = untyped(&names);
-            let identifier = identifier(possible(&own.identifier.name));
+            let untyped = |own: TypedName| TypedName { r#type: TypeExpression::default(), ..own };
+            let identifier = possible(&own.identifier.name).into();
+            let parameters = own.parameters.into_iter().map(untyped).collect();
             domain.predicates.push(Declaration { identifier, parameters });
         }
         for Derived { head, condition, .. } in &mut domain.derived {
@@ -223,5 +227,5 @@ pub(super) fn possible(name: &Name) -> Name {
 }
 
 fn possible_atom(own: &Atom) -> Condition {
-    Condition::Atom(Atom { predicate: identifier(possible(&own.predicate.name)), ..own.clone() })
+    Condition::Atom(Atom { predicate: possible(&own.predicate.name).into(), ..own.clone() })
 }

@@ -14,9 +14,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use pddl::ast::{ActionBody, Atom, Condition, Domain, Effect, Name, Term};
 
-use super::clause::{Clause, Literal};
-use super::names;
-use super::syntax::Said;
+use super::Fact;
+use super::clause::{Clause, Literal, Operand};
 
 /// How often a clause is unfolded, and how many clauses of one predicate that may make.
 const DEPTH: usize = 8;
@@ -25,8 +24,9 @@ const CLAUSES: usize = 1000;
 /// That arguments of a fact which actions add are stated to be of some classes: predicate, position, class.
 pub(super) type Guards = BTreeSet<(Name, usize, Name)>;
 
-/// What all actions of a domain ask of the arguments of what they add. Classes that are changed themselves guard nothing.
-pub(super) fn guards(domain: &Domain, changed: &BTreeSet<Name>, timed: &BTreeSet<Name>) -> Guards {
+/// The classes that all actions of a domain require of the arguments of the facts that they add. A class guards only if the initial
+/// state alone decides what belongs to it, so that `varying` has the predicates that actions or events change, and derived predicates.
+pub(super) fn guards(domain: &Domain, varying: &BTreeSet<Name>, timed: &BTreeSet<Name>) -> Guards {
     let mut found: BTreeMap<(Name, usize), BTreeSet<Name>> = BTreeMap::new();
     for action in &domain.actions {
         let (asked, effects): (Vec<&Condition>, Vec<&Effect>) = match &action.body {
@@ -37,7 +37,7 @@ pub(super) fn guards(domain: &Domain, changed: &BTreeSet<Name>, timed: &BTreeSet
                 effects.iter().map(|(_, own)| own).collect(),
             ),
         };
-        let classes = classes(&asked, changed);
+        let classes = classes(&asked, varying);
         let mut added = Vec::new();
         for effect in effects {
             additions(effect, &[], &mut added);
@@ -59,13 +59,13 @@ pub(super) fn guards(domain: &Domain, changed: &BTreeSet<Name>, timed: &BTreeSet
     .collect()
 }
 
-/// The unary atoms that a condition asks for.
-pub(super) fn classes<'c>(asked: &[&'c Condition], changed: &BTreeSet<Name>) -> Vec<(Name, &'c Term)> {
+/// The unary atoms that a condition requires, without those of `varying` predicates, which may hold of other things in other states.
+pub(super) fn classes<'c>(asked: &[&'c Condition], varying: &BTreeSet<Name>) -> Vec<(Name, &'c Term)> {
     let (mut parts, mut found) = (asked.to_vec(), Vec::new());
     while let Some(part) = parts.pop() {
         match part {
             Condition::And(more) => parts.extend(more),
-            Condition::Atom(atom) if !changed.contains(&atom.predicate.name) => {
+            Condition::Atom(atom) if !varying.contains(&atom.predicate.name) => {
                 if let [own] = &atom.arguments[..] {
                     found.push((atom.predicate.name.clone(), own));
                 }
@@ -202,19 +202,30 @@ impl Unfold<'_> {
             let itself = name == self.head && *operands == clause.arguments;
             let guarded = |(predicate, position, class): &(Name, usize, Name)| {
                 predicate == name
-                    && names::inferred(class) == *self.head
                     && clause.arguments[..] == operands[*position..=*position]
+                    && self.holds_of_all(class)
             };
             itself || self.guards.iter().any(guarded)
         })
+    }
+
+    /// Returns `true` if a clause concludes the predicate of all members of a class.
+    fn holds_of_all(&self, class: &Name) -> bool {
+        let is_inclusion = |clause: &Clause| match (&clause.body[..], &clause.arguments[..]) {
+            ([Literal::Holds(name, operands)], [Operand::Variable(_)]) => {
+                name == class && *operands == clause.arguments
+            }
+            _ => false,
+        };
+        self.all[self.head].iter().flatten().any(is_inclusion)
     }
 }
 
 /// Whether a fact keeps to a guard, where so much is stated.
 pub(super) fn keeps(
-    (predicate, arguments): &Said,
+    (predicate, arguments): &Fact,
     (guarded, position, class): &(Name, usize, Name),
-    stated: &BTreeSet<Said>,
+    stated: &BTreeSet<Fact>,
 ) -> bool {
     let has = |of: &Name| stated.contains(&(class.clone(), vec![of.clone()]));
     predicate != guarded || arguments.get(*position).is_none_or(has)

@@ -6,12 +6,12 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
-use pddl::ast::{Derived, Domain, Name};
+use pddl::ast::{Domain, Name};
 
+use super::Fact;
 use super::clause::{self, Clause, Literal, Operand};
 use super::possible::Possible;
 use super::settle::{Guards, settle};
-use super::syntax::Said;
 
 /// The settled derived predicates, and their clauses.
 #[derive(Debug, Clone, Default)]
@@ -21,47 +21,23 @@ pub(super) struct Folded {
 }
 
 impl Folded {
-    /// What is settled of the rules of a knowledge base in a domain whose actions and events change some predicates, and of the
-    /// domain's own axioms about nothing but the given predicates of the knowledge base.
+    /// Settles what it can of the predicates in `known`, and of predicates whose axioms mention nothing else. Actions and timed
+    /// initial literals change the predicates in `changed`; of these, timed initial literals change those in `timed`.
     pub fn new(
-        derived: &[Derived],
         domain: &Domain,
         (changed, timed): (&BTreeSet<Name>, &BTreeSet<Name>),
         guards: &Guards,
-        mut known: BTreeSet<Name>,
+        known: &HashSet<Name>,
     ) -> Self {
-        let mut all: BTreeMap<Name, Option<Vec<Clause>>> = BTreeMap::new();
-        for axiom in derived {
-            add(&mut all, &axiom.head.identifier.name, clause::clauses(axiom));
-        }
-        let own: Vec<(&Name, Option<Vec<Clause>>)> = domain
+        let axioms: Vec<(&Name, Option<Vec<Clause>>)> = domain
             .derived
             .iter()
             .map(|axiom| (&axiom.head.identifier.name, clause::clauses(axiom)))
             .collect();
-        // Axioms about maps may hold of very much; they are left to the planner.
-        let mut large: BTreeSet<&Name> = own.iter().map(|(head, _)| *head).collect();
-        loop {
-            let small = |clauses: &Option<Vec<Clause>>| {
-                clauses.iter().all(|all| {
-                    all.iter().all(|clause| {
-                        clause.is_bound()
-                            && clause.body.iter().all(|part| match part {
-                                Literal::Holds(name, _) => part.is_type() || known.contains(name),
-                                Literal::Equal(..) => true,
-                            })
-                    })
-                })
-            };
-            let next = large.iter().copied().find(|head| {
-                own.iter().all(|(other, clauses)| other != head || clauses.is_some() && small(clauses))
-            });
-            let Some(next) = next else { break };
-            large.remove(next);
-            known.insert(next.clone());
-        }
-        for (head, clauses) in &own {
-            add(&mut all, head, clauses.clone().filter(|_| !large.contains(head)));
+        let known = with_small(&axioms, known.clone());
+        let mut all: BTreeMap<Name, Option<Vec<Clause>>> = BTreeMap::new();
+        for (head, clauses) in axioms {
+            add(&mut all, head, clauses.filter(|_| known.contains(head)));
         }
         let (settled, open) = settle(all, changed, guards);
         let possible = Possible::new(domain, &open, (changed, timed), &|class| known.contains(class));
@@ -77,27 +53,53 @@ impl Folded {
     /// What is settled, and what is possible of the rest, given what is stated of which objects.
     pub fn facts(
         &self,
-        stated: &BTreeSet<Said>,
+        stated: &BTreeSet<Fact>,
         objects: &BTreeSet<Name>,
         is_of: &dyn Fn(&Name, &Name) -> bool,
-    ) -> BTreeSet<Said> {
+    ) -> BTreeSet<Fact> {
         let settled: Vec<&Clause> = self.settled.values().flatten().collect();
         let mut facts = fixpoint(&settled, stated, objects, is_of);
-        let all: BTreeSet<Said> =
-            stated.iter().chain(&facts).cloned().chain(self.possible.added(stated)).collect();
+        let mut all: BTreeSet<Fact> = stated.union(&facts).cloned().collect();
+        all.extend(self.possible.added(&all));
         let open: Vec<&Clause> = self.possible.clauses().collect();
         facts.extend(self.possible.bounds(fixpoint(&open, &all, objects, is_of)));
         facts
     }
 }
 
+/// Adds to `known` the predicates whose axioms mention only predicates in it. Those of other axioms, for example about maps, may hold of
+/// very much.
+fn with_small(axioms: &[(&Name, Option<Vec<Clause>>)], mut known: HashSet<Name>) -> HashSet<Name> {
+    let is_small = |clauses: &[Clause], known: &HashSet<Name>| {
+        let is_known = |part: &Literal| match part {
+            Literal::Holds(name, _) => part.is_type() || known.contains(name),
+            Literal::Equal(..) => true,
+        };
+        clauses.iter().all(|clause| clause.is_bound() && clause.body.iter().all(is_known))
+    };
+    let mut large: BTreeSet<&Name> = axioms.iter().map(|(head, _)| *head).collect();
+    large.retain(|head| !known.contains(*head));
+    loop {
+        let is_small = |(_, clauses): &&(&Name, Option<Vec<Clause>>)| {
+            clauses.as_ref().is_some_and(|clauses| is_small(clauses, &known))
+        };
+        let next = large.iter().copied().find(|head| {
+            let mut own = axioms.iter().filter(|(other, _)| other == head);
+            own.all(|axiom| is_small(&axiom))
+        });
+        let Some(next) = next else { return known };
+        large.remove(next);
+        known.insert(next.clone());
+    }
+}
+
 /// What follows from facts by clauses.
 fn fixpoint(
     clauses: &[&Clause],
-    stated: &BTreeSet<Said>,
+    stated: &BTreeSet<Fact>,
     objects: &BTreeSet<Name>,
     is_of: &dyn Fn(&Name, &Name) -> bool,
-) -> BTreeSet<Said> {
+) -> BTreeSet<Fact> {
     let mut known = Known { relations: HashMap::new(), objects };
     let parts = clauses.iter().flat_map(|clause| &clause.body);
     let types: BTreeSet<&Name> = parts.filter(|part| part.is_type()).filter_map(Literal::name).collect();
@@ -232,7 +234,7 @@ impl Known<'_> {
     }
 
     /// The instances of a head; arguments that the body does not bind stand for anything.
-    fn heads(&self, clause: &Clause, found: &Found<'_>, new: &mut Vec<Said>) {
+    fn heads(&self, clause: &Clause, found: &Found<'_>, new: &mut Vec<Fact>) {
         let mut rows: Vec<(Vec<Name>, Found<'_>)> = vec![(Vec::new(), found.clone())];
         for argument in &clause.arguments {
             rows = rows

@@ -1,0 +1,107 @@
+//! Narrowing: an equivalent and smaller task for the planner.
+//!
+//! A domain in PLANTA's form is completed with hundreds of axioms, and actions change little of what they conclude. Derived predicates
+//! that no action can change become initial facts (`settle`, `fold`). The others get an upper bound, a static predicate
+//! that holds wherever they can hold (`possible`), so that grounding looks at few objects.
+//!
+//! The planner alone uses this. What a mission says, exports and certifies is the task before narrowing, with which the checker compares the
+//! ground task.
+
+mod clause;
+mod fold;
+mod possible;
+mod settle;
+
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet, HashSet};
+
+use ::mission::Mission;
+use pddl::ast::{Atom, Domain, InitialElement, Name, Problem, Term, TypeExpression};
+use pddl::{Mentioned, TypeHierarchy};
+
+use fold::Folded;
+use settle::Guards;
+
+/// A ground fact: predicate and arguments.
+type Fact = (Name, Vec<Name>);
+
+/// A domain and a problem with the same plans as those of a mission, smaller if its knowledge base completes its domain.
+///
+/// `domain` and `problem` may be variants of the mission's own, with another state or goal.
+pub(crate) fn narrowed<'t>(
+    mission: &Mission,
+    domain: &'t Domain,
+    problem: &'t Problem,
+) -> (Cow<'t, Domain>, Cow<'t, Problem>) {
+    match mission.completed_predicates() {
+        Some(known) => {
+            let (domain, problem) = narrow(domain, problem, known);
+            (Cow::Owned(domain), Cow::Owned(problem))
+        }
+        None => (Cow::Borrowed(domain), Cow::Borrowed(problem)),
+    }
+}
+
+/// Narrows the predicates in `known` and what follows from them. Other predicates are of maps and tasks and may hold of very much, so that
+/// they are left to grounding.
+fn narrow(domain: &Domain, problem: &Problem, known: &HashSet<Name>) -> (Domain, Problem) {
+    let mentioned = Mentioned::by_domain(domain).and_problem(problem);
+    let facts: BTreeSet<Fact> = problem
+        .init
+        .iter()
+        .filter_map(InitialElement::fact)
+        .filter(|(predicate, _)| known.contains(predicate))
+        .collect();
+    let heads = domain.derived.iter().map(|axiom| &axiom.head.identifier.name);
+    let varying = mentioned.changed.iter().chain(heads).cloned().collect();
+    let mut guards: Guards = settle::guards(domain, &varying, &mentioned.timed);
+    guards.retain(|guard @ (predicate, _, class)| {
+        known.contains(predicate)
+            && known.contains(class)
+            && facts.iter().all(|fact| settle::keeps(fact, guard, &facts))
+    });
+    let folded = Folded::new(domain, (&mentioned.changed, &mentioned.timed), &guards, known);
+    let (mut domain, mut problem) = (domain.clone(), problem.clone());
+    folded.shorten(&mut domain);
+    drop_unused(&mut domain, &problem);
+    let objects = domain.constants.iter().chain(&problem.objects);
+    let names: BTreeSet<Name> = objects.clone().map(|object| object.identifier.name.clone()).collect();
+    let mut types: BTreeMap<&Name, Vec<&TypeExpression>> = BTreeMap::new();
+    for object in objects {
+        types.entry(&object.identifier.name).or_default().push(&object.r#type);
+    }
+    let hierarchy = TypeHierarchy::of(&domain);
+    let is_of = |object: &Name, r#type: &Name| {
+        let expected = TypeExpression { alternatives: vec![r#type.clone().into()] };
+        types.get(object).is_some_and(|own| own.iter().any(|own| hierarchy.fits(own, &expected)))
+    };
+    let conclusions = folded.facts(&facts, &names, &is_of);
+    let conclusions = conclusions.into_iter().filter(|fact| !facts.contains(fact));
+    problem.init.extend(conclusions.map(|(predicate, arguments)| {
+        let arguments = arguments.into_iter().map(|name| Term::Constant(name.into())).collect();
+        InitialElement::Fact(Atom { span: Default::default(), predicate: predicate.into(), arguments })
+    }));
+    (domain, problem)
+}
+
+/// Removes the derived predicates on which no action, goal, metric or other predicate depends.
+fn drop_unused(domain: &mut Domain, problem: &Problem) {
+    let derived = std::mem::take(&mut domain.derived);
+    let mut used = Mentioned::by_domain(domain).and_problem(problem).predicates;
+    loop {
+        let mut more = Mentioned::default();
+        for axiom in derived.iter().filter(|axiom| used.contains(&axiom.head.identifier.name)) {
+            more.condition(&axiom.condition);
+        }
+        let count = used.len();
+        used.extend(more.predicates);
+        if used.len() == count {
+            break;
+        }
+    }
+    let (kept, unused): (Vec<_>, Vec<_>) =
+        derived.into_iter().partition(|axiom| used.contains(&axiom.head.identifier.name));
+    domain.derived = kept;
+    let unused: BTreeSet<Name> = unused.into_iter().map(|axiom| axiom.head.identifier.name).collect();
+    domain.predicates.retain(|declared| !unused.contains(&declared.identifier.name));
+}

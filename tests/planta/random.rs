@@ -1,0 +1,252 @@
+//! Random tasks in PLANTA's form: narrowed and settled as the planner gets them, and as they are exported, they have the same states.
+//!
+//! Both are explored by brute force, which shares nothing with the planner. The oracle of a change in the front end is the exported task: it
+//! has all axioms, nothing that is settled, and no bound.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use fastrand::Rng;
+use metaplan::mission::Planning;
+
+use crate::brute::Task;
+use crate::files::{Input, metaplan, real, shown};
+
+const CLASSES: [&str; 5] = ["Ca", "Cb", "Cc", "Cd", "Ce"];
+const PROPERTIES: [&str; 2] = ["pa", "pb"];
+const INDIVIDUALS: [&str; 2] = ["i1", "i2"];
+/// Larger tasks are skipped.
+const STATES: usize = 300;
+
+/// The texts of a task: knowledge base, domain and problem.
+struct Texts {
+    knowledge: String,
+    domain: String,
+    problem: String,
+}
+
+impl Texts {
+    fn write(&self, directory: &Path) -> Input {
+        let file = |name: &str, text: &str| {
+            let path = directory.join(name);
+            std::fs::write(&path, text).expect("the file is written");
+            path
+        };
+        Input {
+            domain: file("domain.pddl", &self.domain),
+            problem: file("problem.pddl", &self.problem),
+            knowledge: file("kb.ofn", &self.knowledge),
+            directory: directory.to_owned(),
+        }
+    }
+}
+
+fn knowledge(axioms: &str) -> String {
+    let mut text = "Prefix(:=<http://example.org/k#>)\nOntology(<http://example.org/k>\n".to_owned();
+    for (kind, names) in
+        [("Class", &CLASSES[..]), ("ObjectProperty", &PROPERTIES), ("NamedIndividual", &INDIVIDUALS)]
+    {
+        for name in names {
+            let _ = writeln!(text, "Declaration({kind}(:{name}))");
+        }
+    }
+    text + axioms + ")\n"
+}
+
+fn pick<'n>(random: &mut Rng, names: &[&'n str]) -> &'n str {
+    names[random.usize(..names.len())]
+}
+
+/// Axioms about classes and properties, and assertions.
+fn axioms(random: &mut Rng) -> String {
+    let mut text = String::new();
+    // An individual that is only declared is no object.
+    for individual in INDIVIDUALS {
+        let _ = writeln!(text, "ClassAssertion(:Ce :{individual})");
+    }
+    for class in CLASSES {
+        for individual in INDIVIDUALS {
+            if random.u8(..10) < 3 {
+                let _ = writeln!(text, "ClassAssertion(:{class} :{individual})");
+            }
+        }
+        let other = pick(random, &CLASSES);
+        if random.u8(..10) < 3 && class != other {
+            let _ = writeln!(text, "SubClassOf(:{class} :{other})");
+        }
+    }
+    for property in PROPERTIES {
+        for (axiom, chance) in [("ObjectPropertyDomain", 5), ("ObjectPropertyRange", 5)] {
+            if random.u8(..10) < chance {
+                let _ = writeln!(text, "{axiom}(:{property} :{})", pick(random, &CLASSES));
+            }
+        }
+        if random.u8(..10) < 3 {
+            let [filler, class] = [pick(random, &CLASSES), pick(random, &CLASSES)];
+            let _ = writeln!(text, "SubClassOf(ObjectSomeValuesFrom(:{property} :{filler}) :{class})");
+        }
+        if random.u8(..10) < 3 {
+            let [subject, object] = [pick(random, &INDIVIDUALS), pick(random, &INDIVIDUALS)];
+            let _ = writeln!(text, "ObjectPropertyAssertion(:{property} :{subject} :{object})");
+        }
+    }
+    text
+}
+
+/// The name of what is stated of a class or property, or follows.
+fn inferred(name: &str) -> String {
+    format!("inferred-{}{}", name[..1].to_uppercase(), &name[1..])
+}
+
+/// A condition on one or two variables.
+fn condition(random: &mut Rng, has_axiom: bool) -> String {
+    let variable = pick(random, &["?x", "?x", "?y"]);
+    match random.u8(..if has_axiom { 8 } else { 7 }) {
+        0 | 1 => format!("({} {variable})", pick(random, &CLASSES)),
+        2..=4 => format!("({} {variable})", inferred(pick(random, &CLASSES))),
+        5 => format!("({} ?x ?y)", inferred(pick(random, &PROPERTIES))),
+        6 => format!("({} ?x ?y)", pick(random, &PROPERTIES)),
+        _ => format!("(usable {variable})"),
+    }
+}
+
+fn effect(random: &mut Rng) -> String {
+    let variable = pick(random, &["?x", "?x", "?y"]);
+    let atom = match random.u8(..6) {
+        0 | 1 => format!("({} {variable})", pick(random, &CLASSES)),
+        2 | 3 => format!("({} ?x ?y)", pick(random, &PROPERTIES)),
+        _ => format!("(done {variable})"),
+    };
+    if random.u8(..10) < 2 { format!("(not {atom})") } else { atom }
+}
+
+fn texts(seed: u64) -> Texts {
+    let mut random = Rng::with_seed(seed);
+    let knowledge = knowledge(&axioms(&mut random));
+    let mut domain =
+        "(define (domain d) (:requirements :strips :derived-predicates)\n (:predicates (done ?x)".to_owned();
+    let has_axiom = random.u8(..10) < 4;
+    if has_axiom {
+        let [one, other] = [pick(&mut random, &CLASSES), pick(&mut random, &CLASSES)].map(inferred);
+        let _ = write!(domain, " (usable ?x))\n (:derived (usable ?x) (and ({one} ?x) ({other} ?x)))");
+    } else {
+        domain.push(')');
+    }
+    // At least one action asks for a conclusion: that is what the form is recognised by.
+    for number in 0..random.usize(2..5) {
+        let mut conditions = vec![condition(&mut random, has_axiom)];
+        if number == 0 {
+            conditions.push(format!("({} ?x)", inferred(pick(&mut random, &CLASSES))));
+        }
+        if random.bool() {
+            conditions.push(condition(&mut random, has_axiom));
+        }
+        let effects: Vec<String> = (0..random.usize(1..3)).map(|_| effect(&mut random)).collect();
+        let _ = write!(
+            domain,
+            "\n (:action a{number} :parameters (?x ?y) :precondition (and {}) :effect (and {}))",
+            conditions.join(" "),
+            effects.join(" ")
+        );
+    }
+    domain += ")\n";
+    let goal = format!(
+        "(and (done {}) ({} {}))",
+        pick(&mut random, &INDIVIDUALS),
+        inferred(pick(&mut random, &CLASSES)),
+        pick(&mut random, &INDIVIDUALS)
+    );
+    let problem = format!("(define (problem p) (:domain d) (:init) (:goal {goal}))\n");
+    Texts { knowledge, domain, problem }
+}
+
+/// Explores a task as it is narrowed and as it is exported. Returns the least number of actions to a goal, if there is a plan; none if the task has
+/// too many states.
+fn compare(texts: &Texts, name: &str) -> Option<Option<usize>> {
+    let directory = tempfile::tempdir().expect("a directory");
+    let mission = texts.write(directory.path()).mission();
+    let (filled, _) = mission.filled().unwrap_or_else(|messages| panic!("{}", shown(&messages)));
+    let exported = Task::new(mission.domain(), &filled).explore_within(STATES)?;
+    let (domain, problem) = mission.narrowed(&filled);
+    let narrowed = Task::new(&domain, &problem).explore_within(2 * STATES).expect("as many states");
+    let text = format!("{name}\n{}\n{}\n{}", texts.knowledge, texts.domain, texts.problem);
+    assert_eq!(narrowed.least, exported.least, "{text}");
+    assert_eq!(narrowed.steps, exported.steps, "{text}");
+    Some(exported.least)
+}
+
+/// Compares tasks from a seed on, so many that are small enough.
+fn compare_many(seed: u64, tasks: usize) {
+    let outcomes = (seed..).filter_map(|seed| compare(&texts(seed), &format!("seed {seed}")));
+    let solvable = outcomes.take(tasks).filter(Option::is_some).count();
+    assert!(solvable * 10 > tasks, "only {solvable} of {tasks} tasks have a plan");
+}
+
+#[test]
+fn random_tasks_have_the_states_of_their_export() {
+    compare_many(0, 300);
+}
+
+#[test]
+#[ignore = "10,000 tasks: minutes"]
+fn many_random_tasks_have_the_states_of_their_export() {
+    compare_many(1_000, 10_000);
+}
+
+/// Actions that ask for what follows add facts of everything that it follows of, not only of what is stated.
+#[test]
+fn conditions_on_conclusions_do_not_bound_what_is_stated() {
+    let knowledge = knowledge("ClassAssertion(:Ca :i1)\n");
+    let actions = "(:action b :parameters (?x) :precondition (inferred-Cb ?x) :effect (done ?x)))\n";
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (done i1)))\n".to_owned();
+    let head = "(define (domain d) (:requirements :strips :derived-predicates)\n (:predicates (done ?x)";
+    let domains = [
+        format!(
+            "{head})\n (:action a :parameters (?x) :precondition (inferred-Ca ?x) :effect (Cb ?x))\n {actions}"
+        ),
+        format!(
+            "{head} (usable ?x))\n (:derived (usable ?x) (inferred-Ca ?x))\n \
+             (:action a :parameters (?x) :precondition (usable ?x) :effect (Cb ?x))\n {actions}"
+        ),
+    ];
+    for domain in domains {
+        let texts = Texts { knowledge: knowledge.clone(), domain, problem: problem.clone() };
+        assert_eq!(compare(&texts, "conclusions"), Some(Some(2)));
+    }
+}
+
+/// The public domain with a conclusion in place of a class in one of its conditions: the same best plan as its export, and a certificate of that.
+#[test]
+fn a_public_domain_with_conclusions_in_conditions_is_planned_as_its_export() {
+    let Some(real) = real() else { return };
+    let source = real.join("pddl/suave_planta");
+    let domain = std::fs::read_to_string(source.join("suave_domain_extended.pddl")).expect("a domain");
+    let edits = [
+        ("(Function ?f)", "(inferred-Function ?f)"),
+        ("(FunctionDesign ?fd_goal)", "(inferred-FunctionDesign ?fd_goal)"),
+    ];
+    for (class, conclusion) in edits {
+        assert!(domain.contains(class), "{class}");
+        let directory = tempfile::tempdir().expect("a directory");
+        let path = directory.path().join("domain.pddl");
+        std::fs::write(&path, domain.replace(class, conclusion)).expect("the domain is written");
+        let input = Input {
+            domain: path,
+            problem: source.join("suave_problem_extended.pddl"),
+            knowledge: real.join("owl/suave_planta/suave_extended.owl"),
+            directory: real.join("owl/pddl_tomasys"),
+        };
+        let text = |path: &Path| path.to_str().expect("UTF-8").to_owned();
+        let (proof, exported) =
+            (text(&directory.path().join("proof")), text(&directory.path().join("exported")));
+        let planned = metaplan(&input.arguments("plan", &["--certificate", &proof]));
+        assert!(planned.0 == 0 && planned.1.contains("cost 7: optimal"), "{conclusion}: {planned:?}");
+        let verified = metaplan(&["verify", &proof]);
+        assert_eq!(verified.0, 0, "{conclusion}: {verified:?}");
+        let written = metaplan(&input.arguments("export", &["--to", "pddl", "-o", &exported]));
+        assert_eq!(written.0, 0, "{conclusion}: {written:?}");
+        let [domain, problem] = ["domain.pddl", "problem.pddl"].map(|name| format!("{exported}/{name}"));
+        let planned = metaplan(&["plan", &domain, &problem, "--quiet"]);
+        assert!(planned.0 == 0 && planned.1.contains("cost 7: optimal"), "{conclusion}: {planned:?}");
+    }
+}
