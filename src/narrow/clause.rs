@@ -4,6 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use pddl::ast::{Condition, Derived, Name, Term, TypedName};
 
+/// A ground fact: predicate and arguments.
+pub(super) type Fact = (Name, Vec<Name>);
+
 /// `head(arguments) ← body`; all variables are bound by the clause.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Clause {

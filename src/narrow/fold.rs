@@ -8,8 +8,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use pddl::ast::{Domain, Name};
 
-use super::Fact;
-use super::clause::{self, Clause, Literal, Operand};
+use super::clause::{self, Clause, Fact, Literal, Operand};
 use super::possible::Possible;
 use super::settle::{Guards, settle};
 

@@ -19,11 +19,9 @@ use ::mission::Mission;
 use pddl::ast::{Atom, Domain, InitialElement, Name, Problem, Term, TypeExpression};
 use pddl::{Mentioned, TypeHierarchy};
 
+use clause::Fact;
 use fold::Folded;
 use settle::Guards;
-
-/// A ground fact: predicate and arguments.
-type Fact = (Name, Vec<Name>);
 
 /// A domain and a problem with the same plans as those of a mission, smaller if its knowledge base completes its domain.
 ///

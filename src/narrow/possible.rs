@@ -12,8 +12,7 @@ use pddl::ast::{
     ActionBody, Atom, Condition, Declaration, Derived, Domain, Effect, Name, Term, TypeExpression, TypedName,
 };
 
-use super::Fact;
-use super::clause::{Clause, Literal};
+use super::clause::{Clause, Fact, Literal};
 use super::settle::{additions, classes, same};
 
 /// A fact that an action may add.

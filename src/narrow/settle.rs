@@ -14,8 +14,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use pddl::ast::{ActionBody, Atom, Condition, Domain, Effect, Name, Term};
 
-use super::Fact;
-use super::clause::{Clause, Literal, Operand};
+use super::clause::{Clause, Fact, Literal, Operand};
 
 /// How often a clause is unfolded, and how many clauses of one predicate that may make.
 const DEPTH: usize = 8;

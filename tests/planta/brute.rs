@@ -332,13 +332,8 @@ impl Task {
         facts
     }
 
-    /// Everything, state by state.
-    pub fn explore(&self) -> Reached {
-        self.explore_within(20_000).expect("few states")
-    }
-
-    /// As [`Task::explore`]; none if there are more states than that.
-    pub fn explore_within(&self, limit: usize) -> Option<Reached> {
+    /// Everything, state by state; none if there are more states than that.
+    pub fn explore(&self, limit: usize) -> Option<Reached> {
         let changed = self.changed();
         let fixed = self.initial.iter().filter(|(name, _)| !changed.contains(*name));
         let fixed = self.closed(fixed.map(|(name, rows)| (name.clone(), rows.clone())).collect(), false);

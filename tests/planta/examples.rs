@@ -101,9 +101,9 @@ fn compare(Example { name, input, created, least }: &Example) {
     let mission = input.mission();
     let (filled, _) = mission.filled().unwrap_or_else(|messages| panic!("{}", shown(&messages)));
     let (domain, problem) = written(mission.domain(), &filled);
-    let exported = Task::new(&domain, &problem).explore();
+    let exported = Task::new(&domain, &problem).explore(20_000).expect("few states");
     let (domain, problem) = mission.narrowed(&filled);
-    let narrowed = Task::new(&domain, &problem).explore();
+    let narrowed = Task::new(&domain, &problem).explore(20_000).expect("few states");
     let declared: BTreeSet<String> =
         domain.predicates.iter().map(|own| own.identifier.name.to_string().to_ascii_lowercase()).collect();
     // What is decided beforehand is what follows in every state.
@@ -118,7 +118,7 @@ fn compare(Example { name, input, created, least }: &Example) {
     let Some((created_domain, created_problem)) = created else { return };
     let folder = input.domain.parent().expect("a folder");
     let (domain, problem) = parsed(&folder.join(created_domain), &folder.join(created_problem));
-    let golden = Task::new(&domain, &problem).explore();
+    let golden = Task::new(&domain, &problem).explore(20_000).expect("few states");
     assert_eq!(exported.least, golden.least, "{name}");
     if *least == Least::AsLong {
         return;

@@ -11,6 +11,7 @@ use metaplan::mission::Planning;
 
 use crate::brute::Task;
 use crate::files::{Input, metaplan, real, shown};
+use crate::situations::run;
 
 const CLASSES: [&str; 5] = ["Ca", "Cb", "Cc", "Cd", "Ce"];
 const PROPERTIES: [&str; 2] = ["pa", "pb"];
@@ -166,9 +167,9 @@ fn compare(texts: &Texts, name: &str) -> Option<Option<usize>> {
     let directory = tempfile::tempdir().expect("a directory");
     let mission = texts.write(directory.path()).mission();
     let (filled, _) = mission.filled().unwrap_or_else(|messages| panic!("{}", shown(&messages)));
-    let exported = Task::new(mission.domain(), &filled).explore_within(STATES)?;
+    let exported = Task::new(mission.domain(), &filled).explore(STATES)?;
     let (domain, problem) = mission.narrowed(&filled);
-    let narrowed = Task::new(&domain, &problem).explore_within(2 * STATES).expect("as many states");
+    let narrowed = Task::new(&domain, &problem).explore(2 * STATES).expect("as many states");
     let text = format!("{name}\n{}\n{}\n{}", texts.knowledge, texts.domain, texts.problem);
     assert_eq!(narrowed.least, exported.least, "{text}");
     assert_eq!(narrowed.steps, exported.steps, "{text}");
@@ -213,6 +214,27 @@ fn conditions_on_conclusions_do_not_bound_what_is_stated() {
         let texts = Texts { knowledge: knowledge.clone(), domain, problem: problem.clone() };
         assert_eq!(compare(&texts, "conclusions"), Some(Some(2)));
     }
+}
+
+/// An observation that no action could have brought about is planned with: `i2` is not stated to be a `Ca`, which the action requires.
+#[test]
+fn an_observation_that_breaks_a_guard_is_planned_with() {
+    let knowledge = knowledge(
+        "ClassAssertion(:Ca :i1) ClassAssertion(:Ce :i1) ClassAssertion(:Ce :i2) ObjectPropertyDomain(:pa :Ca)\n",
+    );
+    let domain = "(define (domain d) (:requirements :strips :derived-predicates)\n (:predicates (done ?x))
+ (:action a :parameters (?x ?y) :precondition (Ca ?x) :effect (pa ?x ?y))
+ (:action b :parameters (?x) :precondition (inferred-Ca ?x) :effect (done ?x)))\n"
+        .to_owned();
+    let problem = "(define (problem p) (:domain d) (:init) (:goal (done i2)))\n".to_owned();
+    let directory = tempfile::tempdir().expect("a directory");
+    let input = Texts { knowledge, domain, problem }.write(directory.path());
+    let line = "{\"event\":\"fact_changed\",\"name\":\"pa i2 i1\",\"value\":true}\n";
+    let answers = run(&input.arguments("run", &[]), line);
+    let first = |kind: &str| answers.iter().find(|answer| answer["answer"] == kind);
+    assert!(first("plan_none").is_some() && first("error").is_none(), "{answers:#?}");
+    let plan = first("plan_found").unwrap_or_else(|| panic!("{answers:#?}"));
+    assert_eq!(plan["steps"].as_array().map(Vec::len), Some(1), "{plan}");
 }
 
 /// The public domain with a conclusion in place of a class in one of its conditions: the same best plan as its export, and a certificate of that.
