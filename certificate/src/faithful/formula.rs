@@ -13,6 +13,10 @@ use crate::faithful::verdict::Cause;
 /// A condition falls apart into at most so many cases.
 const CASE_LIMIT: usize = 4_096;
 
+/// Upper limit on the nesting of a condition once derived atoms are replaced by their rules. Functions on formulas recurse as
+/// deep as a formula nests.
+pub(super) const DEPTH_LIMIT: usize = 300;
+
 /// A condition in negation normal form.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Formula {
@@ -61,6 +65,16 @@ impl Formula {
         match self {
             Self::All(parts) | Self::Any(parts) => parts.iter().map(Self::size).sum(),
             _ => 1,
+        }
+    }
+
+    /// The nesting of conjunctions and disjunctions; 0 for an atom.
+    pub(super) fn depth(&self) -> usize {
+        match self {
+            Self::All(parts) | Self::Any(parts) => {
+                parts.iter().map(Self::depth).max().unwrap_or(0).saturating_add(1)
+            }
+            _ => 0,
         }
     }
 

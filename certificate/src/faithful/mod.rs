@@ -143,12 +143,14 @@ impl<'f> Files<'f> {
         let world = World::new(domain, problem)?;
         let names = Names::new(&world, model)?;
         let mut all = Vec::new();
+        let mut size = 0_usize;
         for (action, schema) in domain.actions.iter().enumerate() {
             for arguments in instances::of(&world, schema, stop)? {
+                size = size.saturating_add(arguments.len());
                 let requires = requires(&world, schema, &arguments)?;
                 all.push(Instance { action, arguments, requires });
             }
-            if all.len() > instances::INSTANCE_LIMIT {
+            if all.len() > instances::INSTANCE_LIMIT || size > instances::ARGUMENT_LIMIT {
                 return Err(instances::too_many("actions").into());
             }
         }
