@@ -18,6 +18,7 @@ use crate::faithful::key::{CLOCK, Key};
 use crate::faithful::linear::{Interval, Linear};
 use crate::faithful::verdict::{Cause, Difference};
 use crate::faithful::world::World;
+use crate::integer::MAX_DIGITS;
 
 pub(super) const WITNESS_FORMAT: &str = "metaplan-witness/1";
 
@@ -64,6 +65,9 @@ impl Invariant {
         };
         let number = |text: Option<String>| {
             let read = |text: String| {
+                if text.len() > MAX_DIGITS {
+                    return Err(form(format!("a fraction of {} characters, more than {MAX_DIGITS}", text.len())));
+                }
                 let is_fraction = text.bytes().all(|byte| byte.is_ascii_digit() || b"-/".contains(&byte));
                 let parsed = if is_fraction { text.parse::<BigRational>().ok() } else { None };
                 parsed.ok_or_else(|| form(format!("{text} is not a fraction")))
