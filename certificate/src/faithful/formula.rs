@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
 use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
 
 use crate::faithful::key::Key;
 use crate::faithful::linear::Linear;
@@ -92,7 +93,7 @@ impl Formula {
 /// multiplied.
 #[derive(Debug, Default)]
 pub(super) struct Structure {
-    pub(super) groups: FxHashMap<Key, u32>,
+    pub(super) groups: FxHashMap<Key, SmallVec<[u32; 1]>>,
     pub(super) integers: FxHashMap<Key, BigRational>,
 }
 
@@ -111,12 +112,17 @@ impl Known {
         self.holding.get(&group)
     }
 
+    /// The atoms that are known to hold.
+    pub(super) fn holding_atoms(&self) -> impl Iterator<Item = &Key> {
+        self.atoms.iter().filter(|(_, holds)| **holds).map(|(key, _)| key)
+    }
+
     pub(super) fn atom(&self, structure: &Structure, key: &Key) -> Option<bool> {
         if let Some(holds) = self.atoms.get(key) {
             return Some(*holds);
         }
-        let other = structure.groups.get(key).and_then(|group| self.holding.get(group));
-        other.map(|_| false)
+        let groups = structure.groups.get(key)?;
+        groups.iter().any(|group| self.holding.contains_key(group)).then_some(false)
     }
 
     /// Whether a condition holds, if that follows.
@@ -181,7 +187,7 @@ impl Known {
         match formula {
             Formula::Atom(key, holds) => {
                 known.atoms.insert(key.clone(), *holds);
-                if *holds && let Some(group) = structure.groups.get(key) {
+                for group in structure.groups.get(key).into_iter().flatten().filter(|_| *holds) {
                     known.holding.insert(*group, key.clone());
                 }
                 Ok(vec![known])

@@ -71,7 +71,7 @@ impl Names {
                         return form(format!("{text} is the value of two variables"));
                     }
                     if is_basic {
-                        names.structure.groups.insert(key.clone(), variable);
+                        names.structure.groups.entry(key.clone()).or_default().push(variable);
                     } else {
                         names.linked.insert(key.clone());
                     }
