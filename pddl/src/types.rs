@@ -82,7 +82,9 @@ impl TypeHierarchy {
         let (Some(left), Some(right)) = (self.index.get(left), self.index.get(right)) else { return true };
         let mut children = vec![Vec::new(); self.parents.len()];
         for (child, parents) in self.parents.iter().enumerate() {
-            parents.iter().for_each(|parent| children[*parent].push(child));
+            for parent in parents {
+                children[*parent].push(child);
+            }
         }
         let (below_left, below_right) = (closure(&children, *left), closure(&children, *right));
         below_left.iter().zip(&below_right).any(|(left, right)| *left && *right)

@@ -94,14 +94,14 @@ pub const SUBJECT: [&str; 4] = [DOMAIN, PROBLEM, crate::knowledge::DOCUMENT, cra
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 pub struct Subject {
-    /// The extent of the verification.
+    /// The extent of the verification: `files`, `knowledge` or `mission`.
     pub kind: SubjectKind,
     /// The name of the mission, if one was given.
     pub mission: Option<String>,
     /// SHA-256 of the lines that `sha256sum` prints for `domain.pddl`, `problem.pddl`, and `knowledge.nt` and `origin.json` if
     /// the certificate has them.
     pub digest: String,
-    /// Parts that were not given, and therefore not checked.
+    /// Parts that were not given, and therefore not checked: `knowledge`, `mission`.
     pub not_checked: Vec<Unchecked>,
 }
 

@@ -48,7 +48,9 @@ fn circular<'b>(axioms: &Axioms, bodies: &'b [(Key, Formula)]) -> FxHashSet<&'b 
         atoms(body, below.entry(key).or_default());
     }
     let mut remaining: FxHashSet<&Key> = below.keys().copied().collect();
-    below.values_mut().for_each(|own| own.retain(|key| remaining.contains(key)));
+    for own in below.values_mut() {
+        own.retain(|key| remaining.contains(key));
+    }
     let mut above: FxHashMap<&Key, FxHashSet<&Key>> = FxHashMap::default();
     for (key, own) in &below {
         for lower in own {
@@ -133,7 +135,9 @@ fn fixpoint(bodies: &[(Key, Formula)], holds: impl Fn(&Formula, &FxHashSet<Key>)
     for (place, (_, body)) in bodies.iter().enumerate() {
         let mut below = FxHashSet::default();
         atoms(body, &mut below);
-        below.into_iter().for_each(|key| readers.entry(key).or_default().push(place));
+        for key in below {
+            readers.entry(key).or_default().push(place);
+        }
     }
     let mut own: FxHashSet<Key> = FxHashSet::default();
     let mut open: Vec<usize> = (0..bodies.len()).rev().collect();

@@ -122,7 +122,9 @@ pub(super) fn search(
 ) -> Vec<Group> {
     let mut adding: FxHashMap<&Key, Vec<&Move>> = FxHashMap::default();
     for own in moves {
-        own.adds.iter().for_each(|key| adding.entry(key).or_default().push(own));
+        for key in &own.adds {
+            adding.entry(key).or_default().push(own);
+        }
     }
     let may_hold = |key: &Key| invariant.may_hold(key);
     let mut found: Vec<Group> = Vec::new();
@@ -148,19 +150,17 @@ pub(super) fn search(
             if checks > SEARCH_LIMIT {
                 return found;
             }
-            match broken {
-                Some(repairs) => open.extend(repairs.into_iter().rev().map(|key| {
-                    let mut larger = group.clone();
-                    larger.insert(key);
-                    larger
-                })),
-                None => {
-                    if group != variable {
-                        found.push(group);
-                    }
-                    continue 'variables;
+            let Some(repairs) = broken else {
+                if group != variable {
+                    found.push(group);
                 }
-            }
+                continue 'variables;
+            };
+            open.extend(repairs.into_iter().rev().map(|key| {
+                let mut larger = group.clone();
+                larger.insert(key);
+                larger
+            }));
         }
     }
     found

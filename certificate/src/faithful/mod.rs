@@ -237,7 +237,9 @@ impl<'f> Files<'f> {
     fn each_move(&self, invariant: &Invariant, axioms: &Axioms, visit: &mut dyn FnMut(Move)) -> Result<()> {
         let structure = &self.names.structure;
         let waits = action::waits(&self.world.timeline, structure)?;
-        waits.iter().for_each(|case| visit(Move::new(structure, case)));
+        for case in &waits {
+            visit(Move::new(structure, case));
+        }
         for instance in &self.instances {
             let cases = self.cases(instance, invariant, axioms)?;
             cases.iter().map(|case| Move::new(structure, case)).filter(Move::adds_any).for_each(&mut *visit);

@@ -88,10 +88,11 @@ pub fn mutate(files: &Files, draw: &mut Draw<'_>) -> Files {
 /// Gives the manifest the sizes and hashes of the files.
 fn mend(files: &mut Files) {
     let Ok(mut manifest) = serde_json::from_slice::<Value>(&files["manifest.json"]) else { return };
-    for entry in manifest["files"].as_array_mut().into_iter().flatten() {
-        if let Some(text) = entry["name"].as_str().and_then(|name| files.get(name)) {
-            entry["bytes"] = text.len().into();
-            entry["sha256"] = digest(text).into();
+    let listed = manifest.get_mut("files").and_then(Value::as_array_mut);
+    for entry in listed.into_iter().flatten().filter_map(Value::as_object_mut) {
+        if let Some(text) = entry.get("name").and_then(Value::as_str).and_then(|name| files.get(name)) {
+            entry.insert("bytes".to_owned(), text.len().into());
+            entry.insert("sha256".to_owned(), digest(text).into());
         }
     }
     files.insert("manifest.json".to_owned(), manifest.to_string().into_bytes());
@@ -153,7 +154,7 @@ fn lists(text: &str, draw: &mut Draw<'_>) -> String {
         3 => format!("(and {own} {other})"),
         4 => format!("{}{own}{}", around.repeat(often), ")".repeat(often)),
         _ => {
-            let names = (0..often).map(|number| format!(" ?x{number}")).collect::<String>();
+            let names = (0..often).fold(String::new(), |names, number| format!("{names} ?x{number}"));
             format!("(exists ({names}) {own})")
         }
     };
