@@ -10,13 +10,17 @@ use crate::argument::ARGUMENT_FORMAT;
 use crate::argument::Argument;
 use crate::integer::Integer;
 use crate::model::TASK_FORMAT;
-use crate::model::{Model, Operator};
+use crate::model::{Model, Operator, Quantity};
 use crate::references;
 use crate::semantics::{State, holds_without_numbers};
 use crate::table::{Table, check_need, check_potential};
 
 /// Combinations of designs that matter, of all operators together, are not more than this.
 const CHOICE_LIMIT: usize = 1 << 20;
+/// Upper limit on the comparisons of two combinations of designs, of all operators together: about a second.
+const COMPARISON_LIMIT: usize = 1 << 25;
+/// Going through a combination counts as this many comparisons.
+const COMBINATION_COST: usize = 2;
 
 /// What was checked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -233,45 +237,69 @@ impl Checker<'_> {
 /// For each operator the combinations that no other one makes superfluous: one that costs no more, and with which every condition
 /// holds as soon and every number ends as high (exactly so where more may hurt). What covers the successor by the
 /// latter covers the successor by the former.
-#[expect(clippy::arithmetic_side_effects, reason = "choices are held in memory")]
 fn choices(model: &Model, monotone: bool) -> Result<Vec<Rc<[Choice]>>, Fault> {
     let mut known: FxHashMap<_, Rc<[Choice]>> = FxHashMap::default();
-    let mut count = 0;
-    let all = model.operators.iter().map(|operator| {
+    let mut count = 0_usize;
+    let mut comparisons = 0;
+    let mut all = Vec::new();
+    for operator in &model.operators {
         let quantities: Vec<_> = quantities(operator).collect();
         let key = (operator.uses, operator.exclusions, &operator.cost, quantities.clone());
-        let own = known.entry(key).or_insert_with(|| {
-            let sizes = model.sizes(operator);
-            let mut front: Vec<(Choice, Vec<Integer>)> = Vec::new();
-            let as_good = |a: &(Choice, Vec<Integer>), b: &(Choice, Vec<Integer>)| {
-                let mut pairs = a.1.iter().zip(&b.1);
-                a.0.1 <= b.0.1
-                    && if monotone { pairs.all(|(a, b)| a >= b) } else { pairs.all(|(a, b)| a == b) }
-            };
-            for choice in model.choices(operator) {
-                let profile = quantities.iter().map(|quantity| model.quantity(quantity, &choice, &sizes));
-                let profile = profile.collect();
-                let cost = model.quantity(&operator.cost, &choice, &sizes);
-                let new = ((choice, cost), profile);
-                if !front.iter().any(|old| as_good(old, &new)) {
-                    front.retain(|old| !as_good(&new, old));
-                    front.push(new);
-                }
+        let own = if let Some(own) = known.get(&key) {
+            Rc::clone(own)
+        } else {
+            let own = front(model, operator, &quantities, monotone, &mut comparisons)?;
+            count = count.saturating_add(own.len());
+            if count > CHOICE_LIMIT {
+                let reason = format!("more than {CHOICE_LIMIT} combinations of designs matter");
+                return Err(form("the task", reason));
             }
-            count += front.len();
-            front.into_iter().map(|(choice, _)| choice).collect()
-        });
-        let own = Rc::clone(own);
-        if count > CHOICE_LIMIT {
-            return Err(form("the task", "too many combinations of designs".into()));
+            known.insert(key, Rc::clone(&own));
+            own
+        };
+        all.push(own);
+    }
+    Ok(all)
+}
+
+/// The combinations of an operator as [`choices`] has them; counts the comparisons.
+fn front(
+    model: &Model,
+    operator: &Operator,
+    quantities: &[&Quantity],
+    monotone: bool,
+    comparisons: &mut usize,
+) -> Result<Rc<[Choice]>, Fault> {
+    let sizes = model.sizes(operator);
+    let mut front: Vec<(Choice, Vec<Integer>)> = Vec::new();
+    let as_good = |a: &(Choice, Vec<Integer>), b: &(Choice, Vec<Integer>)| {
+        let mut pairs = a.1.iter().zip(&b.1);
+        a.0.1 <= b.0.1 && if monotone { pairs.all(|(a, b)| a >= b) } else { pairs.all(|(a, b)| a == b) }
+    };
+    let all = model.choices(operator);
+    let combinations = all.len();
+    for choice in all {
+        *comparisons = comparisons.saturating_add(front.len()).saturating_add(COMBINATION_COST);
+        if *comparisons > COMPARISON_LIMIT {
+            let reason = format!(
+                "an operator with {combinations} combinations of designs, too many of which have advantages over \
+                 each other: more than {COMPARISON_LIMIT} comparisons"
+            );
+            return Err(form("the task", reason));
         }
-        Ok(own)
-    });
-    all.collect()
+        let profile = quantities.iter().map(|quantity| model.quantity(quantity, &choice, &sizes)).collect();
+        let cost = model.quantity(&operator.cost, &choice, &sizes);
+        let new = ((choice, cost), profile);
+        if !front.iter().any(|old| as_good(old, &new)) {
+            front.retain(|old| !as_good(&new, old));
+            front.push(new);
+        }
+    }
+    Ok(front.into_iter().map(|(choice, _)| choice).collect())
 }
 
 /// What depends on designs in the conditions and changes of an operator.
-fn quantities(operator: &Operator) -> impl Iterator<Item = &crate::model::Quantity> {
+fn quantities(operator: &Operator) -> impl Iterator<Item = &Quantity> {
     let changes = operator.changes.iter().map(|(_, value)| value);
     operator.condition.comparisons.iter().chain(changes).map(|linear| &linear.quantity)
 }

@@ -1,4 +1,5 @@
-//! Integers of any size: 128 bits where that is enough, more where it is not. Nothing wraps, saturates or is refused.
+//! Integers of any size: 128 bits where that is enough, more where it is not. Nothing wraps or saturates. A document has no
+//! numbers of more than [`MAX_DIGITS`] digits, because the time to read one is quadratic.
 
 use std::cmp::Ordering;
 use std::iter::Sum;
@@ -12,7 +13,10 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Number;
 
-/// An integer.
+/// Upper limit on the digits of a number in a document. A number of a PDDL file has at most 400.
+pub const MAX_DIGITS: usize = 10_000;
+
+/// An integer. A document has none of more than [`MAX_DIGITS`] digits.
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub struct Integer(Repr);
 
@@ -206,6 +210,10 @@ impl<'de> Deserialize<'de> for Integer {
         if let Ok(small) = digits.parse::<i128>() {
             return Ok(Self::from(small));
         }
+        if digits.len() > MAX_DIGITS {
+            let message = format!("a number of {} digits, more than {MAX_DIGITS}", digits.len());
+            return Err(D::Error::custom(message));
+        }
         let is_integer = digits.bytes().all(|byte| byte.is_ascii_digit() || byte == b'-');
         let big = if is_integer { digits.parse::<BigInt>().ok() } else { None };
         big.map(Self::from).ok_or_else(|| D::Error::custom(format!("{digits} is not an integer")))
@@ -253,6 +261,14 @@ mod tests {
             prop_assert_eq!(&written, &a.to_string());
             prop_assert_eq!(serde_json::from_str::<Integer>(&written).expect("an integer"), x);
         }
+    }
+
+    #[test]
+    fn numbers_of_very_many_digits_are_refused_at_once() {
+        let longest = "9".repeat(MAX_DIGITS);
+        assert_eq!(serde_json::from_str::<Integer>(&longest).expect("an integer").to_string(), longest);
+        let error = serde_json::from_str::<Integer>(&"9".repeat(10_000_000)).expect_err("too long");
+        assert!(error.to_string().starts_with("a number of 10000000 digits, more than 10000"), "{error}");
     }
 
     #[test]

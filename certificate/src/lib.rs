@@ -46,7 +46,7 @@ mod table;
 /// The documents of a certificate as they are written.
 pub mod format {
     pub use crate::argument::{ARGUMENT_FORMAT, Argument, Label, Need, Potential};
-    pub use crate::integer::Integer;
+    pub use crate::integer::{Integer, MAX_DIGITS};
     pub use crate::model::{
         Argument as Parameter, Condition, Conditional, Exclusion, Fact, Layer, Linear, Literal, Model,
         Objective, Operator, Quantity, TASK_FORMAT,

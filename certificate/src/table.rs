@@ -3,7 +3,7 @@
 //! A potential is a lower bound on the cost to the goal if it is at most 0 wherever the goal can hold, and no operator lowers it by
 //! more than it costs. A need is a lower bound on what must be left of a number if no operator makes up for it
 //! otherwise: one that uses the number requires that it stays at least 0, and whatever else changes it may only stand where
-//! nothing is needed.
+//! nothing is needed. What it requires may be stronger: `battery >= 5` is enough where 4 are used.
 
 use crate::integer::Integer;
 use crate::model::{Conditional, Fact, Linear, Literal, Model, Operator, Quantity};
@@ -166,13 +166,22 @@ fn use_of(model: &Model, operator: &Operator, number: u32) -> Use {
     let mut changes = operator.changes.iter().filter(|(own, _)| *own == number);
     let Some((_, value)) = changes.next() else { return Use::Lowers(Integer::ZERO) };
     let most = model.most(&value.quantity);
-    let guarded =
-        most.is_zero() && value.quantity.tables.is_empty() || operator.condition.comparisons.contains(value);
+    let guarded = most.is_zero() && value.quantity.tables.is_empty()
+        || operator.condition.comparisons.iter().any(|guard| implies(model, guard, value));
     if changes.next().is_none() && is_alone(value, number) && !most.is_positive() && guarded {
         Use::Lowers(-&most)
     } else {
         Use::Other
     }
+}
+
+/// Returns `true` if one expression is at most another one in all states and with all designs, so that the latter is at
+/// least 0 if the former is. `false` says nothing.
+fn implies(model: &Model, guard: &Linear, wanted: &Linear) -> bool {
+    let same_designs = guard.quantity.tables == wanted.quantity.tables
+        && guard.quantity.constant <= wanted.quantity.constant;
+    guard.factors == wanted.factors
+        && (same_designs || model.most(&guard.quantity) <= model.least(&wanted.quantity))
 }
 
 /// Checks that a table bounds from below what must be left of a number, where it is not 0.

@@ -55,22 +55,8 @@ impl TypeHierarchy {
         self.index.get(lower).is_some_and(|lower| self.reaches(*lower, *upper))
     }
 
-    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     fn reaches(&self, lower: usize, upper: usize) -> bool {
-        let mut seen = vec![lower];
-        let mut next = 0;
-        while let Some(at) = seen.get(next).copied() {
-            if at == upper {
-                return true;
-            }
-            for parent in &self.parents[at] {
-                if !seen.contains(parent) {
-                    seen.push(*parent);
-                }
-            }
-            next += 1;
-        }
-        false
+        lower == upper || closure(&self.parents, lower)[upper]
     }
 
     /// Whether an object of type `given` is one of type `wanted`.
@@ -82,9 +68,7 @@ impl TypeHierarchy {
     /// Whether something can be of both types.
     pub(crate) fn overlap(&self, left: &TypeExpression, right: &TypeExpression) -> bool {
         let common = |left: &Name, right: &Name| {
-            self.is_a(left, right)
-                || self.is_a(right, left)
-                || self.index.keys().any(|name| self.is_a(name, left) && self.is_a(name, right))
+            self.is_a(left, right) || self.is_a(right, left) || self.have_common_subtype(left, right)
         };
         left.alternatives.is_empty()
             || right.alternatives.is_empty()
@@ -94,10 +78,37 @@ impl TypeHierarchy {
                 .any(|left| right.alternatives.iter().any(|right| common(&left.name, &right.name)))
     }
 
+    fn have_common_subtype(&self, left: &Name, right: &Name) -> bool {
+        let (Some(left), Some(right)) = (self.index.get(left), self.index.get(right)) else { return true };
+        let mut children = vec![Vec::new(); self.parents.len()];
+        for (child, parents) in self.parents.iter().enumerate() {
+            for parent in parents {
+                children[*parent].push(child);
+            }
+        }
+        let (below_left, below_right) = (closure(&children, *left), closure(&children, *right));
+        below_left.iter().zip(&below_right).any(|(left, right)| *left && *right)
+    }
+
     /// Whether a type is above itself.
     pub(crate) fn is_cyclic(&self, name: &Name) -> bool {
         let Some(index) = self.index.get(name) else { return false };
         *index != 0
             && self.parents[*index].iter().any(|parent| *parent != *index && self.reaches(*parent, *index))
     }
+}
+
+/// By type: whether links lead to it from a type, which is reached itself.
+fn closure(links: &[Vec<usize>], from: usize) -> Vec<bool> {
+    let mut reached = vec![false; links.len()];
+    reached[from] = true;
+    let mut open = vec![from];
+    while let Some(at) = open.pop() {
+        for next in &links[at] {
+            if !std::mem::replace(&mut reached[*next], true) {
+                open.push(*next);
+            }
+        }
+    }
+    reached
 }

@@ -65,7 +65,7 @@ pub const CODES: &[[&str; 4]] = &[
     [
         "M120",
         "There is no certificate.",
-        "The answer is not proved, or a part of the task is not covered by certificates.",
+        "The answer is not proved, a part of the task is not covered by certificates, or the comparison of the ground task with the files cannot tell whether they agree.",
         "The message names the reason; the plan itself is shown.",
     ],
     [

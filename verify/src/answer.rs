@@ -5,7 +5,7 @@ use std::fmt::{self, Write as _};
 use mission::visible::{pretty, visible, visible_json};
 use serde::Serialize;
 
-use crate::manifest::{Claim, Verification, VerifiedPart};
+use crate::manifest::{Claim, Subject, SubjectKind, Unchecked, Verification, VerifiedPart};
 
 const FORMAT: &str = "metaplan-verification/1";
 
@@ -20,6 +20,8 @@ pub struct VerificationAnswer<'a> {
     verified: bool,
     /// What the certificate claims: `{"optimal": {"metric": "408"}}`, `"unsolvable"`, or null.
     claim: Option<&'a Claim>,
+    /// The files or the mission that the claim was checked for, or null if the files cannot be read.
+    subject: Option<&'a Subject>,
     /// What was checked, up to the first part that failed.
     parts: Vec<PartAnswer<'a>>,
 }
@@ -48,6 +50,7 @@ impl<'a> VerificationAnswer<'a> {
             format: FORMAT,
             verified: report.verified(),
             claim: report.claim.as_ref(),
+            subject: report.subject.as_ref(),
             parts: report.parts.iter().map(part).collect(),
         }
     }
@@ -73,9 +76,26 @@ fn text(report: &Verification) -> String {
         Some(Claim::Unsolvable) => "there is no plan".to_owned(),
         None => "nothing is claimed".to_owned(),
     };
-    let verdict = if report.verified() { "verified" } else { "NOT verified" };
-    let _ = writeln!(text, "{verdict}: {claim}");
+    let _ = match (&report.subject, report.verified()) {
+        (Some(subject), true) => writeln!(text, "verified: {claim}, for {}", extent(subject)),
+        _ => writeln!(text, "NOT verified: {claim}"),
+    };
     visible(&text).into_owned()
+}
+
+/// The extent of a verification, in words.
+fn extent(subject: &Subject) -> String {
+    let checked = match (&subject.mission, subject.kind) {
+        (Some(name), _) => format!("the mission `{name}` with digest {:.12}", subject.digest),
+        (None, SubjectKind::Knowledge) => "these PDDL files and their knowledge base".to_owned(),
+        (None, _) => "these PDDL files only".to_owned(),
+    };
+    let word = |unchecked: &Unchecked| match unchecked {
+        Unchecked::Knowledge => "knowledge base",
+        Unchecked::Mission => "mission",
+    };
+    let others: Vec<&str> = subject.not_checked.iter().map(word).collect();
+    if others.is_empty() { checked } else { format!("{checked}; not checked: {}", others.join(", ")) }
 }
 
 /// For programs: a [`VerificationAnswer`].

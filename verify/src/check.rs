@@ -14,8 +14,8 @@ use num_rational::BigRational;
 use crate::about::about;
 use crate::files::{read, text};
 use crate::manifest::{
-    ARGUMENT, Claim, DOMAIN, Manifest, PLAN, PROBLEM, Refutation, STREAMED, TASK, Verification, VerifiedPart,
-    WITNESS,
+    ARGUMENT, Claim, DOMAIN, Manifest, PLAN, PROBLEM, Refutation, STREAMED, Subject, TASK, Verification,
+    VerifiedPart, WITNESS,
 };
 use crate::plan::plan;
 use crate::task::{read_pddl, same_task};
@@ -65,10 +65,12 @@ impl<'a> Verifier<'a> {
 
     /// Checks part by part. What is wrong with the certificate is a part that fails, and no error.
     pub fn verify(&self) -> Verification {
-        let mut report = Verification { claim: None, parts: Vec::new() };
+        let mut report = Verification { claim: None, subject: None, parts: Vec::new() };
         match read(self.directory) {
             Ok((manifest, contents)) => {
                 report.claim = Some(manifest.claim.clone());
+                let mission = self.mission.map(|mission| mission.name.as_str());
+                report.subject = Some(Subject::new(&manifest.files, mission));
                 let bytes: u64 = manifest.files.iter().map(|file| file.bytes).sum();
                 let files =
                     format!("{} files, {bytes} bytes, as the manifest has them", manifest.files.len());

@@ -36,5 +36,5 @@ pub mod watch;
 pub use answer::{VerificationAnswer, json};
 pub use check::Verifier;
 pub use codes::CODES;
-pub use manifest::{Claim, Verification, VerifiedPart};
+pub use manifest::{Claim, Subject, SubjectKind, Unchecked, Verification, VerifiedPart};
 pub use watch::{Watch, seconds};

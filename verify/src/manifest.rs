@@ -1,6 +1,10 @@
 //! What a certificate consists of and claims, and what came of checking it.
 
+use std::fmt::Write as _;
+
 use serde::{Deserialize, Serialize};
+
+use crate::digest::digest;
 
 /// The version of the format.
 pub const FORMAT: &str = "metaplan-certificate/3";
@@ -83,6 +87,68 @@ pub struct File {
     pub sha256: String,
 }
 
+/// The files that say what a certificate is about, of which [`Subject::digest`] is made.
+pub const SUBJECT: [&str; 4] = [DOMAIN, PROBLEM, crate::knowledge::DOCUMENT, crate::knowledge::ORIGIN];
+
+/// The files or the mission that a claim was checked for.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Subject {
+    /// The extent of the verification: `files`, `knowledge` or `mission`.
+    pub kind: SubjectKind,
+    /// The name of the mission, if one was given.
+    pub mission: Option<String>,
+    /// SHA-256 of the lines that `sha256sum` prints for `domain.pddl`, `problem.pddl`, and `knowledge.nt` and `origin.json` if
+    /// the certificate has them.
+    pub digest: String,
+    /// Parts that were not given, and therefore not checked: `knowledge`, `mission`.
+    pub not_checked: Vec<Unchecked>,
+}
+
+/// The extent of a verification.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum SubjectKind {
+    /// The PDDL files of the certificate, wherever they come from.
+    Files,
+    /// The PDDL files, and that they follow from the knowledge base of the certificate.
+    Knowledge,
+    /// The files of a mission in its present situation, its knowledge base among them if it has one.
+    Mission,
+}
+
+/// A part that a verification leaves out if it is not given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "snake_case")]
+pub enum Unchecked {
+    /// The knowledge base that the PDDL files follow from: the certificate has none.
+    Knowledge,
+    /// The mission that the certificate is about: none was given.
+    Mission,
+}
+
+impl Subject {
+    /// The subject of a certificate with these files.
+    pub(crate) fn new(files: &[File], mission: Option<&str>) -> Self {
+        let mut lines = String::new();
+        for name in SUBJECT {
+            for file in files.iter().filter(|file| file.name == name) {
+                let _ = writeln!(lines, "{}  {name}", file.sha256);
+            }
+        }
+        let has_knowledge = files.iter().any(|file| file.name == crate::knowledge::ORIGIN);
+        let (kind, not_checked) = match (mission, has_knowledge) {
+            (Some(_), _) => (SubjectKind::Mission, Vec::new()),
+            (None, true) => (SubjectKind::Knowledge, vec![Unchecked::Mission]),
+            (None, false) => (SubjectKind::Files, vec![Unchecked::Knowledge, Unchecked::Mission]),
+        };
+        let (mission, digest) = (mission.map(str::to_owned), digest(lines.as_bytes()));
+        Self { kind, mission, digest, not_checked }
+    }
+}
+
 /// What came of one part of a verification.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct VerifiedPart {
@@ -99,6 +165,8 @@ pub struct VerifiedPart {
 pub struct Verification {
     /// The claim; none if the manifest does not say.
     pub claim: Option<Claim>,
+    /// The files or the mission that the claim was checked for; none if the files cannot be read.
+    pub subject: Option<Subject>,
     /// In order; what rests on a part that fails is left out.
     pub parts: Vec<VerifiedPart>,
 }

@@ -41,7 +41,7 @@ impl Watch {
             if !own.answered.swap(true, Ordering::Relaxed) {
                 let reason = format!("{LATE}, or more than {MEMORY_LIMIT} MB");
                 let parts = vec![VerifiedPart { part: "limits", result: Err(reason) }];
-                give_up(&Verification { claim: None, parts });
+                give_up(&Verification { claim: None, subject: None, parts });
             }
         });
         watch

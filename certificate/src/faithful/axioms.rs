@@ -15,7 +15,7 @@ pub(super) struct Axioms {
     pub(super) bound: Relation,
     /// Those that depend on themselves and are variables of the task. All others are what their rules say.
     pub(super) linked: FxHashSet<Key>,
-    /// Predicates and functions on which a derived predicate depends.
+    /// Predicates and functions that the rules of each derived predicate mention.
     pub(super) reads: FxHashMap<u32, FxHashSet<u32>>,
 }
 
@@ -29,8 +29,25 @@ impl Axioms {
         }
     }
 
-    /// Whether a derived predicate depends on one of some predicates and functions.
-    pub(super) fn depends(&self, symbol: u32, mut others: impl Iterator<Item = u32>) -> bool {
-        self.reads.get(&symbol).is_some_and(|own| others.any(|other| own.contains(&other)))
+    /// Returns `true` if a derived predicate depends on one of some predicates and functions, by its own rules or by those of
+    /// derived predicates in between.
+    pub(super) fn depends(&self, symbol: u32, others: impl Iterator<Item = u32>) -> bool {
+        let others: FxHashSet<u32> = others.collect();
+        if others.is_empty() {
+            return false;
+        }
+        let mut seen = FxHashSet::from_iter([symbol]);
+        let mut open = vec![symbol];
+        while let Some(own) = open.pop() {
+            for below in self.reads.get(&own).into_iter().flatten() {
+                if others.contains(below) {
+                    return true;
+                }
+                if seen.insert(*below) {
+                    open.push(*below);
+                }
+            }
+        }
+        false
     }
 }

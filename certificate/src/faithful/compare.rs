@@ -8,7 +8,7 @@ use num_traits::{One, Zero};
 use rustc_hash::FxHashMap;
 
 use crate::faithful::case::Case;
-use crate::faithful::effects::{self, Made};
+use crate::faithful::effects::{self, Made, Mismatch};
 use crate::faithful::formula::{Formula, Known};
 use crate::faithful::key::{Key, PHASE};
 use crate::faithful::length::Length;
@@ -255,21 +255,20 @@ impl<'c> Comparison<'c> {
         let mut open = vec![case.known.clone()];
         for _ in 0..SPLIT_LIMIT {
             let Some(known) = open.pop() else { return Ok(()) };
-            let mut reason = Difference::NoOperatorFor { instance: String::new() };
+            let mut reason = Obstacle::from(Difference::NoOperatorFor { instance: String::new() });
             let mut done = false;
             for ((operator, choice), condition) in candidates.iter().zip(&conditions) {
                 let found = match known.decide(structure, condition) {
                     Some(true) => self.simulates((operator, choice), case, &known, instance),
-                    _ => Err(Difference::WrongCondition { instance: String::new() }),
+                    _ => Err(Difference::WrongCondition { instance: String::new() }.into()),
                 };
                 match found {
                     Ok(()) => {
                         done = true;
                         break;
                     }
-                    // What is nearest to an operator is said.
-                    Err(other) if !matches!(other, Difference::WrongCondition { .. }) => reason = other,
-                    Err(other) if matches!(reason, Difference::NoOperatorFor { .. }) => reason = other,
+                    // The reason against the operator that is nearest is reported.
+                    Err(other) if rank(&other) >= rank(&reason) => reason = other,
                     Err(_) => {}
                 }
             }
@@ -277,7 +276,7 @@ impl<'c> Comparison<'c> {
                 continue;
             }
             let leaf = conditions.iter().find_map(|condition| known.open(structure, condition, &|_| true));
-            let Some(leaf) = leaf else { return Err(named(reason, &(instance.name)()).into()) };
+            let Some(leaf) = leaf else { return Err(named(reason, &(instance.name)())) };
             open.extend(known.split(structure, std::iter::once(leaf))?);
         }
         if open.is_empty() {
@@ -292,19 +291,21 @@ impl<'c> Comparison<'c> {
         case: &Case,
         known: &Known,
         instance: &Instance<'_>,
-    ) -> std::result::Result<(), Difference> {
+    ) -> Result<()> {
         let made = Made { operator, choice };
-        effects::compare(self.task, case, known, Some(made))
-            .map_err(|what| Difference::WrongEffect { instance: (instance.name)(), what })?;
+        let wrong_effect = |what| Difference::WrongEffect { instance: (instance.name)(), what };
+        effects::compare(self.task, case, known, Some(made)).map_err(|mismatch| match mismatch {
+            Mismatch::Differs(what) => Obstacle::from(wrong_effect(what)),
+            Mismatch::Unknown(atoms) => Cause::Exclusion { instance: (instance.name)(), atoms }.into(),
+        })?;
         if !self.keeps_time((operator, choice), case) {
-            let what = self.task.world.show(&timeline::clock());
-            return Err(Difference::WrongEffect { instance: (instance.name)(), what });
+            return Err(wrong_effect(self.task.world.show(&timeline::clock())).into());
         }
         let model = self.task.model;
         let own = model.quantity(&operator.cost, choice, &model.sizes(operator));
         if own.to_rational() > &instance.cost * model.objective.scale.to_rational() {
             let cost = instance.cost.to_string();
-            return Err(Difference::WrongCost { instance: (instance.name)(), cost });
+            return Err(Difference::WrongCost { instance: (instance.name)(), cost }.into());
         }
         Ok(())
     }
@@ -396,12 +397,24 @@ impl<'c> Comparison<'c> {
     }
 }
 
-/// A difference with the name of the instance.
-fn named(difference: Difference, instance: &str) -> Difference {
+/// How near an operator is that is refused for this reason.
+fn rank(reason: &Obstacle) -> u8 {
+    match reason {
+        Obstacle::Differs(Difference::NoOperatorFor { .. }) => 0,
+        Obstacle::Differs(Difference::WrongCondition { .. }) => 1,
+        Obstacle::Differs(_) => 2,
+        Obstacle::Open(_) => 3,
+    }
+}
+
+/// A reason with the name of the instance.
+fn named(reason: Obstacle, instance: &str) -> Obstacle {
     let instance = instance.to_owned();
-    match difference {
-        Difference::NoOperatorFor { .. } => Difference::NoOperatorFor { instance },
-        Difference::WrongCondition { .. } => Difference::WrongCondition { instance },
+    match reason {
+        Obstacle::Differs(Difference::NoOperatorFor { .. }) => Difference::NoOperatorFor { instance }.into(),
+        Obstacle::Differs(Difference::WrongCondition { .. }) => {
+            Difference::WrongCondition { instance }.into()
+        }
         other => other,
     }
 }

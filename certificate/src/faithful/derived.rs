@@ -42,25 +42,51 @@ pub(super) fn axioms(
     Ok(axioms)
 }
 
-/// The derived atoms that depend on themselves, and those in between: what is left once those are taken away that depend on
-/// none that is left, or on which none depends.
+/// The derived atoms that depend on themselves, and those in between: the atoms that remain once those are taken away that depend
+/// on none that remains, or on which none depends.
 fn circular<'b>(axioms: &Axioms, bodies: &'b [(Key, Formula)]) -> FxHashSet<&'b Key> {
-    let open = |key: &Key| axioms.known(key).is_none();
-    let mut left: FxHashMap<&Key, FxHashSet<&Key>> = FxHashMap::default();
-    for (key, body) in bodies.iter().filter(|(key, _)| open(key)) {
-        let mut below = FxHashSet::default();
-        atoms(body, &mut below);
-        left.insert(key, below);
+    let mut below: FxHashMap<&Key, FxHashSet<&Key>> = FxHashMap::default();
+    for (key, body) in bodies.iter().filter(|(key, _)| axioms.known(key).is_none()) {
+        atoms(body, below.entry(key).or_default());
     }
-    loop {
-        let heads: FxHashSet<&Key> = left.keys().copied().collect();
-        for below in left.values_mut() {
-            below.retain(|key| heads.contains(key));
+    let mut remaining: FxHashSet<&Key> = below.keys().copied().collect();
+    for own in below.values_mut() {
+        own.retain(|key| remaining.contains(key));
+    }
+    let mut above: FxHashMap<&Key, FxHashSet<&Key>> = FxHashMap::default();
+    for (key, own) in &below {
+        for lower in own {
+            above.entry(*lower).or_default().insert(*key);
         }
-        let needed: FxHashSet<&Key> = left.values().flatten().copied().collect();
-        left.retain(|key, below| !below.is_empty() && needed.contains(key));
-        if left.len() == heads.len() {
-            return heads;
+    }
+    for (links, opposite) in [(&below, &above), (&above, &below)] {
+        take_ends_away(&mut remaining, links, opposite);
+    }
+    remaining
+}
+
+/// Takes away the atoms without a link to one that remains, again and again.
+#[expect(clippy::arithmetic_side_effects, reason = "a link is taken away once")]
+fn take_ends_away<'b>(
+    remaining: &mut FxHashSet<&'b Key>,
+    links: &FxHashMap<&'b Key, FxHashSet<&'b Key>>,
+    opposite: &FxHashMap<&'b Key, FxHashSet<&'b Key>>,
+) {
+    let count = |key: &'b Key| {
+        let own = links.get(key).into_iter().flatten();
+        (key, own.filter(|other| remaining.contains(*other)).count())
+    };
+    let mut counts: FxHashMap<&Key, usize> = remaining.iter().copied().map(count).collect();
+    let mut open: Vec<&Key> = counts.iter().filter(|(_, count)| **count == 0).map(|(key, _)| *key).collect();
+    while let Some(key) = open.pop() {
+        remaining.remove(key);
+        for other in opposite.get(key).into_iter().flatten() {
+            if let Some(count) = counts.get_mut(other) {
+                *count -= 1;
+                if *count == 0 {
+                    open.push(*other);
+                }
+            }
         }
     }
 }
@@ -133,22 +159,27 @@ fn atoms<'f>(formula: &'f Formula, found: &mut FxHashSet<&'f Key>) {
     }
 }
 
+/// The least set of atoms whose bodies hold by the set. A body that holds by a set holds by every larger one, so that it is read
+/// again only when an atom in it has joined.
 fn fixpoint(bodies: &[(Key, Formula)], holds: impl Fn(&Formula, &FxHashSet<Key>) -> bool) -> FxHashSet<Key> {
-    let mut own: FxHashSet<Key> = FxHashSet::default();
-    let mut open: Vec<&(Key, Formula)> = bodies.iter().collect();
-    loop {
-        let before = open.len();
-        open.retain(|(key, body)| {
-            let new = holds(body, &own);
-            if new {
-                own.insert(key.clone());
-            }
-            !new
-        });
-        if open.len() == before {
-            return own;
+    let mut readers: FxHashMap<&Key, Vec<usize>> = FxHashMap::default();
+    for (place, (_, body)) in bodies.iter().enumerate() {
+        let mut below = FxHashSet::default();
+        atoms(body, &mut below);
+        for key in below {
+            readers.entry(key).or_default().push(place);
         }
     }
+    let mut own: FxHashSet<Key> = FxHashSet::default();
+    let mut open: Vec<usize> = (0..bodies.len()).rev().collect();
+    while let Some(place) = open.pop() {
+        let (key, body) = &bodies[place];
+        if !own.contains(key) && holds(body, &own) {
+            own.insert(key.clone());
+            open.extend(readers.get(key).into_iter().flatten());
+        }
+    }
+    own
 }
 
 /// Whether a body may hold where derived atoms hold only if they are in one set, and surely if they are in the other one.
@@ -173,7 +204,7 @@ fn certain(world: &World<'_>, formula: &Formula, must: &FxHashSet<Key>, may: &Fx
     }
 }
 
-/// The predicates and functions on which each derived predicate depends, itself included if it is recursive.
+/// The predicates and functions that the rules of each derived predicate mention.
 fn reads(world: &World<'_>) -> Result<FxHashMap<u32, FxHashSet<u32>>, Cause> {
     let mut reads: FxHashMap<u32, FxHashSet<u32>> = FxHashMap::default();
     for (symbol, rules) in world.derived() {
@@ -182,17 +213,7 @@ fn reads(world: &World<'_>) -> Result<FxHashMap<u32, FxHashSet<u32>>, Cause> {
             in_condition(world, &rule.condition, own)?;
         }
     }
-    loop {
-        let before = reads.clone();
-        for own in reads.values_mut() {
-            let more: Vec<u32> =
-                own.iter().filter_map(|symbol| before.get(symbol)).flatten().copied().collect();
-            own.extend(more);
-        }
-        if reads == before {
-            return Ok(reads);
-        }
-    }
+    Ok(reads)
 }
 
 fn in_condition(world: &World<'_>, condition: &Condition, found: &mut FxHashSet<u32>) -> Result<(), Cause> {

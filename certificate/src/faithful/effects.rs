@@ -19,13 +19,21 @@ pub(super) struct Made<'m> {
     pub(super) choice: &'m [u32],
 }
 
-/// Compares a case with an operator, or with nothing that happens. An error is the first variable or number that differs.
+/// The first variable or number that is not shown to become the same.
+pub(super) enum Mismatch {
+    /// A variable or number becomes something else.
+    Differs(String),
+    /// It does not follow that at most one of the atoms of a variable holds afterwards, or there are too many cases.
+    Unknown(String),
+}
+
+/// Compares a case with an operator, or with nothing that happens.
 pub(super) fn compare(
     task: &Translation<'_>,
     case: &Case,
     known: &Known,
     made: Option<Made<'_>>,
-) -> Result<(), String> {
+) -> Result<(), Mismatch> {
     numbers(task, case, made)?;
     let touched = case.truths.keys().chain(case.effects.iter().map(|(_, key, _)| key));
     let touched = touched.filter_map(|key| Some(task.names.fact(key)?.0));
@@ -36,14 +44,17 @@ pub(super) fn compare(
     }
     for variable in variables {
         let own = Variable::new(task, case, made.map(|made| made.operator), variable);
-        if !own.agrees(known) {
-            return Err(task.model.variables[variable as usize].join(" or "));
+        let words = || task.model.variables[variable as usize].join(" or ");
+        match own.agrees(known) {
+            Some(true) => {}
+            Some(false) => return Err(Mismatch::Differs(words())),
+            None => return Err(Mismatch::Unknown(words())),
         }
     }
     Ok(())
 }
 
-fn numbers(task: &Translation<'_>, case: &Case, made: Option<Made<'_>>) -> Result<(), String> {
+fn numbers(task: &Translation<'_>, case: &Case, made: Option<Made<'_>>) -> Result<(), Mismatch> {
     let fluents = (0..).zip(&task.names.fluents);
     // What becomes of the clock is a matter of the passage.
     for (number, key) in fluents.filter(|(_, key)| key.0 != CLOCK) {
@@ -54,7 +65,7 @@ fn numbers(task: &Translation<'_>, case: &Case, made: Option<Made<'_>>) -> Resul
             Some(task.value(value, choice, &task.model.sizes(operator)))
         });
         if found.unwrap_or_else(same) != expected {
-            return Err(task.world.show(key));
+            return Err(Mismatch::Differs(task.world.show(key)));
         }
     }
     Ok(())
@@ -78,6 +89,8 @@ struct Variable<'v> {
 enum Outcome<'o> {
     Same,
     Other,
+    /// Nothing shows that its atoms stay exclusive.
+    Unknown,
     /// It depends on this.
     Open(Formula),
     OpenPart(&'o Formula),
@@ -102,23 +115,23 @@ impl<'v> Variable<'v> {
         Self { task, own: variable, case, effects, touched, certain, conditional }
     }
 
-    /// Whether both make the same of it wherever this is known.
-    fn agrees(&self, known: &Known) -> bool {
+    /// Whether both make the same of it wherever this is known; `None` if the comparison cannot tell.
+    fn agrees(&self, known: &Known) -> Option<bool> {
         let structure = &self.task.names.structure;
         let mut open = vec![known.clone()];
         for _ in 0..SPLIT_LIMIT {
-            let Some(known) = open.pop() else { return true };
+            let Some(known) = open.pop() else { return Some(true) };
             let outcome = self.outcome(&known);
             let leaf = match &outcome {
                 Outcome::Same => continue,
-                Outcome::Other => return false,
+                Outcome::Other => return Some(false),
+                Outcome::Unknown => return None,
                 Outcome::Open(leaf) => leaf,
                 Outcome::OpenPart(leaf) => leaf,
             };
-            let Ok(cases) = known.split(structure, std::iter::once(leaf)) else { return false };
-            open.extend(cases);
+            open.extend(known.split(structure, std::iter::once(leaf)).ok()?);
         }
-        open.is_empty()
+        open.is_empty().then_some(true)
     }
 
     fn outcome(&self, known: &Known) -> Outcome<'_> {
@@ -145,7 +158,7 @@ impl<'v> Variable<'v> {
             return if same { Outcome::Same } else { Outcome::Other };
         }
         let mut possible = self.possible(known);
-        possible.next().map_or(Outcome::Other, |(_, key)| Outcome::Open(Formula::Atom(key.clone(), true)))
+        possible.next().map_or(Outcome::Unknown, |(_, key)| Outcome::Open(Formula::Atom(key.clone(), true)))
     }
 
     fn may_hold(&self, known: &Known, key: &Key) -> bool {
@@ -203,7 +216,7 @@ impl<'v> Variable<'v> {
                 _ => Ok(None),
             },
             ([value], false) => Ok(Some(*value)),
-            _ => Err(Outcome::Other),
+            _ => Err(Outcome::Unknown),
         }
     }
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
 use rustc_hash::FxHashMap;
+use smallvec::SmallVec;
 
 use crate::faithful::key::Key;
 use crate::faithful::linear::Linear;
@@ -12,6 +13,10 @@ use crate::faithful::verdict::Cause;
 
 /// A condition falls apart into at most so many cases.
 const CASE_LIMIT: usize = 4_096;
+
+/// Upper limit on the nesting of a condition once derived atoms are replaced by their rules. Functions on formulas recurse as
+/// deep as a formula nests.
+pub(super) const DEPTH_LIMIT: usize = 300;
 
 /// A condition in negation normal form.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -64,6 +69,16 @@ impl Formula {
         }
     }
 
+    /// The nesting of conjunctions and disjunctions; 0 for an atom.
+    pub(super) fn depth(&self) -> usize {
+        match self {
+            Self::All(parts) | Self::Any(parts) => {
+                parts.iter().map(Self::depth).max().unwrap_or(0).saturating_add(1)
+            }
+            _ => 0,
+        }
+    }
+
     pub(super) fn negated(&self) -> Self {
         match self {
             Self::All(parts) => Self::junction(parts.iter().map(Self::negated), false),
@@ -78,7 +93,7 @@ impl Formula {
 /// multiplied.
 #[derive(Debug, Default)]
 pub(super) struct Structure {
-    pub(super) groups: FxHashMap<Key, u32>,
+    pub(super) groups: FxHashMap<Key, SmallVec<[u32; 1]>>,
     pub(super) integers: FxHashMap<Key, BigRational>,
 }
 
@@ -97,12 +112,17 @@ impl Known {
         self.holding.get(&group)
     }
 
+    /// The atoms that are known to hold.
+    pub(super) fn holding_atoms(&self) -> impl Iterator<Item = &Key> {
+        self.atoms.iter().filter(|(_, holds)| **holds).map(|(key, _)| key)
+    }
+
     pub(super) fn atom(&self, structure: &Structure, key: &Key) -> Option<bool> {
         if let Some(holds) = self.atoms.get(key) {
             return Some(*holds);
         }
-        let other = structure.groups.get(key).and_then(|group| self.holding.get(group));
-        other.map(|_| false)
+        let groups = structure.groups.get(key)?;
+        groups.iter().any(|group| self.holding.contains_key(group)).then_some(false)
     }
 
     /// Whether a condition holds, if that follows.
@@ -167,7 +187,7 @@ impl Known {
         match formula {
             Formula::Atom(key, holds) => {
                 known.atoms.insert(key.clone(), *holds);
-                if *holds && let Some(group) = structure.groups.get(key) {
+                for group in structure.groups.get(key).into_iter().flatten().filter(|_| *holds) {
                     known.holding.insert(*group, key.clone());
                 }
                 Ok(vec![known])

@@ -9,6 +9,10 @@ use pddl::ast::{Action, ActionBody, Atom, Condition, Name, Term};
 
 /// With more instances, nothing is checked.
 pub(super) const INSTANCE_LIMIT: usize = 400_000;
+/// Upper limit on the number of arguments of all instances together; they take 256 MB then.
+pub(super) const ARGUMENT_LIMIT: usize = 1 << 26;
+/// The caller's limits are polled once for this many instances.
+const POLL_INTERVAL: usize = 1 << 10;
 
 /// Values of parameters so far.
 type Binding<'b> = FxHashMap<&'b Name, u32>;
@@ -55,15 +59,24 @@ pub(super) fn of(
             if stop() {
                 return Err(Cause::Stopped);
             }
-            if longer.len() > INSTANCE_LIMIT {
+            if are_too_many(longer.len(), action) {
                 return Err(too_many(action.identifier.name.as_str()));
             }
         }
         partial = longer;
     }
     let mut instances = Vec::new();
+    // The join gives the same parameters a value in each binding.
+    let mut typed = Vec::new();
+    for parameter in &action.parameters {
+        let is_bound = partial.first().is_none_or(|own| own.contains_key(&parameter.identifier.name));
+        typed.push(if is_bound { Vec::new() } else { world.objects_of(&parameter.r#type) });
+        if stop() {
+            return Err(Cause::Stopped);
+        }
+    }
     for binding in &partial {
-        complete(world, action, binding, &mut Vec::new(), &mut instances)?;
+        complete(world, action, (binding, &typed), stop, &mut instances)?;
     }
     instances.sort_unstable();
     instances.dedup();
@@ -111,30 +124,45 @@ fn extend<'b>(
     Ok(())
 }
 
-/// Adds the instances with all objects that fit the parameters that are left.
+/// Adds the instances with all objects that fit the parameters without a value; `typed` has those objects by parameter.
+#[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 fn complete(
     world: &World<'_>,
     action: &Action,
-    binding: &Binding<'_>,
-    arguments: &mut Vec<u32>,
+    (binding, typed): (&Binding<'_>, &[Vec<u32>]),
+    stop: &dyn Fn() -> bool,
     instances: &mut Vec<Vec<u32>>,
 ) -> Result<(), Cause> {
-    if instances.len() > INSTANCE_LIMIT {
-        return Err(too_many(action.identifier.name.as_str()));
+    let mut choices: Vec<&[u32]> = Vec::new();
+    for (parameter, typed) in action.parameters.iter().zip(typed) {
+        choices.push(match binding.get(&parameter.identifier.name) {
+            Some(object) if world.is_of(*object, &parameter.r#type) => std::slice::from_ref(object),
+            Some(_) => &[],
+            None => typed,
+        });
     }
-    let Some(parameter) = action.parameters.get(arguments.len()) else {
-        instances.push(arguments.clone());
+    if choices.iter().any(|own| own.is_empty()) {
         return Ok(());
-    };
-    let own = match binding.get(&parameter.identifier.name) {
-        Some(object) if world.is_of(*object, &parameter.r#type) => vec![*object],
-        Some(_) => Vec::new(),
-        None => world.objects_of(&parameter.r#type),
-    };
-    for object in own {
-        arguments.push(object);
-        complete(world, action, binding, arguments, instances)?;
-        arguments.pop();
     }
-    Ok(())
+    // Counts through all combinations, the last parameter fastest.
+    let mut places = vec![0; choices.len()];
+    loop {
+        if are_too_many(instances.len(), action) {
+            return Err(too_many(action.identifier.name.as_str()));
+        }
+        if instances.len().is_multiple_of(POLL_INTERVAL) && stop() {
+            return Err(Cause::Stopped);
+        }
+        instances.push(choices.iter().zip(&places).map(|(own, place)| own[*place]).collect());
+        let Some(at) = (0..choices.len()).rev().find(|at| places[*at] + 1 < choices[*at].len()) else {
+            return Ok(());
+        };
+        places[at] += 1;
+        places[at + 1..].fill(0);
+    }
+}
+
+/// Returns `true` if an action has more instances than are checked.
+fn are_too_many(instances: usize, action: &Action) -> bool {
+    instances > INSTANCE_LIMIT || instances.saturating_mul(action.parameters.len()) > ARGUMENT_LIMIT
 }

@@ -1,6 +1,8 @@
 //! The witness of what can become of a state: atoms that may hold, and intervals of numbers. It holds at first, and no instance
 //! leaves it, even if nothing is ever deleted [1], [2].
 //!
+//! It may also have groups of atoms of which at most one holds (`exclusive`).
+//!
 //! It is made as a least fixpoint, whose intervals are widened after a while. Who checks it goes through all instances once,
 //! and does not rely on how it was made.
 //!
@@ -13,11 +15,13 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use serde::{Deserialize, Serialize};
 
 use crate::faithful::case::Case;
+use crate::faithful::exclusive::{self, Group};
 use crate::faithful::formula::{Formula, Known, Structure};
 use crate::faithful::key::{CLOCK, Key};
 use crate::faithful::linear::{Interval, Linear};
 use crate::faithful::verdict::{Cause, Difference};
 use crate::faithful::world::World;
+use crate::integer::MAX_DIGITS;
 
 pub(super) const WITNESS_FORMAT: &str = "metaplan-witness/1";
 
@@ -34,6 +38,9 @@ struct Written {
     /// Fluents that actions change, each with the least and the greatest value that it can have; null where there is none.
     /// What is not listed has no bounds.
     numbers: Vec<(String, Option<String>, Option<String>)>,
+    /// Groups of atoms of which at most one holds, in addition to the variables of the task.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    exclusive: Vec<Vec<String>>,
 }
 
 #[derive(Debug, Clone, Default)]
@@ -41,6 +48,8 @@ pub(super) struct Invariant {
     atoms: FxHashSet<Key>,
     /// Those of fluents that never change are points.
     numbers: FxHashMap<Key, Interval>,
+    /// Of each at most one atom holds.
+    pub(super) exclusive: Vec<Group>,
 }
 
 impl Invariant {
@@ -50,7 +59,7 @@ impl Invariant {
         // Nothing is known of the clock.
         let values = world.initial_values().filter(|(key, _)| key.0 != CLOCK);
         let numbers = values.map(|(key, value)| (key.clone(), Interval::point(value))).collect();
-        Self { atoms, numbers }
+        Self { atoms, numbers, exclusive: Vec::new() }
     }
 
     pub(super) fn read(world: &World<'_>, text: &str) -> Result<Self, Difference> {
@@ -64,6 +73,12 @@ impl Invariant {
         };
         let number = |text: Option<String>| {
             let read = |text: String| {
+                if text.len() > MAX_DIGITS {
+                    return Err(form(format!(
+                        "a fraction of {} characters, more than {MAX_DIGITS}",
+                        text.len()
+                    )));
+                }
                 let is_fraction = text.bytes().all(|byte| byte.is_ascii_digit() || b"-/".contains(&byte));
                 let parsed = if is_fraction { text.parse::<BigRational>().ok() } else { None };
                 parsed.ok_or_else(|| form(format!("{text} is not a fraction")))
@@ -79,6 +94,14 @@ impl Invariant {
             if witness.numbers.insert(key(&fluent)?, interval).is_some() {
                 return Err(form(format!("{fluent} has two intervals")));
             }
+        }
+        for group in &written.exclusive {
+            let group: Group = group.iter().map(key).collect::<Result<_, _>>()?;
+            if !exclusive::holds_initially(world, &group) {
+                let words: Vec<String> = group.iter().map(|key| world.show(key)).collect();
+                return Err(Difference::Exclusive { atoms: words.join(" or ") });
+            }
+            witness.exclusive.push(group);
         }
         let first = Self::initial(world);
         let missing = first.atoms.iter().find(|key| !witness.atoms.contains(*key));
@@ -106,7 +129,9 @@ impl Invariant {
             .filter(|(key, own)| world.changes(key.0) && (own.low.is_some() || own.high.is_some()));
         let mut numbers: Vec<_> = bounded.map(number).collect();
         numbers.sort_unstable();
-        let written = Written { format: WITNESS_FORMAT.to_owned(), atoms, numbers };
+        let group = |group: &Group| group.iter().map(|key| world.show(key)).collect();
+        let exclusive = self.exclusive.iter().map(group).collect();
+        let written = Written { format: WITNESS_FORMAT.to_owned(), atoms, numbers, exclusive };
         serde_json::to_string(&written).unwrap_or_default()
     }
 
@@ -168,7 +193,7 @@ impl Invariant {
     }
 
     /// The atoms that an instance may make true.
-    fn added<'c>(structure: &'c Structure, case: &'c Case) -> impl Iterator<Item = &'c Key> {
+    pub(super) fn added<'c>(structure: &'c Structure, case: &'c Case) -> impl Iterator<Item = &'c Key> {
         let at_end = case
             .effects
             .iter()
@@ -194,8 +219,15 @@ impl Invariant {
                 (!interval.contains(&self.range(after, &case.known))).then_some(key)
             })
         };
-        match new.or_else(outside) {
-            Some(key) => Err(Difference::Witness { what: world.show(key) }),
+        if let Some(key) = new.or_else(outside) {
+            return Err(Difference::Witness { what: world.show(key) });
+        }
+        let mut groups = exclusive::concerned(case, &self.exclusive);
+        match groups.find(|group| !exclusive::keeps(structure, self, case, group)) {
+            Some(group) => {
+                let words: Vec<String> = group.iter().map(|key| world.show(key)).collect();
+                Err(Difference::Exclusive { atoms: words.join(" or ") })
+            }
             None => Ok(()),
         }
     }

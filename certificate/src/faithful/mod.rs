@@ -26,6 +26,7 @@ mod case;
 mod compare;
 mod derived;
 mod effects;
+mod exclusive;
 mod formula;
 mod happening;
 mod instances;
@@ -53,6 +54,7 @@ use crate::references;
 use axioms::Axioms;
 use case::Case;
 use compare::Comparison;
+use exclusive::{Group, Move};
 use invariant::{Invariant, Widening};
 use key::Key;
 use pddl::ast::{Action, ActionBody, ConditionTime, Domain, Effect, Problem};
@@ -144,12 +146,14 @@ impl<'f> Files<'f> {
         let world = World::new(domain, problem)?;
         let names = Names::new(&world, model)?;
         let mut all = Vec::new();
+        let mut size = 0_usize;
         for (action, schema) in domain.actions.iter().enumerate() {
             for arguments in instances::of(&world, schema, stop)? {
+                size = size.saturating_add(arguments.len());
                 let requires = requires(&world, schema, &arguments)?;
                 all.push(Instance { action, arguments, requires });
             }
-            if all.len() > instances::INSTANCE_LIMIT {
+            if all.len() > instances::INSTANCE_LIMIT || size > instances::ARGUMENT_LIMIT {
                 return Err(instances::too_many("actions").into());
             }
         }
@@ -200,15 +204,58 @@ impl<'f> Files<'f> {
             }
             open = next;
             if !news {
-                return Ok(widening.invariant.write(&self.world));
+                let mut invariant = widening.invariant;
+                invariant.exclusive = self.exclusive(&invariant, &axioms)?;
+                return Ok(invariant.write(&self.world));
             }
         }
         Err(invariant::too_many_rounds(ROUND_LIMIT).into())
     }
 
+    /// Groups of which at most one atom holds, for the variables that are not exclusive by themselves.
+    fn exclusive(&self, invariant: &Invariant, axioms: &Axioms) -> Result<Vec<Group>> {
+        let atoms = |variable| self.names.atoms(variable).map(|(_, key)| key.clone()).collect();
+        let variables: Vec<Group> = self.model.basic_variables().map(atoms).collect();
+        let may_hold = |key: &Key| invariant.may_hold(key);
+        let mut broken: BTreeSet<u32> = BTreeSet::new();
+        self.each_move(invariant, axioms, &mut |own| {
+            let touched = own.adds.iter().filter_map(|key| Some(self.names.fact(key)?.0));
+            broken
+                .extend(touched.filter(|own_variable| {
+                    own.keeps(&variables[*own_variable as usize], &may_hold).is_err()
+                }));
+        })?;
+        if broken.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut moves = Vec::new();
+        self.each_move(invariant, axioms, &mut |own| moves.push(own))?;
+        let broken = broken.into_iter().map(|variable| variables[variable as usize].clone());
+        Ok(exclusive::search(&self.world, invariant, broken, &moves, self.stop))
+    }
+
+    /// Visits what each case of each instance does.
+    fn each_move(&self, invariant: &Invariant, axioms: &Axioms, visit: &mut dyn FnMut(Move)) -> Result<()> {
+        let structure = &self.names.structure;
+        let waits = action::waits(&self.world.timeline, structure)?;
+        for case in &waits {
+            visit(Move::new(structure, case));
+        }
+        for instance in &self.instances {
+            let cases = self.cases(instance, invariant, axioms)?;
+            cases.iter().map(|case| Move::new(structure, case)).filter(Move::adds_any).for_each(&mut *visit);
+        }
+        Ok(())
+    }
+
     #[expect(clippy::arithmetic_side_effects, reason = "instances are held in memory")]
-    fn compare(&self, witness: &str) -> Result<Faithful> {
+    fn compare(mut self, witness: &str) -> Result<Faithful> {
         let invariant = Invariant::read(&self.world, witness)?;
+        for (number, group) in exclusive::numbered(self.model.variables.len(), &invariant.exclusive) {
+            for key in group {
+                self.names.structure.groups.entry(key.clone()).or_default().push(number);
+            }
+        }
         let axioms = derived::axioms(&self.world, &invariant, &self.names.linked)?;
         let task = Translation::new(&self.world, self.model, &self.names, &invariant, &axioms)?;
         let timed = self.world.problem.metric.is_none() && self.takes_time(&invariant, &axioms)?;

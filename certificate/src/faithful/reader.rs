@@ -9,7 +9,7 @@ use rustc_hash::FxHashMap;
 use smallvec::SmallVec;
 
 use crate::faithful::axioms::Axioms;
-use crate::faithful::formula::Formula;
+use crate::faithful::formula::{DEPTH_LIMIT, Formula};
 use crate::faithful::invariant::Invariant;
 use crate::faithful::key::Key;
 use crate::faithful::length::Length;
@@ -20,6 +20,13 @@ use pddl::ast::{Arithmetic, Atom, Comparison, Condition, Expression, Name, Term,
 
 /// The conditions of one instance have at most so many parts.
 const SIZE_LIMIT: usize = 200_000;
+/// Upper limit on the parts that are read for one instance, those among them that are read again (see [`Reader::unfold`]).
+const WORK_LIMIT: usize = 16 * SIZE_LIMIT;
+/// Upper limit on the variables of one quantifier, or of the head of a rule.
+const VARIABLE_LIMIT: usize = 10_000;
+/// Upper limit on the nesting of conditions while derived atoms are replaced by their rules. It bounds the stack; atoms
+/// below are replaced one by one.
+const UNFOLDING_LIMIT: usize = 100;
 
 /// Stands for `total-time` in metrics.
 pub(super) const TOTAL_TIME: Key = (u32::MAX, SmallVec::new_const());
@@ -30,6 +37,10 @@ pub(super) struct Applied {
     pub(super) truths: BTreeMap<Key, bool>,
     pub(super) changes: BTreeMap<Key, Linear>,
 }
+
+/// The variables of a quantifier that have an object: for each the objects that are left, and that of an outer variable of
+/// the same name.
+type Levels = Vec<(std::vec::IntoIter<u32>, Option<u32>)>;
 
 pub(super) struct Reader<'r> {
     pub(super) world: &'r World<'r>,
@@ -44,8 +55,24 @@ pub(super) struct Reader<'r> {
     pub(super) in_when: bool,
     /// Derived atoms stay as they are.
     pub(super) opaque: bool,
-    unfolding: Vec<Key>,
+    unfolding: Unfolding,
+    /// The nesting of the condition that is read.
+    depth: usize,
     size: usize,
+    work: usize,
+}
+
+/// Derived atoms that are being replaced by their rules.
+#[derive(Default)]
+struct Unfolding {
+    /// Those whose rules are being read, outermost first.
+    path: Vec<Key>,
+    /// The nesting at which the first of them is read.
+    base: usize,
+    /// An atom below [`UNFOLDING_LIMIT`], to be read by itself before the others are read again.
+    pending: Option<Key>,
+    /// The conditions of such atoms.
+    known: FxHashMap<Key, Formula>,
 }
 
 impl<'r> Reader<'r> {
@@ -60,13 +87,26 @@ impl<'r> Reader<'r> {
             is_metric: false,
             in_when: false,
             opaque: false,
-            unfolding: Vec::new(),
+            unfolding: Unfolding::default(),
+            depth: 0,
             size: 0,
+            work: 0,
         }
     }
 
     /// A condition (or its negation) on the state after what is applied, in terms of the state before.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "conditions nest no deeper than what is read recursively"
+    )]
     pub(super) fn formula(&mut self, condition: &'r Condition, holds: bool) -> Result<Formula, Cause> {
+        self.depth += 1;
+        let formula = self.formula_of(condition, holds);
+        self.depth -= 1;
+        formula
+    }
+
+    fn formula_of(&mut self, condition: &'r Condition, holds: bool) -> Result<Formula, Cause> {
         match condition {
             Condition::And(parts) => self.junction(parts.iter().map(|part| (part, holds)), holds),
             Condition::Or(parts) => self.junction(parts.iter().map(|part| (part, holds)), !holds),
@@ -92,10 +132,14 @@ impl<'r> Reader<'r> {
         }
     }
 
-    #[expect(clippy::arithmetic_side_effects, reason = "SIZE_LIMIT is far below")]
     fn count(&mut self) -> Result<(), Cause> {
-        self.size += 1;
-        if self.size <= SIZE_LIMIT {
+        self.count_parts(1)
+    }
+
+    fn count_parts(&mut self, parts: usize) -> Result<(), Cause> {
+        self.size = self.size.saturating_add(parts);
+        self.work = self.work.saturating_add(parts);
+        if self.size <= SIZE_LIMIT && self.work <= WORK_LIMIT {
             return Ok(());
         }
         Err(Cause::TooMany { what: "parts of the conditions of one instance".into(), limit: SIZE_LIMIT })
@@ -156,23 +200,51 @@ impl<'r> Reader<'r> {
         within: Option<&'r Condition>,
         visit: &mut dyn FnMut(&mut Self) -> Result<bool, Cause>,
     ) -> Result<bool, Cause> {
-        self.count()?;
-        let Some((first, rest)) = bound.split_first() else { return visit(self) };
-        let name = &first.identifier.name;
-        let shadowed = self.binding.get(name).copied();
-        let mut goes_on = true;
-        for object in self.candidates(bound, within) {
-            self.binding.insert(name, object);
-            if !self.each(rest, within, visit)? {
-                goes_on = false;
-                break;
+        if bound.len() > VARIABLE_LIMIT {
+            let what = format!("variables of one quantifier or rule, of which one has {}", bound.len());
+            return Err(Cause::TooMany { what, limit: VARIABLE_LIMIT });
+        }
+        let mut open = Levels::new();
+        loop {
+            self.count()?;
+            if let Some(next) = bound.get(open.len()) {
+                let objects = self.candidates(&bound[open.len()..], within).into_iter();
+                open.push((objects, self.binding.get(&next.identifier.name).copied()));
+            } else if !visit(self)? {
+                for (own, (_, hidden)) in bound.iter().zip(&open).rev() {
+                    self.rebind(&own.identifier.name, *hidden);
+                }
+                return Ok(false);
+            }
+            if !self.next_binding(bound, &mut open) {
+                return Ok(true);
             }
         }
-        match shadowed {
+    }
+
+    /// Gives the innermost variable that has another object that object; `false` if there is none.
+    #[expect(clippy::arithmetic_side_effects, reason = "an entry for each of the first variables")]
+    fn next_binding(&mut self, bound: &'r [TypedName], open: &mut Levels) -> bool {
+        while !open.is_empty() {
+            let last = open.len() - 1;
+            let name = &bound[last].identifier.name;
+            let (objects, hidden) = &mut open[last];
+            if let Some(object) = objects.next() {
+                self.binding.insert(name, object);
+                return true;
+            }
+            let hidden = *hidden;
+            self.rebind(name, hidden);
+            open.pop();
+        }
+        false
+    }
+
+    fn rebind(&mut self, name: &'r Name, hidden: Option<u32>) {
+        match hidden {
             Some(object) => self.binding.insert(name, object),
             None => self.binding.remove(name),
         };
-        Ok(goes_on)
     }
 
     fn equal(&self, left: &Term, right: &Term) -> Result<bool, Cause> {
@@ -264,15 +336,72 @@ impl<'r> Reader<'r> {
     }
 
     /// The condition under which a derived atom holds.
+    ///
+    /// The rules of the derived atoms that it rests on are read recursively up to a limit on the nesting. An atom below the limit
+    /// interrupts the reading; its own condition is read first, and then the reading begins again.
     pub(super) fn unfold(&mut self, key: &Key) -> Result<Formula, Cause> {
-        if self.unfolding.contains(key) {
-            return Err(Cause::unsupported(format!(
-                "{}, which depends on itself and is not a variable of the task, or on what the same action changes",
-                self.world.show(key)
-            )));
+        if let Some(known) = self.unfolding.known.get(key).cloned() {
+            self.count_parts(known.size())?;
+            return Ok(known);
         }
-        self.unfolding.push(key.clone());
+        if self.unfolding.path.is_empty() {
+            return self.unfold_from(key);
+        }
+        if self.unfolding.path.contains(key) {
+            return Err(self.circular(key));
+        }
+        if self.depth.saturating_sub(self.unfolding.base) > UNFOLDING_LIMIT {
+            self.unfolding.pending = Some(key.clone());
+            // Ends the reading, which `unfold_from` begins again.
+            return Err(Cause::Stopped);
+        }
         let outer = std::mem::take(&mut self.binding);
+        let body = self.body(key)?;
+        self.binding = outer;
+        Ok(body)
+    }
+
+    fn unfold_from(&mut self, key: &Key) -> Result<Formula, Cause> {
+        let outer = std::mem::take(&mut self.binding);
+        let (base, size) = (self.depth, self.size);
+        self.unfolding.base = base;
+        let mut open = vec![key.clone()];
+        let formula = loop {
+            let Some(own) = open.last().cloned() else { break Err(Cause::Stopped) };
+            (self.depth, self.size) = (base, size);
+            self.unfolding.path.clear();
+            match (self.body(&own), self.unfolding.pending.take()) {
+                (Ok(formula), _) if open.len() == 1 => break Ok(formula),
+                (Ok(formula), _) if formula.depth() > DEPTH_LIMIT => {
+                    let what =
+                        "levels of a condition after derived atoms are replaced by their rules".to_owned();
+                    break Err(Cause::TooMany { what, limit: DEPTH_LIMIT });
+                }
+                (Ok(formula), _) => {
+                    open.pop();
+                    self.unfolding.known.insert(own, formula);
+                }
+                (Err(_), Some(below)) if open.contains(&below) => break Err(self.circular(&below)),
+                (Err(_), Some(below)) => open.push(below),
+                (Err(cause), None) => break Err(cause),
+            }
+        };
+        self.unfolding = Unfolding::default();
+        self.depth = base;
+        self.binding = outer;
+        formula
+    }
+
+    fn circular(&self, key: &Key) -> Cause {
+        Cause::unsupported(format!(
+            "{}, which depends on itself and is not a variable of the task, or on what the same action changes",
+            self.world.show(key)
+        ))
+    }
+
+    /// The disjunction of the conditions of an atom's rules.
+    fn body(&mut self, key: &Key) -> Result<Formula, Cause> {
+        self.unfolding.path.push(key.clone());
         let mut bodies = Vec::new();
         for rule in self.world.rules(key.0).unwrap_or_default() {
             let parameters = &rule.head.parameters;
@@ -285,8 +414,7 @@ impl<'r> Reader<'r> {
             self.binding = names.zip(key.1.iter().copied()).collect();
             bodies.push(self.formula(&rule.condition, true)?);
         }
-        self.binding = outer;
-        self.unfolding.pop();
+        self.unfolding.path.pop();
         Ok(Formula::junction(bodies, false))
     }
 

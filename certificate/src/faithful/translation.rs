@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::faithful::axioms::Axioms;
-use crate::faithful::formula::{Formula, Structure};
+use crate::faithful::formula::{DEPTH_LIMIT, Formula, Structure};
 use crate::faithful::invariant::Invariant;
 use crate::faithful::key::Key;
 use crate::faithful::linear::Linear;
@@ -17,8 +17,8 @@ use crate::model::{self, Condition, Fact, Literal, Model};
 /// A condition of the task has at most so many parts once its names are replaced by what they stand for.
 const SIZE_LIMIT: usize = 200_000;
 
-/// Conditions of the task refer to each other at most so deep.
-const DEPTH_LIMIT: usize = 200;
+/// Upper limit on the parts of all such conditions together.
+const TOTAL_LIMIT: usize = 16 * SIZE_LIMIT;
 
 type Result<T> = std::result::Result<T, Obstacle>;
 
@@ -71,7 +71,7 @@ impl Names {
                         return form(format!("{text} is the value of two variables"));
                     }
                     if is_basic {
-                        names.structure.groups.insert(key.clone(), variable);
+                        names.structure.groups.entry(key.clone()).or_default().push(variable);
                     } else {
                         names.linked.insert(key.clone());
                     }
@@ -145,6 +145,8 @@ pub(super) struct Translation<'t> {
     possible: Vec<Vec<(u32, &'t Key)>>,
     /// What derived variables stand for that the files do not have, or whose value is known.
     unfolded: BTreeMap<u32, Formula>,
+    /// The bodies of the rules of each derived variable.
+    bodies: FxHashMap<u32, Vec<&'t Condition>>,
 }
 
 impl<'t> Translation<'t> {
@@ -158,9 +160,15 @@ impl<'t> Translation<'t> {
         let possible =
             |(variable, _)| names.atoms(variable).filter(|(_, key)| invariant.may_hold(key)).collect();
         let possible = (0..).zip(&model.variables).map(possible).collect();
-        let mut own = Self { world, model, names, invariant, axioms, possible, unfolded: BTreeMap::new() };
+        let mut bodies: FxHashMap<u32, Vec<&Condition>> = FxHashMap::default();
+        for (head, body) in model.axioms.iter().flat_map(|layer| &layer.rules) {
+            bodies.entry(head.0).or_default().push(body);
+        }
+        let unfolded = BTreeMap::new();
+        let mut own = Self { world, model, names, invariant, axioms, possible, unfolded, bodies };
+        let mut total = 0;
         for variable in model.derived_variables() {
-            own.unfold(variable, &mut Vec::new())?;
+            own.unfold(variable, &mut total)?;
         }
         Ok(own)
     }
@@ -174,42 +182,70 @@ impl<'t> Translation<'t> {
         self.names.key((variable, 0)).is_some_and(|key| self.axioms.linked.contains(key))
     }
 
-    fn unfold(&mut self, variable: u32, above: &mut Vec<u32>) -> Result<()> {
-        if (variable as usize) < self.model.basic
-            || self.is_linked(variable)
-            || self.unfolded.contains_key(&variable)
-        {
-            return Ok(());
-        }
-        if above.contains(&variable) || above.len() > DEPTH_LIMIT {
-            return Err(Cause::unsupported(
-                "a condition of the task that depends on itself, or on many others in a row",
-            )
-            .into());
-        }
-        above.push(variable);
-        let model = self.model;
-        let mut size = 0_usize;
-        for body in bodies(model, variable) {
-            let clauses = body.clauses.iter().flatten().map(|((variable, _), _)| *variable);
-            for below in body.facts.iter().map(|fact| fact.0).chain(clauses) {
-                self.unfold(below, above)?;
-                size = size.saturating_add(self.unfolded.get(&below).map_or(1, Formula::size));
+    fn needs_unfolding(&self, variable: u32) -> bool {
+        (variable as usize) >= self.model.basic
+            && !self.is_linked(variable)
+            && !self.unfolded.contains_key(&variable)
+    }
+
+    /// Replaces a derived variable by its rules, after those that they read.
+    fn unfold(&mut self, variable: u32, total: &mut usize) -> Result<()> {
+        let mut above = FxHashSet::default();
+        // Each variable, and whether what its rules read is unfolded.
+        let mut open = vec![(variable, false)];
+        while let Some((variable, is_ready)) = open.pop() {
+            if !self.needs_unfolding(variable) {
+                continue;
             }
+            if is_ready {
+                above.remove(&variable);
+                self.replace(variable, total)?;
+                continue;
+            }
+            if !above.insert(variable) {
+                return Err(Cause::unsupported("a condition of the task that depends on itself").into());
+            }
+            open.push((variable, true));
+            open.extend(self.read_by(variable).map(|below| (below, false)));
         }
-        above.pop();
+        Ok(())
+    }
+
+    /// The variables that the rules of a derived variable read.
+    fn read_by(&self, variable: u32) -> impl Iterator<Item = u32> {
+        self.bodies(variable).flat_map(|body| {
+            let clauses = body.clauses.iter().flatten().map(|((variable, _), _)| *variable);
+            body.facts.iter().map(|fact| fact.0).chain(clauses)
+        })
+    }
+
+    fn replace(&mut self, variable: u32, total: &mut usize) -> Result<()> {
+        let sizes = self.read_by(variable).map(|below| self.unfolded.get(&below).map_or(1, Formula::size));
+        let size = sizes.fold(0, usize::saturating_add);
+        *total = total.saturating_add(size);
+        let what = "parts of conditions of the task".to_owned();
         if size > SIZE_LIMIT {
-            let what = "parts of a condition of the task".to_owned();
             return Err(Cause::TooMany { what, limit: SIZE_LIMIT }.into());
         }
+        if *total > TOTAL_LIMIT {
+            return Err(Cause::TooMany { what, limit: TOTAL_LIMIT }.into());
+        }
         let formula = self.rules(variable);
+        if formula.depth() > DEPTH_LIMIT {
+            let what = "levels of a condition of the task".to_owned();
+            return Err(Cause::TooMany { what, limit: DEPTH_LIMIT }.into());
+        }
         self.unfolded.insert(variable, formula);
         Ok(())
     }
 
+    fn bodies(&self, variable: u32) -> impl Iterator<Item = &'t Condition> + '_ {
+        self.bodies.get(&variable).into_iter().flatten().copied()
+    }
+
     /// The condition under which the rules of the task give a derived variable its atom.
     pub(super) fn rules(&self, variable: u32) -> Formula {
-        Formula::junction(bodies(self.model, variable).map(|body| self.condition(body, &[], &[])), false)
+        Formula::junction(self.bodies(variable).map(|body| self.condition(body, &[], &[])), false)
     }
 
     fn fact(&self, (variable, value): Fact) -> Formula {
@@ -264,9 +300,4 @@ impl<'t> Translation<'t> {
         let value = self.linear(linear, choice, sizes).times(&self.model.number_scale.to_rational().recip());
         self.invariant.settled(&value)
     }
-}
-
-fn bodies(model: &Model, variable: u32) -> impl Iterator<Item = &Condition> {
-    let rules = model.axioms.iter().flat_map(|layer| &layer.rules);
-    rules.filter(move |(head, _)| head.0 == variable).map(|(_, body)| body)
 }

@@ -79,6 +79,12 @@ pub enum Difference {
         /// An atom or a number.
         what: String,
     },
+    /// The witness says that at most one of some atoms holds, and that is not shown.
+    #[error("nothing shows that at most one of {atoms} holds, as the witness has it")]
+    Exclusive {
+        /// The atoms.
+        atoms: String,
+    },
     /// The witness cannot be read.
     #[error("it is not a witness: {reason}")]
     WitnessForm {
@@ -104,6 +110,17 @@ pub enum Cause {
         what: String,
         /// How many are gone through.
         limit: usize,
+    },
+    /// It does not follow that an instance keeps the atoms of a variable exclusive.
+    #[error(
+        "cannot tell whether the ground task stands for the files: it takes at most one of {atoms} to hold, and neither \
+         {instance} nor the witness by itself shows that this stays so; no difference was found"
+    )]
+    Exclusion {
+        /// The action with its arguments.
+        instance: String,
+        /// The values of the variable.
+        atoms: String,
     },
     /// Time or memory was up, or the user had enough.
     #[error("the comparison of the task with the files was stopped")]

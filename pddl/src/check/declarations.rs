@@ -199,17 +199,19 @@ impl<'a> Checker<'a> {
 
     /// The parameters of an action, an axiom or a quantifier.
     pub(super) fn parameters(&mut self, parameters: &[TypedName]) {
-        for (index, parameter) in parameters.iter().enumerate() {
+        let mut seen: FxHashMap<&Name, Span> = FxHashMap::default();
+        for parameter in parameters {
             self.type_is_declared(&parameter.r#type);
             let Identifier { name, span } = &parameter.identifier;
-            let earlier = parameters[..index].iter().find(|earlier| earlier.identifier.name == *name);
-            if let Some(earlier) = earlier {
+            if let Some(earlier) = seen.get(name) {
                 let source = self.sink.source();
                 self.sink.error("P127", *span, format!("the variable `?{name}` is declared twice")).related(
                     source,
-                    earlier.identifier.span,
+                    *earlier,
                     "the first declaration is here",
                 );
+            } else {
+                seen.insert(name, *span);
             }
         }
     }

@@ -2,6 +2,7 @@
 //! soon as their variables have values.
 
 use std::collections::BTreeSet;
+use std::rc::Rc;
 
 use crate::aggregate::Function;
 use crate::builtin::BuiltIn;
@@ -67,28 +68,32 @@ impl Matcher<'_> {
         found
     }
 
-    /// Adds all matches of the open atoms of a body that extend some values.
+    /// Adds all matches of the open atoms of a body that extend some values, in the order of a search in depth.
     fn extend(&mut self, body: &[Atom], open: &[usize], values: Values, found: &mut Vec<Values>) {
-        self.too_many |= found.len() >= MATCH_LIMIT;
-        if self.too_many {
-            return;
-        }
-        if open.is_empty() {
-            found.push(values);
-            return;
-        }
-        let without =
-            |at: usize| -> Vec<usize> { open.iter().copied().filter(|other| *other != at).collect() };
-        if let Some(at) = open.iter().copied().find(|at| is_ready(body, *at, &values)) {
-            let rest = without(at);
-            if let Atom::BuiltIn { built_in, arguments } = &body[at] {
-                for longer in self.solve(*built_in, arguments, &values) {
-                    self.extend(body, &rest, longer, found);
-                }
-            } else if let Some(longer) = self.filter(body, at, values) {
-                self.extend(body, &rest, longer, found);
+        let mut states: Vec<(Rc<[usize]>, Values)> = vec![(open.into(), values)];
+        while let Some((open, values)) = states.pop() {
+            self.too_many |= found.len() >= MATCH_LIMIT;
+            if self.too_many {
+                return;
             }
-            return;
+            if open.is_empty() {
+                found.push(values);
+                continue;
+            }
+            let (at, next) = self.step(body, &open, values);
+            let rest: Rc<[usize]> = open.iter().copied().filter(|other| Some(*other) != at).collect();
+            states.extend(next.into_iter().rev().map(|longer| (Rc::clone(&rest), longer)));
+        }
+    }
+
+    /// The open atom that is matched next, and the values that it leads to.
+    fn step(&mut self, body: &[Atom], open: &[usize], values: Values) -> (Option<usize>, Vec<Values>) {
+        if let Some(at) = open.iter().copied().find(|at| is_ready(body, *at, &values)) {
+            let next = match &body[at] {
+                Atom::BuiltIn { built_in, arguments } => self.solve(*built_in, arguments, &values),
+                _ => self.filter(body, at, values).into_iter().collect(),
+            };
+            return (Some(at), next);
         }
         let relations = open.iter().copied().filter_map(|at| match &body[at] {
             Atom::Relation { predicate, arguments } => Some((at, *predicate, arguments)),
@@ -103,13 +108,9 @@ impl Matcher<'_> {
             (at, relation, arguments, least.flatten())
         });
         let best = places.min_by_key(|(_, relation, _, place)| self.facts.count(*relation, *place));
-        let Some((at, relation, arguments, place)) = best else { return };
-        let rest = without(at);
-        for row in self.facts.rows(relation, place) {
-            if let Some(longer) = self.agree(arguments, row, &values) {
-                self.extend(body, &rest, longer, found);
-            }
-        }
+        let Some((at, relation, arguments, place)) = best else { return (None, Vec::new()) };
+        let rows = self.facts.rows(relation, place);
+        (Some(at), rows.into_iter().filter_map(|row| self.agree(arguments, row, &values)).collect())
     }
 
     /// The values with which a relation's terms are those of a row.

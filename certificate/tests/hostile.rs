@@ -1,0 +1,276 @@
+//! Documents that ask for much: they are checked in polynomial time, or refused early with a message that names the size. All
+//! of this runs in the threads of tests, which have a stack of 2 MB, without optimisation.
+
+use std::fmt::Write as _;
+
+use metaplan_certificate::{Cause, Difference, Faithful, Fault, check, faithful, witness};
+use num_rational::BigRational;
+use pddl::Source;
+use pddl::ast::{Domain, Problem};
+
+fn read(domain: &str, problem: &str) -> (Domain, Problem) {
+    let (domain, problem, _) =
+        pddl::read(&Source::new("d", domain), &Source::new("p", problem)).expect("PDDL");
+    (domain, problem)
+}
+
+/// A task with variables of one atom each, and operators with a name, arguments, a variable that must hold and one that comes to
+/// hold.
+fn task(objects: &str, atoms: &[&str], operators: &[(&str, &str, Option<usize>, usize)]) -> String {
+    let variables: Vec<String> = atoms.iter().map(|atom| format!(r#"["{atom}", "none of these"]"#)).collect();
+    let values: Vec<&str> = atoms.iter().map(|_| "1").collect();
+    let mut schemas: Vec<String> = Vec::new();
+    let mut all: Vec<String> = Vec::new();
+    for (name, arguments, needs, gives) in operators {
+        schemas.push(format!("\"{name}\""));
+        let needs = needs.map_or_else(String::new, |variable| format!("[{variable}, 0]"));
+        all.push(format!(
+            r#"{{"schema": {}, "arguments": [{arguments}], "uses": 0, "exclusions": 0, "condition": {{"facts": [{needs}]}},
+              "effects": [[{gives}, 0]], "cost": {{"constant": 1}}, "duration": {{"constant": 0}}}}"#,
+            all.len()
+        ));
+    }
+    format!(
+        r#"{{"format": "metaplan-task/1", "objects": [{objects}], "schemas": [{}], "variables": [{}], "basic": {},
+          "values": [{}], "numbers": [], "fluents": [], "number_scale": 1, "slots": [], "uses": [[]], "exclusions": [[]],
+          "tables": [], "operators": [{}], "axioms": [], "goal": {{"facts": [[1, 0]]}},
+          "objective": {{"scale": 1, "offset": 0, "maximize": false}}, "time_scale": 1}}"#,
+        schemas.join(", "),
+        variables.join(", "),
+        atoms.len(),
+        values.join(", "),
+        all.join(", ")
+    )
+}
+
+/// Reaching `(b)` in two steps, with further declarations, rules and actions, objects and facts that change nothing.
+fn compare(declarations: &str, more: &str, objects: &str, facts: &str) -> Faithful {
+    let domain = format!(
+        "(define (domain d) (:predicates (a) (b) {declarations}) {more}
+          (:action go :parameters () :precondition (a) :effect (b)) (:action on :parameters () :precondition () :effect (a)))"
+    );
+    let problem =
+        format!("(define (problem p) (:domain d) (:objects {objects}) (:init {facts}) (:goal (b)))");
+    let (domain, problem) = read(&domain, &problem);
+    let task = task("", &["(a)", "(b)"], &[("go", "", Some(0), 1), ("on", "", None, 0)]);
+    match witness(&domain, &problem, &task, &|| false) {
+        Ok(witness) => faithful(&domain, &problem, &task, &witness, &|| false),
+        Err(verdict) => verdict,
+    }
+}
+
+/// Names with a prefix and numbers from 0.
+fn names(prefix: &str, count: usize) -> String {
+    (0..count).fold(String::new(), |mut text, number| {
+        let _ = write!(text, " {prefix}{number}");
+        text
+    })
+}
+
+/// `(next o0 o1)`, and so on, and the end.
+fn chain(length: usize) -> String {
+    let mut facts = format!("(end o{length})");
+    for number in 0..length {
+        let _ = write!(facts, " (next o{number} o{})", number + 1);
+    }
+    facts
+}
+
+#[test]
+fn derived_atoms_in_a_long_row_are_replaced_by_their_rules() {
+    let length = 5_000;
+    let declarations = "(next ?x ?y) (end ?x) (p ?x)";
+    let more = "(:derived (p ?x) (or (and (end ?x) (a)) (exists (?y) (and (next ?x ?y) (p ?y)))))
+      (:action zz :parameters () :precondition (p o0) :effect (a))";
+    let found = compare(declarations, more, &names("o", length + 1), &chain(length));
+    assert!(matches!(found, Faithful::Yes { instances: 3, .. }), "{found:?}");
+}
+
+/// Where each atom adds a level to the condition, the levels are limited.
+#[test]
+fn conditions_that_nest_too_deep_are_refused() {
+    let length = 5_000;
+    let declarations = "(next ?x ?y) (end ?x) (p ?x) (q ?x)";
+    let more = "(:derived (p ?x) (or (and (end ?x) (a)) (exists (?y) (and (next ?x ?y) (or (a) (and (q ?x) (p ?y)))))))
+      (:action q :parameters (?x) :precondition (q ?x) :effect (q ?x))
+      (:action zz :parameters () :precondition (p o0) :effect (a))";
+    let facts = (0..length).fold(chain(length), |text, number| format!("{text} (q o{number})"));
+    let found = compare(declarations, more, &names("o", length + 1), &facts);
+    let Faithful::Undecided(cause) = &found else { panic!("{found:?}") };
+    let said = "the comparison of the task with the files ends at 300 levels of a condition";
+    assert!(cause.to_string().starts_with(said), "{cause}");
+}
+
+#[test]
+fn many_names_in_one_place_are_refused_or_compared() {
+    let many = names("?x", 60_000);
+    let quantified =
+        |word: &str| format!("(:action zz :parameters () :precondition ({word} ({many}) (a)) :effect (a))");
+    for more in [
+        quantified("exists"),
+        quantified("forall"),
+        format!("(:derived (p{many}) (a)) (:action zz :parameters () :precondition (a) :effect (a))"),
+    ] {
+        let found = compare(&format!("(p{many})"), &more, "o", "");
+        let Faithful::Undecided(cause) = &found else { panic!("{found:?}") };
+        let said = "ends at 10000 variables of one quantifier or rule, of which one has 60000";
+        assert!(cause.to_string().ends_with(said), "{cause}");
+    }
+    let more = format!("(:action zz :parameters ({many}) :precondition (a) :effect (a))");
+    let found = compare("", &more, "o", "");
+    assert!(matches!(found, Faithful::Yes { instances: 3, .. }), "{found:?}");
+    // With two objects there are too many instances, and nothing is multiplied out.
+    let found = compare("", &more, "o o2", "");
+    assert!(matches!(found, Faithful::Undecided(Cause::TooMany { .. })), "{found:?}");
+}
+
+/// Also the widest rules that are compared take little time.
+#[test]
+fn many_derived_predicates_in_a_row_take_little_time() {
+    let count = 3_000;
+    let mut declarations = String::new();
+    let mut more = String::new();
+    for number in 0..=count {
+        let _ = write!(declarations, "(p{number})");
+        let body = if number == count { "(a)".to_owned() } else { format!("(p{})", number + 1) };
+        let _ = write!(more, "(:derived (p{number}) {body})");
+    }
+    let found = compare(&declarations, &more, "", "");
+    assert!(matches!(found, Faithful::Yes { .. }), "{found:?}");
+}
+
+/// Each of the combinations costs less than those with a higher number, and allows less.
+#[test]
+fn many_combinations_of_designs_with_advantages_are_refused() {
+    let slots = 19;
+    let task = task("\"x\", \"y\"", &["(a)", "(b)"], &[("go", "", Some(0), 1), ("on", "", None, 0)]);
+    let mut task: serde_json::Value = serde_json::from_str(&task).expect("JSON");
+    task["slots"] = serde_json::json!([[0, 1]]);
+    task["uses"] = serde_json::json!([[], vec![(0, [0, 1]); slots]]);
+    let powers = (0..slots).map(|slot| [0, 1 << slot]);
+    task["tables"] = powers.collect();
+    task["numbers"] = serde_json::json!([0]);
+    task["fluents"] = serde_json::json!(["(n)"]);
+    let tables: Vec<(Vec<usize>, usize)> = (0..slots).map(|slot| (vec![slot], slot)).collect();
+    let operator = &mut task["operators"][0];
+    operator["uses"] = 1.into();
+    operator["cost"]["tables"] = serde_json::json!(tables);
+    operator["condition"]["comparisons"] =
+        serde_json::json!([{"factors": [], "quantity": {"constant": 0, "tables": tables}}]);
+    let argument =
+        r#"{"format": "metaplan-argument/1", "potentials": [], "needs": [], "labels": [[[1, 1], [0], 0]]}"#;
+    let fault = check(&task.to_string(), argument, None).expect_err("too many");
+    let Fault::Form { reason, .. } = &fault else { panic!("{fault}") };
+    assert!(reason.starts_with("an operator with 524288 combinations of designs"), "{reason}");
+}
+
+/// Walking `steps` times with a battery: each step uses 4 and requires that `required` are there.
+fn walk(required: i32) -> Result<(), Fault> {
+    let task = format!(
+        r#"{{"format": "metaplan-task/1", "objects": [], "schemas": ["walk"],
+          "variables": [["(s)", "(t)", "(u)", "none of these"]], "basic": 1, "values": [0], "numbers": [7], "fluents": ["(battery)"],
+          "number_scale": 1, "slots": [], "uses": [[]], "exclusions": [[]], "tables": [], "operators": [{}, {}],
+          "axioms": [], "goal": {{"facts": [[0, 2]]}},
+          "objective": {{"scale": 1, "offset": 0, "maximize": false}}, "time_scale": 1}}"#,
+        step(0, required),
+        step(1, required)
+    );
+    // From `(s)` two steps are needed, which use 8.
+    let argument = r#"{"format": "metaplan-argument/1", "potentials": [],
+      "needs": [{"number": 0, "pattern": [0], "values": [8, 4, 0, null]}], "labels": []}"#;
+    check(&task, argument, None).map(|_| ())
+}
+
+fn step(from: u32, required: i32) -> String {
+    format!(
+        r#"{{"schema": 0, "arguments": [], "uses": 0, "exclusions": 0, "condition": {{"facts": [[0, {from}]],
+          "comparisons": [{{"factors": [[0, 1]], "quantity": {{"constant": {}}}}}]}}, "effects": [[0, {}]],
+          "changes": [[0, {{"factors": [[0, 1]], "quantity": {{"constant": -4}}}}]],
+          "cost": {{"constant": 1}}, "duration": {{"constant": 0}}}}"#,
+        -required,
+        from + 1
+    )
+}
+
+/// With 7 in the battery nobody walks twice, whatever a step requires beyond its use. If it requires less, the battery may fall below 0.
+#[test]
+fn needs_rest_on_requirements_that_are_at_least_the_use() {
+    for required in [4, 5, 100] {
+        assert_eq!(walk(required), Ok(()), "{required}");
+    }
+    for required in [3, 0, -1] {
+        assert!(matches!(walk(required), Err(Fault::Bound { table: "need", .. })), "{required}");
+    }
+}
+
+const STAGES: &str = "(define (domain d) (:predicates (idle) (loading) (loaded) (done))
+  (:action begin :parameters () :precondition (idle) :effect (and (not (idle)) (loading)))
+  (:action load :parameters () :precondition (loading) :effect (and (not (loading)) (loaded)))
+  (:action finish :parameters () :precondition (loaded) :effect (and (not (loaded)) (idle) (done))))";
+
+/// The task of [`STAGES`], whose first variable has two of three exclusive atoms.
+fn stages() -> String {
+    let operator = |schema: u32, facts: &str, effects: &str| {
+        format!(
+            r#"{{"schema": {schema}, "arguments": [], "uses": 0, "exclusions": 0, "condition": {{"facts": [{facts}]}},
+              "effects": [{effects}], "cost": {{"constant": 1}}, "duration": {{"constant": 0}}}}"#
+        )
+    };
+    format!(
+        r#"{{"format": "metaplan-task/1", "objects": [], "schemas": ["begin", "load", "finish"],
+          "variables": [["(loading)", "(loaded)", "none of these"], ["(idle)", "none of these"], ["(done)", "none of these"]],
+          "basic": 3, "values": [2, 0, 1], "numbers": [], "fluents": [], "number_scale": 1, "slots": [], "uses": [[]],
+          "exclusions": [[]], "tables": [], "operators": [{}, {}, {}], "axioms": [], "goal": {{"facts": [[2, 0]]}},
+          "objective": {{"scale": 1, "offset": 0, "maximize": false}}, "time_scale": 1}}"#,
+        operator(0, "[1, 0]", "[0, 0], [1, 1]"),
+        operator(1, "[0, 0]", "[0, 1]"),
+        operator(2, "[0, 1]", "[0, 2], [1, 0], [2, 0]")
+    )
+}
+
+#[test]
+fn a_group_shows_that_its_parts_are_exclusive() {
+    let problem = "(define (problem p) (:domain d) (:init (idle)) (:goal (done)))";
+    let (domain, problem) = read(STAGES, problem);
+    let made = witness(&domain, &problem, &stages(), &|| false).expect("a witness");
+    let group = r#","exclusive":[["(idle)","(loading)","(loaded)"]]"#;
+    assert!(made.contains(group), "{made}");
+    let compared = |witness: &str| faithful(&domain, &problem, &stages(), witness, &|| false);
+    assert_eq!(compared(&made), Faithful::Yes { instances: 3, idle: 0, timed: false });
+    // Without the group, the comparison cannot tell, and does not name a difference.
+    let found = compared(&made.replace(group, ""));
+    let Faithful::Undecided(cause @ Cause::Exclusion { .. }) = &found else { panic!("{found:?}") };
+    assert!(cause.to_string().starts_with("cannot tell whether the ground task"), "{cause}");
+    // Groups that are not exclusive are refused, also beside one that is.
+    for wrong in [r#""(idle)","(done)""#, r#""(loading)","(done)""#] {
+        let found = compared(
+            &made.replace(group, &format!(r#","exclusive":[["(idle)","(loading)","(loaded)"],[{wrong}]]"#)),
+        );
+        assert!(matches!(found, Faithful::No(Difference::Exclusive { .. })), "{wrong}: {found:?}");
+    }
+}
+
+#[test]
+fn a_group_that_does_not_hold_at_first_is_refused() {
+    let problem = "(define (problem p) (:domain d) (:init (idle) (done)) (:goal (done)))";
+    let (domain, problem) = read(STAGES, problem);
+    let made = witness(&domain, &problem, &stages(), &|| false).expect("a witness");
+    let wrong = made.replacen('}', r#","exclusive":[["(idle)","(done)"]]}"#, 1);
+    let wrong = if made.contains("exclusive") {
+        made.replace(r#"["(idle)","(loading)","(loaded)"]"#, r#"["(idle)","(done)"]"#)
+    } else {
+        wrong
+    };
+    let found = faithful(&domain, &problem, &stages(), &wrong, &|| false);
+    assert!(matches!(found, Faithful::No(Difference::Exclusive { .. })), "{found:?}");
+}
+
+#[test]
+fn numbers_of_very_many_digits_are_refused() {
+    let task = task("", &["(a)", "(b)"], &[("go", "", Some(0), 1)]);
+    let task = task.replace(r#""time_scale": 1"#, &format!(r#""time_scale": {}"#, "9".repeat(10_000_000)));
+    let argument = r#"{"format": "metaplan-argument/1", "potentials": [], "needs": [], "labels": []}"#;
+    let claim = BigRational::from_integer(1.into());
+    let fault = check(&task, argument, Some(&claim)).expect_err("too long");
+    assert!(fault.to_string().contains("a number of 10000000 digits, more than 10000"), "{fault}");
+}

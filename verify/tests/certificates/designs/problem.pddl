@@ -1,0 +1,20 @@
+(define (problem rover)
+  (:domain rover)
+  (:objects
+    a b c - place
+    fast slow - design)
+  (:init
+    (at a)
+    (road a b)
+    (road b c)
+    (road b a)
+    (usable fast)
+    (usable slow)
+    (= (battery) 7)
+    (= (use fast) 5)
+    (= (use slow) 2)
+    (= (price fast) 1)
+    (= (price slow) 3)
+    (= (total-cost) 0))
+  (:goal (and (sampled c) (forall (?p - place) (imply (at ?p) (= ?p c)))))
+  (:metric minimize (total-cost)))

@@ -1,0 +1,5 @@
+(define (problem stuck)
+  (:domain stuck)
+  (:init
+    (b))
+  (:goal (c)))

@@ -1,0 +1,71 @@
+//! Certificates that were changed at random, by bytes, words, lists and JSON values, mostly with a manifest that goes with it: the
+//! verifier answers, without a panic and within a small stack.
+
+#[allow(dead_code, reason = "shared with a fuzz target")]
+mod mutate;
+
+use std::path::Path;
+use std::time::Duration;
+
+use metaplan_verify::Verifier;
+use mutate::{Draw, Files, certificates, mutate, write};
+
+/// The stack of a thread of tests, without optimisation; the program has four times as much.
+const STACK: usize = 2 << 20;
+
+fn originals() -> Vec<Files> {
+    let all = certificates(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/certificates"));
+    assert_eq!(all.len(), 4);
+    all
+}
+
+/// Verifies a certificate in a thread of its own; `None` if that panics.
+fn verified(files: &Files) -> Option<bool> {
+    let directory = tempfile::tempdir().expect("a directory");
+    write(directory.path(), files);
+    std::thread::scope(|scope| {
+        let verify = || {
+            let verification = Verifier::new(directory.path()).time_limit(Duration::from_secs(2)).verify();
+            // The answer is written, too.
+            assert!(verification.to_string().ends_with('\n'));
+            verification.verified()
+        };
+        let thread = std::thread::Builder::new().stack_size(STACK).spawn_scoped(scope, verify);
+        thread.expect("a thread").join().ok()
+    })
+}
+
+/// Changes each certificate for each seed; returns how many changed ones are verified.
+fn withstand(seeds: std::ops::Range<u64>) -> usize {
+    let mut accepted = 0;
+    for (certificate, files) in originals().iter().enumerate() {
+        for seed in seeds.clone() {
+            let mut draw = Draw::Random(seed * 4 + certificate as u64);
+            let changed = mutate(files, &mut draw);
+            let outcome = verified(&changed);
+            assert!(outcome.is_some(), "certificate {certificate}, seed {seed}: a panic");
+            accepted += usize::from(outcome == Some(true));
+        }
+    }
+    accepted
+}
+
+#[test]
+fn the_small_certificates_are_verified() {
+    for files in originals() {
+        assert_eq!(verified(&files), Some(true));
+    }
+}
+
+#[test]
+fn changed_certificates_are_answered() {
+    let accepted = withstand(0..150);
+    // Some changes make no difference: white space, the order of a list.
+    assert!(accepted > 0 && accepted < 300, "{accepted} of 600");
+}
+
+#[test]
+#[ignore = "minutes"]
+fn many_changed_certificates_are_answered() {
+    withstand(1_000..6_000);
+}

@@ -1,0 +1,228 @@
+//! Changes of the files of a certificate, from random numbers or from the bytes of a fuzzer.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use metaplan_verify::digest::digest;
+use serde_json::{Value, json};
+
+/// The files of a certificate by name.
+pub type Files = BTreeMap<String, Vec<u8>>;
+
+/// Upper limit on repetitions of a part of a file.
+const REPETITION_LIMIT: usize = 300;
+
+/// A source of decisions.
+pub enum Draw<'d> {
+    /// Random numbers, the same in every run (`SplitMix64`).
+    Random(u64),
+    /// The bytes of a fuzzer; 0 behind the last one.
+    Bytes(&'d [u8]),
+}
+
+impl Draw<'_> {
+    /// A number below a limit, which is not 0.
+    pub fn below(&mut self, limit: usize) -> usize {
+        let number = match self {
+            Self::Random(state) => {
+                *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
+                let mut z = *state;
+                z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+                z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+                z ^ (z >> 31)
+            }
+            Self::Bytes(bytes) => {
+                let count = if limit <= 256 { 1 } else { 3 }.min(bytes.len());
+                let (own, rest) = bytes.split_at(count);
+                *bytes = rest;
+                own.iter().fold(0, |number, byte| number << 8 | u64::from(*byte))
+            }
+        };
+        usize::try_from(number % limit as u64).expect("below a usize")
+    }
+
+    fn one<'a, T>(&mut self, all: &'a [T]) -> &'a T {
+        &all[self.below(all.len())]
+    }
+}
+
+/// The certificates of a folder.
+pub fn certificates(folder: &Path) -> Vec<Files> {
+    let entries = |path: &Path| {
+        let mut all: Vec<_> =
+            std::fs::read_dir(path).expect("a folder").map(|entry| entry.expect("an entry").path()).collect();
+        all.sort();
+        all
+    };
+    let name = |path: &Path| path.file_name().expect("a name").to_string_lossy().into_owned();
+    let read = |path: &std::path::PathBuf| (name(path), std::fs::read(path).expect("a file"));
+    let folders = entries(folder).into_iter().filter(|path| path.join("manifest.json").is_file());
+    folders.map(|path| entries(&path).iter().map(read).collect()).collect()
+}
+
+/// Changes a certificate in up to three places. Mostly the manifest has the sizes and hashes of the changed files.
+pub fn mutate(files: &Files, draw: &mut Draw<'_>) -> Files {
+    let mut files = files.clone();
+    let names: Vec<String> = files.keys().cloned().collect();
+    for _ in 0..=draw.below(3) {
+        let name = draw.one(&names);
+        let old = &files[name];
+        let text = String::from_utf8_lossy(old);
+        let new = match (draw.below(6), serde_json::from_str::<Value>(&text)) {
+            (0, _) => bytes(old, draw),
+            (1, _) => tokens(&text, draw).into_bytes(),
+            (_, Ok(mut document)) => {
+                structure(&mut document, draw);
+                document.to_string().into_bytes()
+            }
+            (_, Err(_)) => lists(&text, draw).into_bytes(),
+        };
+        files.insert(name.clone(), new);
+    }
+    if draw.below(16) > 0 {
+        mend(&mut files);
+    }
+    files
+}
+
+/// Gives the manifest the sizes and hashes of the files.
+fn mend(files: &mut Files) {
+    let Ok(mut manifest) = serde_json::from_slice::<Value>(&files["manifest.json"]) else { return };
+    let listed = manifest.get_mut("files").and_then(Value::as_array_mut);
+    for entry in listed.into_iter().flatten().filter_map(Value::as_object_mut) {
+        if let Some(text) = entry.get("name").and_then(Value::as_str).and_then(|name| files.get(name)) {
+            entry.insert("bytes".to_owned(), text.len().into());
+            entry.insert("sha256".to_owned(), digest(text).into());
+        }
+    }
+    files.insert("manifest.json".to_owned(), manifest.to_string().into_bytes());
+}
+
+/// A range goes, comes again, or is replaced.
+fn bytes(old: &[u8], draw: &mut Draw<'_>) -> Vec<u8> {
+    let start = draw.below(old.len() + 1);
+    let end = (start + draw.below(40)).min(old.len());
+    let middle = match draw.below(4) {
+        0 => Vec::new(),
+        1 => old[start..end].repeat(1 + draw.below(REPETITION_LIMIT)),
+        2 => (0..=draw.below(8)).map(|_| u8::try_from(draw.below(256)).expect("a byte")).collect(),
+        _ => b"([{\"\\0-9 "[draw.below(9)..][..1].repeat(1 + draw.below(REPETITION_LIMIT)),
+    };
+    [&old[..start], &middle, &old[end..]].concat()
+}
+
+/// A word or number becomes another one of the text, or an extreme one.
+fn tokens(text: &str, draw: &mut Draw<'_>) -> String {
+    let is_part = |c: char| c.is_alphanumeric() || "_-.?:".contains(c);
+    let starts = text.match_indices(is_part).filter(|(at, _)| !text[..*at].ends_with(is_part));
+    let words: Vec<(usize, &str)> =
+        starts.map(|(at, _)| (at, text[at..].split(|c| !is_part(c)).next().unwrap_or_default())).collect();
+    if words.is_empty() {
+        return text.to_owned();
+    }
+    let (at, word) = *draw.one(&words);
+    let long = "9".repeat(1 + draw.below(20_000));
+    let extremes = ["0", "-1", "4294967295", "18446744073709551616", "1e400", "?x", "and", &long];
+    let other = if draw.below(2) == 0 { draw.one(&words).1 } else { *draw.one(&extremes) };
+    format!("{}{other}{}", &text[..at], &text[at + word.len()..])
+}
+
+/// A list in parentheses goes, comes again, becomes another one, or gets more around it.
+fn lists(text: &str, draw: &mut Draw<'_>) -> String {
+    let mut open = Vec::new();
+    let mut all: Vec<(usize, usize)> = Vec::new();
+    for (at, byte) in text.bytes().enumerate() {
+        match byte {
+            b'(' => open.push(at),
+            b')' => all.extend(open.pop().map(|start| (start, at + 1))),
+            _ => {}
+        }
+    }
+    if all.is_empty() {
+        return tokens(text, draw);
+    }
+    let (start, end) = *draw.one(&all);
+    let own = &text[start..end];
+    let (other_start, other_end) = *draw.one(&all);
+    let other = &text[other_start..other_end];
+    let often = 1 + draw.below(REPETITION_LIMIT);
+    let around = *draw.one(&["(not ", "(and ", "(or (p) ", "(exists (?x) ", "(forall (?x) ", "(when (p) "]);
+    let new = match draw.below(6) {
+        0 => String::new(),
+        1 => own.repeat(often),
+        2 => other.to_owned(),
+        3 => format!("(and {own} {other})"),
+        4 => format!("{}{own}{}", around.repeat(often), ")".repeat(often)),
+        _ => {
+            let names = (0..often).fold(String::new(), |names, number| format!("{names} ?x{number}"));
+            format!("(exists ({names}) {own})")
+        }
+    };
+    format!("{}{new}{}", &text[..start], &text[end..])
+}
+
+/// A part of a JSON document goes, comes again, or becomes another one.
+fn structure(document: &mut Value, draw: &mut Draw<'_>) {
+    let mut paths = Vec::new();
+    collect(document, String::new(), &mut paths);
+    let other = document.pointer(draw.one(&paths).as_str()).cloned().unwrap_or_default();
+    let path = draw.one(&paths).clone();
+    let Some(own) = document.pointer_mut(&path) else { return };
+    let often = 1 + draw.below(REPETITION_LIMIT);
+    let number = |draw: &mut Draw<'_>| {
+        let numbers =
+            [json!(0), json!(-1), json!(1), json!(2), json!(u32::MAX), json!(u64::MAX), json!(1_u64 << 40)];
+        draw.one(&numbers).clone()
+    };
+    *own = match (draw.below(6), &*own) {
+        (0, _) => Value::Null,
+        (1, _) => other,
+        (2, Value::Array(all)) if !all.is_empty() => {
+            let again = draw.one(all).clone();
+            all.iter().cloned().chain(std::iter::repeat_n(again, often)).collect()
+        }
+        (3, Value::Array(all)) if !all.is_empty() => {
+            let mut all = all.clone();
+            all.remove(draw.below(all.len()));
+            all.into()
+        }
+        (4, Value::Array(all)) if !all.is_empty() => {
+            let mut all = all.clone();
+            let (left, right) = (draw.below(all.len()), draw.below(all.len()));
+            all.swap(left, right);
+            all.into()
+        }
+        (_, Value::Object(fields)) if !fields.is_empty() => {
+            let mut fields = fields.clone();
+            let names: Vec<String> = fields.keys().cloned().collect();
+            fields.remove(draw.one(&names));
+            fields.into()
+        }
+        (5, _) => (0..100).fold(other, |inner, _| json!([inner])),
+        _ => number(draw),
+    };
+}
+
+fn collect(value: &Value, path: String, paths: &mut Vec<String>) {
+    match value {
+        Value::Array(all) => {
+            for (place, own) in all.iter().enumerate() {
+                collect(own, format!("{path}/{place}"), paths);
+            }
+        }
+        Value::Object(fields) => {
+            for (name, own) in fields {
+                collect(own, format!("{path}/{name}"), paths);
+            }
+        }
+        _ => {}
+    }
+    paths.push(path);
+}
+
+/// Writes a certificate into an empty directory.
+pub fn write(directory: &Path, files: &Files) {
+    for (name, text) in files {
+        std::fs::write(directory.join(name), text).expect("a file");
+    }
+}
