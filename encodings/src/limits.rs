@@ -66,7 +66,7 @@ impl Limits {
     /// neither the flag nor the memory counts.
     #[must_use]
     pub fn extended(&self) -> Self {
-        let grace = (self.time / 10).saturating_add(GRACE);
+        let grace = self.time.mul_f64(0.1).saturating_add(GRACE);
         let deadline = self.deadline.and_then(|deadline| deadline.checked_add(grace));
         Self { deadline, time: self.time, ..Self::default() }
     }

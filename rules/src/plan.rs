@@ -232,6 +232,9 @@ impl Planner<'_> {
 
     /// `None` once the budget is spent, and where a condition stays unbound, which [`check`] rules out.
     fn plan(&mut self, seed: Vec<Source>, skip: Option<usize>, fresh_from: usize) -> Option<Plan> {
+        if !self.budget.visit(1, self.number) {
+            return None;
+        }
         let mut bound = Bound(vec![false; self.lowered.width]);
         let seed = bound.pattern(seed.into_iter().enumerate());
         let seed_is_link = self.is_link(skip);

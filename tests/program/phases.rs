@@ -60,6 +60,11 @@ fn assert_nothing_to_show(found: &Run) {
     assert!(found.status == 12 && found.stderr.contains("limit was reached"), "{found:#?}");
 }
 
+/// The texts of so many numbers, one after the other.
+fn repeated(count: usize, text: impl Fn(usize) -> String) -> String {
+    (0..count).fold(String::new(), |all, number| all + &text(number))
+}
+
 fn files(domain: &str, problem: &str) -> tempfile::TempDir {
     let directory = tempfile::tempdir().expect("a directory");
     std::fs::write(directory.path().join("domain.pddl"), domain).expect("a file");
@@ -71,8 +76,8 @@ const PLAN: [&str; 3] = ["plan", "domain.pddl", "problem.pddl"];
 
 /// A problem with many facts.
 fn many_facts(count: usize) -> tempfile::TempDir {
-    let objects: String = (0..count).map(|number| format!(" o{number}")).collect();
-    let facts: String = (0..count).map(|number| format!("(p o{number} o{})", (number * 7) % count)).collect();
+    let objects = repeated(count, |number| format!(" o{number}"));
+    let facts = repeated(count, |number| format!("(p o{number} o{})", (number * 7) % count));
     files(
         "(define (domain d) (:predicates (p ?x ?y) (q)) (:action a :parameters () :precondition () :effect (q)))",
         &format!("(define (problem p) (:domain d) (:objects{objects}) (:init {facts}) (:goal (q)))"),
@@ -106,8 +111,8 @@ fn reasoning_keeps_the_limit() {
 
 /// A condition over so many variables, each with these objects, that no fact guards.
 fn quantified(variables: usize, objects: &str) -> tempfile::TempDir {
-    let names: String = (0..variables).map(|number| format!(" ?v{number}")).collect();
-    let parts: String = (0..variables).map(|number| format!("(not (p ?v{number}))")).collect();
+    let names = repeated(variables, |number| format!(" ?v{number}"));
+    let parts = repeated(variables, |number| format!("(not (p ?v{number}))"));
     let domain = format!(
         "(define (domain d) (:requirements :typing :negative-preconditions :existential-preconditions) (:types one)
            (:predicates (p ?x - one) (q) (r))
@@ -133,9 +138,8 @@ fn variables_with_one_object_cost_next_to_nothing() {
 
 /// A precondition over so many variables with two objects each. Grounding joins the few edges; the validator tries all combinations.
 fn universal(variables: usize) -> tempfile::TempDir {
-    let names: String = (0..variables).map(|number| format!(" ?v{number}")).collect();
-    let edges: String =
-        (1..variables).map(|number| format!("(not (edge ?v{} ?v{number}))", number - 1)).collect();
+    let names = repeated(variables, |number| format!(" ?v{number}"));
+    let edges = repeated(variables - 1, |number| format!("(not (edge ?v{number} ?v{}))", number + 1));
     let domain = format!(
         "(define (domain d) (:requirements :typing :adl) (:types one) (:predicates (edge ?x ?y - one) (on) (q))
            (:action a :parameters () :precondition (forall ({names} - one) (or {edges} (on))) :effect (q)))"
@@ -157,8 +161,8 @@ fn validating_keeps_the_limit() {
 
 /// A derived fact that follows along a chain, as it is written most often. It once took 10 s.
 fn chain(length: usize) -> tempfile::TempDir {
-    let objects: String = (0..=length).map(|number| format!(" o{number}")).collect();
-    let next: String = (0..length).map(|number| format!("(next o{number} o{})", number + 1)).collect();
+    let objects = repeated(length + 1, |number| format!(" o{number}"));
+    let next = repeated(length, |number| format!("(next o{number} o{})", number + 1));
     files(
         "(define (domain d) (:predicates (next ?x ?y) (end ?x) (on) (q) (p ?x))
            (:derived (p ?x) (or (and (end ?x) (on)) (exists (?y) (and (next ?x ?y) (p ?y)))))

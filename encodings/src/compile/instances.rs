@@ -9,7 +9,7 @@ use super::terms::identifier;
 /// The objects of a task, each with the types of its declarations.
 pub(super) struct Objects<'t> {
     types: TypeHierarchy,
-    objects: Vec<(&'t Name, Vec<&'t TypeExpression>)>,
+    all: Vec<(&'t Name, Vec<&'t TypeExpression>)>,
     limits: &'t Limits,
 }
 
@@ -27,13 +27,13 @@ impl<'t> Objects<'t> {
             }
             objects[place].1.push(&entry.r#type);
         }
-        Self { types: TypeHierarchy::of(domain), objects, limits }
+        Self { types: TypeHierarchy::of(domain), all: objects, limits }
     }
 
     /// The objects of a type.
     pub(super) fn members(&self, wanted: &TypeExpression) -> impl Iterator<Item = &'t Name> {
         let fits = |types: &[&TypeExpression]| types.iter().any(|given| self.types.fits(given, wanted));
-        self.objects.iter().filter(move |(_, types)| fits(types)).map(|(name, _)| *name)
+        self.all.iter().filter(move |(_, types)| fits(types)).map(|(name, _)| *name)
     }
 
     /// All ways to bind some variables, each added to a binding. They end at a limit, so that the limits are to be checked afterwards.

@@ -327,7 +327,9 @@ impl<'p> Closure<'_, 'p> {
 fn names_in<'p>(condition: &'p Condition, found: &mut dyn FnMut(&'p Name)) {
     match condition {
         Condition::And(parts) | Condition::Or(parts) => {
-            parts.iter().for_each(|part| names_in(part, found));
+            for part in parts {
+                names_in(part, found);
+            }
         }
         Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
             names_in(inner, found);
@@ -349,7 +351,9 @@ fn functions_in<'p>(expression: &'p Expression, found: &mut dyn FnMut(&'p Name))
     match expression {
         Expression::Fluent(atom) => found(&atom.predicate.name),
         Expression::Operation(_, operands, _) => {
-            operands.iter().for_each(|operand| functions_in(operand, found));
+            for operand in operands {
+                functions_in(operand, found);
+            }
         }
         Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => {}
     }

@@ -162,10 +162,9 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         let mut result = Ok(true);
         self.world.each(variables, bindings, &mut |bindings| {
             match self.holds(body, bindings) {
-                Ok(true) => {}
                 Ok(false) => result = Ok(false),
                 Err(undefined) if result == Ok(true) => result = Err(undefined),
-                Err(_) => {}
+                Ok(true) | Err(_) => {}
             }
             result != Ok(false)
         });

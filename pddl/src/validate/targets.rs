@@ -52,7 +52,9 @@ fn action_effects<'p>(action: &'p Action, found: &mut dyn FnMut(&'p Effect)) {
     match &action.body {
         ActionBody::Instantaneous { effect, .. } => simple_effects(effect, found),
         ActionBody::Durative { effects, .. } => {
-            effects.iter().for_each(|(_, effect)| simple_effects(effect, found));
+            for (_, effect) in effects {
+                simple_effects(effect, found);
+            }
         }
     }
 }

@@ -54,7 +54,9 @@ pub(crate) fn each_binding<'a>(
             Some(level) => levels.push(level),
             None if visit(world, binding) => {}
             None => {
-                levels.iter_mut().for_each(|level| level.undo(binding));
+                for level in &mut levels {
+                    level.undo(binding);
+                }
                 return Ok(false);
             }
         }
