@@ -8,13 +8,21 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use rules::Interrupt;
+
 /// The limits of one planning run. Clones share the flag.
 #[derive(Debug, Clone, Default)]
 pub struct Limits {
     deadline: Option<Instant>,
+    /// The time from the start to the deadline.
+    time: Duration,
     interrupt: Arc<AtomicBool>,
     room: Option<usize>,
 }
+
+/// Time after the deadline in which an answer can be completed, in addition to a tenth of the time limit. It is shorter than the 0.2 s
+/// that a command may take, since the process has to start and to print.
+const GRACE: Duration = Duration::from_millis(120);
 
 /// What a search may store, in bytes, unless it is told.
 const ROOM: usize = 1 << 31;
@@ -29,6 +37,7 @@ impl Limits {
     #[must_use]
     pub fn with_time(mut self, time: Duration) -> Self {
         self.deadline = Instant::now().checked_add(time);
+        self.time = time;
         self
     }
 
@@ -47,7 +56,19 @@ impl Limits {
     #[must_use]
     pub fn within(&self, time: Duration) -> Self {
         let own = self.clone().with_time(time);
-        Self { deadline: own.deadline.into_iter().chain(self.deadline).min(), ..own }
+        match self.deadline {
+            Some(deadline) if own.deadline.is_none_or(|own| deadline < own) => self.clone(),
+            _ => own,
+        }
+    }
+
+    /// Returns limits for the completion of an answer: the deadline is a tenth of the time and a little more later, and
+    /// neither the flag nor the memory counts.
+    #[must_use]
+    pub fn extended(&self) -> Self {
+        let grace = self.time.mul_f64(0.1).saturating_add(GRACE);
+        let deadline = self.deadline.and_then(|deadline| deadline.checked_add(grace));
+        Self { deadline, time: self.time, ..Self::default() }
     }
 
     /// Lets a search store so many bytes, as it estimates them.
@@ -86,6 +107,14 @@ impl Limits {
     pub fn reached(&self) -> bool {
         self.interrupt.load(Ordering::Relaxed)
             || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
+    }
+}
+
+/// Stops a rule engine at the limits.
+impl From<&Limits> for Interrupt {
+    fn from(limits: &Limits) -> Self {
+        let limits = limits.clone();
+        Self::new(move || limits.reached())
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod course;
 mod definition;
+mod derived;
 mod files;
 mod language;
 mod messages;

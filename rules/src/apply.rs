@@ -84,7 +84,8 @@ impl Engine {
             evaluated = Arc::new(equality.normal_program(&self.program));
             Arc::make_mut(equality).program = Arc::clone(&evaluated);
         }
-        let network = compile(&evaluated, Arc::make_mut(&mut self.symbols), &mut self.store)?;
+        let symbols = Arc::make_mut(&mut self.symbols);
+        let network = compile(&evaluated, symbols, &mut self.store, &self.limits)?;
         self.records = Records::new(&network);
         self.network = Arc::new(network);
         Maintenance::new(self).derive_all()?;
@@ -124,7 +125,7 @@ impl Engine {
 
     /// On an error also what takes the change back.
     fn apply_plainly(&mut self, delta: Delta) -> Result<Delta, (Error, Delta)> {
-        self.replan();
+        self.replan().map_err(|error| (error, Delta::default()))?;
         let stated = state_change(self, delta);
         let mut maintenance = Maintenance::new(self);
         match maintenance.update(&stated) {
@@ -135,7 +136,7 @@ impl Engine {
 
     /// As [`Engine::apply`], for rows of the store, which is in no defined state after an error.
     pub(crate) fn apply_rows(&mut self, delta: Delta) -> Result<Delta, Error> {
-        self.replan();
+        self.replan()?;
         let stated = state_change(self, delta);
         let mut maintenance = Maintenance::new(self);
         maintenance.update(&stated)?;
@@ -143,10 +144,12 @@ impl Engine {
     }
 
     /// Plans the joins anew once there are many more facts than they were planned for.
-    fn replan(&mut self) {
-        if self.store.len() > REPLAN_FACTOR * self.network.planned_for.max(REPLAN_FROM) {
-            Arc::make_mut(&mut self.network).plan(&mut self.store, true);
+    fn replan(&mut self) -> Result<(), Error> {
+        if self.store.len() <= REPLAN_FACTOR * self.network.planned_for.max(REPLAN_FROM) {
+            return Ok(());
         }
+        let network = Arc::make_mut(&mut self.network);
+        network.plan(&mut self.store, true, (&self.program, &self.limits))
     }
 
     /// Derives everything anew after an update that was stopped, from what was stated before.

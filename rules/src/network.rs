@@ -6,6 +6,7 @@ use rustc_hash::{FxHashMap, FxHashSet};
 use crate::cost::Costs;
 use crate::error::{Error, Errors};
 use crate::fixpoint::PlanId;
+use crate::limits::{Budget, Limits};
 use crate::lower::Lowering;
 use crate::plan::{Condition, Lowered, Plan, Planner, Template};
 use crate::rule::{Atom, Program, Rule, RuleIdentity, Term};
@@ -54,6 +55,7 @@ pub(crate) fn compile(
     program: &Program,
     symbols: &mut Symbols,
     store: &mut Store,
+    limits: &Limits,
 ) -> Result<Network, Errors> {
     let mut errors: Vec<Error> = program.rules.iter().flat_map(check).collect();
     errors.extend(program.rules.iter().filter_map(|rule| unknown_symbols(rule, symbols)));
@@ -73,7 +75,7 @@ pub(crate) fn compile(
     network.stratum_of = stratify(program, symbols, store, &lowered, network.same)?;
     network.rules = split_by_stratum(lowered, &network.stratum_of);
     network.widths = network.rules.iter().map(|rule| rule.width).collect();
-    network.plan(store, false);
+    network.plan(store, false, (program, limits)).map_err(|error| vec![error])?;
     Ok(network)
 }
 
@@ -95,6 +97,7 @@ pub(crate) fn revise(
     new: &Program,
     symbols: &mut Symbols,
     store: &mut Store,
+    limits: &Limits,
 ) -> Result<Option<Revision>, Errors> {
     let mut errors: Vec<Error> = new.rules.iter().flat_map(check).collect();
     errors.extend(new.rules.iter().filter_map(|rule| unknown_symbols(rule, symbols)));
@@ -147,7 +150,7 @@ pub(crate) fn revise(
         added.insert(number as u32);
     }
     revised.widths = revised.rules.iter().map(|rule| rule.width).collect();
-    revised.plan(store, true);
+    revised.plan(store, true, (new, limits)).map_err(|error| vec![error])?;
     Ok(Some(Revision { network: revised, removed, added }))
 }
 
@@ -240,17 +243,30 @@ impl Network {
     }
 
     /// Plans all rules anew by the sizes that relations have now. `complete` says that the rules have been evaluated.
-    pub fn plan(&mut self, store: &mut Store, complete: bool) {
+    ///
+    /// # Errors
+    /// R304 where planning was interrupted; the plans are then as they were before.
+    pub fn plan(
+        &mut self,
+        store: &mut Store,
+        complete: bool,
+        (program, limits): (&Program, &Limits),
+    ) -> Result<(), Error> {
         let heads = self.rules.iter().flat_map(|rule| &rule.heads);
         let derived: FxHashSet<RelationId> = heads.map(|head| head.relation).collect();
         let costs = Costs::new(store, |relation| !complete && derived.contains(&relation));
         let mut strata = vec![Stratum::default(); self.stratum_of.iter().max().map_or(0, |max| max + 1)];
-        self.plans.clear();
+        let (budget, mut plans) = (Budget::new(limits), Vec::new());
         for (number, lowered) in self.rules.iter().enumerate() {
             let Some(head) = lowered.heads.first() else { continue };
-            let planner = Planner { store, lowered, number: number as u32, costs: &costs };
-            plan_rule(planner, &mut self.plans, &mut strata[self.stratum_of[head.relation.0 as usize]]);
+            let planner = Planner { store, lowered, number: number as u32, costs: &costs, budget: &budget };
+            plan_rule(planner, &mut plans, &mut strata[self.stratum_of[head.relation.0 as usize]]);
+            let identity = |rule: u32| program.rules[self.rules[rule as usize].rule].identity.clone();
+            if let Some(error) = budget.error(identity) {
+                return Err(error);
+            }
         }
+        self.plans = plans;
         strata.retain(|stratum| !stratum.rederive.is_empty());
         self.readers = vec![Vec::new(); self.stratum_of.len()];
         for (number, stratum) in strata.iter().enumerate() {
@@ -262,6 +278,7 @@ impl Network {
         }
         self.strata = strata;
         self.planned_for = store.len();
+        Ok(())
     }
 }
 

@@ -7,6 +7,7 @@
 use crate::aggregate::Function;
 use crate::builtin::BuiltIn;
 use crate::cost::Costs;
+use crate::limits::Budget;
 use crate::source::Source;
 use crate::store::{RelationId, Store, state};
 use crate::symbol::Symbol;
@@ -148,14 +149,6 @@ impl Condition {
             Self::BuiltIn(..) | Self::Same(..) | Self::Different(..) => None,
         }
     }
-
-    fn sources(&self) -> Vec<Source> {
-        match self {
-            Self::Relation(_, sources) | Self::Not(_, sources) | Self::BuiltIn(_, sources) => sources.clone(),
-            Self::Aggregate { group, result, .. } => [group.as_slice(), &[*result]].concat(),
-            Self::Same(left, right) | Self::Different(left, right) => vec![*left, *right],
-        }
-    }
 }
 
 /// The variables bound so far.
@@ -209,6 +202,7 @@ pub(crate) struct Planner<'a> {
     /// Which compiled rule the plans belong to.
     pub number: u32,
     pub costs: &'a Costs,
+    pub budget: &'a Budget,
 }
 
 impl Planner<'_> {
@@ -236,14 +230,20 @@ impl Planner<'_> {
         self.plan(Vec::new(), None, 0)
     }
 
-    /// `None` where a condition stays unbound, which [`check`] rules out.
+    /// `None` once the budget is spent, and where a condition stays unbound, which [`check`] rules out.
     fn plan(&mut self, seed: Vec<Source>, skip: Option<usize>, fresh_from: usize) -> Option<Plan> {
+        if !self.budget.visit(1, self.number) {
+            return None;
+        }
         let mut bound = Bound(vec![false; self.lowered.width]);
         let seed = bound.pattern(seed.into_iter().enumerate());
         let seed_is_link = self.is_link(skip);
         let mut rest: Vec<usize> = (0..self.lowered.body.len()).filter(|&p| Some(p) != skip).collect();
         let mut steps = Vec::new();
         while !rest.is_empty() {
+            if !self.budget.visit(rest.len() as u64, self.number) {
+                return None;
+            }
             let is_aggregate = |p: usize| matches!(self.lowered.body[p], Condition::Aggregate { .. });
             let ready = |p: usize| is_ready(&self.lowered.body[p], &bound);
             let test = rest.iter().position(|&p| ready(p) && !is_aggregate(p));
@@ -345,6 +345,7 @@ fn is_ready(condition: &Condition, bound: &Bound) -> bool {
         Condition::Same(left, right) => bound.knows(*left) || bound.knows(*right),
         Condition::BuiltIn(built_in, sources) => built_in.binds(&bound.known(sources)),
         Condition::Aggregate { group, .. } => bound.knows_all(group),
-        other => bound.knows_all(&other.sources()),
+        Condition::Relation(_, sources) | Condition::Not(_, sources) => bound.knows_all(sources),
+        Condition::Different(left, right) => bound.knows(*left) && bound.knows(*right),
     }
 }

@@ -29,7 +29,8 @@ impl Engine {
             return self.rebuild(program);
         }
         let symbols = Arc::make_mut(&mut self.symbols);
-        let revision = revise(&self.network, &self.program, &program, symbols, &mut self.store)?;
+        let revision =
+            revise(&self.network, &self.program, &program, symbols, &mut self.store, &self.limits)?;
         let Some(revision) = revision else { return self.rebuild(program) };
         let old = (Arc::clone(&self.network), Arc::clone(&self.program));
         self.program = Arc::new(program);
@@ -90,7 +91,8 @@ impl Engine {
     /// defined state.
     pub(crate) fn replace_rules(&mut self, old: &Program, new: &Program) -> Result<Delta, Error> {
         let symbols = Arc::make_mut(&mut self.symbols);
-        let revision = revise(&self.network, old, new, symbols, &mut self.store).map_err(first)?;
+        let revision =
+            revise(&self.network, old, new, symbols, &mut self.store, &self.limits).map_err(first)?;
         if let Some(revision) = revision {
             return self.revise(revision);
         }
@@ -98,7 +100,8 @@ impl Engine {
         let stated = self.rows_with(state::ASSERTED).collect();
         self.store = Store::default();
         self.store.state(stated);
-        let network = compile(new, Arc::make_mut(&mut self.symbols), &mut self.store).map_err(first)?;
+        let symbols = Arc::make_mut(&mut self.symbols);
+        let network = compile(new, symbols, &mut self.store, &self.limits).map_err(first)?;
         self.records = Records::new(&network);
         self.network = Arc::new(network);
         Maintenance::new(self).derive_all()?;

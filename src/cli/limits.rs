@@ -4,10 +4,13 @@
 //! a separate thread ends it at the time limit, unless an answer is being written. Commands that do not plan need
 //! nothing else. In commands that plan, the planner handles the first signal from then on, and returns the best plan
 //! found until then. A second signal ends the program at once.
+//!
+//! The loops of the planner, of the validator and of what follows poll the limits. If one of them does not, the separate thread ends
+//! the program a tenth of the limit later, as long as nothing is shown.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use encodings::Limits;
@@ -18,8 +21,11 @@ use crate::cli::common::{Common, Exit, Failure};
 use crate::cli::output;
 use crate::cli::values::seconds;
 
-/// How often the reading thread looks at the clock.
+/// Time between two looks at the clock.
 const INTERVAL: Duration = Duration::from_millis(10);
+
+/// Processor time in addition to a tenth of the limit after which a command without an answer is ended.
+const GRACE: Duration = Duration::from_millis(150);
 
 /// The option `--time-limit` of commands that have nothing to show before their end, and of those that show what they have.
 #[derive(Debug, Clone, Args)]
@@ -72,7 +78,12 @@ impl Guard {
         }
         let has_read = Arc::new(AtomicBool::new(false));
         if time.is_some() || memory.is_some() {
-            give_up_late(limits.clone(), Arc::clone(&has_read), common.clone());
+            let too_large = Arc::default();
+            if let Some(megabytes) = memory {
+                let _ = memory::watch(megabytes.saturating_add(megabytes / 10), Arc::clone(&too_large));
+            }
+            let late = Late { started: Instant::now(), time, too_large };
+            give_up_late(limits.clone(), Arc::clone(&has_read), late, common.clone());
         }
         Ok(Self { limits, has_read })
     }
@@ -104,20 +115,57 @@ fn nothing_to_show() -> Message {
     Message::error("M130", "a limit was reached before there was anything to show")
 }
 
-/// Reading does not look at the limits.
-fn give_up_late(limits: Limits, has_read: Arc<AtomicBool>, common: Common) {
+/// When a command without an answer is ended after it has read its input.
+struct Late {
+    started: Instant,
+    time: Option<Duration>,
+    /// Set when the process occupies a tenth more than its memory limit.
+    too_large: Arc<AtomicBool>,
+}
+
+impl Late {
+    fn is_reached(&self) -> bool {
+        let is_over = |time: Duration| {
+            let end = time.saturating_add(time / 10).saturating_add(GRACE);
+            let elapsed = self.started.elapsed();
+            // On a busy machine the answer may take longer.
+            elapsed > end && processor_time().unwrap_or(elapsed) > end
+        };
+        self.too_large.load(Ordering::Relaxed) || self.time.is_some_and(is_over)
+    }
+}
+
+/// The processor time of this process, in steps of 10 ms. Returns `None` where the platform does not report it in this way.
+fn processor_time() -> Option<Duration> {
+    let text = std::fs::read_to_string("/proc/self/stat").ok()?;
+    // The name of the program stands in parentheses, and may contain anything.
+    let (_, fields) = text.rsplit_once(')')?;
+    let mut times = fields.split_whitespace().skip(11);
+    let mut ticks = || times.next()?.parse::<u64>().ok();
+    let (user, system) = (ticks()?, ticks()?);
+    Some(Duration::from_millis(user.saturating_add(system).saturating_mul(10)))
+}
+
+/// Reading does not look at the limits. What follows does, but for faults.
+fn give_up_late(limits: Limits, has_read: Arc<AtomicBool>, late: Late, common: Common) {
     std::thread::spawn(move || {
-        while !limits.reached() {
-            if has_read.load(Ordering::Relaxed) {
-                return;
-            }
+        while !has_read.load(Ordering::Relaxed) && !limits.reached() {
             std::thread::sleep(INTERVAL);
         }
-        // A thread that writes an answer holds this lock, and completes the answer.
-        let _stdout = std::io::stdout().lock();
-        if !output::has_begun() && !has_read.swap(true, Ordering::Relaxed) {
-            output::failure(&common, &[nothing_to_show()]);
-            std::process::exit(Exit::NothingFound as i32);
+        end_unless(&common, || has_read.swap(true, Ordering::Relaxed));
+        while !late.is_reached() {
+            std::thread::sleep(INTERVAL);
         }
+        end_unless(&common, || false);
     });
+}
+
+/// Ends the program, unless there is something to show, or another condition holds.
+fn end_unless(common: &Common, condition: impl FnOnce() -> bool) {
+    // A thread that writes an answer holds this lock, and completes the answer.
+    let _stdout = std::io::stdout().lock();
+    if !output::has_begun() && !condition() {
+        output::failure(common, &[nothing_to_show()]);
+        std::process::exit(Exit::NothingFound as i32);
+    }
 }

@@ -260,9 +260,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         let text = format!("the SAT solver gave up: {reason}");
         output::warnings(common, &[Message::warning("M114", text)]);
     }
-    let certified = arguments.certificate.as_deref().map_or(Ok(()), |directory| planned.certify(directory));
     finish(&planned, &mission, (arguments, common))?;
-    Ok(match certified {
+    // The plan is shown by now, however long the rest takes.
+    Ok(match arguments.certificate.as_deref().map_or(Ok(()), |directory| planned.certify(directory)) {
         Ok(()) => exit(planned.solution.status),
         // The plan is there, but what was asked for besides is not.
         Err(message) => {

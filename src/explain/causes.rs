@@ -225,14 +225,18 @@ fn is_available(knowledge: &Knowledge, design: &FunctionDesign) -> bool {
     designs.iter().any(|own| own.individual == design.individual && own.available)
 }
 
-/// The best plan once alterations have come true.
+/// The best plan once alterations have come true. At a limit, returns the best plan found until then.
 pub(super) fn in_situation(
     mission: &Mission,
     alterations: &[Alteration],
     limits: &Limits,
 ) -> Result<BestPlan, Errors> {
+    if limits.reached() {
+        return Ok(BestPlan::default());
+    }
     let mut mission = mission.clone();
     if let Some(knowledge) = mission.knowledge_mut() {
+        knowledge.interrupt(limits.into());
         let altered = altered(knowledge, alterations);
         *knowledge = altered.unwrap_or_else(|| knowledge.clone());
     }

@@ -22,6 +22,9 @@ pub(super) fn solve(
     limits: &Limits,
     allowed: &dyn Fn(&str, bool) -> bool,
 ) -> Result<BestPlan, Errors> {
+    if limits.reached() {
+        return Ok(BestPlan::default());
+    }
     let (mut problem, _) = mission.filled()?;
     let domain = mission.allow(&mut problem, allowed);
     // Later queries need time, too.

@@ -92,8 +92,17 @@ struct Tried<'a> {
 impl Tried<'_> {
     /// The best plan with another value. Returns `None` at a limit.
     fn with(&self, name: &str, value: &BigRational) -> Result<Option<BestPlan>, Errors> {
+        if self.limits.reached() {
+            return Ok(None);
+        }
         let mut other = self.mission.clone();
-        other.set(name, &number::decimal(value))?;
+        if let Some(knowledge) = other.knowledge_mut() {
+            knowledge.interrupt(self.limits.into());
+        }
+        match other.set(name, &number::decimal(value)) {
+            Err(_) if self.limits.reached() => return Ok(None),
+            outcome => outcome?,
+        }
         Ok(Some(best(&other, self.limits)?).filter(|plan| plan.proved))
     }
 

@@ -2,10 +2,10 @@
 
 use ::mission::Mission;
 use ::verify::measure::measure;
-use encodings::Plan;
+use encodings::{Limits, Plan};
 use num_rational::BigRational;
 use pddl::ast::{Name, Problem};
-use pddl::validate::{Options, PlanStep, PlanText, Verdict, validate};
+use pddl::validate::{Interrupted, Options, PlanStep, PlanText, Verdict, validate_within};
 
 /// How the validator is to read a plan.
 #[derive(Debug, Clone)]
@@ -13,6 +13,15 @@ pub struct Reading {
     options: Options,
     /// Whether a plan without a metric is measured by its time.
     timed: bool,
+}
+
+/// Why a plan is not shown.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Unconfirmed {
+    /// The validator refuses it, or measures it otherwise: a fault of the planner.
+    Refused(String),
+    /// A limit was reached before the validator had executed it.
+    Interrupted,
 }
 
 impl Reading {
@@ -29,15 +38,31 @@ impl Reading {
         }
     }
 
-    /// What the validator says a plan with this reading comes to, by the problem's metric; none of an invalid plan.
-    pub(super) fn value(&self, mission: &Mission, problem: &Problem, plan: &Plan) -> Option<BigRational> {
-        let verdict = verdict_of(mission, problem, plan, self);
+    /// What the validator says a plan with this reading comes to, by the problem's metric. Returns `None` for an invalid plan, and if a
+    /// limit is reached.
+    pub(super) fn value(
+        &self,
+        mission: &Mission,
+        problem: &Problem,
+        plan: &Plan,
+        limits: &Limits,
+    ) -> Option<BigRational> {
+        let verdict = verdict_of(mission, problem, plan, self, limits).ok()?;
         measure(problem, &verdict, plan.steps.len(), self.timed).filter(|_| verdict.valid)
     }
 }
 
-/// What the independent validator says of a plan.
-pub(super) fn verdict_of(mission: &Mission, problem: &Problem, plan: &Plan, reading: &Reading) -> Verdict {
+/// The verdict of the independent validator on a plan.
+///
+/// # Errors
+/// A limit was reached.
+pub(super) fn verdict_of(
+    mission: &Mission,
+    problem: &Problem,
+    plan: &Plan,
+    reading: &Reading,
+    limits: &Limits,
+) -> Result<Verdict, Interrupted> {
     let steps = plan.steps.iter().map(|step| PlanStep {
         action: Name::new(&step.action),
         arguments: step.arguments.iter().map(|argument| Name::new(argument)).collect(),
@@ -45,21 +70,31 @@ pub(super) fn verdict_of(mission: &Mission, problem: &Problem, plan: &Plan, read
         duration: (!step.duration.is_zero()).then(|| step.duration.to_rational()),
         line: 0,
     });
-    validate(mission.domain(), problem, &PlanText { steps: steps.collect() }, &reading.options)
+    let plan = PlanText { steps: steps.collect() };
+    validate_within(mission.domain(), problem, &plan, &reading.options, &|| limits.reached())
 }
 
-/// Has the independent validator execute a plan for a problem that [`Mission::filled`] has made.
+/// Has the independent validator execute a plan for a problem that [`Mission::filled`] has made. A plan is often found at the limits: so
+/// the validator has the time of [`Limits::extended`].
 ///
 /// # Errors
-/// Why the plan is none, or that it costs something else: a fault of the planner.
-pub fn confirm(mission: &Mission, problem: &Problem, plan: &Plan, reading: &Reading) -> Result<(), String> {
-    let verdict = verdict_of(mission, problem, plan, reading);
+/// The plan is invalid or costs something else, or the time does not suffice.
+pub fn confirm(
+    mission: &Mission,
+    problem: &Problem,
+    plan: &Plan,
+    reading: &Reading,
+    limits: &Limits,
+) -> Result<(), Unconfirmed> {
+    let verdict = verdict_of(mission, problem, plan, reading, &limits.extended());
+    let verdict = verdict.map_err(|Interrupted| Unconfirmed::Interrupted)?;
+    let refused = |reason: String| Err(Unconfirmed::Refused(reason));
     match (&verdict.violation, measure(problem, &verdict, plan.steps.len(), reading.timed)) {
         (Some(violation), _) => {
-            Err(format!("the validator refuses the plan that was found: {}", violation.message))
+            refused(format!("the validator refuses the plan that was found: {}", violation.message))
         }
         (None, Some(value)) if value != plan.cost.to_rational() => {
-            Err(format!("the plan that was found costs {value}, and not {} as claimed", plan.cost))
+            refused(format!("the plan that was found costs {value}, and not {} as claimed", plan.cost))
         }
         (None, _) => Ok(()),
     }

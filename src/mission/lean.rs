@@ -5,7 +5,7 @@
 //! plan neighborhood graph search, ICAPS 2010).
 
 use ::mission::Mission;
-use encodings::Plan;
+use encodings::{Limits, Plan};
 use pddl::ast::Problem;
 
 use crate::mission::confirm::Reading;
@@ -13,8 +13,14 @@ use crate::mission::confirm::Reading;
 /// Each action of a longer plan would be judged in a plan as long: that takes too long.
 const LONGEST: usize = 200;
 
-/// The plan without actions that cost nothing and that nothing else in it needs.
-pub fn lean(mission: &Mission, problem: &Problem, mut plan: Plan, reading: &Reading) -> Plan {
+/// The plan without actions that cost nothing and that nothing else in it needs, as far as that is found within the limits.
+pub fn lean(
+    mission: &Mission,
+    problem: &Problem,
+    mut plan: Plan,
+    reading: &Reading,
+    limits: &Limits,
+) -> Plan {
     if plan.steps.len() > LONGEST {
         return plan;
     }
@@ -22,7 +28,7 @@ pub fn lean(mission: &Mission, problem: &Problem, mut plan: Plan, reading: &Read
         if plan.steps[index].cost.is_zero() {
             let mut less = plan.clone();
             less.steps.remove(index);
-            if reading.value(mission, problem, &less) == Some(plan.cost.to_rational()) {
+            if reading.value(mission, problem, &less, limits) == Some(plan.cost.to_rational()) {
                 plan = less;
             }
         }
@@ -33,7 +39,7 @@ pub fn lean(mission: &Mission, problem: &Problem, mut plan: Plan, reading: &Read
 
 #[cfg(test)]
 mod tests {
-    use encodings::{Exact, Plan, Step};
+    use encodings::{Exact, Limits, Plan, Step};
     use num_rational::BigRational;
     use pddl::Source;
 
@@ -60,8 +66,8 @@ mod tests {
             cost: number(0),
         };
         let plan = Plan { steps: work.iter().map(step).collect(), cost: number(cost) };
-        let separation = BigRational::new(1.into(), 1000.into());
-        let plan = lean(&mission, mission.problem(), plan, &Reading::concurrent(&separation));
+        let reading = Reading::concurrent(&BigRational::new(1.into(), 1000.into()));
+        let plan = lean(&mission, mission.problem(), plan, &reading, &Limits::none());
         let left: Vec<&str> = plan.steps.iter().map(|step| step.arguments[0].as_str()).collect();
         assert_eq!(left, expected, "{work:?}");
     }

@@ -16,7 +16,7 @@ mod steps;
 pub use ::mission::{Bindings, CoAdaptation, Mission, Names};
 pub use blocking::{Blocking, blocking};
 pub use btcpp::btcpp_text;
-pub use confirm::{Reading, confirm};
+pub use confirm::{Reading, Unconfirmed, confirm};
 pub use lean::lean;
 pub use planning::Planning;
 pub(crate) use planning::{ground_with, replanner};

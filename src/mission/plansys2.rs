@@ -6,7 +6,7 @@
 use std::fmt::Write as _;
 
 use ::mission::Mission;
-use encodings::{Exact, Plan, Step};
+use encodings::{Exact, Limits, Plan, Step};
 use num_rational::BigRational;
 use pddl::ast::Problem;
 
@@ -23,9 +23,10 @@ pub struct PlanLine {
     pub duration: Exact,
 }
 
-/// The plan with a thousandth between the end of an action and whatever begins then, where that is still a plan; otherwise as it is.
+/// The plan with a thousandth between the end of an action and whatever begins then. It is returned as it is if it is no plan then, or if a
+/// limit is reached.
 #[must_use]
-pub fn spaced(mission: &Mission, problem: &Problem, plan: Plan, reading: &Reading) -> Plan {
+pub fn spaced(mission: &Mission, problem: &Problem, plan: Plan, reading: &Reading, limits: &Limits) -> Plan {
     let mut later = plan.clone();
     for next in 1..plan.steps.len() {
         let start = plan.steps[next].start.to_rational();
@@ -43,7 +44,8 @@ pub fn spaced(mission: &Mission, problem: &Problem, plan: Plan, reading: &Readin
         });
         later.steps[next].start = after.fold(start.clone(), BigRational::max).into();
     }
-    if verdict_of(mission, problem, &later, reading).violation.is_none() { later } else { plan }
+    let verdict = verdict_of(mission, problem, &later, reading, limits);
+    if verdict.is_ok_and(|verdict| verdict.violation.is_none()) { later } else { plan }
 }
 
 /// The lines of a plan, whose arguments are as the domain's file writes them.
@@ -109,7 +111,7 @@ mod tests {
         });
         let plan = Plan { steps: steps.collect(), cost: exact(0, 1) };
         let reading = if concurrent { Reading::concurrent(&instant()) } else { Reading::sequential(true) };
-        popf_text(&plan_lines(&spaced(&mission, mission.problem(), plan, &reading)))
+        popf_text(&plan_lines(&spaced(&mission, mission.problem(), plan, &reading, &Limits::none())))
     }
 
     fn check(init: &str, concurrent: bool, steps: &[(&str, i64, i64)], expected: &str) {

@@ -18,8 +18,8 @@ use crate::answers::Preparation;
 use crate::knowledge::Knowledge;
 use crate::message::{Errors, Message};
 use crate::mission::numbers::missing_values;
-use crate::mission::{Mission, Planning as _, Reading, blocking, confirm, lean};
-use crate::planner::objectives::{Objectives, fault};
+use crate::mission::{Mission, Planning as _, Reading, Unconfirmed, blocking, confirm, lean};
+use crate::planner::objectives::{Objectives, fault, unconfirmed};
 use crate::planner::planned::Ground;
 pub use crate::planner::planned::{Planned, PlannedFront};
 
@@ -184,7 +184,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         let front = encodings::pareto(&task, &config, &mut self.hear());
         let reading = Reading::sequential(task.is_timed());
         for point in &front.points {
-            objectives.confirm(self.mission, &self.problem, point, &reading)?;
+            objectives.confirm(self.mission, &self.problem, point, &reading, &config.limits)?;
         }
         let Self { mission, problem, .. } = self;
         Ok(PlannedFront { front, preparation, mission, problem, objectives: objectives.texts })
@@ -204,7 +204,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         if let Some(plan) = solution.plan.take() {
             let mut problem = self.problem.clone();
             problem.metric = objectives.metrics.first().cloned().or(problem.metric);
-            solution.plan = Some(lean(self.mission, &problem, plan, &reading));
+            solution.plan = Some(lean(self.mission, &problem, plan, &reading, &limits.extended().half()));
         }
         let point = valued(solution, &objectives);
         self.planned(point, objectives, Ground::Concurrent, reading, ground)
@@ -260,8 +260,17 @@ impl<'m, 'r> Planner<'m, 'r> {
             return Ok(None);
         };
         let reading = Reading::sequential(task.is_timed());
-        for plan in &found.plans {
-            confirm(self.mission, &self.problem, plan, &reading).map_err(|reason| fault(&reason))?;
+        let limits = &self.config.limits;
+        for index in 0..found.plans.len() {
+            match confirm(self.mission, &self.problem, &found.plans[index], &reading, limits) {
+                Ok(()) => {}
+                Err(Unconfirmed::Interrupted) => {
+                    found.plans.truncate(index);
+                    found.complete = false;
+                    break;
+                }
+                Err(reason) => return Err(unconfirmed(reason).into()),
+            }
         }
         found.plans = found.plans.into_iter().map(|plan| self.mission.written(plan)).collect();
         Ok(Some(found))
@@ -280,7 +289,7 @@ impl<'m, 'r> Planner<'m, 'r> {
             return Err(fault(reason).into());
         }
         let Self { mission, problem, config, .. } = self;
-        objectives.confirm(mission, &problem, &point, &reading)?;
+        objectives.confirm(mission, &problem, &point, &reading, &config.limits)?;
         let Point { solution, values } = point;
         Ok(Planned {
             solution,

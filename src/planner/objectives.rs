@@ -1,10 +1,10 @@
 //! What plans are measured by, and that they are.
 
-use encodings::Point;
+use encodings::{Limits, Point};
 use pddl::ast::{Metric, Problem};
 
 use crate::message::{Errors, Message};
-use crate::mission::{Mission, Reading, confirm};
+use crate::mission::{Mission, Reading, Unconfirmed, confirm};
 
 /// Objectives in order; none for the problem's metric.
 #[derive(Debug, Clone)]
@@ -33,25 +33,37 @@ impl Objectives {
     /// Has the validator execute the plan, and check its value by every objective.
     ///
     /// # Errors
-    /// M170, what the validator refuses or measures otherwise.
+    /// M170, what the validator refuses or measures otherwise; or M130, the time does not suffice.
     pub(super) fn confirm(
         &self,
         mission: &Mission,
         problem: &Problem,
         point: &Point,
         reading: &Reading,
+        limits: &Limits,
     ) -> Result<(), Errors> {
         let Some(plan) = &point.solution.plan else { return Ok(()) };
         if self.metrics.is_empty() {
-            confirm(mission, problem, plan, reading).map_err(|reason| fault(&reason))?;
+            confirm(mission, problem, plan, reading, limits).map_err(unconfirmed)?;
         }
         for (metric, value) in self.metrics.iter().zip(&point.values) {
             let problem = Problem { metric: Some(metric.clone()), ..problem.clone() };
             let mut plan = plan.clone();
             plan.cost = value.clone();
-            confirm(mission, &problem, &plan, reading).map_err(|reason| fault(&reason))?;
+            confirm(mission, &problem, &plan, reading, limits).map_err(unconfirmed)?;
         }
         Ok(())
+    }
+}
+
+/// Why a plan that was found is not shown.
+pub(super) fn unconfirmed(reason: Unconfirmed) -> Message {
+    match reason {
+        Unconfirmed::Refused(reason) => fault(&reason),
+        Unconfirmed::Interrupted => Message::error(
+            "M130",
+            "a limit was reached before the validator had executed the plan that was found",
+        ),
     }
 }
 

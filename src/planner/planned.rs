@@ -93,7 +93,8 @@ impl Planned<'_> {
     /// The plan with gaps between actions, as PlanSys2 asks for them, and otherwise as [`Planned::written`].
     pub fn spaced(&self) -> Option<Plan> {
         let plan = self.solution.plan.clone()?;
-        Some(self.mission.written(spaced(self.mission, &self.problem, plan, &self.reading)))
+        let limits = self.limits.extended();
+        Some(self.mission.written(spaced(self.mission, &self.problem, plan, &self.reading, &limits)))
     }
 
     /// The answer in the JSON format of `metaplan plan`.

@@ -59,7 +59,7 @@ pub fn metaplan(arguments: &[&str]) -> Outcome {
 
 /// The program that is tested: the one that cargo has built for the tests, or `metaplan` in the directory that `METAPLAN_PROGRAMS` names.
 /// CI names that of `cargo install`, whose release build runs these tests in a fraction of the time.
-fn program() -> PathBuf {
+pub fn program() -> PathBuf {
     match std::env::var_os("METAPLAN_PROGRAMS") {
         Some(directory) => Path::new(&directory).join(format!("metaplan{}", std::env::consts::EXE_SUFFIX)),
         None => PathBuf::from(env!("CARGO_BIN_EXE_metaplan")),

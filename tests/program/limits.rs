@@ -67,7 +67,7 @@ fn a_signal_ends_the_program_while_it_reads() {
 
 /// A round trip through so many places, whose best order takes long to prove.
 #[cfg(unix)]
-fn round_trip(places: u32) -> (String, String) {
+pub fn round_trip(places: u32) -> (String, String) {
     use std::fmt::Write as _;
     let domain = "(define (domain trip) (:requirements :action-costs) (:predicates (at ?p) (seen ?p)) (:functions (far ?a ?b) (total-cost))
         (:action go :parameters (?a ?b) :precondition (at ?a)

@@ -31,6 +31,7 @@ mod names;
 #[cfg(target_os = "linux")]
 mod outputs;
 mod paper;
+mod phases;
 mod probabilistic;
 mod real;
 mod reason;

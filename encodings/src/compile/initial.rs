@@ -78,8 +78,8 @@ impl<'t> Initial<'t> {
                 self.undefined(premise, binding).or_else(|| self.undefined(conclusion, binding))
             }
             Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {
-                let instances = self.objects.bindings(variables, binding).into_iter();
-                instances.map(|mut inner| self.undefined(body, &mut inner)).find_map(|found| found)
+                let mut instances = self.objects.bindings(variables, binding);
+                instances.find_map(|mut inner| self.undefined(body, &mut inner))
             }
             Condition::Atom(_) | Condition::Equal(..) => None,
             Condition::Compare(_, left, right, _) => {
@@ -128,8 +128,7 @@ impl<'t> Initial<'t> {
             }
             Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {
                 let instances = self.objects.bindings(variables, binding);
-                let truths: Vec<_> =
-                    instances.into_iter().map(|mut inner| self.truth(body, &mut inner)).collect();
+                let truths: Vec<_> = instances.map(|mut inner| self.truth(body, &mut inner)).collect();
                 kleene(&truths, matches!(condition, Condition::Exists(..)))
             }
             Condition::Atom(atom) => Some(self.facts.contains(&key(atom, binding))),

@@ -1,5 +1,6 @@
 //! Objects by type, and conditions with objects for variables.
 
+use crate::limits::Limits;
 use pddl::TypeHierarchy;
 use pddl::ast::{Atom, Condition, Domain, Expression, Name, Problem, Term, TypeExpression, TypedName};
 
@@ -8,14 +9,15 @@ use super::terms::identifier;
 /// The objects of a task, each with the types of its declarations.
 pub(super) struct Objects<'t> {
     types: TypeHierarchy,
-    objects: Vec<(&'t Name, Vec<&'t TypeExpression>)>,
+    all: Vec<(&'t Name, Vec<&'t TypeExpression>)>,
+    limits: &'t Limits,
 }
 
 /// What stands for a variable, innermost last.
 pub(super) type Binding = Vec<(Name, Term)>;
 
 impl<'t> Objects<'t> {
-    pub(super) fn of(domain: &'t Domain, problem: &'t Problem) -> Self {
+    pub(super) fn of(domain: &'t Domain, problem: &'t Problem, limits: &'t Limits) -> Self {
         let mut objects: Vec<(&Name, Vec<&TypeExpression>)> = Vec::new();
         let mut places = rustc_hash::FxHashMap::default();
         for entry in domain.constants.iter().chain(&problem.objects) {
@@ -25,34 +27,47 @@ impl<'t> Objects<'t> {
             }
             objects[place].1.push(&entry.r#type);
         }
-        Self { types: TypeHierarchy::of(domain), objects }
+        Self { types: TypeHierarchy::of(domain), all: objects, limits }
     }
 
     /// The objects of a type.
     pub(super) fn members(&self, wanted: &TypeExpression) -> impl Iterator<Item = &'t Name> {
         let fits = |types: &[&TypeExpression]| types.iter().any(|given| self.types.fits(given, wanted));
-        self.objects.iter().filter(move |(_, types)| fits(types)).map(|(name, _)| *name)
+        self.all.iter().filter(move |(_, types)| fits(types)).map(|(name, _)| *name)
     }
 
-    /// All ways to bind some variables, each added to a binding.
-    pub(super) fn bindings(&self, variables: &[TypedName], binding: &Binding) -> Vec<Binding> {
-        let mut all = vec![binding.clone()];
-        for variable in variables {
-            let members: Vec<&Name> = self.members(&variable.r#type).collect();
-            let extended = all.iter().flat_map(|binding| {
-                members.iter().map(|object| {
-                    let mut longer = binding.clone();
-                    longer.push((
-                        variable.identifier.name.clone(),
-                        Term::Constant(identifier(object.as_str())),
-                    ));
-                    longer
-                })
-            });
-            all = extended.collect();
-        }
-        all
+    /// All ways to bind some variables, each added to a binding. They end at a limit, so that the limits are to be checked afterwards.
+    pub(super) fn bindings(
+        &self,
+        variables: &[TypedName],
+        binding: &Binding,
+    ) -> impl Iterator<Item = Binding> + use<'t> {
+        let names = variables.iter().map(|variable| variable.identifier.name.clone());
+        let members = variables.iter().map(|variable| self.members(&variable.r#type).collect());
+        let (names, members): (Vec<Name>, Vec<Vec<&'t Name>>) = (names.collect(), members.collect());
+        let sizes: Vec<usize> = members.iter().map(Vec::len).collect();
+        let first = sizes.iter().all(|size| *size > 0).then(|| vec![0; sizes.len()]);
+        let positions = std::iter::successors(first, move |last| following(last, &sizes));
+        let outer = binding.clone();
+        self.limits.watch(positions).map_while(Result::ok).map(move |positions| {
+            let objects = members.iter().zip(positions).map(|(own, position)| own[position]);
+            let constants = objects.map(|object| Term::Constant(identifier(object.as_str())));
+            outer.iter().cloned().chain(names.iter().cloned().zip(constants)).collect()
+        })
     }
+}
+
+/// The positions after some positions in lists of these sizes, in lexicographic order.
+fn following(positions: &[usize], sizes: &[usize]) -> Option<Vec<usize>> {
+    let mut next = positions.to_vec();
+    for (position, size) in next.iter_mut().zip(sizes).rev() {
+        *position = position.saturating_add(1);
+        if *position < *size {
+            return Some(next);
+        }
+        *position = 0;
+    }
+    None
 }
 
 /// A condition with objects for its variables. The variables of its own quantifiers get names that no action uses; `fresh` counts them.

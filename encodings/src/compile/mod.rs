@@ -23,6 +23,7 @@ mod timed;
 use std::borrow::Cow;
 
 use crate::error::{Errors, File};
+use crate::limits::Limits;
 use pddl::ast::{Constraint, Domain, Expression, InitialElement, Metric, Name, Problem, Term};
 
 use additions::unsupported;
@@ -61,12 +62,13 @@ pub(crate) fn is_violation(action: &str) -> bool {
 /// Compiles preferences and constraints away. Preferences that no objective asks for are dropped.
 ///
 /// # Errors
-/// Every constraint that cannot be compiled, with its place.
+/// Every constraint that cannot be compiled, with its place; or a limit was reached.
 pub(crate) fn compile<'t>(
     domain: &'t Domain,
     problem: &'t Problem,
     objectives: &'t [Metric],
     course: Course<'_>,
+    limits: &Limits,
 ) -> Result<Compiled<'t>, Errors> {
     if !is_needed(domain, problem) {
         let (domain, problem) = (Cow::Borrowed(domain), Cow::Borrowed(problem));
@@ -79,7 +81,7 @@ pub(crate) fn compile<'t>(
         });
     }
     let asked = asked(if objectives.is_empty() { problem.metric.as_slice() } else { objectives });
-    let objects = Objects::of(domain, problem);
+    let objects = Objects::of(domain, problem, limits);
     let mut monitors = Monitors::new(domain, problem, &objects, course);
     let mut errors = Vec::new();
     for (file, constraint) in constraints(domain, problem) {
@@ -101,6 +103,7 @@ pub(crate) fn compile<'t>(
             (File::Problem, problem.metric.as_ref().map_or(problem.name.span, |metric| metric.span)),
         ));
     }
+    limits.check().map_err(|interrupted| vec![interrupted.into()])?;
     if !errors.is_empty() {
         return Err(errors.into());
     }

@@ -122,7 +122,7 @@ impl<'t> Monitors<'t> {
                 Ok(all(each.collect::<Result<Vec<_>, _>>()?))
             }
             Trajectory::ForAll(variables, body) => {
-                let instances = self.objects.bindings(variables, &binding).into_iter();
+                let instances = self.objects.bindings(variables, &binding);
                 let each = instances.map(|binding| self.trajectory(body, binding, hard, place));
                 Ok(all(each.collect::<Result<Vec<_>, _>>()?))
             }

@@ -90,7 +90,8 @@ pub fn ground_concurrent(
     }
     let separation = Rational::from_big(separation.clone());
     let own = Course::Overlapping(&separation.to_big());
-    let plain = info_span!("compile").in_scope(|| compile_away(domain, problem, &config.objectives, own))?;
+    let GroundConfig { objectives, limits, .. } = config;
+    let plain = info_span!("compile").in_scope(|| compile_away(domain, problem, objectives, own, limits))?;
     let kept = Kept::new(domain, problem, config);
     let config = config.clone().with_objectives(plain.objectives.to_vec());
     let mut task = ground_plain((&plain.domain, &plain.problem, &config, &separation))?;

@@ -81,8 +81,9 @@ pub(crate) fn ground_for<N: TaskNumber>(
     config: &GroundConfig,
     generality: &Generality,
 ) -> Result<Task<N>, Errors> {
+    let GroundConfig { objectives, limits, .. } = config;
     let plain =
-        info_span!("compile").in_scope(|| compile(domain, problem, &config.objectives, Course::Sequence))?;
+        info_span!("compile").in_scope(|| compile(domain, problem, objectives, Course::Sequence, limits))?;
     let lifted =
         || info_span!("normalize").in_scope(|| normalize(&plain.domain, &plain.problem, &plain.objectives));
     let found = ground_normal(lifted()?, config, generality);

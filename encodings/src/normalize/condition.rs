@@ -1,11 +1,12 @@
 //! Conditions, effects and expressions of the syntax tree in ids.
 
-use crate::lifted::{Change, Effect, Expression, Formula, Rational};
+use crate::lifted::configuration::formula_terms;
+use crate::lifted::{Bound, Change, Effect, Expression, Formula, Rational, Term};
 use crate::normalize::names::{Duration, Names, Scope};
 use pddl::ast;
+use rustc_hash::FxHashSet;
 
 /// A condition, or its negation, in negation normal form.
-#[expect(clippy::arithmetic_side_effects, reason = "as many variables were pushed as are taken off")]
 pub(super) fn condition(
     names: &mut Names,
     written: &ast::Condition,
@@ -25,10 +26,10 @@ pub(super) fn condition(
         ]),
         C::ForAll(variables, body) | C::Exists(variables, body) => {
             let universal = matches!(written, C::ForAll(..)) == positive;
-            let bound = names.bind(variables, scope);
-            let body = Box::new(condition(names, body, positive, scope));
-            scope.variables.truncate(scope.variables.len() - variables.len());
-            if universal { Formula::ForAll(bound, body) } else { Formula::Exists(bound, body) }
+            let bound = names.quantify(variables, scope);
+            let body = condition(names, body, positive, scope);
+            scope.pop(variables.len());
+            quantified(universal, bound, body)
         }
         C::Atom(atom) => {
             let predicate = names.predicate(&atom.predicate, scope.file);
@@ -45,16 +46,31 @@ pub(super) fn condition(
     }
 }
 
+/// A quantified condition without the variables that do not occur in it, unless their types are empty.
+fn quantified(universal: bool, mut bound: Vec<Bound>, body: Formula) -> Formula {
+    let mut used = FxHashSet::default();
+    formula_terms(&body, &mut |term| {
+        if let Term::Parameter(variable) = term {
+            used.insert(variable);
+        }
+    });
+    bound.retain(|own| own.candidates.is_empty() || used.contains(&own.variable));
+    match (bound.is_empty(), universal) {
+        (true, _) => body,
+        (false, true) => Formula::ForAll(bound, Box::new(body)),
+        (false, false) => Formula::Exists(bound, Box::new(body)),
+    }
+}
+
 /// Flattens an effect into changes, each with the variables and the condition that it stands under.
-#[expect(clippy::arithmetic_side_effects, reason = "as many variables were pushed as are taken off")]
 pub(super) fn effect(names: &mut Names, written: &ast::Effect, scope: &mut Scope, out: &mut Vec<Effect>) {
     let change = match written {
         ast::Effect::And(parts) => return parts.iter().for_each(|part| effect(names, part, scope, out)),
         ast::Effect::ForAll(variables, inner) => {
-            let bound = names.bind(variables, scope);
+            let bound = names.quantify(variables, scope);
             let first = out.len();
             effect(names, inner, scope, out);
-            scope.variables.truncate(scope.variables.len() - variables.len());
+            scope.pop(variables.len());
             for effect in &mut out[first..] {
                 effect.bound.splice(0..0, bound.iter().cloned());
             }

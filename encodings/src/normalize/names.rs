@@ -23,7 +23,9 @@ pub(super) enum Duration {
 /// The variables in sight, each with what it stands for, and the file that is read.
 pub(super) struct Scope {
     pub(super) file: File,
-    pub(super) variables: Vec<(Name, Term)>,
+    variables: Vec<Name>,
+    /// What each variable in sight stands for, innermost last.
+    terms: FxHashMap<Name, Vec<Term>>,
     /// How many variables have been bound so far, in sight or not.
     pub(super) bound: u32,
     /// What `?duration` stands for.
@@ -32,11 +34,28 @@ pub(super) struct Scope {
 
 impl Scope {
     pub(super) fn new(file: File) -> Self {
-        Self { file, variables: Vec::new(), bound: 0, duration: Duration::Instantaneous }
+        let (variables, terms) = (Vec::new(), FxHashMap::default());
+        Self { file, variables, terms, bound: 0, duration: Duration::Instantaneous }
     }
 
     pub(super) fn place(&self, span: Span) -> Place {
         Place { file: self.file, span }
+    }
+
+    fn push(&mut self, name: &Name, term: Term) {
+        self.variables.push(name.clone());
+        self.terms.entry(name.clone()).or_default().push(term);
+    }
+
+    /// Takes the last `count` variables out of sight.
+    pub(super) fn pop(&mut self, count: usize) {
+        for name in self.variables.drain(self.variables.len().saturating_sub(count)..) {
+            self.terms.get_mut(&name).map(Vec::pop);
+        }
+    }
+
+    fn get(&self, name: &Name) -> Option<Term> {
+        self.terms.get(name)?.last().copied()
     }
 }
 
@@ -161,13 +180,30 @@ impl Names {
         self.errors.push(Error::Unknown { kind, name: identifier.name.to_string(), place });
     }
 
-    /// Takes variables into sight.
+    /// Takes the variables of a quantifier into sight. One with a single object stands for that object, and is not bound.
+    #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
+    pub(super) fn quantify(&mut self, variables: &[TypedName], scope: &mut Scope) -> Vec<Bound> {
+        let mut all = Vec::new();
+        for variable in variables {
+            let candidates = self.candidates(&variable.r#type);
+            if let [object] = candidates[..] {
+                scope.push(&variable.identifier.name, Term::Object(object));
+                continue;
+            }
+            scope.push(&variable.identifier.name, Term::Parameter(scope.bound));
+            all.push(Bound { variable: scope.bound, candidates });
+            scope.bound += 1;
+        }
+        all
+    }
+
+    /// Takes parameters into sight.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(super) fn bind(&mut self, variables: &[TypedName], scope: &mut Scope) -> Vec<Bound> {
         let mut all = Vec::with_capacity(variables.len());
         for variable in variables {
             let candidates = self.candidates(&variable.r#type);
-            scope.variables.push((variable.identifier.name.clone(), Term::Parameter(scope.bound)));
+            scope.push(&variable.identifier.name, Term::Parameter(scope.bound));
             all.push(Bound { variable: scope.bound, candidates });
             scope.bound += 1;
         }
@@ -199,10 +235,7 @@ impl Names {
 
     pub(super) fn term(&mut self, term: &ast::Term, scope: &mut Scope) -> Term {
         let (kind, identifier, found) = match term {
-            ast::Term::Variable(identifier) => {
-                let found = scope.variables.iter().rev().find(|(name, _)| *name == identifier.name);
-                ("variable", identifier, found.map(|(_, term)| *term))
-            }
+            ast::Term::Variable(identifier) => ("variable", identifier, scope.get(&identifier.name)),
             ast::Term::Constant(identifier) => {
                 let found = self.object_ids.get(&identifier.name);
                 ("object", identifier, found.map(|object| Term::Object(*object)))

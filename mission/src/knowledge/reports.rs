@@ -7,7 +7,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use rules::{Delta, Fact, Limits, Symbol};
+use rules::{Delta, Fact, Interrupt, Limits, Symbol};
 
 use crate::knowledge::base::Knowledge;
 use crate::knowledge::waiting::{Fault, RobotReport, Waiting, fault};
@@ -106,6 +106,12 @@ impl Knowledge {
     /// Lets wait what waited when a snapshot was made.
     pub fn set_waiting(&mut self, waiting: Waiting) {
         self.waiting = waiting;
+    }
+
+    /// Sets what stops later updates before their end.
+    pub fn interrupt(&mut self, interrupt: Interrupt) {
+        let limits = Limits { interrupt: Some(interrupt), ..self.runtime.engine().limits().clone() };
+        self.runtime.engine_mut().set_limits(limits);
     }
 
     /// From now on an update may take so many steps; see [`rules::Limits`].

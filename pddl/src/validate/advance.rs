@@ -60,7 +60,7 @@ pub fn advance(
     step: &PlanStep,
     forced: bool,
 ) -> Result<Advance, Box<Violation>> {
-    advance_in(&World::new(domain, problem), step, forced)
+    advance_in(&World::new(domain, problem, &|| false), step, forced)
 }
 
 /// Executes each of some steps from the initial state of a problem, as [`advance`] does for one of them that is not forced.
@@ -69,7 +69,7 @@ pub fn advance_each(
     problem: &Problem,
     steps: &[PlanStep],
 ) -> Vec<Result<Advance, Box<Violation>>> {
-    let world = World::new(domain, problem);
+    let world = World::new(domain, problem, &|| false);
     steps.iter().map(|step| advance_in(&world, step, false)).collect()
 }
 
@@ -152,7 +152,7 @@ fn is_same(left: &Atom, right: &Atom) -> bool {
 /// The value of the problem's metric if the plan ended in its initial state after `total_time`, in the domain's time
 /// unit; none without a metric, or where it is undefined.
 pub fn metric_after(domain: &Domain, problem: &Problem, total_time: &BigRational) -> Option<BigRational> {
-    let world = World::new(domain, problem);
+    let world = World::new(domain, problem, &|| false);
     let options = Options::default();
     let execution = Execution::new(&world, &options);
     metric(&world, &execution.state, total_time)

@@ -35,6 +35,9 @@ pub(super) fn run<'e, 'p>(
         let next_start = starts.last().map(|(time, _)| time);
         let next_end = running.iter().map(|running| &running.end).min();
         let Some(next) = next_start.into_iter().chain(next_end).min() else { break };
+        if execution.world.budget.poll() {
+            break;
+        }
         let time = execution.next_timed().filter(|timed| *timed <= next).unwrap_or(next).clone();
         let mut parts = Simultaneous::default();
         if execution.next_timed() == Some(&time)

@@ -66,7 +66,7 @@ pub struct NumberBound {
 /// # Errors
 /// A step is not an action of the domain, or an effect is undefined.
 pub fn course(domain: &Domain, problem: &Problem, plan: &PlanText) -> Result<Course, Box<Violation>> {
-    let world = World::new(domain, problem);
+    let world = World::new(domain, problem, &|| false);
     let texts = plan.steps.iter().zip(1..);
     let steps: Vec<Step<'_>> = texts.map(|(text, number)| step::resolve(&world, number, text)).collect();
     let mut starts: Vec<usize> = (0..steps.len()).collect();

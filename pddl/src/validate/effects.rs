@@ -5,7 +5,7 @@ use num_rational::BigRational;
 use num_traits::{One, Zero};
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use crate::ast::{Arithmetic, Assignment, Effect, TypedName};
+use crate::ast::{Arithmetic, Assignment, Effect};
 
 use super::evaluate::{Bindings, Evaluator, Undefined, apply};
 use super::world::{Arguments, State, Symbol, World};
@@ -66,7 +66,14 @@ impl<'p> Evaluator<'_, 'p> {
                 }
                 Ok(())
             }
-            Effect::ForAll(variables, body) => self.collect_for_all(variables, body, bindings, changes),
+            Effect::ForAll(variables, body) => {
+                let mut result = Ok(());
+                self.world.each(variables, bindings, &mut |bindings| {
+                    result = self.collect(body, bindings, changes);
+                    result.is_ok()
+                });
+                result
+            }
             Effect::When(condition, body) => {
                 if self.holds(condition, bindings)? {
                     self.collect(body, bindings, changes)
@@ -81,27 +88,6 @@ impl<'p> Evaluator<'_, 'p> {
                 changes.record((symbol, arguments), change(*kind, value)?)
             }
         }
-    }
-
-    fn collect_for_all(
-        &self,
-        variables: &'p [TypedName],
-        body: &'p Effect,
-        bindings: &mut Bindings<'p>,
-        changes: &mut Changes,
-    ) -> Result<(), EffectError> {
-        let Some((first, rest)) = variables.split_first() else {
-            return self.collect(body, bindings, changes);
-        };
-        let place = bindings.0.len();
-        bindings.declare(std::slice::from_ref(first));
-        let mut result = Ok(());
-        for object in self.world.objects_of(&first.r#type) {
-            bindings.0[place].object = Some(object);
-            result = result.and_then(|()| self.collect_for_all(rest, body, bindings, changes));
-        }
-        bindings.0.truncate(place);
-        result
     }
 }
 
@@ -160,6 +146,12 @@ impl Changes {
         state.values.extend(values);
         change_facts(self.added, self.deleted, state);
         Ok(())
+    }
+
+    /// Returns `true` if a fact or a number of one of these predicates and functions is changed.
+    pub(super) fn concern(&self, symbols: &FxHashSet<Symbol>) -> bool {
+        let facts = self.added.iter().chain(&self.deleted);
+        facts.chain(self.numeric.keys()).any(|(symbol, _)| symbols.contains(symbol))
     }
 
     /// Changes the facts of the state, and no numbers.

@@ -5,11 +5,13 @@
 
 use num_rational::BigRational;
 use num_traits::Zero;
+use rustc_hash::FxHashSet;
 
 use crate::ast::{
     Arithmetic, Atom, Comparison, Condition, Expression, Name, Term, TypeExpression, TypedName,
 };
 
+use super::derive::Trace;
 use super::world::{Arguments, State, Symbol, World};
 
 /// Why a condition or an expression has no value.
@@ -67,12 +69,16 @@ pub(super) struct Evaluator<'e, 'p> {
     pub(super) duration: Option<&'e BigRational>,
     /// `total-time`, in the metric.
     pub(super) total_time: Option<&'e BigRational>,
+    /// Parts of conditions, by address, that count as true in a search for bindings.
+    pub(super) ignored: Option<&'e FxHashSet<*const Condition>>,
+    /// Where missing facts are noted.
+    pub(super) trace: Option<&'e Trace<'e, 'p>>,
 }
 
 impl<'e, 'p> Evaluator<'e, 'p> {
     /// Evaluates conditions outside of actions.
     pub(super) fn new(world: &'e World<'p>, state: &'e State) -> Self {
-        Self { world, state, duration: None, total_time: None }
+        Self { world, state, duration: None, total_time: None, ignored: None, trace: None }
     }
 
     pub(super) fn holds(
@@ -93,22 +99,26 @@ impl<'e, 'p> Evaluator<'e, 'p> {
                 },
             },
             Condition::Exists(variables, body) => self.exists(variables, body, bindings),
-            Condition::ForAll(variables, body) => {
-                let outer = bindings.0.len();
-                bindings.declare(variables);
-                let result = self.for_all(outer, body, bindings);
-                bindings.0.truncate(outer);
-                result
+            Condition::ForAll(variables, body) => self.for_all(variables, body, bindings),
+            Condition::Atom(atom) => {
+                Ok(self.arguments(atom, bindings).is_some_and(|arguments| self.is_fact(atom, arguments)))
             }
-            Condition::Atom(atom) => Ok(self.arguments(atom, bindings).is_some_and(|arguments| {
-                self.state.holds(self.world.symbol(&atom.predicate.name), &arguments)
-            })),
             Condition::Equal(left, right, _) => Ok(self.term(left, bindings).is_some()
                 && self.term(left, bindings) == self.term(right, bindings)),
             Condition::Compare(operator, left, right, _) => {
                 Ok(compare(*operator, &self.value(left, bindings)?, &self.value(right, bindings)?))
             }
         }
+    }
+
+    fn is_fact(&self, atom: &Atom, arguments: Arguments) -> bool {
+        let name = &atom.predicate.name;
+        let predicate = self.world.symbol(name);
+        let holds = self.state.holds(predicate, &arguments);
+        if let Some(trace) = self.trace.filter(|_| !holds) {
+            trace.missed(name, (predicate, arguments));
+        }
+        holds
     }
 
     fn all(
@@ -143,26 +153,21 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         result
     }
 
-    /// Whether the body holds for all objects of the variables from `place` on.
-    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     fn for_all(
         &self,
-        place: usize,
+        variables: &'p [TypedName],
         body: &'p Condition,
         bindings: &mut Bindings<'p>,
     ) -> Result<bool, Undefined> {
-        let Some(Binding { r#type, .. }) = bindings.0.get(place).copied() else {
-            return self.holds(body, bindings);
-        };
         let mut result = Ok(true);
-        for object in self.world.objects_of(r#type) {
-            bindings.0[place].object = Some(object);
-            match self.for_all(place + 1, body, bindings) {
-                Ok(true) => {}
-                Ok(false) => return Ok(false),
-                Err(undefined) => result = result.and(Err(undefined)),
+        self.world.each(variables, bindings, &mut |bindings| {
+            match self.holds(body, bindings) {
+                Ok(false) => result = Ok(false),
+                Err(undefined) if result == Ok(true) => result = Err(undefined),
+                Ok(true) | Err(_) => {}
             }
-        }
+            result != Ok(false)
+        });
         result
     }
 
@@ -173,9 +178,9 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         bindings: &mut Bindings<'p>,
     ) -> Result<bool, Undefined> {
         let outer = bindings.0.len();
-        bindings.declare(variables);
+        self.declare(variables, bindings);
         let mut result = Ok(false);
-        self.solve(vec![body], bindings, None, &mut |_, undefined| {
+        self.solve(vec![body], outer, bindings, &mut |_, undefined| {
             result = undefined.map_or(Ok(true), |undefined| Err(undefined.clone()));
             result != Ok(true)
         });

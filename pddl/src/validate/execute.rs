@@ -257,10 +257,10 @@ impl<'e, 'p> Execution<'e, 'p> {
         time: &BigRational,
         changes: Changes,
     ) -> Result<(), Box<Violation>> {
-        let is_neutral = changes.is_neutral();
+        let concerns_axioms = !changes.is_neutral() && changes.concern(&self.world.read_by_axioms);
         let applied = changes.apply(self.world, &mut self.state);
         applied.map_err(|error| self.effect_violation(step, time, &error))?;
-        if !is_neutral {
+        if concerns_axioms {
             close(self.world, &mut self.state);
         }
         Ok(())

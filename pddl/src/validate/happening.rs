@@ -91,8 +91,11 @@ impl<'e, 'p> Execution<'e, 'p> {
 
     /// Lets events take place.
     pub(super) fn apply_events(&mut self, changes: Changes) {
+        let concerns_axioms = changes.concern(&self.world.read_by_axioms);
         changes.apply_facts(&mut self.state);
-        close(self.world, &mut self.state);
+        if concerns_axioms {
+            close(self.world, &mut self.state);
+        }
     }
 
     /// Takes the events of the next time out of those to come.

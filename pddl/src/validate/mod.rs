@@ -7,6 +7,7 @@
 #![doc = include_str!("definition.md")]
 
 mod advance;
+mod budget;
 mod concurrent;
 mod course;
 mod derive;
@@ -34,6 +35,7 @@ use num_traits::Zero;
 use crate::ast::{Direction, Domain, Name, Problem};
 
 pub use advance::{Advance, ValueChange, advance, advance_each, metric_after};
+pub use budget::Interrupted;
 pub use course::{Course, CourseMoment, NumberBound, course};
 pub use options::Options;
 pub use plan::{PlanStep, PlanText};
@@ -54,18 +56,46 @@ const READINGS: usize = 4096;
 ///
 /// A step whose name and objects fit several schemas stands for any of them: a plan is valid if some reading of it is, and
 /// the best one counts. Beyond 4,096 readings each such step is the first schema that can start.
-#[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 pub fn validate(domain: &Domain, problem: &Problem, plan: &PlanText, options: &Options) -> Verdict {
-    let world = World::new(domain, problem);
+    judge_readings(&World::new(domain, problem, &|| false), plan, options)
+}
+
+/// Executes a plan as [`validate`] does, unless `stop` returns `true` before the end. It is called every few hundred steps of each
+/// loop.
+///
+/// # Errors
+/// `stop` has returned `true`.
+pub fn validate_within(
+    domain: &Domain,
+    problem: &Problem,
+    plan: &PlanText,
+    options: &Options,
+    stop: &dyn Fn() -> bool,
+) -> Result<Verdict, Interrupted> {
+    if stop() {
+        return Err(Interrupted);
+    }
+    let world = World::new(domain, problem, stop);
+    let verdict = judge_readings(&world, plan, options);
+    world.budget.check(verdict)
+}
+
+/// The verdict on the best reading of a plan.
+#[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
+fn judge_readings(world: &World<'_>, plan: &PlanText, options: &Options) -> Verdict {
     let steps: Vec<_> =
-        plan.steps.iter().enumerate().map(|(index, step)| step::resolve(&world, index + 1, step)).collect();
-    let first = judge(&world, &steps, options);
-    step::readings(&steps, READINGS).into_iter().map(|steps| judge(&world, &steps, options)).fold(
-        first,
-        |best, verdict| {
-            if is_better(problem, &verdict, &best) { verdict } else { best }
-        },
-    )
+        plan.steps.iter().enumerate().map(|(index, step)| step::resolve(world, index + 1, step)).collect();
+    let mut best = judge(world, &steps, options);
+    for steps in step::readings(&steps, READINGS) {
+        if world.budget.poll() {
+            break;
+        }
+        let verdict = judge(world, &steps, options);
+        if is_better(world.problem, &verdict, &best) {
+            best = verdict;
+        }
+    }
+    best
 }
 
 fn judge<'p>(world: &World<'p>, steps: &[Step<'p>], options: &Options) -> Verdict {

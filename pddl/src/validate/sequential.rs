@@ -26,6 +26,9 @@ pub(super) fn run<'e, 'p>(
     }
     let mut clock = BigRational::zero();
     for step in order {
+        if execution.world.budget.poll() {
+            break;
+        }
         let stated = step.text.start.as_ref().filter(|_| is_timed).unwrap_or(&clock);
         starts_late_enough(execution, step, stated, &clock)?;
         // What the tolerance forgives is put off.

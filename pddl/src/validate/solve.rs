@@ -1,26 +1,105 @@
 //! All bindings under which a condition holds: the facts propose the objects, so that quantifiers over
 //! many variables do not run through all their combinations.
+//!
+//! The search is depth-first with a stack of its own, since a quantifier may bind more variables than the call stack has frames.
 
 use crate::ast::{Atom, Condition, Expression, Name, Term, TypedName};
 
 use super::evaluate::{Bindings, Evaluator, Undefined};
 use super::world::{Arguments, Symbol};
 
-/// Is told of a solution, with what made it undefined if it is; says whether to go on.
+/// Receives each solution, with what made it undefined if it is. Returns `false` to end the search.
 pub(super) type Found<'f, 'p> = &'f mut dyn FnMut(&Bindings<'p>, Option<&Undefined>) -> bool;
 
-impl<'p> Evaluator<'_, 'p> {
-    /// Finds the objects for the unbound variables with which all parts hold. Returns whether to go on.
+/// Conditions that are left to be solved, with the first undefined one among those that were evaluated.
+type Goals<'p> = (Vec<&'p Condition>, Option<Undefined>);
+
+/// A choice of the search, with the options that are left.
+struct Branch<'e, 'p> {
+    /// The conditions that are left, whichever option is chosen.
+    open: Vec<&'p Condition>,
+    undefined: Option<Undefined>,
+    /// The number of variables that were declared before the choice.
+    declared: usize,
+    options: Choices<'e, 'p>,
+    /// The variables that the present option has bound.
+    bound: Vec<usize>,
+}
+
+/// The options of a choice.
+enum Choices<'e, 'p> {
+    /// The objects of a variable.
+    Objects(usize, Box<dyn Iterator<Item = Symbol> + 'e>),
+    /// The facts that an atom can match.
+    Facts(&'p Atom, Box<dyn Iterator<Item = &'e Arguments> + 'e>),
+    /// The parts of a disjunction.
+    Alternatives(std::slice::Iter<'p, Condition>),
+}
+
+impl Branch<'_, '_> {
+    /// Takes back the present option.
+    fn undo(&mut self, bindings: &mut Bindings<'_>) {
+        for place in self.bound.drain(..) {
+            bindings.0[place].object = None;
+        }
+        bindings.0.truncate(self.declared);
+    }
+}
+
+impl<'e, 'p> Evaluator<'e, 'p> {
+    /// Finds the objects for the unbound variables from place `first` on with which all parts hold. Returns whether to go on.
     pub(super) fn solve(
         &self,
         parts: Vec<&'p Condition>,
+        first: usize,
         bindings: &mut Bindings<'p>,
-        mut undefined: Option<Undefined>,
         found: Found<'_, 'p>,
     ) -> bool {
         let outer = bindings.0.len();
+        let mut stack: Vec<Branch<'e, 'p>> = Vec::new();
+        let mut goals = Some((parts, None));
+        let go_on = loop {
+            if let Some(goals) = goals.take()
+                && let Some((open, undefined)) = self.settle(goals, bindings)
+            {
+                match self.choice(open, first, bindings) {
+                    Some((open, options)) => {
+                        let declared = bindings.0.len();
+                        stack.push(Branch { open, undefined, declared, options, bound: Vec::new() });
+                    }
+                    None if found(bindings, undefined.as_ref()) => {}
+                    None => break false,
+                }
+            }
+            if self.world.budget.is_spent() {
+                break false;
+            }
+            let Some(branch) = stack.last_mut() else { break true };
+            goals = self.next(branch, bindings);
+            if goals.is_none() {
+                stack.pop();
+            }
+        };
+        while let Some(mut branch) = stack.pop() {
+            branch.undo(bindings);
+        }
+        bindings.0.truncate(outer);
+        go_on
+    }
+
+    /// Declares the variables of a quantifier, and binds those with one object only.
+    pub(super) fn declare(&self, variables: &'p [TypedName], bindings: &mut Bindings<'p>) {
+        let first = bindings.0.len();
+        bindings.declare(variables);
+        for binding in &mut bindings.0[first..] {
+            binding.object = self.world.only_object(binding.r#type);
+        }
+    }
+
+    /// Evaluates the conditions whose variables all have objects, and declares the variables of quantifiers. Returns the
+    /// conditions that are left, or `None` if one does not hold.
+    fn settle(&self, (mut todo, mut undefined): Goals<'p>, bindings: &mut Bindings<'p>) -> Option<Goals<'p>> {
         let mut open = Vec::new();
-        let mut todo = parts;
         while let Some(part) = todo.pop() {
             match part {
                 Condition::And(inner) => todo.extend(inner),
@@ -28,79 +107,107 @@ impl<'p> Evaluator<'_, 'p> {
                 Condition::Exists(variables, body)
                     if variables.iter().all(|entry| bindings.place(&entry.identifier.name).is_none()) =>
                 {
-                    bindings.declare(variables);
+                    self.declare(variables, bindings);
                     todo.push(body);
                 }
+                _ if self.ignored.is_some_and(|ignored| ignored.contains(&std::ptr::from_ref(part))) => {}
                 _ if is_bound(part, bindings) => match self.holds(part, bindings) {
                     Ok(true) => {}
-                    Ok(false) => {
-                        bindings.0.truncate(outer);
-                        return true;
-                    }
+                    Ok(false) => return None,
                     Err(reason) => undefined = undefined.or(Some(reason)),
                 },
                 _ => open.push(part),
             }
+            if self.world.budget.is_spent() {
+                return None;
+            }
         }
-        let go_on = self.branch(open, bindings, undefined, found);
-        bindings.0.truncate(outer);
-        go_on
+        Some((open, undefined))
     }
 
-    /// Binds a variable in all ways that an open part allows.
-    fn branch(
+    /// Chooses what to bind next: the options that an open condition allows, and the conditions that are left then. Returns `None`
+    /// if all variables have objects.
+    fn choice(
         &self,
         mut open: Vec<&'p Condition>,
-        bindings: &mut Bindings<'p>,
-        undefined: Option<Undefined>,
-        found: Found<'_, 'p>,
-    ) -> bool {
+        first: usize,
+        bindings: &Bindings<'p>,
+    ) -> Option<(Vec<&'p Condition>, Choices<'e, 'p>)> {
+        let world = self.world;
         if let Some((place, object)) = open.iter().find_map(|part| self.forced(part, bindings)) {
-            return self.with_object(place, object, open, bindings, undefined, found);
+            let r#type = bindings.0[place].r#type;
+            let object = std::iter::once(object).filter(move |object| world.is_of(*object, r#type));
+            return Some((open, Choices::Objects(place, Box::new(object))));
         }
         let atoms = open.iter().enumerate().filter_map(|(index, part)| match part {
-            Condition::Atom(atom) => {
-                Some((self.state.count(self.world.symbol(&atom.predicate.name)), index, atom))
-            }
+            Condition::Atom(atom) => Some((self.row_count(atom, bindings), index, atom)),
             _ => None,
         });
         if let Some((_, index, atom)) = atoms.min_by_key(|(count, index, _)| (*count, *index)) {
             let atom: &'p Atom = atom;
             open.swap_remove(index);
-            return self.by_facts(atom, &open, bindings, undefined.as_ref(), found);
+            if let Some(trace) = self.trace {
+                trace.read(&atom.predicate.name, world.symbol(&atom.predicate.name));
+            }
+            let rows = self.rows(atom, bindings);
+            return Some((open, Choices::Facts(atom, rows)));
         }
-        if let Some(index) = open.iter().position(|part| matches!(part, Condition::Or(_))) {
-            let Condition::Or(alternatives) = open.swap_remove(index) else { return true };
-            return alternatives.iter().all(|alternative| {
-                let parts = open.iter().copied().chain([alternative]).collect();
-                self.solve(parts, bindings, undefined.clone(), found)
-            });
+        if let Some(index) = open.iter().position(|part| matches!(part, Condition::Or(_)))
+            && let Condition::Or(alternatives) = open.swap_remove(index)
+        {
+            return Some((open, Choices::Alternatives(alternatives.iter())));
         }
-        let Some(place) = bindings.0.iter().position(|binding| binding.object.is_none()) else {
-            return found(bindings, undefined.as_ref());
-        };
-        let r#type = bindings.0[place].r#type;
-        self.world
-            .objects_of(r#type)
-            .all(|object| self.with_object(place, object, open.clone(), bindings, undefined.clone(), found))
+        let place = (first..bindings.0.len()).find(|place| bindings.0[*place].object.is_none())?;
+        Some((open, Choices::Objects(place, world.objects_of(bindings.0[place].r#type))))
     }
 
-    fn with_object(
-        &self,
-        place: usize,
-        object: Symbol,
-        open: Vec<&'p Condition>,
-        bindings: &mut Bindings<'p>,
-        undefined: Option<Undefined>,
-        found: Found<'_, 'p>,
-    ) -> bool {
-        if !self.world.is_of(object, bindings.0[place].r#type) {
-            return true;
+    /// Takes the next option of a choice. Returns the conditions that are left then, or `None` after the last option.
+    fn next(&self, branch: &mut Branch<'e, 'p>, bindings: &mut Bindings<'p>) -> Option<Goals<'p>> {
+        branch.undo(bindings);
+        let mut open = branch.open.clone();
+        match &mut branch.options {
+            Choices::Objects(place, objects) => {
+                bindings.0[*place].object = Some(objects.next()?);
+                branch.bound.push(*place);
+            }
+            Choices::Facts(atom, facts) => {
+                while !self.unify(atom, facts.next()?, bindings, &mut branch.bound) {
+                    for place in branch.bound.drain(..) {
+                        bindings.0[place].object = None;
+                    }
+                    if self.world.budget.is_spent() {
+                        return None;
+                    }
+                }
+            }
+            Choices::Alternatives(alternatives) => open.push(alternatives.next()?),
         }
-        bindings.0[place].object = Some(object);
-        let go_on = self.solve(open, bindings, undefined, found);
-        bindings.0[place].object = None;
-        go_on
+        Some((open, branch.undefined.clone()))
+    }
+
+    /// The number of facts that [`Evaluator::rows`] returns.
+    fn row_count(&self, atom: &Atom, bindings: &Bindings<'p>) -> usize {
+        let all = || self.state.count(self.world.symbol(&atom.predicate.name));
+        self.indexed_rows(atom, bindings).map_or_else(all, <[Arguments]>::len)
+    }
+
+    /// The facts that an atom can match: of a predicate that never changes those with one of the objects that the atom has, and
+    /// otherwise all.
+    fn rows(&self, atom: &Atom, bindings: &Bindings<'p>) -> Box<dyn Iterator<Item = &'e Arguments> + 'e> {
+        match self.indexed_rows(atom, bindings) {
+            Some(rows) => Box::new(rows.iter()),
+            None => Box::new(self.state.tuples(self.world.symbol(&atom.predicate.name))),
+        }
+    }
+
+    /// The facts with one of the objects that an atom has, those with the rarest one; `None` if it has none, or if its predicate
+    /// can change.
+    fn indexed_rows(&self, atom: &Atom, bindings: &Bindings<'p>) -> Option<&'e [Arguments]> {
+        let predicate = self.world.symbol(&atom.predicate.name);
+        let columns = atom.arguments.iter().enumerate();
+        let columns = columns.filter_map(|(column, term)| Some((column, self.term(term, bindings)?)));
+        let rows = columns.filter_map(|(column, object)| self.world.fixed_rows(predicate, column, object));
+        rows.min_by_key(|rows| rows.len())
     }
 
     /// The object that an equation with one unbound side forces.
@@ -119,30 +226,9 @@ impl<'p> Evaluator<'_, 'p> {
         }
     }
 
-    /// Binds the variables of an atom as each fact of its predicate proposes.
-    fn by_facts(
-        &self,
-        atom: &'p Atom,
-        open: &[&'p Condition],
-        bindings: &mut Bindings<'p>,
-        undefined: Option<&Undefined>,
-        found: Found<'_, 'p>,
-    ) -> bool {
-        for tuple in self.state.tuples(self.world.symbol(&atom.predicate.name)) {
-            let mut bound = Vec::new();
-            let fits = self.unify(atom, tuple, bindings, &mut bound);
-            let go_on = !fits || self.solve(open.to_vec(), bindings, undefined.cloned(), found);
-            for place in bound {
-                bindings.0[place].object = None;
-            }
-            if !go_on {
-                return false;
-            }
-        }
-        true
-    }
-
-    fn unify(
+    /// Binds the variables of an atom as a fact proposes. Returns `false` if the fact does not match; the variables in `bound` are
+    /// bound then, too.
+    pub(super) fn unify(
         &self,
         atom: &Atom,
         tuple: &Arguments,

@@ -8,10 +8,10 @@
 
 use num_rational::BigRational;
 
-use crate::ast::{Condition, ConditionTime, Name, Preference, Trajectory, TypedName};
+use crate::ast::{Condition, ConditionTime, Name, Preference, Trajectory};
 use crate::print::constraint_text;
 
-use super::evaluate::{Binding, Bindings, Evaluator, Undefined};
+use super::evaluate::{Bindings, Evaluator, Undefined};
 use super::execute::{Execution, undefined_violation};
 use super::record::{Moment, constraints};
 use super::running::Running;
@@ -51,6 +51,7 @@ impl<'e, 'p> Execution<'e, 'p> {
                 if !judge.follows(&constraint.trajectory, bindings) {
                     unmet = unmet.saturating_add(1);
                 }
+                true
             });
             match &constraint.preference {
                 Some(name) => violated.extend(std::iter::repeat_n(name.name.clone(), unmet)),
@@ -81,32 +82,15 @@ fn count_violated<'p>(
     bindings: &mut Bindings<'p>,
 ) -> Result<usize, Undefined> {
     let (mut count, mut undefined) = (0_usize, None);
-    evaluator.world.each(&preference.variables, bindings, &mut |bindings| match evaluator
-        .holds(&preference.condition, bindings)
-    {
-        Ok(true) => {}
-        Ok(false) => count = count.saturating_add(1),
-        Err(reason) => undefined = Some(reason),
+    evaluator.world.each(&preference.variables, bindings, &mut |bindings| {
+        match evaluator.holds(&preference.condition, bindings) {
+            Ok(true) => {}
+            Ok(false) => count = count.saturating_add(1),
+            Err(reason) => undefined = Some(reason),
+        }
+        true
     });
     undefined.map_or(Ok(count), Err)
-}
-
-impl<'p> World<'p> {
-    /// All bindings of some variables to objects of their types.
-    fn each(
-        &self,
-        variables: &'p [TypedName],
-        bindings: &mut Bindings<'p>,
-        found: &mut dyn FnMut(&mut Bindings<'p>),
-    ) {
-        let Some((first, rest)) = variables.split_first() else { return found(bindings) };
-        for object in self.objects_of(&first.r#type) {
-            let variable = &first.identifier.name;
-            bindings.0.push(Binding { variable, r#type: &first.r#type, object: Some(object) });
-            self.each(rest, bindings, found);
-            bindings.0.pop();
-        }
-    }
 }
 
 /// A trajectory in the light of the definition.
@@ -129,9 +113,7 @@ impl<'p> Judge<'_, 'p> {
         match trajectory {
             Trajectory::And(parts) => parts.iter().all(|part| self.follows(part, bindings)),
             Trajectory::ForAll(variables, body) => {
-                let mut all = true;
-                self.world.each(variables, bindings, &mut |bindings| all &= self.follows(body, bindings));
-                all
+                self.world.each(variables, bindings, &mut |bindings| self.follows(body, bindings))
             }
             Trajectory::AtEnd(what) => self.holds(what, bindings).last() == Some(&true),
             Trajectory::Always(what) => self.holds(what, bindings).iter().all(|holds| *holds),

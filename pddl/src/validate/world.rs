@@ -9,8 +9,12 @@ use crate::ast::{
     Atom, Domain, Identifier, InitialElement, Name, Problem, Span, Term, TypeExpression, TypedName,
 };
 use crate::number::dense;
-use crate::strata::Strata;
 use crate::types::TypeHierarchy;
+
+use super::budget::Budget;
+use super::derive::{Stratum, read_by_axioms, strata};
+use super::evaluate::Bindings;
+use super::targets::changeable_predicates;
 
 /// The function that counts the violations of a preference.
 const IS_VIOLATED: &str = "is-violated";
@@ -22,9 +26,13 @@ pub(super) struct Symbol(u32);
 /// The objects that a predicate or function is applied to.
 pub(super) type Arguments = SmallVec<[Symbol; 4]>;
 
+/// The column of a predicate and the object in it.
+type ColumnKey = (Symbol, usize, Symbol);
+
 /// A domain with a problem, its names numbered.
 #[derive(Debug)]
 pub(super) struct World<'p> {
+    pub(super) budget: Budget<'p>,
     pub(super) domain: &'p Domain,
     pub(super) problem: &'p Problem,
     types: TypeHierarchy,
@@ -35,8 +43,14 @@ pub(super) struct World<'p> {
     place: FxHashMap<Symbol, usize>,
     /// The objects of each type that is declared, in order, and as a set.
     members: FxHashMap<Name, (Vec<Symbol>, FxHashSet<Symbol>)>,
-    /// The axioms by layer, lowest first.
-    pub(super) layers: Vec<Vec<usize>>,
+    /// The axioms, lowest stratum first.
+    pub(super) strata: Vec<Stratum<'p>>,
+    /// The predicates and functions in conditions of axioms.
+    pub(super) read_by_axioms: FxHashSet<Symbol>,
+    /// The predicates that a plan can change, or that follow from others.
+    changeable: FxHashSet<Symbol>,
+    /// The facts of all other predicates, by each object in them.
+    fixed: FxHashMap<ColumnKey, Vec<Arguments>>,
 }
 
 /// The facts and values at one time.
@@ -49,8 +63,10 @@ pub(super) struct State {
 }
 
 impl<'p> World<'p> {
-    pub(super) fn new(domain: &'p Domain, problem: &'p Problem) -> Self {
+    /// Numbers the names. Loops end when `stop` returns `true`, and what they have found means nothing then.
+    pub(super) fn new(domain: &'p Domain, problem: &'p Problem, stop: &'p dyn Fn() -> bool) -> Self {
         let mut world = Self {
+            budget: Budget::new(stop),
             domain,
             problem,
             types: TypeHierarchy::of(domain),
@@ -59,7 +75,10 @@ impl<'p> World<'p> {
             objects: Vec::new(),
             place: FxHashMap::default(),
             members: FxHashMap::default(),
-            layers: layers(domain),
+            strata: strata(domain),
+            read_by_axioms: FxHashSet::default(),
+            changeable: FxHashSet::default(),
+            fixed: FxHashMap::default(),
         };
         world.intern(&Name::new("total-cost"));
         for declaration in domain.predicates.iter().chain(&domain.functions) {
@@ -82,7 +101,41 @@ impl<'p> World<'p> {
             let set = own.iter().copied().collect();
             world.members.insert(name, (own, set));
         }
+        world.read_by_axioms = read_by_axioms(domain).into_iter().map(|name| world.symbol(name)).collect();
+        world.changeable =
+            changeable_predicates(domain, problem).into_iter().map(|name| world.symbol(name)).collect();
+        world.index_fixed();
         world
+    }
+
+    /// Indexes the initial facts that never change.
+    fn index_fixed(&mut self) {
+        let mut fixed: FxHashMap<ColumnKey, Vec<Arguments>> = FxHashMap::default();
+        let mut seen = FxHashSet::default();
+        for element in &self.problem.init {
+            let InitialElement::Fact(atom) = element else { continue };
+            let (predicate, arguments) = self.ground(atom);
+            if self.changeable.contains(&predicate) || !seen.insert((predicate, arguments.clone())) {
+                continue;
+            }
+            for (column, object) in arguments.iter().enumerate() {
+                let rows = fixed.entry((predicate, column, *object)).or_default();
+                // An object that a fact has twice is in two columns.
+                rows.push(arguments.clone());
+            }
+        }
+        self.fixed = fixed;
+    }
+
+    /// The facts with an object in a column; `None` if those of the predicate can change.
+    pub(super) fn fixed_rows(
+        &self,
+        predicate: Symbol,
+        column: usize,
+        object: Symbol,
+    ) -> Option<&[Arguments]> {
+        let is_fixed = !self.changeable.contains(&predicate);
+        is_fixed.then(|| self.fixed.get(&(predicate, column, object)).map_or(&[][..], Vec::as_slice))
     }
 
     fn intern(&mut self, name: &Name) -> Symbol {
@@ -130,6 +183,11 @@ impl<'p> World<'p> {
         self.symbols.get(name).copied().unwrap_or(Symbol(u32::MAX))
     }
 
+    /// The name with a number.
+    pub(super) fn name_of(&self, symbol: Symbol) -> Option<&Name> {
+        self.names.get(symbol.0 as usize)
+    }
+
     pub(super) fn name(&self, symbol: Symbol) -> &str {
         self.names.get(symbol.0 as usize).map_or("?", Name::as_str)
     }
@@ -161,6 +219,52 @@ impl<'p> World<'p> {
             return Box::new(members.iter().copied());
         }
         Box::new(self.objects.iter().map(|(object, _)| *object).filter(|object| self.is_of(*object, wanted)))
+    }
+
+    /// The object of a type, if it has only one.
+    pub(super) fn only_object(&self, wanted: &TypeExpression) -> Option<Symbol> {
+        let mut objects = self.objects_of(wanted);
+        objects.next().filter(|_| objects.next().is_none())
+    }
+
+    /// Calls `visit` with each way to give objects to some variables, until it returns `false`. Returns `true` if it never did.
+    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
+    pub(super) fn each(
+        &self,
+        variables: &'p [TypedName],
+        bindings: &mut Bindings<'p>,
+        visit: &mut dyn FnMut(&mut Bindings<'p>) -> bool,
+    ) -> bool {
+        if variables.iter().any(|entry| self.objects_of(&entry.r#type).next().is_none()) {
+            return true;
+        }
+        let first = bindings.0.len();
+        bindings.declare(variables);
+        // Objects that a variable has not had yet, for the variables that have one.
+        let mut rest = Vec::with_capacity(variables.len());
+        let is_complete = loop {
+            for entry in &variables[rest.len()..] {
+                let mut objects = self.objects_of(&entry.r#type);
+                bindings.0[first + rest.len()].object = objects.next();
+                rest.push(objects);
+            }
+            if self.budget.is_spent() || !visit(bindings) {
+                break false;
+            }
+            let next = loop {
+                let Some(objects) = rest.last_mut() else { break None };
+                match objects.next() {
+                    Some(object) => break Some(object),
+                    None => rest.pop(),
+                };
+            };
+            if next.is_none() {
+                break true;
+            }
+            bindings.0[first + rest.len() - 1].object = next;
+        };
+        bindings.0.truncate(first);
+        is_complete
     }
 
     /// A fact or a function with its arguments as written.
@@ -218,21 +322,4 @@ impl State {
             |facts: &FxHashMap<Symbol, FxHashSet<Arguments>>| facts.get(&predicate).map_or(0, FxHashSet::len);
         count(&self.facts) + count(&self.derived)
     }
-}
-
-/// The axioms by the layer of their head. Axioms through their own negation have no layers; the checker
-/// refuses them, and here they all come into one.
-#[expect(clippy::arithmetic_side_effects, reason = "levels are at most the number of predicates")]
-fn layers(domain: &Domain) -> Vec<Vec<usize>> {
-    let strata = Strata::of(domain).ok();
-    let mut layers: Vec<Vec<usize>> = Vec::new();
-    for (index, axiom) in domain.derived.iter().enumerate() {
-        let name = &axiom.head.identifier.name;
-        let level = strata.as_ref().and_then(|strata| strata.level(name)).unwrap_or(0);
-        if layers.len() <= level {
-            layers.resize(level + 1, Vec::new());
-        }
-        layers[level].push(index);
-    }
-    layers
 }

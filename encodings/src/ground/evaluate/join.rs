@@ -5,7 +5,7 @@
 
 use crate::ground::vocabulary::atom::Binding;
 use crate::ground::vocabulary::world::World;
-use crate::lifted::{Bound, Formula, PredicateId, Term};
+use crate::lifted::{Arguments, Bound, Formula, ObjectId, PredicateId, Term};
 use crate::limits::Interrupted;
 
 /// An atom that must be able to hold.
@@ -44,25 +44,146 @@ pub(crate) fn each_binding<'a>(
     binding: &mut Binding,
     visit: &mut dyn FnMut(&mut World<'a>, &mut Binding) -> bool,
 ) -> Result<bool, Interrupted> {
-    let open = |term: &&Term, binding: &Binding| match term {
-        Term::Parameter(variable) if binding[*variable as usize].is_none() => Some(*variable),
-        _ => None,
-    };
-    let own = |variable: u32| bound.iter().any(|b| b.variable == variable);
-    let useful = guards.iter().enumerate().filter_map(|(position, (_, terms))| {
-        let variables: Vec<_> = terms.iter().filter_map(|term| open(&term, binding)).collect();
-        let joins = !variables.is_empty() && variables.iter().all(|v| own(*v)) && terms.len() <= 64;
-        joins.then_some((variables.len(), position))
-    });
-    let Some((_, position)) = useful.min() else {
-        return each_candidate(world, bound, binding, visit);
-    };
-    let (predicate, terms) = guards[position];
-    let rest: Vec<_> =
-        guards.iter().enumerate().filter(|(i, _)| *i != position).map(|(_, guard)| *guard).collect();
-    for row in world.rows(predicate, terms, binding) {
-        let mut fresh = Vec::new();
-        let fits = terms.iter().zip(row.iter()).all(|(term, object)| match term {
+    debug_assert!(bound.is_sorted_by_key(|own| own.variable));
+    let mut join = Join { bound, guards, is_used: vec![false; guards.len()] };
+    // Quantifiers may bind more variables than the call stack has frames.
+    let mut levels: Vec<Level> = Vec::new();
+    loop {
+        world.visit()?;
+        match join.next_level(world, levels.last(), binding) {
+            Some(level) => levels.push(level),
+            None if visit(world, binding) => {}
+            None => {
+                for level in &mut levels {
+                    level.undo(binding);
+                }
+                return Ok(false);
+            }
+        }
+        while let Some(level) = levels.last_mut() {
+            level.undo(binding);
+            if join.advance(world, level, binding)? {
+                break;
+            }
+            join.leave(level);
+            levels.pop();
+        }
+        if levels.is_empty() {
+            return Ok(true);
+        }
+    }
+}
+
+/// The variables and the guards of an enumeration.
+struct Join<'j> {
+    /// Ascending by variable.
+    bound: &'j [Bound],
+    guards: &'j [Guard<'j>],
+    /// For each guard, whether its rows are being gone through.
+    is_used: Vec<bool>,
+}
+
+/// Options for some variables, and the variables that the present option has bound.
+struct Level {
+    options: Options,
+    fresh: Vec<u32>,
+}
+
+enum Options {
+    /// The rows that fit a guard, by its position.
+    Rows(usize, std::vec::IntoIter<Arguments>),
+    /// The candidates of a variable, by its place, and the position of the next one.
+    Candidates(usize, usize),
+}
+
+impl Level {
+    fn undo(&mut self, binding: &mut Binding) {
+        for variable in self.fresh.drain(..) {
+            binding[variable as usize] = None;
+        }
+    }
+}
+
+impl Join<'_> {
+    /// What is to be bound next: what the guard with the fewest open variables leaves open, or else a variable.
+    fn next_level(
+        &mut self,
+        world: &mut World<'_>,
+        last: Option<&Level>,
+        binding: &Binding,
+    ) -> Option<Level> {
+        let guard = match last {
+            // No guard was left before.
+            Some(Level { options: Options::Candidates(..), .. }) => None,
+            _ => self.next_guard(binding),
+        };
+        let options = if let Some(position) = guard {
+            self.is_used[position] = true;
+            let (predicate, terms) = self.guards[position];
+            Options::Rows(position, world.rows(predicate, terms, binding).into_iter())
+        } else {
+            let first = match last {
+                Some(Level { options: Options::Candidates(place, _), .. }) => *place,
+                _ => 0,
+            };
+            let is_open = |place: &usize| binding[self.bound[*place].variable as usize].is_none();
+            Options::Candidates((first..self.bound.len()).find(is_open)?, 0)
+        };
+        Some(Level { options, fresh: Vec::new() })
+    }
+
+    /// The guard with the fewest open variables, all of which are those of the quantifier.
+    fn next_guard(&self, binding: &Binding) -> Option<usize> {
+        let open_variables = |(position, (_, terms)): (usize, &Guard<'_>)| {
+            let open = terms.iter().filter_map(|term| match term {
+                Term::Parameter(variable) if binding[*variable as usize].is_none() => Some(*variable),
+                _ => None,
+            });
+            let (mut count, mut joins) = (0_usize, !self.is_used[position] && terms.len() <= 64);
+            for variable in open {
+                count = count.saturating_add(1);
+                joins &= self.find(variable).is_some();
+            }
+            (joins && count > 0).then_some((count, position))
+        };
+        self.guards.iter().enumerate().filter_map(open_variables).min().map(|(_, position)| position)
+    }
+
+    /// Binds what the next option binds. Returns `false` after the last option.
+    fn advance(
+        &self,
+        world: &mut World<'_>,
+        level: &mut Level,
+        binding: &mut Binding,
+    ) -> Result<bool, Interrupted> {
+        match &mut level.options {
+            Options::Candidates(place, next) => {
+                let Bound { variable, candidates } = &self.bound[*place];
+                let Some(object) = candidates.get(*next) else { return Ok(false) };
+                *next = next.saturating_add(1);
+                binding[*variable as usize] = Some(*object);
+                level.fresh.push(*variable);
+                Ok(true)
+            }
+            Options::Rows(position, rows) => {
+                let (_, terms) = self.guards[*position];
+                for row in rows {
+                    world.visit()?;
+                    if self.fits(terms, &row, binding, &mut level.fresh) {
+                        return Ok(true);
+                    }
+                    for variable in level.fresh.drain(..) {
+                        binding[variable as usize] = None;
+                    }
+                }
+                Ok(false)
+            }
+        }
+    }
+
+    /// Binds the open variables of terms to the objects of a row. Returns `false` if the row does not fit.
+    fn fits(&self, terms: &[Term], row: &[ObjectId], binding: &mut Binding, fresh: &mut Vec<u32>) -> bool {
+        terms.iter().zip(row).all(|(term, object)| match term {
             Term::Object(constant) => constant == object,
             Term::Parameter(variable) => {
                 if let Some(known) = binding[*variable as usize] {
@@ -70,40 +191,19 @@ pub(crate) fn each_binding<'a>(
                 }
                 binding[*variable as usize] = Some(*object);
                 fresh.push(*variable);
-                let ranges =
-                    |b: &Bound| b.variable == *variable && b.candidates.binary_search(object).is_ok();
-                bound.iter().any(ranges)
+                self.find(*variable).is_some_and(|own| own.candidates.binary_search(object).is_ok())
             }
-        });
-        let go_on = !fits || each_binding(world, bound, &rest, binding, visit)?;
-        for variable in fresh {
-            binding[variable as usize] = None;
-        }
-        if !go_on {
-            return Ok(false);
-        }
+        })
     }
-    Ok(true)
-}
 
-/// Every object for every variable that is still open.
-fn each_candidate<'a>(
-    world: &mut World<'a>,
-    bound: &[Bound],
-    binding: &mut Binding,
-    visit: &mut dyn FnMut(&mut World<'a>, &mut Binding) -> bool,
-) -> Result<bool, Interrupted> {
-    let Some(first) = bound.iter().find(|b| binding[b.variable as usize].is_none()) else {
-        world.visit()?;
-        return Ok(visit(world, binding));
-    };
-    for object in first.candidates.iter() {
-        binding[first.variable as usize] = Some(*object);
-        let go_on = each_candidate(world, bound, binding, visit)?;
-        binding[first.variable as usize] = None;
-        if !go_on {
-            return Ok(false);
+    fn find(&self, variable: u32) -> Option<&Bound> {
+        let place = self.bound.binary_search_by_key(&variable, |own| own.variable).ok()?;
+        self.bound.get(place)
+    }
+
+    fn leave(&mut self, level: &Level) {
+        if let Options::Rows(position, _) = level.options {
+            self.is_used[position] = false;
         }
     }
-    Ok(true)
 }

@@ -12,7 +12,7 @@
 mod program;
 mod relaxed;
 
-use rules::{Engine, Interrupt, Program, Symbol};
+use rules::{Engine, Program, Symbol};
 use rustc_hash::FxHashMap;
 
 use crate::error::Error;
@@ -50,7 +50,7 @@ pub(crate) fn reach(
     let (symbols, rules, facts) = relaxed.finish();
     let objects: FxHashMap<Symbol, ObjectId> =
         symbols.objects.iter().copied().zip((0..).map(ObjectId)).collect();
-    let within = rules::Limits { steps: u64::MAX, interrupt: Some(interrupt(limits)) };
+    let within = rules::Limits { steps: u64::MAX, interrupt: Some(limits.into()) };
     let program = Program { rules, ..Program::default() };
     let engine =
         Engine::with_limits(symbols.table, program, facts, within).map_err(|errors| refusal(&errors))?;
@@ -88,12 +88,6 @@ pub(crate) fn reach(
         instances.push(bindings);
     }
     Ok(Reached { instances, atoms, derived })
-}
-
-/// What stops the rule engine.
-fn interrupt(limits: &Limits) -> Interrupt {
-    let limits = limits.clone();
-    Interrupt::new(move || limits.reached())
 }
 
 /// Why the rule engine has no result.

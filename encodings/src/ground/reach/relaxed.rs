@@ -128,6 +128,7 @@ impl<'a> Relaxed<'a> {
         exact: bool,
         out: &mut Vec<Atom>,
     ) -> Result<(), Interrupted> {
+        self.limits.check()?;
         match formula {
             Formula::And(parts) => {
                 return parts.iter().try_for_each(|part| self.body(part, candidates, exact, out));
@@ -273,10 +274,11 @@ pub(super) fn free(formula: &Formula) -> Vec<u32> {
     }
     let mut bound = Vec::new();
     bound_in(formula, &mut bound);
+    bound.sort_unstable();
     let mut free = Vec::new();
     formula_terms(formula, &mut |term| {
         if let Term::Parameter(variable) = term
-            && !bound.contains(&variable)
+            && bound.binary_search(&variable).is_err()
         {
             free.push(variable);
         }

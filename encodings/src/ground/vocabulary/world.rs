@@ -16,7 +16,7 @@ use crate::number::dense;
 use crate::task::quantity::NumericId;
 use pddl::ast::Name;
 
-/// The limits are looked at after so many bindings that nothing guards.
+/// Number of steps of enumerations between two looks at the limits.
 const BETWEEN_LOOKS: u32 = 256;
 
 type AtomIndex<K> = IndexMap<(K, Arguments), (), FxBuildHasher>;
@@ -35,7 +35,7 @@ pub(crate) struct World<'a> {
     pub(crate) numerics: AtomIndex<FunctionId>,
     /// For a predicate and a set of columns (bit i for column i): rows by the values in those columns.
     joins: FxHashMap<(PredicateId, u64), Rows>,
-    /// How many bindings were visited that nothing guards, modulo 2^32.
+    /// Steps of enumerations so far, modulo 2^32.
     visited: Wrapping<u32>,
 }
 
@@ -58,7 +58,7 @@ impl<'a> World<'a> {
         }
     }
 
-    /// Notes a binding that nothing guards; looks at the limits every so often.
+    /// Notes a step of an enumeration. Checks the limits every few hundred steps.
     pub(crate) fn visit(&mut self) -> Result<(), Interrupted> {
         self.visited += 1;
         if self.visited.0.is_multiple_of(BETWEEN_LOOKS) {

@@ -1,0 +1,226 @@
+//! Limits in every phase: for each phase an input that is slow in this phase, and a limit on processor time and memory.
+//!
+//! Each command has to end after a tenth more than its limit and 0.2 s at the latest, in processor time.
+#![cfg(target_os = "linux")]
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::Command;
+
+use serde_json::Value;
+
+use crate::common::{program, verify_in};
+use crate::limits::round_trip;
+
+/// The result of a command, with what it used.
+#[derive(Debug)]
+struct Run {
+    status: i64,
+    stdout: String,
+    stderr: String,
+    /// Processor time in seconds, of user and system.
+    time: f64,
+    /// The largest main memory, in megabytes.
+    memory: f64,
+}
+
+/// Runs the program, and measures it. Needs python3.
+fn run(directory: &Path, arguments: &[&str]) -> Run {
+    let script = "import json, resource as r, subprocess as s, sys\n\
+        o = s.run(sys.argv[1:], stdout=s.PIPE, stderr=s.PIPE)\n\
+        u = r.getrusage(r.RUSAGE_CHILDREN)\n\
+        print(json.dumps([o.returncode, o.stdout.decode(), o.stderr.decode(), u.ru_utime + u.ru_stime, u.ru_maxrss / 1024]))";
+    let mut python = Command::new("python3");
+    let output = python.args(["-c", script]).arg(program()).args(arguments).current_dir(directory).output();
+    let output = output.expect("python3 runs");
+    let answer: Value =
+        serde_json::from_slice(&output.stdout).unwrap_or_else(|error| panic!("{error}: {output:?}"));
+    let text = |index: usize| answer[index].as_str().expect("text").to_owned();
+    let number = |index: usize| answer[index].as_f64().expect("a number");
+    Run {
+        status: answer[0].as_i64().expect("a status"),
+        stdout: text(1),
+        stderr: text(2),
+        time: number(3),
+        memory: number(4),
+    }
+}
+
+/// Runs a command with a time limit in seconds, which it has to keep.
+fn limited(directory: &Path, arguments: &[&str], limit: f64) -> Run {
+    let limit_text = limit.to_string();
+    let found = run(directory, &[arguments, &["--time-limit", &limit_text]].concat());
+    let most = 1.1 * limit + 0.2;
+    assert!(found.time <= most, "{arguments:?}: {} s with a limit of {limit} s\n{found:#?}", found.time);
+    found
+}
+
+/// Asserts that there was nothing to show, and that the limit is named as the reason.
+fn assert_nothing_to_show(found: &Run) {
+    assert!(found.status == 12 && found.stderr.contains("limit was reached"), "{found:#?}");
+}
+
+/// The texts of so many numbers, one after the other.
+fn repeated(count: usize, text: impl Fn(usize) -> String) -> String {
+    (0..count).fold(String::new(), |all, number| all + &text(number))
+}
+
+fn files(domain: &str, problem: &str) -> tempfile::TempDir {
+    let directory = tempfile::tempdir().expect("a directory");
+    std::fs::write(directory.path().join("domain.pddl"), domain).expect("a file");
+    std::fs::write(directory.path().join("problem.pddl"), problem).expect("a file");
+    directory
+}
+
+const PLAN: [&str; 3] = ["plan", "domain.pddl", "problem.pddl"];
+
+/// A problem with many facts.
+fn many_facts(count: usize) -> tempfile::TempDir {
+    let objects = repeated(count, |number| format!(" o{number}"));
+    let facts = repeated(count, |number| format!("(p o{number} o{})", (number * 7) % count));
+    files(
+        "(define (domain d) (:predicates (p ?x ?y) (q)) (:action a :parameters () :precondition () :effect (q)))",
+        &format!("(define (problem p) (:domain d) (:objects{objects}) (:init {facts}) (:goal (q)))"),
+    )
+}
+
+#[test]
+fn reading_keeps_the_limit() {
+    let directory = many_facts(400_000);
+    assert_nothing_to_show(&limited(directory.path(), &PLAN, 0.3));
+}
+
+/// A transitive property along a chain of individuals.
+fn transitive(count: usize) -> tempfile::TempDir {
+    let mut text = "@prefix : <http://example.org/> . @prefix owl: <http://www.w3.org/2002/07/owl#> .\n\
+        :before a owl:TransitiveProperty , owl:ObjectProperty .\n"
+        .to_owned();
+    for number in 0..count {
+        let _ = writeln!(text, ":i{number} a owl:NamedIndividual ; :before :i{} .", number + 1);
+    }
+    let directory = tempfile::tempdir().expect("a directory");
+    std::fs::write(directory.path().join("chain.ttl"), text).expect("a file");
+    directory
+}
+
+#[test]
+fn reasoning_keeps_the_limit() {
+    let directory = transitive(1_500);
+    assert_nothing_to_show(&limited(directory.path(), &["reason", "chain.ttl"], 0.5));
+}
+
+/// A condition over so many variables, each with these objects, that no fact guards.
+fn quantified(variables: usize, objects: &str) -> tempfile::TempDir {
+    let names = repeated(variables, |number| format!(" ?v{number}"));
+    let parts = repeated(variables, |number| format!("(not (p ?v{number}))"));
+    let domain = format!(
+        "(define (domain d) (:requirements :typing :negative-preconditions :existential-preconditions) (:types one)
+           (:predicates (p ?x - one) (q) (r))
+           (:action a :parameters () :precondition (exists ({names} - one) (and {parts} (r))) :effect (q))
+           (:action b :parameters (?x - one) :precondition () :effect (and (p ?x) (r))))"
+    );
+    let problem =
+        format!("(define (problem p) (:domain d) (:objects {objects} - one) (:init (r)) (:goal (q)))");
+    files(&domain, &problem)
+}
+
+#[test]
+fn grounding_keeps_the_limit() {
+    assert_nothing_to_show(&limited(quantified(40, "x y").path(), &PLAN, 0.5));
+}
+
+/// There is one case in all.
+#[test]
+fn variables_with_one_object_cost_next_to_nothing() {
+    let found = limited(quantified(1_000, "x").path(), &PLAN, 3.0);
+    assert_eq!(found.status, 0, "{found:#?}");
+}
+
+/// A precondition over so many variables with two objects each. Grounding joins the few edges; the validator tries all combinations.
+fn universal(variables: usize) -> tempfile::TempDir {
+    let names = repeated(variables, |number| format!(" ?v{number}"));
+    let edges = repeated(variables - 1, |number| format!("(not (edge ?v{number} ?v{}))", number + 1));
+    let domain = format!(
+        "(define (domain d) (:requirements :typing :adl) (:types one) (:predicates (edge ?x ?y - one) (on) (q))
+           (:action a :parameters () :precondition (forall ({names} - one) (or {edges} (on))) :effect (q)))"
+    );
+    let problem = "(define (problem p) (:domain d) (:objects x y - one) (:init (edge x y)) (:goal (q)))";
+    files(&domain, problem)
+}
+
+#[test]
+fn validating_keeps_the_limit() {
+    let directory = universal(40);
+    let found = limited(directory.path(), &PLAN, 0.5);
+    assert_nothing_to_show(&found);
+    assert!(found.stderr.contains("validator"), "the plan is found: {found:#?}");
+    std::fs::write(directory.path().join("plan"), "(a)\n").expect("a file");
+    let validate = ["validate", "domain.pddl", "problem.pddl", "plan"];
+    assert_nothing_to_show(&limited(directory.path(), &validate, 0.3));
+}
+
+/// A derived fact that follows along a chain, as it is written most often. It once took 10 s.
+fn chain(length: usize) -> tempfile::TempDir {
+    let objects = repeated(length + 1, |number| format!(" o{number}"));
+    let next = repeated(length, |number| format!("(next o{number} o{})", number + 1));
+    files(
+        "(define (domain d) (:predicates (next ?x ?y) (end ?x) (on) (q) (p ?x))
+           (:derived (p ?x) (or (and (end ?x) (on)) (exists (?y) (and (next ?x ?y) (p ?y)))))
+           (:action switch :parameters () :precondition () :effect (on))
+           (:action finish :parameters () :precondition (p o0) :effect (q)))",
+        &format!(
+            "(define (problem p) (:domain d) (:objects{objects}) (:init (end o{length}) {next}) (:goal (q)))"
+        ),
+    )
+}
+
+#[test]
+fn a_plan_over_a_chain_of_derived_facts_keeps_the_limit() {
+    limited(chain(700).path(), &PLAN, 1.0);
+}
+
+/// A round trip whose best order takes long to prove, with a manifest.
+fn trip(places: u32) -> tempfile::TempDir {
+    let (domain, problem) = round_trip(places);
+    let directory = files(&domain, &problem);
+    let manifest = "name = \"trip\"\n[planning]\ndomain = \"domain.pddl\"\nproblem = \"problem.pddl\"\n";
+    std::fs::write(directory.path().join("mission.toml"), manifest).expect("a file");
+    directory
+}
+
+#[test]
+fn searching_and_encoding_keep_the_limit() {
+    let directory = trip(24);
+    let found = limited(directory.path(), &PLAN, 1.0);
+    assert_eq!(found.status, 1, "{found:#?}");
+    for more in [&["--engine", "sat"][..], &["--engine", "sat", "--strategy", "cores"], &["--concurrent"]] {
+        limited(directory.path(), &[&PLAN[..], more].concat(), 1.0);
+    }
+    let pareto = ["--pareto", "(total-cost),(total-time)"];
+    limited(directory.path(), &[&PLAN[..], &pareto].concat(), 1.0);
+}
+
+#[test]
+fn explaining_keeps_the_limit() {
+    let directory = trip(16);
+    limited(directory.path(), &["explain", "mission.toml"], 1.0);
+}
+
+#[test]
+fn certifying_keeps_the_limit() {
+    let directory = trip(8);
+    let found = limited(directory.path(), &[&PLAN[..], &["--certificate", "c"]].concat(), 1.0);
+    assert!(found.stdout.contains("go"), "the plan is shown: {found:#?}");
+    if directory.path().join("c").exists() {
+        assert_ne!(verify_in(directory.path(), &["c", "--time-limit", "0.2"]).status, -1);
+    }
+}
+
+/// Residual conditions that take much memory.
+#[test]
+fn grounding_keeps_the_memory_limit() {
+    let directory = quantified(40, "x y");
+    let found = run(directory.path(), &[&PLAN[..], &["--memory-limit", "150"]].concat());
+    assert!(found.memory <= 1.1 * 150.0, "{found:#?}");
+    assert_nothing_to_show(&found);
+}
