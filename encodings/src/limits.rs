@@ -8,12 +8,15 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use crate::thresholds::Thresholds;
+
 /// The limits of one planning run. Clones share the flag.
 #[derive(Debug, Clone, Default)]
 pub struct Limits {
     deadline: Option<Instant>,
     interrupt: Arc<AtomicBool>,
     room: Option<usize>,
+    thresholds: Thresholds,
 }
 
 /// What a search may store, in bytes, unless it is told.
@@ -55,6 +58,19 @@ impl Limits {
     pub fn with_room(mut self, bytes: usize) -> Self {
         self.room = Some(bytes);
         self
+    }
+
+    /// Lets parts of the search begin at other sizes than usual.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn with_thresholds(mut self, thresholds: Thresholds) -> Self {
+        self.thresholds = thresholds;
+        self
+    }
+
+    /// The sizes at which parts of the search begin.
+    pub(crate) fn thresholds(&self) -> &Thresholds {
+        &self.thresholds
     }
 
     /// How many bytes a search may store.
