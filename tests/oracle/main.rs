@@ -13,7 +13,10 @@
 mod certify;
 mod enumerate;
 mod field;
+mod front;
 mod judge;
 mod magnify;
 mod numbers;
+#[path = "../../encodings/tests/random/mod.rs"]
+mod random;
 mod temporal;
