@@ -10,6 +10,7 @@
 // Speed does not matter here.
 #![allow(clippy::format_collect, clippy::format_push_string, clippy::needless_for_each)]
 
+mod alternatives;
 mod certify;
 mod enumerate;
 mod field;
