@@ -190,10 +190,8 @@ pub fn read(domain: &str, problem: &str) -> Result<(Mission, Problem), Errors> {
 fn config(name: &str, limits: Limits, thresholds: Thresholds) -> Config {
     let sum: usize = name.bytes().map(usize::from).sum();
     let config = Config::default().with_limits(limits);
-    // After how much of the exact search the others have their turns.
-    let is_early = thresholds == Thresholds::NONE;
-    let head_start = if is_early { 1 } else { [config.head_start, 10, 1][sum % 3] };
-    config.with_head_start(head_start)
+    let usual = [config.head_start, 10, 1][sum % 3];
+    config.with_head_start(if thresholds == Thresholds::NONE { 1 } else { usual })
 }
 
 fn plan(
@@ -338,9 +336,11 @@ fn judge_caught(case: &Case, tally: &mut Tally) {
         }
     };
     check_witness(case, &mission, &problem, tally);
-    for thresholds in [Thresholds::default(), Thresholds::NONE] {
+    // What is not decided the first time is hardly decided the second time.
+    let short = case.limit.min(Duration::from_millis(300));
+    for (thresholds, limit) in [(Thresholds::default(), case.limit), (Thresholds::NONE, short)] {
         let started = Instant::now();
-        let limits = Limits::none().with_time(case.limit);
+        let limits = Limits::none().with_time(limit);
         let answer = plan(&mission, &problem, case, (&limits, thresholds));
         tally.planning += started.elapsed();
         judge_answer(case, (&mission, &problem), answer, &limits, tally);
