@@ -9,7 +9,7 @@
     reason = "what noticed each fault, and after how long, is what this is run for"
 )]
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -47,8 +47,8 @@ const PARTS: [&str; 24] = [
 /// The variable that switches a fault on; counted from 1.
 const SWITCH: &str = "METAPLAN_MUTANT";
 
-/// Where the switch is.
-const LIBRARY: &str = "encodings/src/lib.rs";
+/// Where the switch is in a crate.
+const LIBRARY: &str = "src/lib.rs";
 
 /// A program of tests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,8 +60,9 @@ enum Tests {
 }
 
 /// What is asked of each fault, in order: tests, and how many tasks they judge.
-const ORACLES: [(Tests, &str, u32); 8] = [
+const ORACLES: [(Tests, &str, u32); 9] = [
     (Tests::Oracle, "field::", 0),
+    (Tests::Oracle, "front::", 300),
     (Tests::Unit, "search::", 0),
     (Tests::Oracle, "numbers::special::hundreds_of_designs", 0),
     (Tests::Oracle, "temporal::actions_one_after_another", 4_000),
@@ -162,7 +163,12 @@ fn mutated(mutants: &[Mutant]) -> PathBuf {
          let on = || std::env::var(\"{SWITCH}\").ok().and_then(|text| text.parse().ok()).unwrap_or(0); \
          *ON.get_or_init(on) == number }}"
     );
-    *faulty.entry(home.join(LIBRARY)).or_insert_with(|| original(LIBRARY)) += &question;
+    let crates: BTreeSet<&str> =
+        mutants.iter().filter_map(|own| own.file.split_once("/src/")).map(|(own, _)| own).collect();
+    for own in crates {
+        let library = format!("{own}/{LIBRARY}");
+        *faulty.entry(home.join(&library)).or_insert_with(|| original(&library)) += &question;
+    }
     for part in PARTS {
         prune(&root.join(part), &home.join(part));
         copy(&root.join(part), &home.join(part), &faulty);

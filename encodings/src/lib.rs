@@ -26,6 +26,7 @@ mod error;
 mod limits;
 mod lists;
 mod number;
+mod thresholds;
 mod words;
 
 mod compile;
@@ -78,6 +79,8 @@ pub use planner::Planner;
 pub use replan::{First, Progress, Query, Replanned, Replanner};
 pub use sat::{Backend, BackendError};
 pub use task::Task;
+#[doc(hidden)]
+pub use thresholds::Thresholds;
 pub use words::UnknownWord;
 pub use {num_rational::BigRational, pddl};
 

@@ -10,6 +10,8 @@ use std::time::{Duration, Instant};
 
 use rules::Interrupt;
 
+use crate::thresholds::Thresholds;
+
 /// The limits of one planning run. Clones share the flag.
 #[derive(Debug, Clone, Default)]
 pub struct Limits {
@@ -18,6 +20,7 @@ pub struct Limits {
     time: Duration,
     interrupt: Arc<AtomicBool>,
     room: Option<usize>,
+    thresholds: Thresholds,
 }
 
 /// Time after the deadline in which an answer can be completed, in addition to a tenth of the time limit. It is shorter than the 0.2 s
@@ -76,6 +79,19 @@ impl Limits {
     pub fn with_room(mut self, bytes: usize) -> Self {
         self.room = Some(bytes);
         self
+    }
+
+    /// Lets parts of the search begin at other sizes than usual.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn with_thresholds(mut self, thresholds: Thresholds) -> Self {
+        self.thresholds = thresholds;
+        self
+    }
+
+    /// The sizes at which parts of the search begin.
+    pub(crate) fn thresholds(&self) -> &Thresholds {
+        &self.thresholds
     }
 
     /// How many bytes a search may store.

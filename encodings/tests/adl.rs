@@ -4,7 +4,8 @@
 
 use crate::random::Random;
 use crate::random_adl::Generator;
-use metaplan_encodings::{Config, Engine, GroundConfig, Limits, Solution, Status, ground, optimize};
+use crate::tally::limits;
+use metaplan_encodings::{Config, Engine, GroundConfig, Solution, Status, ground, optimize};
 use pddl::{Source, read};
 
 /// Engines, each with the states that the exact search stores before others have their turn.
@@ -17,8 +18,8 @@ fn solve(domain: &str, problem: &str, engine: Engine, head_start: usize) -> Solu
         .unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
     let task = ground(&domain, &problem, &GroundConfig::default())
         .unwrap_or_else(|errors| panic!("{errors:?}\n{domain:?}"));
-    let limits = Limits::none();
-    let config = Config::default().with_engine(engine).with_head_start(head_start).with_limits(limits);
+    let config = Config::default().with_engine(engine).with_head_start(head_start);
+    let config = config.with_limits(limits(head_start));
     optimize(&task, &config, &mut |_| {})
 }
 
@@ -212,6 +213,7 @@ fn agree(seeds: std::ops::Range<u64>) {
         let known = optimize(&task, &Config::default().with_head_start(1_000_000), &mut |_| {});
         for head_start in [1, 10, 100] {
             let config = Config::default().with_engine(Engine::Search).with_head_start(head_start);
+            let config = config.with_limits(limits(head_start));
             let found = optimize(&task, &config, &mut |_| {});
             let context = || format!("seed {seed}, {head_start}\n{domain}\n{problem}\n{known:?}\n{found:?}");
             assert_eq!((found.status, cost(&found)), (known.status, cost(&known)), "{}", context());

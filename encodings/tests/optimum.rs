@@ -2,6 +2,7 @@
 //! explicit states of the mission, from which the PDDL text is generated, too.
 
 use crate::missions::Mission;
+use crate::tally::limits;
 use metaplan_encodings::{Backend, Config, Engine, GroundConfig, Proof, Status, Strategy, ground, optimize};
 use pddl::{Source, read};
 
@@ -22,7 +23,8 @@ fn check(seed: u64, (engine, head_start): (Engine, usize), backend: &Backend, st
         .with_confirmation(true)
         .with_horizon(horizon)
         .with_strategy(strategy)
-        .with_backend(backend.clone());
+        .with_backend(backend.clone())
+        .with_limits(limits(head_start));
     let solution = optimize(&task, &config, &mut |_| {});
     let context = || {
         format!("seed {seed}, {engine:?}, {head_start}, {backend:?}, {strategy:?}: {mission:?}: {solution:?}")

@@ -2,8 +2,14 @@
 
 use std::time::Duration;
 
-use metaplan_encodings::{Config, GroundConfig, Limits, Solution, Status, ground, optimize};
+use metaplan_encodings::{Config, GroundConfig, Limits, Solution, Status, Thresholds, ground, optimize};
 use pddl::ast::{Domain, Problem};
+
+/// Limits with which, where others have their turns at once, everything else begins at once, too.
+pub fn limits(head_start: usize) -> Limits {
+    let thresholds = if head_start == 1 { Thresholds::NONE } else { Thresholds::default() };
+    Limits::none().with_thresholds(thresholds)
+}
 
 /// What the planner says of a task; none where it refuses it, which it may for one reason only.
 pub fn solve(domain: &Domain, problem: &Problem, reason: &str) -> Option<Solution> {

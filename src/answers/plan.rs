@@ -207,9 +207,9 @@ struct MillisecondsPart {
 struct AlternativesPart {
     /// The steps of each.
     plans: Vec<Vec<StepPart>>,
-    /// Whether it is proved that there are no others.
+    /// Whether it is proved that there are no others, idle actions apart: those that cost nothing and on whose effects nothing depends.
     complete: bool,
-    /// For each step, what every such plan has in common; null where that is not known.
+    /// For each step, what every such plan has in common, idle actions apart; null where that is not known.
     forced: Option<Vec<ForcedPart>>,
 }
 

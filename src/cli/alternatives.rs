@@ -18,19 +18,22 @@ pub(super) fn text(found: Option<&Alternatives>, planned: &Planned<'_>, columns:
         let _ = write!(text, "\nalternative {number}\n{}", steps_text(plan, columns));
     }
     text += match (found.plans.is_empty(), found.complete) {
-        (true, true) => "\nthe plan is the only one that is as good, proved\n",
-        (false, true) => "\nthere are no others that are as good, proved\n",
+        (true, true) => "\nthe plan is the only one that is as good, idle actions apart, proved\n",
+        (false, true) => "\nthere are no others that are as good, idle actions apart, proved\n",
         (_, false) if planned.is_at_limit() => {
             "\na limit was reached: there may be others that are as good\n"
         }
         (_, false) => "\nthere may be others that are as good\n",
     };
-    let (Some(forced), Some(plan)) = (&found.forced, &planned.solution.plan) else { return text };
-    for ((step, forced), number) in plan.steps.iter().zip(forced).zip(1..) {
+    let steps = planned.solution.plan.iter().flat_map(|plan| &plan.steps);
+    for ((step, forced), number) in steps.zip(found.forced.iter().flatten()).zip(1..) {
         let own = if forced.action { vec![step.action.as_str()] } else { Vec::new() };
         let all: Vec<_> = own.into_iter().chain(forced.functions.iter().map(String::as_str)).collect();
         let all = if all.is_empty() { "nothing".to_owned() } else { all.join(", ") };
         let _ = writeln!(text, "step {number}: in every plan that is as good: {all}");
+    }
+    if found.complete || found.forced.is_some() {
+        text += "idle actions are not counted: they cost nothing, and nothing depends on their effects\n";
     }
     text
 }

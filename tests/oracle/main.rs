@@ -10,10 +10,14 @@
 // Speed does not matter here.
 #![allow(clippy::format_collect, clippy::format_push_string, clippy::needless_for_each)]
 
+mod alternatives;
 mod certify;
 mod enumerate;
 mod field;
+mod front;
 mod judge;
 mod magnify;
 mod numbers;
+#[path = "../../encodings/tests/random/mod.rs"]
+mod random;
 mod temporal;

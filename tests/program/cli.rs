@@ -423,7 +423,14 @@ fn tiles_in_reverse() -> String {
 #[test]
 fn alternatives_are_listed_with_what_is_forced() {
     let only = metaplan(&["plan", "missions/ugv.toml", "--alternatives", "3"]);
-    check(&only, 0, &["the only one that is as good, proved", "step 1: in every plan that is as good: move"]);
+    check(
+        &only,
+        0,
+        &[
+            "the only one that is as good, idle actions apart, proved",
+            "step 1: in every plan that is as good: move",
+        ],
+    );
     let problem = PROBLEM.replace("(way b c)", "(way b c) (way a d) (way d c)").replace("a b c", "a b c d");
     let answer = plan(DOMAIN, &problem, &["--alternatives", "5"]);
     check(
@@ -432,7 +439,7 @@ fn alternatives_are_listed_with_what_is_forced() {
         &[
             "alternative 1",
             "go a d",
-            "no others that are as good, proved",
+            "no others that are as good, idle actions apart, proved",
             "step 1: in every plan that is as good: nothing",
         ],
     );
@@ -440,4 +447,26 @@ fn alternatives_are_listed_with_what_is_forced() {
     assert_eq!(answer["alternatives"]["plans"].as_array().map(Vec::len), Some(0), "{answer:#}");
     assert_eq!(answer["alternatives"]["complete"].as_bool(), Some(false), "{answer:#}");
     assert_eq!(answer["alternatives"]["forced"][0]["action"].as_bool(), Some(false), "{answer:#}");
+}
+
+/// A free action whose effect nothing reads makes other plans that are as good, which are not counted.
+#[test]
+fn what_is_said_of_all_plans_leaves_out_idle_actions() {
+    let domain = "(define (domain d) (:predicates (p) (q) (seen)) (:functions (total-cost))
+      (:action look :effect (seen))
+      (:action a :effect (and (p) (increase (total-cost) 1)))
+      (:action b :precondition (p) :effect (and (q) (increase (total-cost) 1))))";
+    let problem = "(define (problem p) (:domain d) (:init (= (total-cost) 0)) (:goal (q))
+      (:metric minimize (total-cost)))";
+    let answer = plan(domain, problem, &["--alternatives", "5"]);
+    let idle = "idle actions are not counted: they cost nothing, and nothing depends on their effects";
+    check(
+        &answer,
+        0,
+        &[
+            "the plan is the only one that is as good, idle actions apart, proved",
+            "step 1: in every plan",
+            idle,
+        ],
+    );
 }

@@ -32,8 +32,6 @@ use crate::task::{OperatorId, State, Task};
 
 /// Upper limit on the combinations of designs of one operator.
 const MAX_CHOICES: usize = 20_000;
-/// Number of labels at which the second search first checks whether the graph contains enough plans.
-const FEW: usize = 50_000;
 
 /// A step from one label to another.
 #[derive(Debug, Clone, Copy)]
@@ -297,7 +295,7 @@ impl<'a> Search<'a> {
         let is_exact = guide.is_some();
         self.reach(&mut growth, task.initial.clone(), 0, guide);
         let mut pulse = limits.pulse();
-        let mut next_look = FEW;
+        let mut next_look = self.context.limits.thresholds().alternatives;
         while let Some(Reverse((_, _, id))) = growth.open.pop() {
             let ended =
                 pulse.beat().map_err(Stopped::from).and_then(|()| self.expand(&mut growth, id, guide));

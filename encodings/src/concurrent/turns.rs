@@ -18,11 +18,8 @@ use crate::limits::Limits;
 use crate::number::{Int, Rational};
 use crate::plan::solution::Part;
 
-/// How many situations the exact search looks at before the greedy one has its turn.
-const SOON: usize = 10_000;
-/// How many situations the greedy search evaluates at its first turn, and how many the exact one looks at then.
-const GREEDY: usize = 5_000;
-const EXACT: usize = 20_000;
+/// For each situation that the greedy search evaluates in a turn, how many the exact one looks at.
+const EXACT: usize = 4;
 /// Number of rounds in which the search for sequential plans runs although a plan is known. Its best plan is an upper
 /// bound.
 const WHOLE: usize = 2;
@@ -40,7 +37,8 @@ pub(super) fn take_turns(
     let mut exact = Search::new(concurrent, &expansion, &estimate, bounds);
     let root = if concurrent.is_bounded { exact.lower() } else { 0 };
     record.begin(Rational::from_integer(root));
-    let mut ended = info_span!("search").in_scope(|| exact.run(limits, SOON, record));
+    let mut ended =
+        info_span!("search").in_scope(|| exact.run(limits, limits.thresholds().concurrent, record));
     if exact.is_over() || limits.reached() {
         return (claimed(ended, (concurrent, &exact), root), exact.incumbent);
     }
@@ -55,7 +53,7 @@ pub(super) fn take_turns(
     greedy.extend(differs.then(|| begin(Mode::Sequential)));
     let whole = Whole::new(concurrent, limits);
     let mut seeker = whole.as_ref().map(|own| Seeker::new(own, limits));
-    let mut share = 1_usize;
+    let (mut share, turn) = (1_usize, limits.thresholds().turn.max(1));
     for round in 0..rounds {
         let is_over = exact.is_over() || is_best(concurrent, &exact, root);
         if is_over || limits.reached() || (greedy.is_empty() && exact.is_full(limits)) {
@@ -64,7 +62,8 @@ pub(super) fn take_turns(
         seeker = seeker.filter(|_| exact.incumbent.is_none() || round < WHOLE);
         if let Some(seeker) = &mut seeker {
             let _span = info_span!("satisfice").entered();
-            let found = seeker.run((concurrent, &expansion), share, &mut record.statistics);
+            let work = turn.saturating_mul(share);
+            let found = seeker.run((concurrent, &expansion), work, &mut record.statistics);
             let is_better =
                 |own: &Sequence| exact.incumbent.as_ref().is_none_or(|known| own.value < known.value);
             if let Some(sequence) = found.filter(is_better) {
@@ -74,7 +73,7 @@ pub(super) fn take_turns(
         }
         for position in (0..greedy.len()).rev() {
             let _span = info_span!("greedy").entered();
-            let work = GREEDY.saturating_mul(share);
+            let work = turn.saturating_mul(share);
             if pursue(&mut greedy[position], &mut exact, work, limits, record) == Outcome::Exhausted {
                 let mode = greedy.remove(position).mode;
                 // What was left out may have come sooner.
@@ -87,8 +86,8 @@ pub(super) fn take_turns(
         greedy.retain(|own| own.mode != Mode::Sequential || exact.incumbent.is_none());
         let _span = info_span!("search").entered();
         // A plan is worth more than a bound.
-        let part = if exact.incumbent.is_none() { EXACT / 4 } else { EXACT };
-        ended = exact.run(limits, part.saturating_mul(share), record);
+        let part = if exact.incumbent.is_none() { 1 } else { EXACT };
+        ended = exact.run(limits, turn.saturating_mul(part).saturating_mul(share), record);
         share = share.saturating_mul(2);
     }
     (claimed(ended, (concurrent, &exact), root), exact.incumbent)

@@ -32,9 +32,10 @@ use crate::task::{Operator, OperatorId, Task};
 /// Tasks with more operators are not ground twice.
 const OPERATORS: usize = 100_000;
 
-/// What the search by estimates goes through in a share of work, in nodes and propositions, and how many states the other one stores.
-const WORK: u64 = 5_000_000;
-const STATES: usize = 20_000;
+/// For each situation of the greedy search, what the search by estimates goes through, in nodes and propositions, and how many states the
+/// other one stores.
+const WORK: u64 = 1_000;
+const STATES: usize = 4;
 /// That one ends with so many states.
 const MOST_STATES: usize = 1_000_000;
 
@@ -155,31 +156,31 @@ impl<'w> Seeker<'w> {
         Self { whole, limits, satisficer, exact: Exact::Later, stored: 0, known: None }
     }
 
-    /// Continues both searches for `share` units of work. Returns the better one of their plans whose sequences can
+    /// Continues both searches for as much work as `situations` of the greedy search are worth. Returns the better one of their plans whose sequences can
     /// be executed.
     pub(super) fn run(
         &mut self,
         of: (&Concurrent, &Expansion<'_>),
-        share: usize,
+        situations: usize,
         statistics: &mut Statistics,
     ) -> Option<Sequence> {
-        let some = self.estimate(of, share, statistics);
+        let some = self.estimate(of, situations, statistics);
         if self.limits.reached() {
             return some;
         }
-        let best = self.search(of, share, statistics);
+        let best = self.search(of, situations, statistics);
         some.into_iter().chain(best).min_by_key(|sequence| sequence.value)
     }
 
     fn estimate(
         &mut self,
         (concurrent, expansion): (&Concurrent, &Expansion<'_>),
-        share: usize,
+        situations: usize,
         statistics: &mut Statistics,
     ) -> Option<Sequence> {
         let satisficer = self.satisficer.as_mut()?;
         let before = satisficer.figures;
-        let advance = satisficer.run(self.known.as_ref(), WORK.saturating_mul(share as u64));
+        let advance = satisficer.run(self.known.as_ref(), WORK.saturating_mul(situations as u64));
         satisficer.figures.add_to(before, statistics);
         match advance {
             Ok(Advance::Plan(plan)) => {
@@ -197,7 +198,7 @@ impl<'w> Seeker<'w> {
     fn search(
         &mut self,
         (concurrent, expansion): (&Concurrent, &Expansion<'_>),
-        share: usize,
+        situations: usize,
         statistics: &mut Statistics,
     ) -> Option<Sequence> {
         if matches!(self.exact, Exact::Later) {
@@ -206,7 +207,7 @@ impl<'w> Seeker<'w> {
             self.exact = space.map_or(Exact::Over, begin);
         }
         let Exact::Begun(exact) = &mut self.exact else { return None };
-        self.stored = self.stored.saturating_add(STATES.saturating_mul(share));
+        self.stored = self.stored.saturating_add(STATES.saturating_mul(situations));
         let before = exact.figures();
         let found = exact.run(self.stored, &mut |_, _| {});
         exact.figures().add_to(before, statistics);

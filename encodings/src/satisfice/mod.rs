@@ -41,9 +41,6 @@ const PHASES: [(bool, Weight); 6] = [
 /// A search may take this part of the words that bytes are left for; then the next one has its turn.
 const PART: usize = 16;
 
-/// Who has looked at so many states without a plan looks for pairs of facts that lead nowhere.
-const LATE: u64 = 3_000;
-
 /// What came of going on for a while.
 pub(crate) enum Advance<N> {
     /// A cheaper plan.
@@ -90,7 +87,7 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
     /// task.
     pub(crate) fn run(&mut self, limit: Option<&N>, work: u64) -> Result<Advance<N>, Interrupted> {
         let Some((priced, weight)) = PHASES.get(self.phase).copied() else { return Ok(Advance::Ended) };
-        if !self.knows_pairs && self.figures.evaluated >= LATE {
+        if !self.knows_pairs && self.figures.evaluated >= self.limits.thresholds().pairs {
             self.knows_pairs = true;
             self.known.pairs = Pairs::new(self.known.task, self.limits)?;
             // Estimates do not count on what is of no use any more.

@@ -26,8 +26,6 @@ use crate::search::stubborn::Choosing;
 use crate::task::number::TaskNumber;
 use crate::task::{Fact, OperatorId, State, Task};
 
-/// As many states are stored before the first look at how far the search is.
-const FEW: usize = 200_000;
 /// What it takes to take a state and to see what can be done in it, in steps of a computer…
 const NODE_WORK: u64 = 2_000;
 /// … and to make a state after it, and to look it up.
@@ -116,6 +114,8 @@ pub(crate) struct Search<'a, N, E> {
     is_told: bool,
     /// How many steps it has, if that counts: nothing as dear with as many is looked at.
     fewest: Option<u32>,
+    /// How many states are stored at the first look at how far the search is.
+    first_look: usize,
     /// How far the search was whenever the number of its states had doubled.
     progress: Vec<N>,
     pub(crate) figures: Figures,
@@ -135,7 +135,7 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
             limits,
             bounds,
             prepared,
-            store: Store::new(task, orbits.clone()),
+            store: Store::new(task, orbits.clone(), limits.thresholds().front),
             open: Open::new(),
             incomplete: false,
             order,
@@ -150,6 +150,7 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
             limit,
             is_told: false,
             fewest: None,
+            first_look: limits.thresholds().progress.max(1),
             progress: Vec::new(),
             figures: Figures::default(),
             state: initial.clone(),
@@ -193,7 +194,7 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
             if self.is_met() {
                 return Some(Found::Unknown(None));
             }
-            if self.store.len() >> self.progress.len() >= FEW {
+            if self.store.len() >> self.progress.len() >= self.first_look {
                 self.progress.extend(self.bound.clone());
                 let is_hopeful = self.is_hopeful();
                 if self.patience != Patience::None {

@@ -22,13 +22,11 @@ use crate::task::number::TaskNumber;
 
 /// How many states are stored at most where an answer is wanted at once, or is written down.
 pub(crate) const STATE_LIMIT: usize = 400_000;
-/// After so many states without a plan the greedy search has its turn, with as many.
-const SOON: usize = 20_000;
+/// The greedy search stores at least so many states.
+const LEAST: usize = 100;
 /// The work that is worth as much as a state, in steps of a computer.
 const STATE: u64 = 2_500;
-/// After so much work the search that is clearly behind has half as much as the other one…
-const LONG: u64 = 6_000_000_000;
-/// … and after so much it is given up.
+/// After so much work the search that is clearly behind is given up.
 const TOO_LONG: u64 = 100_000_000_000;
 
 /// Searches a task whose operators all cost at least 0, as long as there is memory and hope to come to the end with it.
@@ -37,7 +35,8 @@ pub(crate) fn search(context: Context<'_>, bounds: &Bounds) -> Found {
     let space = || Space { context, bounds, prepared: &prepared, orbits: None };
     let mut duo = Duo::new(space(), &context.task.initial);
     let mut some: Option<GroundPlan> = None;
-    let mut most = SOON;
+    let soon = context.limits.thresholds().states.max(1);
+    let mut most = soon;
     loop {
         match duo.run(most, &mut |_, _| {}) {
             Some(Found::Unknown(plan)) => {
@@ -50,8 +49,8 @@ pub(crate) fn search(context: Context<'_>, bounds: &Bounds) -> Found {
             Some(found) => return found,
             None => {}
         }
-        if most == SOON && duo.best_plan().is_none() {
-            some = greedily(&space(), &context.task.initial, SOON);
+        if most == soon && duo.best_plan().is_none() {
+            some = greedily(&space(), &context.task.initial, usize::MAX);
             if let Some(plan) = &some {
                 duo.know(&plan.cost);
             }
@@ -97,7 +96,7 @@ fn search_within<N: TaskNumber, E: Estimate<N>>(
 ) -> Found<N> {
     let is_known = limit.is_some();
     let mut search = Search::new(space, initial, Order::Fewest, limit);
-    if let Some(found) = search.run(SOON.min(most), hear) {
+    if let Some(found) = search.run(space.context.limits.thresholds().states.min(most), hear) {
         return found;
     }
     let mut some = None;
@@ -121,7 +120,8 @@ fn greedily<N: TaskNumber, E: Estimate<N>>(
     most: usize,
 ) -> Option<GroundPlan<N>> {
     let mut greedy = Search::new(space, initial, Order::Greedy, None);
-    greedy.run(SOON.min(most), &mut |_, _| {});
+    let states = space.context.limits.thresholds().states.max(LEAST);
+    greedy.run(states.min(most), &mut |_, _| {});
     greedy.best_plan()
 }
 
@@ -195,7 +195,8 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Duo<'a, N, E> {
         let until = STATE.saturating_mul(most as u64);
         let count = self.searches.len();
         let mut ended = Vec::new();
-        let behind = if until >= LONG { behind(&self.searches) } else { None };
+        let thresholds = self.space.context.limits.thresholds();
+        let behind = if until >= thresholds.behind { behind(&self.searches) } else { None };
         for position in 0..count {
             let bound = &mut self.bound;
             let mut told = |cost: Option<&N>, own: &N| {
@@ -263,8 +264,9 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Duo<'a, N, E> {
         let patience = if self.is_patient { Patience::Some } else { Patience::None };
         self.searches.iter_mut().for_each(|search| search.patience = patience);
         if let Some(stubborn) = Stubborn::new(context.task).map(Arc::new) {
+            let trial = context.limits.thresholds().stubborn;
             for search in &mut self.searches {
-                search.choosing = Some(Choosing::new(Arc::clone(&stubborn)));
+                search.choosing = Some(Choosing::new(Arc::clone(&stubborn), trial));
             }
         }
     }
@@ -337,7 +339,7 @@ mod tests {
         let mut search = Search::new(&space, &task.initial, order, None);
         search.sharper = if sharp { bounds.sharper(task) } else { None };
         let stubborn = if chosen { Stubborn::new(task) } else { None };
-        search.choosing = stubborn.map(|stubborn| Choosing::new(Arc::new(stubborn)));
+        search.choosing = stubborn.map(|stubborn| Choosing::new(Arc::new(stubborn), 1_000));
         match search.run(usize::MAX, &mut |_, _| {}) {
             Some(Found::Optimal(plan)) => Some((plan.cost, plan.steps.len())),
             Some(Found::None) => None,

@@ -9,9 +9,6 @@
 
 use crate::number::dense;
 
-/// As many labels stay in one box.
-const MOST: usize = 24;
-
 /// What labels are compared by: positions of numbers, one for each criterion.
 pub(super) trait Criteria {
     /// Whether the first number is at least as good as the second by a criterion.
@@ -45,11 +42,13 @@ struct Region {
 #[derive(Default)]
 pub(super) struct Front {
     regions: Vec<Region>,
+    /// As many labels stay in one box.
+    most: usize,
 }
 
 impl Front {
-    pub(super) fn new(labels: Vec<u32>, criteria: &impl Criteria) -> Self {
-        let mut front = Self { regions: vec![region(labels, criteria)] };
+    pub(super) fn new(labels: Vec<u32>, most: usize, criteria: &impl Criteria) -> Self {
+        let mut front = Self { regions: vec![region(labels, criteria)], most };
         front.split(0, criteria);
         front
     }
@@ -57,7 +56,7 @@ impl Front {
     /// About how much memory is taken.
     pub(super) fn bytes(&self) -> usize {
         let numbers = self.regions.first().map_or(0, |region| region.best.len());
-        let region = numbers.saturating_add(MOST).saturating_mul(8);
+        let region = numbers.saturating_add(self.most).saturating_mul(8);
         self.regions.len().saturating_mul(region.saturating_add(size_of::<Region>()))
     }
 
@@ -132,7 +131,7 @@ impl Front {
         let mut stack = vec![from];
         while let Some(at) = stack.pop() {
             let Content::Labels(labels) = &mut self.regions[at as usize].content else { continue };
-            if labels.len() <= MOST {
+            if labels.len() <= self.most {
                 continue;
             }
             let labels = std::mem::take(labels);
@@ -250,11 +249,11 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_front_is_what_nothing_dominates(points in proptest::collection::vec(
+        fn a_front_is_what_nothing_dominates(most in 0_usize..30, points in proptest::collection::vec(
             proptest::collection::vec(0_u32..30, 3), 1..400,
         )) {
             let points = Points(points);
-            let mut front = Front::new(vec![0], &points);
+            let mut front = Front::new(vec![0], most, &points);
             let mut expected = vec![0_u32];
             for new in 1..dense(points.0.len()) {
                 let own = &points.0[new as usize];

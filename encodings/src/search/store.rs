@@ -39,8 +39,6 @@ struct Compared {
 
 /// Marks a front that is a tree.
 const TREE: u32 = 1 << 31;
-/// Fronts with more labels are trees.
-const LONG: usize = 24;
 
 /// Numbers, each once.
 struct Numbers<N> {
@@ -88,6 +86,8 @@ pub(super) struct Store<N> {
     /// … and the first node of its front, or the number of its tree.
     fronts: Vec<u32>,
     trees: Vec<Front>,
+    /// Fronts with more labels are trees.
+    longest: usize,
     /// What the trees take.
     tree_bytes: usize,
     table: HashTable<u32>,
@@ -172,7 +172,7 @@ fn pack(fields: &[Field], values: &[u32], words: usize, to: &mut Vec<u32>) {
 }
 
 impl<N: TaskNumber> Store<N> {
-    pub(super) fn new(task: &Task<N>, orbits: Option<Arc<Orbits>>) -> Self {
+    pub(super) fn new(task: &Task<N>, orbits: Option<Arc<Orbits>>, longest: usize) -> Self {
         let sizes: Vec<usize> =
             task.variables[..task.basic].iter().map(|variable| variable.values.len()).collect();
         let (fields, words) = fields(&sizes);
@@ -193,6 +193,7 @@ impl<N: TaskNumber> Store<N> {
             keys: Vec::new(),
             fronts: Vec::new(),
             trees: Vec::new(),
+            longest,
             tree_bytes: 0,
             table: HashTable::new(),
             nodes: Vec::new(),
@@ -299,8 +300,8 @@ impl<N: TaskNumber> Store<N> {
             self.nodes[known as usize].state = Standing::Dominated;
         }
         stay.insert(0, id);
-        if stay.len() > LONG {
-            let tree = Front::new(stay, self);
+        if stay.len() > self.longest {
+            let tree = Front::new(stay, self.longest, self);
             self.tree_bytes = self.tree_bytes.saturating_add(tree.bytes());
             self.fronts[place as usize] = dense(self.trees.len()) | TREE;
             self.trees.push(tree);

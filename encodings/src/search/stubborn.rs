@@ -32,9 +32,7 @@ use crate::lists::Lists;
 use crate::number::dense;
 use crate::task::{Condition, Fact, Literal, Operator, OperatorId, Task};
 
-/// After so many states it is looked at whether it pays…
-const TRIAL: u64 = 1_000;
-/// … which it does if at least one of so many operators is left out.
+/// Stubborn sets pay if at least one of so many operators is left out.
 const PART: u64 = 5;
 
 /// Who requires, sets and asks for what in a task.
@@ -66,6 +64,8 @@ pub(super) struct Choosing {
     set: Vec<u32>,
     /// How many operators that can be applied are not in the set.
     out: usize,
+    /// After so many states it is looked at whether it pays.
+    trial: u64,
     /// States, and operators that could be applied in them, and those of them that were left out.
     looked: u64,
     applicable: u64,
@@ -129,7 +129,7 @@ fn sorted(items: impl Iterator<Item = u32>) -> Vec<u32> {
 }
 
 impl Choosing {
-    pub(super) fn new(stubborn: Arc<Stubborn>) -> Self {
+    pub(super) fn new(stubborn: Arc<Stubborn>, trial: u64) -> Self {
         let (operators, facts) = (stubborn.required.len(), stubborn.setting.len());
         Self {
             is_in: vec![false; operators],
@@ -139,6 +139,7 @@ impl Choosing {
             is_set: vec![false; facts],
             set: Vec::new(),
             out: 0,
+            trial,
             looked: 0,
             applicable: 0,
             left_out: 0,
@@ -148,7 +149,7 @@ impl Choosing {
 
     /// Whether it leaves out too little for what it takes.
     pub(super) fn is_idle(&self) -> bool {
-        self.looked == TRIAL && self.left_out.saturating_mul(PART) < self.applicable
+        self.looked == self.trial && self.left_out.saturating_mul(PART) < self.applicable
     }
 
     /// Leaves of the operators that can be applied in a state those that are enough; all where the goal holds. How many were looked at.
@@ -371,7 +372,7 @@ pub(super) mod tests {
         let (states, steps) = reachable(&task)?;
         let best = to_go(&task, &states, &steps);
         let index = OperatorIndex::new(&task);
-        let mut choosing = Choosing::new(stubborn);
+        let mut choosing = Choosing::new(stubborn, u64::MAX);
         let mut left_out = 0;
         for ((state, own), expected) in states.iter().zip(&steps).zip(&best) {
             if task.is_goal(state) {

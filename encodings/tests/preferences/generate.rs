@@ -1,6 +1,6 @@
 //! Random tasks.
 
-use crate::preferences::model::{Action, Atom, Constraint, Effect, Formula, State, Task, Term};
+use super::model::{Action, Atom, Constraint, Effect, Formula, State, Task, Term};
 use crate::random::Random;
 
 pub struct Generator(pub Random);

@@ -2,7 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use encodings::{Backend, Config, Engine, Limits, Semantics, Solution, Status, Strategy, Unbounded};
+use encodings::{
+    Backend, Config, Engine, Limits, Semantics, Solution, Status, Strategy, Thresholds, Unbounded,
+};
 use fastrand::Rng;
 use metaplan::mission::Planning as _;
 
@@ -27,7 +29,11 @@ fn config(rng: &mut Rng) -> Config {
         .with_semantics((!super::draw::once_in(rng, 4)).then(|| one(rng, &semantics)))
         .with_strategy(one(rng, &[Strategy::Auto, Strategy::Tighten, Strategy::Cores]))
         .with_backend(if rng.bool() { Backend::Batsat } else { Backend::Varisat })
-        .with_limits(Limits::none().with_time(LIMIT))
+        .with_limits(Limits::none().with_time(LIMIT).with_thresholds(thresholds(rng.bool())))
+}
+
+fn thresholds(is_early: bool) -> Thresholds {
+    if is_early { Thresholds::NONE } else { Thresholds::default() }
 }
 
 /// Asks with two random settings, and with a horizon.
@@ -163,7 +169,10 @@ pub fn check_objectives(puzzle: &Puzzle, expressions: &[Expr], case: &Case, tall
             return tally.fail(case, "an objective is not read", &messages[0].message);
         }
     };
-    let config = || Config::default().with_limits(Limits::none().with_time(LIMIT));
+    let is_early = expressions.len() == 2;
+    let limits = || Limits::none().with_time(LIMIT).with_thresholds(thresholds(is_early));
+    let config =
+        || Config::default().with_limits(limits()).with_head_start(if is_early { 1 } else { 20_000 });
     let said = || expressions.iter().map(|e| objective(&puzzle.task, e)).collect::<Vec<_>>().join(", ");
     let started = Instant::now();
     if let Ok(task) = mission.ground(&problem, &metrics, &Limits::none()) {

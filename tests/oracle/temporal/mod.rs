@@ -92,6 +92,12 @@ fn case_of(name: String, task: Task, unit: Option<Q>) -> Case {
     case_up_to(if unit.is_none() { CAP } else { OVERLAP_CAP }, name, task, unit)
 }
 
+/// A task of actions one after another that has derived predicates, with its truth; none if the task of the seed has none.
+pub fn with_derived(seed: u64) -> Option<Case> {
+    let task = Maker::make(seed, None);
+    (!task.axioms.is_empty()).then(|| case_of(format!("derived-{seed}"), task, None))
+}
+
 /// A task with its truth, as far as so many nodes show it.
 fn case_up_to(cap: usize, name: String, task: Task, unit: Option<Q>) -> Case {
     let world = World::new(task);

@@ -33,10 +33,6 @@ use answer::Answer;
 use course::Course;
 use search::{Outcome, Search};
 
-/// How many sequences the exhaustive search looks at before others have a turn, and how many each of the two looks at in its first turn.
-const SOON: u64 = 300;
-const TURN: u64 = 300;
-
 /// The task, if such durations can be planned with.
 ///
 /// # Errors
@@ -134,13 +130,14 @@ fn take_turns_choosing(
             }
             (outcome, lower.clone())
         };
-    let (mut ended, mut known) = turn(&mut exhaustive, &mut best, SOON, Part::Search, record);
+    let soon = limits.thresholds().chosen;
+    let (mut ended, mut known) = turn(&mut exhaustive, &mut best, soon, Part::Search, record);
     if ended == Outcome::Exhausted || limits.reached() {
         return (ended == Outcome::Exhausted, known, best);
     }
     let relaxed = Relaxed::new(concurrent);
     let mut greedy = Search::greedy(concurrent, &expansion, Guidance::new(&relaxed));
-    let (mut work, mut rounds) = (TURN, 1..);
+    let (mut work, mut rounds) = (soon.max(1), 1..);
     while ended != Outcome::Exhausted && !limits.reached() {
         // These begin anew each time, for twice as long: not where there is a plan that they need not find.
         if let Some(rounds) = rounds.next().filter(|rounds| *rounds == 1 || best.is_none()) {

@@ -1,13 +1,9 @@
-//! Numbers without an initial value: random tasks against all plans up to a length, executed with values that may be undefined.
-//! Planner and validator have to agree with that.
+//! Small tasks with numbers that may be undefined, executed by their definition; at random, and as PDDL.
 
 use crate::random::Random;
-use crate::tally::{self, Tally};
-use metaplan_encodings::{Solution, Status};
-use pddl::validate::{Options, PlanText, validate};
-use pddl::{Source, read};
 
-const DEPTH: usize = 5;
+/// Plans up to this length are looked at.
+pub(crate) const DEPTH: usize = 5;
 
 /// Whether r and s hold, and the values of a and b.
 #[derive(Debug, Clone, Copy)]
@@ -55,7 +51,7 @@ struct Action {
 }
 
 #[derive(Debug)]
-struct Task {
+pub(crate) struct Task {
     actions: Vec<Action>,
     init: State,
     goal: Formula,
@@ -164,12 +160,12 @@ impl Task {
         })
     }
 
-    fn is_plan(&self, plan: &[usize]) -> bool {
+    pub(crate) fn is_plan(&self, plan: &[usize]) -> bool {
         self.execute(plan).is_some_and(|state| self.goal.truth(&state) == Some(true))
     }
 
     /// The length of the shortest plan, if one is short enough.
-    fn shortest(&self) -> Option<usize> {
+    pub(crate) fn shortest(&self) -> Option<usize> {
         let mut layer: Vec<Vec<usize>> = vec![Vec::new()];
         for length in 0..=DEPTH {
             if layer.iter().any(|plan| self.is_plan(plan)) {
@@ -182,7 +178,7 @@ impl Task {
         None
     }
 
-    fn domain(&self) -> String {
+    pub(crate) fn domain(&self) -> String {
         let mut text =
             String::from("(define (domain d) (:predicates (r) (s)) (:functions (a) (b) (total-cost))\n");
         for (action, number) in self.actions.iter().zip(0..) {
@@ -212,7 +208,7 @@ impl Task {
         text + ")"
     }
 
-    fn problem(&self) -> String {
+    pub(crate) fn problem(&self) -> String {
         let facts =
             ["(r)", "(s)"].iter().zip(self.init.facts).filter(|(_, holds)| *holds).map(|(fact, _)| *fact);
         let values = ["a", "b"].iter().zip(self.init.values);
@@ -226,10 +222,10 @@ impl Task {
     }
 }
 
-struct Generator(Random);
+pub(crate) struct Generator(pub(crate) Random);
 
 impl Generator {
-    fn below(&mut self, limit: u64) -> usize {
+    pub(crate) fn below(&mut self, limit: u64) -> usize {
         self.0.below(limit).unsigned_abs() as usize
     }
 
@@ -267,7 +263,7 @@ impl Generator {
         changes.into_iter().map(|change| Effect { condition: guard(self, &change), change }).collect()
     }
 
-    fn task(&mut self) -> Task {
+    pub(crate) fn task(&mut self) -> Task {
         let actions = (0..3).map(|_| {
             let is_durative = self.below(4) == 0;
             let start = if is_durative { self.effects() } else { Vec::new() };
@@ -278,56 +274,4 @@ impl Generator {
         let facts = [(); 2].map(|()| self.below(2) == 0);
         Task { actions, init: State { facts, values }, goal: self.formula(2) }
     }
-}
-
-fn solve(domain: &str, problem: &str) -> Option<Solution> {
-    let (domain, problem, _) = read(&Source::new("domain", domain), &Source::new("problem", problem))
-        .unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
-    tally::solve(&domain, &problem, "in `when` with a value")
-}
-
-#[test]
-fn plans_are_those_of_values_that_may_be_undefined() {
-    let mut tally = Tally::new();
-    for seed in tally.seeds() {
-        let task = Generator(Random(seed)).task();
-        let (domain, problem) = (task.domain(), task.problem());
-        let Some(solution) = solve(&domain, &problem) else { continue };
-        let about = || format!("seed {seed}\n{domain}\n{problem}\n{solution:?}");
-        tally.count(&solution);
-        let shortest = task.shortest();
-        let Some(plan) = &solution.plan else {
-            assert!(shortest.is_none(), "{}", about());
-            continue;
-        };
-        let step = |step: &metaplan_encodings::Step| step.action[1..].parse().expect("a number");
-        let steps: Vec<usize> = plan.steps.iter().map(step).collect();
-        assert!(task.is_plan(&steps), "{}", about());
-        if solution.status == Status::Optimal {
-            assert!(shortest.is_none_or(|shortest| steps.len() <= shortest), "{}", about());
-        }
-    }
-    tally.check(10);
-}
-
-#[test]
-fn the_validator_executes_with_values_that_may_be_undefined() {
-    let mut valid = 0;
-    for seed in 0..3_000 {
-        let mut generator = Generator(Random(1_000_000 + seed));
-        let task = generator.task();
-        let plan: Vec<usize> = (0..generator.below(5)).map(|_| generator.below(3)).collect();
-        let (domain_text, problem_text) = (task.domain(), task.problem());
-        let (domain, problem, _) = read(
-            &Source::new("domain", domain_text.as_str()),
-            &Source::new("problem", problem_text.as_str()),
-        )
-        .expect("it is read");
-        let text: String = plan.iter().map(|action| format!("(a{action})\n")).collect::<Vec<_>>().concat();
-        let parsed = PlanText::parse(&Source::new("plan", text.as_str())).expect("it is a plan");
-        let verdict = validate(&domain, &problem, &parsed, &Options::default());
-        assert_eq!(verdict.valid, task.is_plan(&plan), "{domain_text}\n{problem_text}\n{text}\n{verdict:?}");
-        valid += u32::from(verdict.valid);
-    }
-    assert!(valid > 100, "{valid} valid plans");
 }

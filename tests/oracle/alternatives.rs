@@ -1,0 +1,201 @@
+//! All cheapest plans: what is said of them is true of every sequence of actions up to a length that is a cheapest plan without idle
+//! actions.
+//!
+//! An action is idle if nothing depends on what it does: it changes no fact that the goal or an applicable action that is not idle reads.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+
+use encodings::{Config, Engine, Limits, Status, Thresholds};
+use fastrand::Rng;
+use metaplan::mission::Planning as _;
+
+use crate::judge::{read, setting};
+
+const FACTS: usize = 5;
+/// Plans up to this length are looked at.
+const LENGTH: usize = 5;
+
+/// Facts, a bit each.
+type State = u32;
+
+/// Facts that have to hold and those that must not, or are added and deleted.
+type Literals = (State, State);
+
+#[derive(Debug)]
+struct Action {
+    condition: Literals,
+    effect: Literals,
+    cost: u32,
+}
+
+impl Action {
+    fn is_applicable(&self, state: State) -> bool {
+        holds(self.condition, state)
+    }
+
+    fn apply(&self, state: State) -> State {
+        state & !self.effect.1 | self.effect.0
+    }
+}
+
+#[derive(Debug)]
+struct Task {
+    actions: Vec<Action>,
+    initial: State,
+    goal: Literals,
+}
+
+fn holds((positive, negative): Literals, state: State) -> bool {
+    state & positive == positive && state & negative == 0
+}
+
+fn literals(rng: &mut Rng, count: usize, negative_in: u32) -> Literals {
+    let mut own = (0, 0);
+    for _ in 0..count {
+        let fact = 1 << rng.usize(0..FACTS);
+        if (own.0 | own.1) & fact == 0 {
+            *(if rng.u32(0..negative_in) == 0 { &mut own.1 } else { &mut own.0 }) |= fact;
+        }
+    }
+    own
+}
+
+fn text(literals: Literals) -> String {
+    (0..FACTS).fold(String::new(), |mut text, fact| {
+        if literals.0 >> fact & 1 == 1 {
+            let _ = write!(text, " (p{fact})");
+        }
+        if literals.1 >> fact & 1 == 1 {
+            let _ = write!(text, " (not (p{fact}))");
+        }
+        text
+    })
+}
+
+impl Task {
+    fn new(seed: u64) -> Self {
+        let mut rng = Rng::with_seed(seed);
+        let rng = &mut rng;
+        let actions = (0..rng.usize(3..7)).map(|_| {
+            let count = rng.usize(0..3);
+            let condition = literals(rng, count, 3);
+            let count = rng.usize(1..3);
+            Action { condition, effect: literals(rng, count, 3), cost: rng.u32(0..3) }
+        });
+        Self {
+            actions: actions.collect(),
+            initial: rng.u32(0..1 << FACTS) & rng.u32(0..1 << FACTS),
+            goal: literals(rng, 2, 4),
+        }
+    }
+
+    fn files(&self) -> (String, String) {
+        let mut domain = "(define (domain d) (:predicates".to_owned();
+        for fact in 0..FACTS {
+            let _ = write!(domain, " (p{fact})");
+        }
+        domain += ") (:functions (total-cost))";
+        for (number, Action { condition, effect, cost }) in self.actions.iter().enumerate() {
+            let (condition, effect) = (text(*condition), text(*effect));
+            let _ = write!(
+                domain,
+                "\n(:action a{number} :parameters () :precondition (and{condition})
+                   :effect (and{effect} (increase (total-cost) {cost})))"
+            );
+        }
+        let (init, goal) = (text((self.initial, 0)), text(self.goal));
+        let problem = format!(
+            "(define (problem p) (:domain d) (:init{init} (= (total-cost) 0)) (:goal (and{goal}))
+               (:metric minimize (total-cost)))"
+        );
+        (domain + ")", problem)
+    }
+
+    /// Numbers of the actions that are not idle.
+    fn active(&self) -> BTreeSet<usize> {
+        let (mut states, mut open) = (BTreeSet::from([self.initial]), vec![self.initial]);
+        while let Some(state) = open.pop() {
+            let applicable = self.actions.iter().filter(|action| action.is_applicable(state));
+            open.extend(applicable.map(|action| action.apply(state)).filter(|next| states.insert(*next)));
+        }
+        let (mut active, mut read) = (BTreeSet::new(), self.goal.0 | self.goal.1);
+        loop {
+            let before = active.len();
+            for (number, action) in self.actions.iter().enumerate() {
+                let changes = |state: &State| {
+                    action.is_applicable(*state) && (*state ^ action.apply(*state)) & read != 0
+                };
+                if states.iter().any(changes) && active.insert(number) {
+                    read |= action.condition.0 | action.condition.1;
+                }
+            }
+            if active.len() == before {
+                return active;
+            }
+        }
+    }
+
+    /// All plans of so many of some actions at most that cost `cost`.
+    fn plans(&self, actions: &BTreeSet<usize>, cost: u32) -> Vec<Vec<usize>> {
+        let (mut plans, mut open) = (Vec::new(), vec![(self.initial, 0, Vec::new())]);
+        while let Some((state, paid, steps)) = open.pop() {
+            if holds(self.goal, state) && paid == cost {
+                plans.push(steps.clone());
+            }
+            if steps.len() == LENGTH {
+                continue;
+            }
+            for number in actions {
+                let action = &self.actions[*number];
+                if action.is_applicable(state) && paid + action.cost <= cost {
+                    open.push((action.apply(state), paid + action.cost, [&steps[..], &[*number]].concat()));
+                }
+            }
+        }
+        plans
+    }
+}
+
+/// Checks what is said of all cheapest plans of a task; whether they are all known.
+fn check(seed: u64) -> Option<bool> {
+    let task = Task::new(seed);
+    let (domain, problem) = task.files();
+    let about = || format!("seed {seed}\n{domain}\n{problem}");
+    let (mission, filled) = read(&domain, &problem).unwrap_or_else(|messages| panic!("{messages:#?}"));
+    let limits = Limits::none();
+    let limits = if seed % 2 == 0 { limits.with_thresholds(Thresholds::NONE) } else { limits };
+    let ground = mission.ground(&filled, &[], &limits).expect("a ground task");
+    let config = Config::default().with_limits(limits);
+    let config = if seed % 3 == 0 { config.with_engine(Engine::Sat) } else { config };
+    let solution = encodings::optimize(&ground, &config, &mut |_| {});
+    if solution.status != Status::Optimal {
+        return None;
+    }
+    let numbers = |plan: &encodings::Plan| -> Vec<usize> {
+        plan.steps.iter().map(|step| step.action[1..].parse().expect("a number")).collect()
+    };
+    let found = encodings::alternatives(&ground, &solution, 30, &config)?;
+    let plan = solution.plan.as_ref().expect("an optimal plan");
+    let (first, cost) = (numbers(plan), plan.cost.to_string().parse().expect("a small number"));
+    let known: BTreeSet<Vec<usize>> = found.plans.iter().map(numbers).chain([first.clone()]).collect();
+    let all = task.plans(&task.active(), cost);
+    for other in &all {
+        assert!(!found.complete || known.contains(other), "{other:?} is not in {known:?}\n{}", about());
+        for (step, forced) in found.forced.iter().flatten().enumerate() {
+            assert!(
+                !forced.action || other.get(step) == first.get(step),
+                "step {step} of {other:?}\n{}",
+                about()
+            );
+        }
+    }
+    Some(found.complete)
+}
+
+#[test]
+fn what_is_said_of_all_cheapest_plans_is_true_up_to_idle_actions() {
+    let (from, tasks) = (setting("ORACLE_FROM", 0), setting("ORACLE_TASKS", 500));
+    let complete = (from..from + tasks).filter(|seed| check(*seed) == Some(true)).count();
+    assert!(complete as u64 * 5 > tasks, "all cheapest plans of {complete} tasks are known");
+}

@@ -1,0 +1,17 @@
+//! Functions with objects as values.
+
+#[path = "../../../encodings/tests/object_fluents/generate.rs"]
+mod generate;
+#[path = "../../../encodings/tests/object_fluents/model.rs"]
+#[allow(dead_code, reason = "the planner's own tests ask more of it")]
+mod model;
+
+use super::{Known, Sample, of_texts, whole};
+use crate::random::Random;
+use generate::Generator;
+
+pub fn sample(seed: u64) -> Sample {
+    let task = Generator(Random(seed)).task();
+    let known = Known::Some(task.best().map(|cost| whole(cost.into())));
+    of_texts(&task.domain(), &task.problem(), false, known)
+}

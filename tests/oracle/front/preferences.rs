@@ -1,0 +1,17 @@
+//! Preferences and constraints of PDDL 3 in sequential plans.
+
+#[path = "../../../encodings/tests/preferences/generate.rs"]
+mod generate;
+#[path = "../../../encodings/tests/preferences/model.rs"]
+#[allow(dead_code, reason = "the planner's own tests ask more of it")]
+mod model;
+
+use super::{Known, Sample, of_texts, whole};
+use crate::random::Random;
+use generate::Generator;
+
+pub fn sample(seed: u64) -> Sample {
+    let task = Generator(Random(seed)).task();
+    let known = Known::Some(task.best().map(whole));
+    of_texts(&task.domain(), &task.problem(), task.maximize, known)
+}

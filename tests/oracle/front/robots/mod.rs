@@ -1,0 +1,292 @@
+//! Robots: missions with a knowledge base, in explicit form, in native form with contexts, and with bindings and name maps.
+//!
+//! A robot moves over a map with a battery. Moving needs one or two functions; designs differ in slowness, energy and safety, need
+//! components and visibility, and changing one may cost something. The oracle is Dijkstra's algorithm over place, battery and designs at
+//! work, by what the documentation says of plain domains and bindings.
+
+mod files;
+
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
+use std::path::Path;
+
+use fastrand::Rng;
+use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
+use metaplan::mission::{Bindings, Mission, Names};
+use ontology::ReadOptions;
+use pddl::Source;
+use rules::Limits as StepLimits;
+
+use super::{Known, Sample, whole};
+use crate::judge::Mode;
+
+/// Full charge of the battery, and the price of charging.
+const FULL: i64 = 12;
+const CHARGING: i64 = 5;
+const PLACES: usize = 4;
+
+/// The form that a mission is written in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// Designs are parameters of actions.
+    Explicit,
+    /// The domain does not mention designs.
+    Native,
+    /// Explicit, with other names for everything.
+    Renamed,
+    /// Native, with other names for functions and actions.
+    NativeBound,
+}
+
+impl Form {
+    fn is_native(self) -> bool {
+        matches!(self, Self::Native | Self::NativeBound)
+    }
+
+    fn is_bound(self) -> bool {
+        matches!(self, Self::Renamed | Self::NativeBound)
+    }
+}
+
+#[derive(Debug, Clone)]
+struct Design {
+    function: usize,
+    slowness: i64,
+    energy: i64,
+    safety: Option<i64>,
+    change: i64,
+    /// The component that it needs.
+    component: Option<usize>,
+    /// The least visibility that it needs.
+    visibility: Option<i64>,
+}
+
+/// What the knowledge base says.
+#[derive(Debug)]
+pub struct Robot {
+    form: Form,
+    functions: usize,
+    designs: Vec<Design>,
+    /// Least safety where the way is narrow.
+    safety: i64,
+    /// Greatest energy of each design at a quiet place.
+    quiet: Option<i64>,
+    /// Greatest slowness of each design anywhere.
+    quick: Option<i64>,
+    /// Whether changing designs costs something.
+    reconfiguration: bool,
+    /// Whether moving takes time, which is what is paid.
+    is_timed: bool,
+    knowledge: Knowledge,
+}
+
+/// The situation in which a mission begins.
+#[derive(Debug)]
+struct Situation {
+    /// By place: kind and length of the ways to other places.
+    ways: BTreeMap<(usize, usize), (bool, i64)>,
+    quiet: BTreeSet<usize>,
+    charger: usize,
+    battery: i64,
+    failed: BTreeSet<usize>,
+    visibility: i64,
+}
+
+impl Robot {
+    pub fn new(seed: u64, form: Form, directory: &Path) -> Self {
+        let mut rng = Rng::with_seed(seed);
+        let functions = rng.usize(1..3);
+        let mut designs = Vec::new();
+        for function in 0..functions {
+            for number in 0..rng.usize(2..5) {
+                let is_first = number == 0;
+                designs.push(Design {
+                    function,
+                    slowness: rng.i64(1..5),
+                    energy: rng.i64(1..5),
+                    safety: (function == 0 && (is_first || rng.u32(0..5) > 0)).then(|| rng.i64(0..5)),
+                    change: rng.i64(0..4),
+                    component: (!is_first && rng.u32(0..3) == 0).then(|| rng.usize(0..2)),
+                    visibility: (rng.u32(0..4) == 0).then(|| rng.i64(1..4)),
+                });
+            }
+        }
+        let (safety, reconfiguration, is_timed) = (rng.i64(1..4), rng.bool(), rng.bool());
+        let (quiet, quick) = (rng.bool().then(|| rng.i64(1..4)), rng.bool().then(|| rng.i64(3..5)));
+        let text = Self::document(form, functions, &designs, [Some(safety), quiet, quick]);
+        let file = directory.join("kb.ttl");
+        std::fs::write(&file, text).expect("a file");
+        let sources = Sources {
+            documents: vec![file],
+            rules: vec![COADAPTATION.to_owned()],
+            options: ReadOptions::default(),
+            limits: StepLimits::default(),
+        };
+        let knowledge = Knowledge::read(&sources).expect("a knowledge base");
+        Self { form, functions, designs, safety, quiet, quick, reconfiguration, is_timed, knowledge }
+    }
+
+    /// A mission of the robot in a random situation.
+    pub fn sample(&self, seed: u64) -> Sample {
+        let mut rng = Rng::with_seed(seed ^ 0x0b07);
+        let situation = Situation::new(&mut rng);
+        let (domain, problem) = self.files(&situation);
+        let mut mission = Mission::new(
+            "robot",
+            Some(Ok(self.knowledge.clone())),
+            self.bindings(),
+            Ok(Source::new("domain.pddl", self.renamed(&domain))),
+            Ok(Source::new("problem.pddl", self.renamed(&problem))),
+        )
+        .unwrap_or_else(|messages| panic!("{messages:#?}\n{domain}\n{problem}"));
+        for component in &situation.failed {
+            mission.fail(&format!("c{component}")).expect("a component");
+        }
+        mission.set("visibility", &situation.visibility.to_string()).expect("an attribute");
+        if self.form.is_bound() {
+            mission.set("charge_level", &situation.battery.to_string()).expect("an attribute");
+        }
+        Sample {
+            mission,
+            mode: Mode::Sequential,
+            maximize: false,
+            known: Known::All(self.best(&situation).map(whole)),
+        }
+    }
+
+    fn bindings(&self) -> Bindings {
+        let bound: &[(&str, &str)] = match self.form {
+            Form::Explicit => &[],
+            Form::Native if self.reconfiguration => &[("reconfigured", "reconfigured:change")],
+            Form::Native => &[],
+            Form::Renamed => &[
+                ("means", "class:FunctionDesign"),
+                ("role", "class:Function"),
+                ("good_for", "solves"),
+                ("usable", "available"),
+                ("slow", "estimation:slowness"),
+                ("hunger", "estimation:energy"),
+                ("charge_left", "measured:charge_level"),
+            ],
+            Form::NativeBound if self.reconfiguration => &[
+                ("go", "action:a_move"),
+                ("slow", "chosen:slowness"),
+                ("hunger", "chosen:energy"),
+                ("charge_left", "measured:charge_level"),
+                ("reconfigured", "reconfigured:change"),
+            ],
+            Form::NativeBound => &[
+                ("go", "action:a_move"),
+                ("slow", "chosen:slowness"),
+                ("hunger", "chosen:energy"),
+                ("charge_left", "measured:charge_level"),
+            ],
+        };
+        let own = |(name, query): &(&str, &str)| ((*name).to_owned(), (*query).to_owned());
+        let bindings = Bindings::with(&bound.iter().map(own).collect()).expect("bindings");
+        if self.form != Form::Renamed {
+            return bindings;
+        }
+        let mut names = Names::default();
+        names.add("k*", "*", None);
+        names.add("kd0", "prime", None);
+        bindings.naming(names)
+    }
+
+    /// Combinations of designs, one for each function, with which the robot can go from a place over a kind of way.
+    fn configurations(&self, situation: &Situation, from: usize, is_narrow: bool) -> Vec<Vec<usize>> {
+        let suits = |design: &Design| {
+            let works = design.component.is_none_or(|component| !situation.failed.contains(&component));
+            let sees = design.visibility.is_none_or(|least| situation.visibility >= least);
+            // The other function has no designs of which safety is estimated.
+            let is_safe = !is_narrow
+                || design.function != 0
+                || design.safety.is_some_and(|safety| safety >= self.safety);
+            let is_silent =
+                self.quiet.is_none_or(|most| !situation.quiet.contains(&from) || design.energy <= most);
+            let is_quick = self.quick.is_none_or(|most| design.slowness <= most);
+            works && sees && is_safe && is_silent && is_quick
+        };
+        let mut all = vec![Vec::new()];
+        for function in 0..self.functions {
+            let own = self.designs.iter().enumerate();
+            let own: Vec<usize> = own
+                .filter(|(_, design)| design.function == function && suits(design))
+                .map(|(at, _)| at)
+                .collect();
+            all = all
+                .iter()
+                .flat_map(|begin| own.iter().map(move |at| [&begin[..], &[*at]].concat()))
+                .collect();
+        }
+        all
+    }
+
+    /// The least cost of a plan.
+    fn best(&self, situation: &Situation) -> Option<i64> {
+        /// Place, battery, and the design at work by function.
+        type Place = (usize, i64, Vec<Option<usize>>);
+        let start: Place = (0, situation.battery, vec![None; self.functions]);
+        let mut open = BinaryHeap::from([Reverse((0, start))]);
+        let mut closed = BTreeSet::new();
+        while let Some(Reverse((cost, state))) = open.pop() {
+            let (place, battery, at_work) = &state;
+            if *place == PLACES - 1 {
+                return Some(cost);
+            }
+            if !closed.insert(state.clone()) {
+                continue;
+            }
+            if *place == situation.charger {
+                open.push(Reverse((cost + CHARGING, (*place, FULL, at_work.clone()))));
+            }
+            for ((from, to), (is_narrow, length)) in &situation.ways {
+                if from != place {
+                    continue;
+                }
+                for configuration in self.configurations(situation, *from, *is_narrow) {
+                    let sum = |value: &dyn Fn(&Design) -> i64| -> i64 {
+                        configuration.iter().map(|design| value(&self.designs[*design])).sum()
+                    };
+                    let left = battery - length * sum(&|design| design.energy);
+                    if left < 0 {
+                        continue;
+                    }
+                    let mut price = length + length * sum(&|design| design.slowness);
+                    let mut next = at_work.clone();
+                    if self.reconfiguration {
+                        for (now, design) in next.iter_mut().zip(&configuration) {
+                            if now.is_some_and(|now| now != *design) {
+                                price += self.designs[*design].change;
+                            }
+                            *now = Some(*design);
+                        }
+                    }
+                    open.push(Reverse((cost + price, (*to, left, next))));
+                }
+            }
+        }
+        None
+    }
+}
+
+impl Situation {
+    fn new(rng: &mut Rng) -> Self {
+        let mut ways = BTreeMap::new();
+        for a in 0..PLACES {
+            for b in 0..PLACES {
+                if a != b && rng.bool() {
+                    ways.insert((a, b), (rng.u32(0..3) == 0, rng.i64(1..4)));
+                }
+            }
+        }
+        Self {
+            ways,
+            quiet: (0..PLACES).filter(|_| rng.u32(0..4) == 0).collect(),
+            charger: rng.usize(0..PLACES),
+            battery: rng.i64(4..=FULL),
+            failed: (0..2).filter(|_| rng.u32(0..3) == 0).collect(),
+            visibility: rng.i64(0..5),
+        }
+    }
+}
