@@ -12,6 +12,11 @@ use metaplan_pddl::ast::{Domain, Problem};
 use metaplan_pddl::validate::{Interrupted, Options, PlanText, validate, validate_within};
 use metaplan_pddl::{Source, read, render};
 
+/// Some texts, one after the other.
+fn concat(texts: impl Iterator<Item = String>) -> String {
+    texts.fold(String::new(), |all, text| all + &text)
+}
+
 const OBJECTS: usize = 3;
 /// The variables; an inner quantifier may hide one of an outer quantifier or of the head.
 const VARIABLES: [&str; 3] = ["?a", "?b", "?c"];
@@ -115,15 +120,18 @@ impl Condition {
         let quantified = |word: &str, variables: &[usize], part: &Self| {
             let names: Vec<&str> = variables.iter().map(|own| VARIABLES[*own]).collect();
             let mut inner = *scope;
-            variables.iter().for_each(|own| inner[*own] = Some(0));
+            for variable in variables {
+                inner[*variable] = Some(0);
+            }
             format!("({word} ({}) {})", names.join(" "), part.text(last, &inner))
         };
         match self {
             Self::Edge(from, to) => edge(*from, *to),
             Self::NotEdge(from, to) => format!("(not {})", edge(*from, *to)),
-            Self::Derived(predicate, terms) => derived(*predicate, terms),
             Self::NotDerived(predicate, terms) if last => format!("(not {})", derived(*predicate, terms)),
-            Self::NotDerived(predicate, terms) => derived(*predicate, terms),
+            Self::Derived(predicate, terms) | Self::NotDerived(predicate, terms) => {
+                derived(*predicate, terms)
+            }
             Self::NotNot(part) => format!("(not (not {}))", text(part)),
             Self::Equal(left, right) => {
                 format!("(= {} {})", term_text(*left, scope), term_text(*right, scope))
@@ -209,7 +217,7 @@ proptest! {
             let _ = write!(domain, "(:derived ({name} {}) {text})", names.join(" "));
         }
         domain.push(')');
-        let init: String = edges.iter().map(|(from, to)| format!("(edge o{from} o{to})")).collect();
+        let init = concat(edges.iter().map(|(from, to)| format!("(edge o{from} o{to})")));
         let facts = fixpoint(&edges, &axioms);
         for (predicate, (name, _)) in DERIVED.iter().enumerate() {
             for scope in each(&head(predicate), &[None; 3]) {
@@ -234,8 +242,8 @@ fn chain(length: usize, axiom: &str) -> (Domain, Problem) {
         "(define (domain d) (:predicates (next ?x ?y) (end ?x) (on) (p ?x)) (:derived (p ?x) {axiom})
            (:action switch :parameters () :precondition () :effect (on)))"
     );
-    let objects: String = (0..=length).map(|number| format!(" o{number}")).collect();
-    let next: String = (0..length).map(|number| format!("(next o{number} o{})", number + 1)).collect();
+    let objects = concat((0..=length).map(|number| format!(" o{number}")));
+    let next = concat((0..length).map(|number| format!("(next o{number} o{})", number + 1)));
     let problem = format!(
         "(define (problem p) (:domain d) (:objects{objects}) (:init (end o{length}) {next}) (:goal (p o0)))"
     );
@@ -284,7 +292,7 @@ fn a_validation_ends_when_it_is_told_to() {
 #[test]
 fn quantifiers_may_bind_many_variables() {
     let check = |count: usize, objects: &str, condition: &dyn Fn(&str) -> String| {
-        let names: String = (0..count).map(|number| format!(" ?v{number}")).collect();
+        let names = concat((0..count).map(|number| format!(" ?v{number}")));
         let domain = format!(
             "(define (domain d) (:requirements :typing) (:types one) (:predicates (on) (p ?x)) (:action switch :parameters () :precondition {} :effect (on)))",
             condition(&names)
@@ -299,7 +307,7 @@ fn quantifiers_may_bind_many_variables() {
     check(2_000, "a", &|names| format!("(exists ({names} - one) (not (on)))"));
     check(2_000, "a", &|names| format!("(forall ({names} - one) (not (on)))"));
     check(300, "a b", &|names| {
-        let parts: String = names.split_whitespace().map(|name| format!("(p {name})")).collect();
+        let parts = concat(names.split_whitespace().map(|name| format!("(p {name})")));
         format!("(exists ({names} - one) (and {parts}))")
     });
     check(2_000, "a b", &|names| format!("(exists ({names} - one) (not (on)))"));

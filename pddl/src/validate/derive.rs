@@ -6,171 +6,17 @@
 //!
 //! \[1\] F. Bancilhon, R. Ramakrishnan: An amateur's introduction to recursive query processing strategies, SIGMOD 1986.
 
-use std::cell::RefCell;
 use std::collections::hash_map::Entry;
 
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
 
-use crate::ast::{Atom, Condition, Derived, Domain, Expression, Name, TypedName};
-use crate::strata::Strata;
+use crate::ast::Derived;
 
+use super::axioms::{Axiom, Occurrence, Stratum};
 use super::effects::Ground;
 use super::evaluate::{Bindings, Evaluator};
+use super::trace::Trace;
 use super::world::{Arguments, State, Symbol, World};
-
-/// The axioms of predicates that may depend on each other.
-#[derive(Debug, Default)]
-pub(super) struct Stratum<'p> {
-    /// The predicates.
-    own: FxHashSet<&'p Name>,
-    axioms: Vec<Axiom<'p>>,
-    /// By predicate of the stratum: where the axioms mention it.
-    occurrences: FxHashMap<&'p Name, Vec<Occurrence<'p>>>,
-}
-
-/// An axiom.
-#[derive(Debug)]
-struct Axiom<'p> {
-    derived: &'p Derived,
-    /// Those parts of its condition, by address, that mention a predicate of the stratum where new facts cannot be joined.
-    opaque: FxHashSet<*const Condition>,
-}
-
-/// An atom in the condition of an axiom, below conjunctions, disjunctions and existential quantifiers only.
-#[derive(Debug)]
-struct Occurrence<'p> {
-    /// The position of the axiom.
-    axiom: usize,
-    atom: &'p Atom,
-    /// The variables of the quantifiers around the atom, outermost first.
-    variables: Vec<&'p [TypedName]>,
-    /// The conjunctions around the atom, with the position of the conjunct that contains the atom.
-    conjunctions: Vec<(&'p [Condition], usize)>,
-}
-
-/// The strata of a domain, lowest first. Axioms through their own negation have no strata; the checker
-/// refuses them, and here they all come into one.
-#[expect(clippy::arithmetic_side_effects, reason = "levels are at most the number of predicates")]
-pub(super) fn strata(domain: &Domain) -> Vec<Stratum<'_>> {
-    let levels = Strata::of(domain).ok();
-    let mut strata: Vec<Stratum<'_>> = Vec::new();
-    for derived in &domain.derived {
-        let name = &derived.head.identifier.name;
-        let level = levels.as_ref().and_then(|levels| levels.level(name)).unwrap_or(0);
-        if strata.len() <= level {
-            strata.resize_with(level + 1, Stratum::default);
-        }
-        strata[level].own.insert(name);
-        strata[level].axioms.push(Axiom { derived, opaque: FxHashSet::default() });
-    }
-    for stratum in &mut strata {
-        let Stratum { own, axioms, occurrences } = stratum;
-        for (axiom, Axiom { derived, opaque }) in axioms.iter_mut().enumerate() {
-            let derived = *derived;
-            let mut walk = Walk {
-                axiom,
-                derived,
-                own: &*own,
-                variables: Vec::new(),
-                conjunctions: Vec::new(),
-                occurrences: &mut *occurrences,
-                opaque,
-            };
-            walk.visit(&derived.condition);
-        }
-    }
-    strata
-}
-
-/// All predicates and functions in the conditions of axioms.
-pub(super) fn read_by_axioms(domain: &Domain) -> FxHashSet<&Name> {
-    let mut names = FxHashSet::default();
-    for axiom in &domain.derived {
-        names_in(&axiom.condition, &mut |name| {
-            names.insert(name);
-        });
-    }
-    names
-}
-
-/// A walk through the condition of an axiom.
-struct Walk<'w, 'p> {
-    axiom: usize,
-    derived: &'p Derived,
-    own: &'w FxHashSet<&'p Name>,
-    variables: Vec<&'p [TypedName]>,
-    conjunctions: Vec<(&'p [Condition], usize)>,
-    occurrences: &'w mut FxHashMap<&'p Name, Vec<Occurrence<'p>>>,
-    opaque: &'w mut FxHashSet<*const Condition>,
-}
-
-impl<'p> Walk<'_, 'p> {
-    /// Notes the occurrences of predicates of the stratum. Returns `true` if there is one with which new facts cannot be joined.
-    fn visit(&mut self, condition: &'p Condition) -> bool {
-        let mut is_opaque = false;
-        match condition {
-            Condition::And(parts) => {
-                for (position, part) in parts.iter().enumerate() {
-                    self.conjunctions.push((parts, position));
-                    is_opaque |= self.visit(part);
-                    self.conjunctions.pop();
-                }
-            }
-            Condition::Or(parts) => parts.iter().for_each(|part| is_opaque |= self.visit(part)),
-            Condition::Exists(variables, body) if !self.hides(variables) => {
-                self.variables.push(variables);
-                is_opaque = self.visit(body);
-                self.variables.pop();
-            }
-            Condition::Atom(atom) if self.own.contains(&atom.predicate.name) => {
-                let occurrence = Occurrence {
-                    axiom: self.axiom,
-                    atom,
-                    variables: self.variables.clone(),
-                    conjunctions: self.conjunctions.clone(),
-                };
-                self.occurrences.entry(&atom.predicate.name).or_default().push(occurrence);
-            }
-            other => names_in(other, &mut |name| is_opaque |= self.own.contains(name)),
-        }
-        if is_opaque {
-            self.opaque.insert(std::ptr::from_ref(condition));
-        }
-        is_opaque
-    }
-
-    /// Returns `true` if one of some variables has the name of a variable around them.
-    fn hides(&self, variables: &[TypedName]) -> bool {
-        let around = self.variables.iter().copied().chain([&self.derived.head.parameters[..]]).flatten();
-        let around: FxHashSet<&Name> = around.map(|entry| &entry.identifier.name).collect();
-        variables.iter().any(|entry| around.contains(&entry.identifier.name))
-    }
-}
-
-/// Facts of a stratum that were missing in an evaluation. If none of them is derived, the result stays as it is.
-#[derive(Debug)]
-pub(super) struct Trace<'e, 'p> {
-    own: &'e FxHashSet<&'p Name>,
-    facts: RefCell<Vec<Ground>>,
-    /// Predicates all of whose facts were read.
-    predicates: RefCell<Vec<Symbol>>,
-}
-
-impl Trace<'_, '_> {
-    /// Notes a fact that does not hold.
-    pub(super) fn missed(&self, name: &Name, fact: Ground) {
-        if self.own.contains(name) {
-            self.facts.borrow_mut().push(fact);
-        }
-    }
-
-    /// Notes that all facts of a predicate are read.
-    pub(super) fn read(&self, name: &Name, predicate: Symbol) {
-        if self.own.contains(name) && !self.predicates.borrow().contains(&predicate) {
-            self.predicates.borrow_mut().push(predicate);
-        }
-    }
-}
 
 /// Replaces the derived facts of `state` by those that follow from its other facts. An axiom whose
 /// condition is undefined for some objects says nothing about them.
@@ -294,8 +140,7 @@ impl<'p> Closure<'_, 'p> {
         *evaluations = evaluations.saturating_add(1);
         let (axiom, arguments, evaluations) = (*axiom, arguments.clone(), *evaluations);
         let derived = self.stratum.axioms[axiom].derived;
-        let (facts, predicates) = (RefCell::default(), RefCell::default());
-        let trace = Trace { own: &self.stratum.own, facts, predicates };
+        let trace = Trace::new(&self.stratum.own);
         let evaluator = Evaluator { trace: Some(&trace), ..Evaluator::new(self.world, self.state) };
         let mut bindings = Bindings::default();
         bindings.declare(&derived.head.parameters);
@@ -306,10 +151,11 @@ impl<'p> Closure<'_, 'p> {
             self.insert(axiom, arguments);
             return;
         }
-        for fact in trace.facts.into_inner() {
+        let (facts, predicates) = trace.into_parts();
+        for fact in facts {
             self.waiting.facts.entry(fact).or_default().push((number, evaluations));
         }
-        for predicate in trace.predicates.into_inner() {
+        for predicate in predicates {
             self.waiting.predicates.entry(predicate).or_default().push((number, evaluations));
         }
     }
@@ -320,41 +166,5 @@ impl<'p> Closure<'_, 'p> {
         if self.state.derived.entry(predicate).or_default().insert(arguments.clone()) {
             self.agenda.push((predicate, arguments));
         }
-    }
-}
-
-/// Calls `found` with each predicate and each function of a condition.
-fn names_in<'p>(condition: &'p Condition, found: &mut dyn FnMut(&'p Name)) {
-    match condition {
-        Condition::And(parts) | Condition::Or(parts) => {
-            for part in parts {
-                names_in(part, found);
-            }
-        }
-        Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
-            names_in(inner, found);
-        }
-        Condition::Imply(premise, conclusion) => {
-            names_in(premise, found);
-            names_in(conclusion, found);
-        }
-        Condition::Atom(atom) => found(&atom.predicate.name),
-        Condition::Equal(..) => {}
-        Condition::Compare(_, left, right, _) => {
-            functions_in(left, found);
-            functions_in(right, found);
-        }
-    }
-}
-
-fn functions_in<'p>(expression: &'p Expression, found: &mut dyn FnMut(&'p Name)) {
-    match expression {
-        Expression::Fluent(atom) => found(&atom.predicate.name),
-        Expression::Operation(_, operands, _) => {
-            for operand in operands {
-                functions_in(operand, found);
-            }
-        }
-        Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => {}
     }
 }

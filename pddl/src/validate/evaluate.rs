@@ -11,7 +11,7 @@ use crate::ast::{
     Arithmetic, Atom, Comparison, Condition, Expression, Name, Term, TypeExpression, TypedName,
 };
 
-use super::derive::Trace;
+use super::trace::Trace;
 use super::world::{Arguments, State, Symbol, World};
 
 /// Why a condition or an expression has no value.
@@ -226,6 +226,48 @@ impl<'e, 'p> Evaluator<'e, 'p> {
         let arguments = self.arguments(atom, bindings).unwrap_or_default();
         let undefined = || Undefined::Function(self.world.show(symbol, &arguments));
         self.state.values.get(&(symbol, arguments.clone())).cloned().ok_or_else(undefined)
+    }
+}
+
+impl<'p> World<'p> {
+    /// Calls `visit` with each way to give objects to some variables, until it returns `false`. Returns `true` if it never did.
+    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
+    pub(super) fn each(
+        &self,
+        variables: &'p [TypedName],
+        bindings: &mut Bindings<'p>,
+        visit: &mut dyn FnMut(&mut Bindings<'p>) -> bool,
+    ) -> bool {
+        if variables.iter().any(|entry| self.objects_of(&entry.r#type).next().is_none()) {
+            return true;
+        }
+        let first = bindings.0.len();
+        bindings.declare(variables);
+        // Objects that a variable has not had yet, for the variables that have one.
+        let mut rest = Vec::with_capacity(variables.len());
+        let is_complete = loop {
+            for entry in &variables[rest.len()..] {
+                let mut objects = self.objects_of(&entry.r#type);
+                bindings.0[first + rest.len()].object = objects.next();
+                rest.push(objects);
+            }
+            if self.budget.is_spent() || !visit(bindings) {
+                break false;
+            }
+            let next = loop {
+                let Some(objects) = rest.last_mut() else { break None };
+                match objects.next() {
+                    Some(object) => break Some(object),
+                    None => rest.pop(),
+                };
+            };
+            if next.is_none() {
+                break true;
+            }
+            bindings.0[first + rest.len() - 1].object = next;
+        };
+        bindings.0.truncate(first);
+        is_complete
     }
 }
 

@@ -7,7 +7,9 @@
 #![doc = include_str!("definition.md")]
 
 mod advance;
+mod axioms;
 mod budget;
+mod changeable;
 mod concurrent;
 mod course;
 mod derive;
@@ -25,6 +27,7 @@ mod sequential;
 mod solve;
 mod step;
 mod targets;
+mod trace;
 mod trajectory;
 mod verdict;
 mod world;

@@ -11,10 +11,9 @@ use crate::ast::{
 use crate::number::dense;
 use crate::types::TypeHierarchy;
 
+use super::axioms::{Stratum, read_by_axioms, strata};
 use super::budget::Budget;
-use super::derive::{Stratum, read_by_axioms, strata};
-use super::evaluate::Bindings;
-use super::targets::changeable_predicates;
+use super::changeable::changeable_predicates;
 
 /// The function that counts the violations of a preference.
 const IS_VIOLATED: &str = "is-violated";
@@ -225,46 +224,6 @@ impl<'p> World<'p> {
     pub(super) fn only_object(&self, wanted: &TypeExpression) -> Option<Symbol> {
         let mut objects = self.objects_of(wanted);
         objects.next().filter(|_| objects.next().is_none())
-    }
-
-    /// Calls `visit` with each way to give objects to some variables, until it returns `false`. Returns `true` if it never did.
-    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
-    pub(super) fn each(
-        &self,
-        variables: &'p [TypedName],
-        bindings: &mut Bindings<'p>,
-        visit: &mut dyn FnMut(&mut Bindings<'p>) -> bool,
-    ) -> bool {
-        if variables.iter().any(|entry| self.objects_of(&entry.r#type).next().is_none()) {
-            return true;
-        }
-        let first = bindings.0.len();
-        bindings.declare(variables);
-        // Objects that a variable has not had yet, for the variables that have one.
-        let mut rest = Vec::with_capacity(variables.len());
-        let is_complete = loop {
-            for entry in &variables[rest.len()..] {
-                let mut objects = self.objects_of(&entry.r#type);
-                bindings.0[first + rest.len()].object = objects.next();
-                rest.push(objects);
-            }
-            if self.budget.is_spent() || !visit(bindings) {
-                break false;
-            }
-            let next = loop {
-                let Some(objects) = rest.last_mut() else { break None };
-                match objects.next() {
-                    Some(object) => break Some(object),
-                    None => rest.pop(),
-                };
-            };
-            if next.is_none() {
-                break true;
-            }
-            bindings.0[first + rest.len() - 1].object = next;
-        };
-        bindings.0.truncate(first);
-        is_complete
     }
 
     /// A fact or a function with its arguments as written.

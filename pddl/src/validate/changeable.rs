@@ -1,0 +1,55 @@
+//! The functions and the predicates that a plan can change.
+
+use rustc_hash::FxHashSet;
+
+use crate::ast::{Action, ActionBody, Domain, Effect, InitialElement, Name, Problem};
+
+/// The functions that some action can change.
+pub(super) fn changeable_functions(domain: &Domain) -> FxHashSet<&Name> {
+    let mut functions = FxHashSet::default();
+    for action in &domain.actions {
+        action_effects(action, &mut |effect| {
+            if let Effect::Assign(_, target, ..) = effect {
+                functions.insert(&target.predicate.name);
+            }
+        });
+    }
+    functions
+}
+
+/// The predicates whose facts actions, timed initial literals or axioms can change.
+pub(super) fn changeable_predicates<'p>(domain: &'p Domain, problem: &'p Problem) -> FxHashSet<&'p Name> {
+    let mut predicates: FxHashSet<&Name> = FxHashSet::default();
+    predicates.extend(domain.derived.iter().map(|axiom| &axiom.head.identifier.name));
+    predicates.extend(problem.init.iter().filter_map(|element| match element {
+        InitialElement::Timed(_, atom, ..) => Some(&atom.predicate.name),
+        _ => None,
+    }));
+    let mut note = |effect: &'p Effect| {
+        if let Effect::Add(atom) | Effect::Delete(atom) = effect {
+            predicates.insert(&atom.predicate.name);
+        }
+    };
+    domain.actions.iter().for_each(|action| action_effects(action, &mut note));
+    predicates
+}
+
+/// Calls `found` with each effect of an action that is not made of others.
+fn action_effects<'p>(action: &'p Action, found: &mut dyn FnMut(&'p Effect)) {
+    match &action.body {
+        ActionBody::Instantaneous { effect, .. } => simple_effects(effect, found),
+        ActionBody::Durative { effects, .. } => {
+            for (_, effect) in effects {
+                simple_effects(effect, found);
+            }
+        }
+    }
+}
+
+fn simple_effects<'p>(effect: &'p Effect, found: &mut dyn FnMut(&'p Effect)) {
+    match effect {
+        Effect::And(parts) => parts.iter().for_each(|part| simple_effects(part, found)),
+        Effect::ForAll(_, body) | Effect::When(_, body) => simple_effects(body, found),
+        Effect::Assign(..) | Effect::Add(_) | Effect::Delete(_) => found(effect),
+    }
+}
