@@ -1,7 +1,11 @@
 //! `metaplan verify` and `metaplan-verify` side by side. All tests of certificates run both, see [`verify_in`].
 
-use crate::certificate::certificate;
-use crate::common::{root, verify_in};
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use crate::certificate::{certificate, change};
+use crate::common::{metaplan, root, verify_in};
 
 /// What is not a certificate at all, what cannot be written, and what takes too long.
 #[test]
@@ -23,4 +27,52 @@ fn both_programs_refuse_alike() {
         let outcome = verify_in(&root(), arguments);
         assert_eq!(outcome.status, status, "{arguments:?}: {outcome:#?}");
     }
+}
+
+/// Without its knowledge files, which anyone can take out of the manifest, a certificate is about its PDDL files only, and the verdict
+/// says so. With a mission it is about that, and otherwise refused.
+#[test]
+fn the_verdict_names_what_was_checked() {
+    use sha2::{Digest as _, Sha256};
+    let directory = tempfile::tempdir().expect("a directory");
+    let target = certificate(directory.path(), &["plan", "missions/ugv.toml"]);
+    let verdict = |arguments: &[&str]| {
+        let outcome = verify_in(&root(), &[&[target.as_str()], arguments].concat());
+        outcome.stdout.lines().last().unwrap_or_default().to_owned()
+    };
+    let optimal = "verified: the plan is optimal, metric 408, for";
+    let whole = format!("{optimal} these PDDL files and their knowledge base; not checked: mission");
+    assert_eq!(verdict(&[]), whole);
+    // The digest is what `sha256sum` prints of what it prints of the files.
+    let lines = ["domain.pddl", "problem.pddl", "knowledge.nt", "origin.json"].map(|name| {
+        let text = std::fs::read(Path::new(&target).join(name)).expect("a file");
+        format!("{:x}  {name}\n", Sha256::digest(text))
+    });
+    let digest = format!("{:x}", Sha256::digest(lines.concat()));
+    let answer = verify_in(&root(), &[&target, "--format", "json"]).json();
+    assert_eq!(answer["subject"]["digest"], digest.as_str());
+    let of_mission = metaplan(&["verify", &target, "--mission", "missions/ugv.toml"]);
+    let last = of_mission.stdout.lines().last().unwrap_or_default();
+    assert_eq!(last, format!("{optimal} the mission `ugv` with digest {}", &digest[..12]));
+    let manifest = Path::new(&target).join("manifest.json");
+    let mut listed: Value =
+        serde_json::from_str(&std::fs::read_to_string(&manifest).expect("a manifest")).expect("JSON");
+    let files = listed["files"].as_array_mut().expect("files");
+    files.retain(|file| {
+        !["knowledge.nt", "origin.json", "derivations.json"]
+            .contains(&file["name"].as_str().unwrap_or_default())
+    });
+    std::fs::write(&manifest, listed.to_string()).expect("a manifest");
+    change(&target, "problem.pddl", &|text| text.replace("(define (problem ", "(define (problem another-"));
+    assert_eq!(
+        verdict(&[]),
+        format!("{optimal} these PDDL files only; not checked: knowledge base, mission")
+    );
+    let answer = verify_in(&root(), &[&target, "--format", "json"]).json();
+    assert_eq!(answer["subject"]["not_checked"], json!(["knowledge", "mission"]));
+    let of_mission = metaplan(&["verify", &target, "--mission", "missions/ugv.toml"]);
+    assert!(
+        of_mission.stdout.ends_with("NOT verified: the plan is optimal, metric 408\n"),
+        "{of_mission:#?}"
+    );
 }

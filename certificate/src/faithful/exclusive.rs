@@ -14,7 +14,6 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::faithful::case::Case;
 use crate::faithful::formula::Structure;
-use crate::faithful::invariant::Invariant;
 use crate::faithful::key::Key;
 use crate::faithful::world::World;
 
@@ -35,7 +34,12 @@ pub(super) fn holds_initially(world: &World<'_>, group: &Group) -> bool {
 }
 
 /// Returns `true` if at most one atom of a group holds after a case, given that this is so before.
-pub(super) fn keeps(structure: &Structure, invariant: &Invariant, case: &Case, group: &Group) -> bool {
+pub(super) fn keeps(
+    structure: &Structure,
+    may_hold: &dyn Fn(&Key) -> bool,
+    case: &Case,
+    group: &Group,
+) -> bool {
     let effects: Vec<_> = case.effects.iter().filter(|(_, key, _)| group.contains(key)).collect();
     let mut open = vec![case.known.clone()];
     for _ in 0..SPLIT_LIMIT {
@@ -54,9 +58,8 @@ pub(super) fn keeps(structure: &Structure, invariant: &Invariant, case: &Case, g
             last.or_else(|| case.truths.get(key).copied())
         };
         let (added, others): (Vec<&Key>, Vec<&Key>) = group.iter().partition(|key| after(key) == Some(true));
-        let may_remain = |key: &Key| {
-            after(key).is_none() && invariant.may_hold(key) && known.atom(structure, key) != Some(false)
-        };
+        let may_remain =
+            |key: &Key| after(key).is_none() && may_hold(key) && known.atom(structure, key) != Some(false);
         if added.len() > 1 || added.len() == 1 && others.into_iter().any(may_remain) {
             return false;
         }
@@ -75,8 +78,8 @@ pub(super) struct Move {
 }
 
 impl Move {
-    pub(super) fn new(structure: &Structure, case: &Case) -> Self {
-        let adds: BTreeSet<Key> = Invariant::added(structure, case).cloned().collect();
+    /// The effect of a case that may add these atoms.
+    pub(super) fn new(structure: &Structure, case: &Case, adds: BTreeSet<Key>) -> Self {
         let at_end = case
             .effects
             .iter()
@@ -115,7 +118,7 @@ impl Move {
 #[expect(clippy::arithmetic_side_effects, reason = "no more than the limit")]
 pub(super) fn search(
     world: &World<'_>,
-    invariant: &Invariant,
+    may_hold: &dyn Fn(&Key) -> bool,
     variables: impl Iterator<Item = Group>,
     moves: &[Move],
     stop: &dyn Fn() -> bool,
@@ -126,7 +129,6 @@ pub(super) fn search(
             adding.entry(key).or_default().push(own);
         }
     }
-    let may_hold = |key: &Key| invariant.may_hold(key);
     let mut found: Vec<Group> = Vec::new();
     let mut checks = 0;
     'variables: for variable in variables {
@@ -145,7 +147,7 @@ pub(super) fn search(
             let mut concerned = group.iter().filter_map(|key| adding.get(key)).flatten();
             let broken = concerned.find_map(|own| {
                 checks += 1;
-                own.keeps(&group, &may_hold).err()
+                own.keeps(&group, may_hold).err()
             });
             if checks > SEARCH_LIMIT {
                 return found;

@@ -223,7 +223,7 @@ impl Invariant {
             return Err(Difference::Witness { what: world.show(key) });
         }
         let mut groups = exclusive::concerned(case, &self.exclusive);
-        match groups.find(|group| !exclusive::keeps(structure, self, case, group)) {
+        match groups.find(|group| !exclusive::keeps(structure, &|key| self.may_hold(key), case, group)) {
             Some(group) => {
                 let words: Vec<String> = group.iter().map(|key| world.show(key)).collect();
                 Err(Difference::Exclusive { atoms: words.join(" or ") })

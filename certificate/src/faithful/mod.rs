@@ -231,19 +231,19 @@ impl<'f> Files<'f> {
         let mut moves = Vec::new();
         self.each_move(invariant, axioms, &mut |own| moves.push(own))?;
         let broken = broken.into_iter().map(|variable| variables[variable as usize].clone());
-        Ok(exclusive::search(&self.world, invariant, broken, &moves, self.stop))
+        Ok(exclusive::search(&self.world, &may_hold, broken, &moves, self.stop))
     }
 
     /// Visits what each case of each instance does.
     fn each_move(&self, invariant: &Invariant, axioms: &Axioms, visit: &mut dyn FnMut(Move)) -> Result<()> {
         let structure = &self.names.structure;
         let waits = action::waits(&self.world.timeline, structure)?;
-        for case in &waits {
-            visit(Move::new(structure, case));
-        }
+        let effect =
+            |case: &Case| Move::new(structure, case, Invariant::added(structure, case).cloned().collect());
+        waits.iter().map(effect).for_each(&mut *visit);
         for instance in &self.instances {
             let cases = self.cases(instance, invariant, axioms)?;
-            cases.iter().map(|case| Move::new(structure, case)).filter(Move::adds_any).for_each(&mut *visit);
+            cases.iter().map(effect).filter(Move::adds_any).for_each(&mut *visit);
         }
         Ok(())
     }

@@ -5,13 +5,16 @@
 mod mutate;
 
 use std::path::Path;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use metaplan_verify::Verifier;
 use mutate::{Draw, Files, certificates, mutate, write};
 
 /// The stack of a thread of tests, without optimisation; the program has four times as much.
 const STACK: usize = 2 << 20;
+
+/// Upper limit on the time for one certificate, on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(20);
 
 fn originals() -> Vec<Files> {
     let all = certificates(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/certificates"));
@@ -42,8 +45,10 @@ fn withstand(seeds: std::ops::Range<u64>) -> usize {
         for seed in seeds.clone() {
             let mut draw = Draw::Random(seed * 4 + certificate as u64);
             let changed = mutate(files, &mut draw);
+            let started = Instant::now();
             let outcome = verified(&changed);
             assert!(outcome.is_some(), "certificate {certificate}, seed {seed}: a panic");
+            assert!(started.elapsed() < PATIENCE, "certificate {certificate}, seed {seed}: it takes long");
             accepted += usize::from(outcome == Some(true));
         }
     }
