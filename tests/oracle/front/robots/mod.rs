@@ -156,9 +156,8 @@ impl Robot {
 
     fn bindings(&self) -> Bindings {
         let bound: &[(&str, &str)] = match self.form {
-            Form::Explicit => &[],
             Form::Native if self.reconfiguration => &[("reconfigured", "reconfigured:change")],
-            Form::Native => &[],
+            Form::Explicit | Form::Native => &[],
             Form::Renamed => &[
                 ("means", "class:FunctionDesign"),
                 ("role", "class:Function"),
