@@ -43,6 +43,8 @@ pub struct Sample {
 pub enum Known {
     /// All plans.
     All(Option<BigRational>),
+    /// All plans of at most this value, where less is better.
+    UpTo(i64, Option<BigRational>),
     /// Some plans.
     Some(Option<BigRational>),
 }
@@ -137,7 +139,7 @@ fn refuted(one: &Answer, other: &Answer, maximize: bool) -> Option<&'static str>
 
 /// A sentence about a claim that brute force refutes.
 fn disproved(answer: &Answer, known: &Known, maximize: bool) -> Option<&'static str> {
-    let (Known::All(best) | Known::Some(best)) = known;
+    let (Known::All(best) | Known::UpTo(_, best) | Known::Some(best)) = known;
     let is_better = |one: &BigRational, other: &BigRational| compare(maximize, one, other).is_lt();
     if let Some(best) = best {
         if answer.status == Status::Unsolvable {
@@ -153,6 +155,11 @@ fn disproved(answer: &Answer, known: &Known, maximize: bool) -> Option<&'static 
     }
     match (known, &answer.cost) {
         (Known::All(None), Some(_)) => Some("a plan where there is none"),
+        (Known::UpTo(limit, best), Some(cost))
+            if *cost <= whole(*limit) && best.as_ref().is_none_or(|best| cost < best) =>
+        {
+            Some("a plan that is better than all plans")
+        }
         (Known::All(Some(best)), Some(cost)) if is_better(cost, best) => {
             Some("a plan that is better than all plans")
         }
@@ -227,7 +234,9 @@ fn check(sample: &Sample, about: &str, seed: u64, tally: &mut Tally) {
         (true, _) => "decided: no plan",
         (false, _) => "not decided",
     });
-    if let (Known::All(best) | Known::Some(best), Status::Optimal) = (known, one.status) {
+    if let (Known::All(best) | Known::UpTo(_, best) | Known::Some(best), Status::Optimal) =
+        (known, one.status)
+    {
         let is_same = best.as_ref() == one.cost.as_ref();
         tally.count(if is_same { "brute force: as good" } else { "brute force: worse, or nothing" });
     }
@@ -265,7 +274,7 @@ fn derived(seed: u64) -> Option<Sample> {
 
 fn undefined(seed: u64) -> Sample {
     let task = partial::Generator(Random(seed)).task();
-    let known = Known::Some(task.shortest().map(|steps| whole(steps as i64)));
+    let known = Known::UpTo(partial::DEPTH as i64, task.shortest().map(|steps| whole(steps as i64)));
     of_texts(&task.domain(), &task.problem(), false, known)
 }
 

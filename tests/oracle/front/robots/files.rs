@@ -17,10 +17,10 @@ impl Robot {
             @prefix t: <http://metacontrol.org/tomasys#> .\n\
             <urn:m> a owl:Ontology ; owl:imports <http://metacontrol.org/tomasys> .\n"
             .to_owned();
-        for attribute in ["slowness", "energy", "safety", "change", "visibility", "charge_level"] {
+        for attribute in ["slowness", "energy", "safety", "change", "visibility", "watt_hours"] {
             let _ = writeln!(text, ":{attribute} a t:QualityAttributeType .");
         }
-        for (observed, value) in [("visibility", 3), ("charge_level", FULL)] {
+        for (observed, value) in [("visibility", 3), ("watt_hours", FULL)] {
             let _ = writeln!(
                 text,
                 ":obs_{observed} a t:QAvalue ; t:isQAtype :{observed} ; t:isMeasured true ; t:hasValue {value}.0 ."
