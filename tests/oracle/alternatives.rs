@@ -164,10 +164,10 @@ fn check(seed: u64) -> Option<bool> {
     let about = || format!("seed {seed}\n{domain}\n{problem}");
     let (mission, filled) = read(&domain, &problem).unwrap_or_else(|messages| panic!("{messages:#?}"));
     let limits = Limits::none();
-    let limits = if seed % 2 == 0 { limits.with_thresholds(Thresholds::NONE) } else { limits };
+    let limits = if seed.is_multiple_of(2) { limits.with_thresholds(Thresholds::NONE) } else { limits };
     let ground = mission.ground(&filled, &[], &limits).expect("a ground task");
     let config = Config::default().with_limits(limits);
-    let config = if seed % 3 == 0 { config.with_engine(Engine::Sat) } else { config };
+    let config = if seed.is_multiple_of(3) { config.with_engine(Engine::Sat) } else { config };
     let solution = encodings::optimize(&ground, &config, &mut |_| {});
     if solution.status != Status::Optimal {
         return None;

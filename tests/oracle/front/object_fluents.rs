@@ -12,6 +12,6 @@ use generate::Generator;
 
 pub fn sample(seed: u64) -> Sample {
     let task = Generator(Random(seed)).task();
-    let known = Known::Some(task.best().map(|cost| whole(cost.into())));
+    let known = Known::UpTo(model::REACH.into(), task.best().map(|cost| whole(cost.into())));
     of_texts(&task.domain(), &task.problem(), false, known)
 }

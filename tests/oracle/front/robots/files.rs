@@ -17,10 +17,10 @@ impl Robot {
             @prefix t: <http://metacontrol.org/tomasys#> .\n\
             <urn:m> a owl:Ontology ; owl:imports <http://metacontrol.org/tomasys> .\n"
             .to_owned();
-        for attribute in ["slowness", "energy", "safety", "change", "visibility", "charge_level"] {
+        for attribute in ["slowness", "energy", "safety", "change", "visibility", "watt_hours"] {
             let _ = writeln!(text, ":{attribute} a t:QualityAttributeType .");
         }
-        for (observed, value) in [("visibility", 3), ("charge_level", FULL)] {
+        for (observed, value) in [("visibility", 3), ("watt_hours", FULL)] {
             let _ = writeln!(
                 text,
                 ":obs_{observed} a t:QAvalue ; t:isQAtype :{observed} ; t:isMeasured true ; t:hasValue {value}.0 ."
@@ -124,9 +124,11 @@ impl Robot {
         let each = |text: &dyn Fn(usize) -> String| -> String {
             (0..if native { 0 } else { self.functions }).map(|f| text(f) + " ").collect()
         };
-        let sum = |attribute: &str| match native {
-            true => format!("({attribute})"),
-            false => format!("(+ 0 {})", each(&|f| format!("({attribute} ?d{f})"))),
+        let sum = |attribute: &str| {
+            if native {
+                return format!("({attribute})");
+            }
+            format!("(+ 0 {})", each(&|f| format!("({attribute} ?d{f})")))
         };
         let (slowness, energy) = (sum("slowness"), sum("energy"));
         let bounds = |name: &str| {
@@ -142,9 +144,10 @@ impl Robot {
             }
             text
         };
-        let works = |at: &str| match self.reconfiguration && !native {
-            true => each(&|f| format!("{at}(at_work ?d{f} f{f}){}", if at.is_empty() { "" } else { ")" })),
-            false => String::new(),
+        let works = |at: &str| {
+            let close = if at.is_empty() { "" } else { ")" };
+            let own = |f: usize| format!("{at}(at_work ?d{f} f{f}){close}");
+            if self.reconfiguration { each(&own) } else { String::new() }
         };
         let effect =
             if self.reconfiguration && native { "(increase (total-cost) (reconfigured))" } else { "" };

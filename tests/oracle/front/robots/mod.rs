@@ -144,7 +144,7 @@ impl Robot {
         }
         mission.set("visibility", &situation.visibility.to_string()).expect("an attribute");
         if self.form.is_bound() {
-            mission.set("charge_level", &situation.battery.to_string()).expect("an attribute");
+            mission.set("watt_hours", &situation.battery.to_string()).expect("an attribute");
         }
         Sample {
             mission,
@@ -156,9 +156,8 @@ impl Robot {
 
     fn bindings(&self) -> Bindings {
         let bound: &[(&str, &str)] = match self.form {
-            Form::Explicit => &[],
             Form::Native if self.reconfiguration => &[("reconfigured", "reconfigured:change")],
-            Form::Native => &[],
+            Form::Explicit | Form::Native => &[],
             Form::Renamed => &[
                 ("means", "class:FunctionDesign"),
                 ("role", "class:Function"),
@@ -166,20 +165,20 @@ impl Robot {
                 ("usable", "available"),
                 ("slow", "estimation:slowness"),
                 ("hunger", "estimation:energy"),
-                ("charge_left", "measured:charge_level"),
+                ("charge_left", "measured:watt_hours"),
             ],
             Form::NativeBound if self.reconfiguration => &[
                 ("go", "action:a_move"),
                 ("slow", "chosen:slowness"),
                 ("hunger", "chosen:energy"),
-                ("charge_left", "measured:charge_level"),
+                ("charge_left", "measured:watt_hours"),
                 ("reconfigured", "reconfigured:change"),
             ],
             Form::NativeBound => &[
                 ("go", "action:a_move"),
                 ("slow", "chosen:slowness"),
                 ("hunger", "chosen:energy"),
-                ("charge_left", "measured:charge_level"),
+                ("charge_left", "measured:watt_hours"),
             ],
         };
         let own = |(name, query): &(&str, &str)| ((*name).to_owned(), (*query).to_owned());
