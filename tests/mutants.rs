@@ -55,13 +55,16 @@ const LIBRARY: &str = "src/lib.rs";
 enum Tests {
     /// `tests/oracle`.
     Oracle,
+    /// `tests/planta`.
+    Planta,
     /// What stands beside the code of the planner, for what only larger tasks come to.
     Unit,
 }
 
 /// What is asked of each fault, in order: tests, and how many tasks they judge.
-const ORACLES: [(Tests, &str, u32); 9] = [
+const ORACLES: [(Tests, &str, u32); 10] = [
     (Tests::Oracle, "field::", 0),
+    (Tests::Planta, "random::", 0),
     (Tests::Oracle, "front::", 300),
     (Tests::Unit, "search::", 0),
     (Tests::Oracle, "numbers::special::hundreds_of_designs", 0),
@@ -163,10 +166,9 @@ fn mutated(mutants: &[Mutant]) -> PathBuf {
          let on = || std::env::var(\"{SWITCH}\").ok().and_then(|text| text.parse().ok()).unwrap_or(0); \
          *ON.get_or_init(on) == number }}"
     );
-    let crates: BTreeSet<&str> =
-        mutants.iter().filter_map(|own| own.file.split_once("/src/")).map(|(own, _)| own).collect();
+    let crates: BTreeSet<&str> = mutants.iter().filter_map(|own| own.file.split("src/").next()).collect();
     for own in crates {
-        let library = format!("{own}/{LIBRARY}");
+        let library = format!("{own}{LIBRARY}");
         *faulty.entry(home.join(&library)).or_insert_with(|| original(&library)) += &question;
     }
     for part in PARTS {
@@ -183,6 +185,7 @@ fn mutated(mutants: &[Mutant]) -> PathBuf {
 fn compiled(home: &Path, tests: Tests) -> PathBuf {
     let (target, name): (&[&str], _) = match tests {
         Tests::Oracle => (&["--test", "oracle"], "oracle"),
+        Tests::Planta => (&["--test", "planta"], "planta"),
         Tests::Unit => (&["--package", "metaplan-encodings", "--lib"], "metaplan_encodings"),
     };
     let output = Command::new(env!("CARGO"))
@@ -252,7 +255,7 @@ fn every_member_is_copied() {
 fn every_fault_is_noticed() {
     let mutants = mutants();
     let home = mutated(&mutants);
-    let programs = [Tests::Oracle, Tests::Unit].map(|tests| (tests, compiled(&home, tests)));
+    let programs = [Tests::Oracle, Tests::Planta, Tests::Unit].map(|tests| (tests, compiled(&home, tests)));
     for oracle in ORACLES {
         assert!(is_content(&programs, &home, 0, oracle), "{} fails without a fault", oracle.1);
     }

@@ -75,10 +75,11 @@ pub struct Contents<'c> {
 
 impl Contents<'_> {
     /// What the validator says that the plan costs; nothing if there is none.
-    fn metric(&self) -> Result<Option<BigRational>, String> {
+    fn metric(&self, limits: &Limits) -> Result<Option<BigRational>, String> {
         let Some(found) = &self.solution.plan else { return Ok(None) };
         let (domain, cost) = (self.mission.domain(), found.cost.to_string());
-        executed(domain, self.problem, self.task.is_timed(), self.plan, &cost).map(|(_, metric)| Some(metric))
+        executed(domain, self.problem, self.task.is_timed(), self.plan, &cost, &|| limits.reached())
+            .map(|(_, metric)| Some(metric))
     }
 }
 
@@ -125,7 +126,7 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
         Message::at("M109", &name, None, format!("the directory cannot be written: {}", error.kind()))
     };
     let whole = create_directory(directory).map_err(failed)?;
-    let metric = contents.metric().map_err(|reason| wrong(&reason))?;
+    let metric = contents.metric(limits).map_err(|reason| wrong(&reason))?;
     // What `verify` would refuse is not written.
     check(text(&files, TASK), text(&files, ARGUMENT), metric.as_ref()).map_err(|fault| wrong(&fault))?;
     let refutation =

@@ -117,7 +117,7 @@ fn conditions(directory: &Path, stop: &dyn Fn() -> bool) -> Result<String, Messa
             let (domain, problem) = read_pddl(text(DOMAIN), text(PROBLEM)).map_err(wrong)?;
             let (_, timed) =
                 same_task(&domain, &problem, (text(TASK), text(WITNESS)), stop).map_err(wrong)?;
-            Some(plan(&domain, &problem, timed, text(PLAN), metric).map_err(wrong)?.1)
+            Some(plan(&domain, &problem, timed, text(PLAN), metric, stop).map_err(wrong)?.1)
         }
     };
     verification_conditions(text(TASK), text(ARGUMENT), metric.as_ref())
@@ -152,7 +152,7 @@ fn parts(
     let metric = match claim {
         Claim::Unsolvable => None,
         Claim::Optimal { metric } => {
-            let checked = plan(&domain, &problem, timed, text(PLAN), metric);
+            let checked = plan(&domain, &problem, timed, text(PLAN), metric, stop);
             let (result, value) = match checked {
                 Ok((said, value)) => (Ok(said), Some(value)),
                 Err(reason) => (Err(reason), None),

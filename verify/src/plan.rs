@@ -3,22 +3,23 @@
 use num_rational::BigRational;
 use num_traits::Zero;
 use pddl::ast::{ActionBody, Comparison, Domain, InitialElement, Name, Problem};
-use pddl::validate::{Options, PlanText, validate};
+use pddl::validate::{Options, PlanText, validate_within};
 use pddl::{Source, to_decimal};
 
 use crate::manifest::PLAN;
 use crate::measure::measure;
 
-/// Has the validator execute the plan. The metric is what it says.
+/// Has the validator execute the plan, unless `stop` returns `true` before the end. The metric is what the validator says.
 ///
 /// # Errors
-/// The plan is none, cannot be executed, or has another metric than claimed.
+/// The plan is none, cannot be executed, or has another metric than claimed; or it was not executed to the end.
 pub fn plan(
     domain: &Domain,
     problem: &Problem,
     timed: bool,
     text: &str,
     claimed: &str,
+    stop: &dyn Fn() -> bool,
 ) -> Result<(String, BigRational), String> {
     let mut plan = PlanText::parse(&Source::new(PLAN, text))
         .map_err(|found| found.first().map_or_else(String::new, |diagnostic| diagnostic.message.clone()))?;
@@ -35,7 +36,8 @@ pub fn plan(
     }
     let tolerance = if is_timed { Options::default().tolerance } else { BigRational::zero() };
     let options = Options::default().with_tolerance(tolerance);
-    let verdict = validate(domain, problem, &plan, &options);
+    let verdict = validate_within(domain, problem, &plan, &options, stop)
+        .map_err(|_| "the validator was stopped before the end of the plan".to_owned())?;
     if let Some(violation) = verdict.violation {
         return Err(violation.message);
     }

@@ -9,8 +9,8 @@ use crate::memory;
 
 /// The process may take so much, in megabytes of 2^20 bytes.
 const MEMORY_LIMIT: u64 = 4096;
-/// So long after a limit has been reached the verification is given up from outside.
-const GRACE: Duration = Duration::from_secs(2);
+/// Time after a limit, besides a tenth of the time limit, until a verification that does not stop by itself is given up.
+const GRACE: Duration = Duration::from_millis(100);
 const LATE: &str = "it takes longer than `--time-limit` allows";
 const INTERVAL: Duration = Duration::from_millis(50);
 
@@ -37,7 +37,7 @@ impl Watch {
             while !own.reached() {
                 std::thread::sleep(INTERVAL);
             }
-            std::thread::sleep(GRACE);
+            std::thread::sleep(own.time / 10 + GRACE);
             if !own.answered.swap(true, Ordering::Relaxed) {
                 let reason = format!("{LATE}, or more than {MEMORY_LIMIT} MB");
                 let parts = vec![VerifiedPart { part: "limits", result: Err(reason) }];

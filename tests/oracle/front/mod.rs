@@ -79,8 +79,8 @@ const SITUATIONS: u64 = 15;
 
 /// The mission of the domain and the problem as `export --to pddl` writes them, and their texts.
 fn exported(mission: &Mission) -> (Mission, [String; 2]) {
-    let (domain, problem, _) = mission.merged().unwrap_or_else(|messages| panic!("{messages:#?}"));
-    let (domain, problem) = portable(&domain, &problem);
+    let (problem, _) = mission.filled().unwrap_or_else(|messages| panic!("{messages:#?}"));
+    let (domain, problem) = portable(mission.domain(), &problem);
     let texts = [print_domain(&domain), print_problem(&problem)];
     let source = |name: &str, text: &String| Ok(Source::new(name, text.clone()));
     let (domain, problem) = (source("domain.pddl", &texts[0]), source("problem.pddl", &texts[1]));
