@@ -14,8 +14,7 @@ fn read(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// A task with variables of one atom each, and operators with a name, arguments, a variable that must hold and one that comes to
-/// hold.
+/// A task with variables of one atom each. An operator has a name, arguments, at most one variable that it requires, and one that it sets.
 fn task(objects: &str, atoms: &[&str], operators: &[(&str, &str, Option<usize>, usize)]) -> String {
     let variables: Vec<String> = atoms.iter().map(|atom| format!(r#"["{atom}", "none of these"]"#)).collect();
     let values: Vec<&str> = atoms.iter().map(|_| "1").collect();
@@ -86,7 +85,7 @@ fn derived_atoms_in_a_long_row_are_replaced_by_their_rules() {
     assert!(matches!(found, Faithful::Yes { instances: 3, .. }), "{found:?}");
 }
 
-/// Where each atom adds a level to the condition, the levels are limited.
+/// The nesting of conditions is limited, also if each atom adds only one level.
 #[test]
 fn conditions_that_nest_too_deep_are_refused() {
     let length = 5_000;
@@ -192,7 +191,7 @@ fn step(from: u32, required: i32) -> String {
     )
 }
 
-/// With 7 in the battery nobody walks twice, whatever a step requires beyond its use. If it requires less, the battery may fall below 0.
+/// A charge of 7 does not suffice for two steps, whatever a step requires beyond its use. If it requires less, the charge may fall below 0.
 #[test]
 fn needs_rest_on_requirements_that_are_at_least_the_use() {
     for required in [4, 5, 100] {
@@ -241,7 +240,7 @@ fn a_group_shows_that_its_parts_are_exclusive() {
     let found = compared(&made.replace(group, ""));
     let Faithful::Undecided(cause @ Cause::Exclusion { .. }) = &found else { panic!("{found:?}") };
     assert!(cause.to_string().starts_with("cannot tell whether the ground task"), "{cause}");
-    // Groups that are not exclusive are refused, also beside one that is.
+    // Groups that are not exclusive are refused, also together with one that is.
     for wrong in [r#""(idle)","(done)""#, r#""(loading)","(done)""#] {
         let found = compared(
             &made.replace(group, &format!(r#","exclusive":[["(idle)","(loading)","(loaded)"],[{wrong}]]"#)),

@@ -6,6 +6,9 @@ use std::collections::BTreeSet;
 use crate::faithful::reader::Reader;
 use pddl::ast::{Atom, Condition, Name, Term, TypedName};
 
+/// A conjunct is looked at unless it has this many times as many rows as there are candidates already.
+const WORTHWHILE: usize = 16;
+
 impl Reader<'_> {
     /// The objects that the first of some variables can stand for in a condition on all of them; all of its type without one.
     pub(super) fn candidates(&self, bound: &[TypedName], within: Option<&Condition>) -> Vec<u32> {
@@ -17,13 +20,41 @@ impl Reader<'_> {
         }
     }
 
-    /// What a conjunct leaves for a variable; none if none of them restricts it. What `hidden` variables stand for is not known.
+    /// The objects that a variable can stand for where all of some conditions hold.
+    pub(super) fn candidates_where(&self, variable: &TypedName, conditions: &[&Condition]) -> Vec<u32> {
+        match self.restricted_by_all(&variable.identifier.name, conditions.iter().copied(), &[]) {
+            Some(some) => some.into_iter().filter(|own| self.world.is_of(*own, &variable.r#type)).collect(),
+            None => self.world.objects_of(&variable.r#type),
+        }
+    }
+
+    /// The candidates that a conjunction leaves for a variable, as [`Reader::restricted`].
+    fn restricted_by_all<'c>(
+        &self,
+        name: &Name,
+        parts: impl Iterator<Item = &'c Condition>,
+        hidden: &[&Name],
+    ) -> Option<BTreeSet<u32>> {
+        // Small parts first; large ones are not worth the time that it takes to go through them.
+        let mut parts: Vec<(usize, &Condition)> =
+            parts.map(|part| (self.size(name, part, hidden), part)).collect();
+        parts.sort_by_key(|(size, _)| *size);
+        let mut best: Option<BTreeSet<u32>> = None;
+        for (size, part) in parts {
+            if best.as_ref().is_some_and(|best| size / WORTHWHILE > best.len()) {
+                break;
+            }
+            let own = self.restricted(name, part, hidden);
+            best = best.into_iter().chain(own).min_by_key(BTreeSet::len);
+        }
+        best
+    }
+
+    /// The candidates that a condition leaves for a variable; none if it does not restrict the variable. The values of `hidden` variables
+    /// are not known.
     fn restricted(&self, name: &Name, condition: &Condition, hidden: &[&Name]) -> Option<BTreeSet<u32>> {
         match condition {
-            Condition::And(parts) => {
-                let parts = parts.iter().filter_map(|part| self.restricted(name, part, hidden));
-                parts.min_by_key(BTreeSet::len)
-            }
+            Condition::And(parts) => self.restricted_by_all(name, parts.iter(), hidden),
             Condition::Exists(bound, inner) => {
                 let own = bound.iter().map(|own| &own.identifier.name);
                 if own.clone().any(|own| own == name) {
@@ -46,6 +77,26 @@ impl Reader<'_> {
         }
     }
 
+    /// Upper bound on the rows that [`Reader::restricted`] looks at.
+    fn size(&self, name: &Name, condition: &Condition, hidden: &[&Name]) -> usize {
+        match condition {
+            Condition::Equal(..) => 1,
+            Condition::Atom(atom) if atom.arguments.iter().any(|term| is(term, name)) => {
+                let Ok(symbol) = self.world.symbol(&atom.predicate.name) else { return usize::MAX };
+                let known = |(place, term)| Some((place, self.known(term, hidden)?));
+                let given = atom.arguments.iter().enumerate().find_map(known);
+                if self.world.rules(symbol).is_some() {
+                    self.axioms.bound.count(symbol, given)
+                } else if self.world.changes(symbol) {
+                    self.invariant.count(symbol, given)
+                } else {
+                    self.world.count(symbol, given)
+                }
+            }
+            _ => usize::MAX,
+        }
+    }
+
     fn in_atom(&self, name: &Name, atom: &Atom, hidden: &[&Name]) -> Option<BTreeSet<u32>> {
         let place = atom.arguments.iter().position(|term| is(term, name))?;
         let symbol = self.world.symbol(&atom.predicate.name).ok()?;
@@ -65,7 +116,7 @@ impl Reader<'_> {
         }
         // What the start of the action adds, the witness of the state before need not have.
         let is_before = self.applied.truths.is_empty();
-        is_before.then(|| self.invariant.rows(symbol).filter_map(of).collect())
+        is_before.then(|| self.invariant.rows(symbol, given).filter_map(|key| of(&key.1)).collect())
     }
 
     fn known(&self, term: &Term, hidden: &[&Name]) -> Option<u32> {

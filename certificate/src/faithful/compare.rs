@@ -397,7 +397,7 @@ impl<'c> Comparison<'c> {
     }
 }
 
-/// How near an operator is that is refused for this reason.
+/// Rank of the reason for which an operator is refused: the greater, the more of the operator fits.
 fn rank(reason: &Obstacle) -> u8 {
     match reason {
         Obstacle::Differs(Difference::NoOperatorFor { .. }) => 0,

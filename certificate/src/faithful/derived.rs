@@ -3,6 +3,7 @@
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::faithful::axioms::Axioms;
+use crate::faithful::bound;
 use crate::faithful::formula::Formula;
 use crate::faithful::invariant::Invariant;
 use crate::faithful::key::Key;
@@ -11,20 +12,18 @@ use crate::faithful::verdict::Cause;
 use crate::faithful::world::World;
 use pddl::ast::{Condition, Expression};
 
-/// With more derived atoms, nothing is checked.
-const ATOM_LIMIT: usize = 50_000;
-
 /// What the witness says of derived atoms.
 pub(super) fn axioms(
     world: &World<'_>,
     invariant: &Invariant,
     linked: &FxHashSet<Key>,
+    stop: &dyn Fn() -> bool,
 ) -> Result<Axioms, Cause> {
     let mut axioms = Axioms { reads: reads(world)?, ..Axioms::default() };
     if axioms.reads.is_empty() {
         return Ok(axioms);
     }
-    bound(world, invariant, &mut axioms)?;
+    bound::add(world, invariant, &mut axioms, stop)?;
     let bodies = bodies(world, invariant, &axioms)?;
     // Each set is sound if the other one is, and each gets better with the other one.
     loop {
@@ -42,8 +41,8 @@ pub(super) fn axioms(
     Ok(axioms)
 }
 
-/// The derived atoms that depend on themselves, and those in between: the atoms that remain once those are taken away that depend
-/// on none that remains, or on which none depends.
+/// The derived atoms on cycles of dependencies, and those on paths between such cycles: what remains after repeated removal of atoms that depend on no
+/// remaining atom, or on which none depends.
 fn circular<'b>(axioms: &Axioms, bodies: &'b [(Key, Formula)]) -> FxHashSet<&'b Key> {
     let mut below: FxHashMap<&Key, FxHashSet<&Key>> = FxHashMap::default();
     for (key, body) in bodies.iter().filter(|(key, _)| axioms.known(key).is_none()) {
@@ -88,50 +87,6 @@ fn take_ends_away<'b>(
                 }
             }
         }
-    }
-}
-
-/// An upper bound of the derived atoms that may hold: the least fixpoint in which everything that is not a positive atom is possible.
-fn bound(world: &World<'_>, invariant: &Invariant, axioms: &mut Axioms) -> Result<(), Cause> {
-    let mut symbols: Vec<u32> = world.derived().map(|(symbol, _)| symbol).collect();
-    symbols.sort_unstable();
-    // The derived predicates that grew in the last round; in the first round every rule is evaluated.
-    let mut grown: Option<FxHashSet<u32>> = None;
-    loop {
-        let mut heads = Vec::new();
-        for symbol in &symbols {
-            for rule in world.rules(*symbol).unwrap_or_default() {
-                let mut read = FxHashSet::default();
-                in_condition(world, &rule.condition, &mut read)?;
-                if grown.as_ref().is_some_and(|grown| grown.is_disjoint(&read)) {
-                    continue;
-                }
-                let mut reader = Reader::new(world, invariant, axioms);
-                let names: Vec<_> = rule.head.parameters.iter().map(|own| &own.identifier.name).collect();
-                reader.each(&rule.head.parameters, Some(&rule.condition), &mut |own| {
-                    let objects = names.iter().map(|name| own.binding[name]).collect();
-                    let key = (*symbol, objects);
-                    if !own.axioms.bound.contains(&key) && own.is_possible(&rule.condition)? {
-                        heads.push(key);
-                    }
-                    Ok(true)
-                })?;
-            }
-        }
-        let mut more = FxHashSet::default();
-        for key in heads {
-            let symbol = key.0;
-            if axioms.bound.insert(key) {
-                more.insert(symbol);
-            }
-            if axioms.bound.len() > ATOM_LIMIT {
-                return Err(Cause::TooMany { what: "derived atoms".into(), limit: ATOM_LIMIT });
-            }
-        }
-        if more.is_empty() {
-            return Ok(());
-        }
-        grown = Some(more);
     }
 }
 

@@ -97,7 +97,7 @@ impl Move {
     /// Returns `Ok` if at most one atom of a group holds afterwards, given that this is so before.
     ///
     /// # Errors
-    /// The atoms each of which, as a member of the group, would show that; none of them if nothing does.
+    /// The atoms of which each would prove it if it were a member of the group; empty if there is no such atom.
     pub(super) fn keeps(&self, group: &Group, may_hold: &dyn Fn(&Key) -> bool) -> Result<(), Vec<Key>> {
         let mut added = self.adds.iter().filter(|key| group.contains(*key));
         let Some(key) = added.next() else { return Ok(()) };

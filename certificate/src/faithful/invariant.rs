@@ -11,7 +11,7 @@
 
 use num_rational::BigRational;
 use num_traits::{Signed, Zero};
-use rustc_hash::{FxHashMap, FxHashSet};
+use rustc_hash::FxHashMap;
 use serde::{Deserialize, Serialize};
 
 use crate::faithful::case::Case;
@@ -19,6 +19,7 @@ use crate::faithful::exclusive::{self, Group};
 use crate::faithful::formula::{Formula, Known, Structure};
 use crate::faithful::key::{CLOCK, Key};
 use crate::faithful::linear::{Interval, Linear};
+use crate::faithful::relation::Relation;
 use crate::faithful::verdict::{Cause, Difference};
 use crate::faithful::world::World;
 use crate::integer::MAX_DIGITS;
@@ -45,7 +46,7 @@ struct Written {
 
 #[derive(Debug, Clone, Default)]
 pub(super) struct Invariant {
-    atoms: FxHashSet<Key>,
+    atoms: Relation,
     /// Those of fluents that never change are points.
     numbers: FxHashMap<Key, Interval>,
     /// Of each at most one atom holds.
@@ -104,7 +105,7 @@ impl Invariant {
             witness.exclusive.push(group);
         }
         let first = Self::initial(world);
-        let missing = first.atoms.iter().find(|key| !witness.atoms.contains(*key));
+        let missing = first.atoms.atoms().find(|key| !witness.atoms.contains(*key));
         let outside = witness
             .numbers
             .iter()
@@ -119,7 +120,7 @@ impl Invariant {
     }
 
     pub(super) fn write(&self, world: &World<'_>) -> String {
-        let mut atoms: Vec<String> = self.atoms.iter().map(|key| world.show(key)).collect();
+        let mut atoms: Vec<String> = self.atoms.atoms().map(|key| world.show(key)).collect();
         atoms.sort_unstable();
         let end = |end: &Option<BigRational>| end.as_ref().map(ToString::to_string);
         let number = |(key, own): (&Key, &Interval)| (world.show(key), end(&own.low), end(&own.high));
@@ -139,9 +140,14 @@ impl Invariant {
         self.atoms.contains(key)
     }
 
-    /// The arguments of the atoms of a predicate that may hold.
-    pub(super) fn rows(&self, predicate: u32) -> impl Iterator<Item = &[u32]> {
-        self.atoms.iter().filter(move |key| key.0 == predicate).map(|key| &key.1[..])
+    /// The atoms of a predicate that may hold, or those with an object at a place.
+    pub(super) fn rows(&self, predicate: u32, place: Option<(usize, u32)>) -> impl Iterator<Item = &Key> {
+        self.atoms.rows(predicate, place)
+    }
+
+    /// The number of [`Invariant::rows`].
+    pub(super) fn count(&self, predicate: u32, place: Option<(usize, u32)>) -> usize {
+        self.atoms.count(predicate, place)
     }
 
     /// A fluent, or the only value that it can have.

@@ -21,6 +21,7 @@
 
 mod action;
 mod axioms;
+mod bound;
 mod candidates;
 mod case;
 mod compare;
@@ -185,7 +186,7 @@ impl<'f> Files<'f> {
         // An instance that always does the same need not be looked at again.
         let mut open: Vec<&Instance> = self.instances.iter().collect();
         for _ in 0..ROUND_LIMIT {
-            let axioms = derived::axioms(&self.world, &widening.invariant, &self.names.linked)?;
+            let axioms = derived::axioms(&self.world, &widening.invariant, &self.names.linked, self.stop)?;
             // What is known of derived atoms is about the invariant as it is now.
             let frozen = (self.world.derived().next().is_some()).then(|| widening.invariant.clone());
             let (mut news, mut next) = (false, Vec::new());
@@ -256,7 +257,7 @@ impl<'f> Files<'f> {
                 self.names.structure.groups.entry(key.clone()).or_default().push(number);
             }
         }
-        let axioms = derived::axioms(&self.world, &invariant, &self.names.linked)?;
+        let axioms = derived::axioms(&self.world, &invariant, &self.names.linked, self.stop)?;
         let task = Translation::new(&self.world, self.model, &self.names, &invariant, &axioms)?;
         let timed = self.world.problem.metric.is_none() && self.takes_time(&invariant, &axioms)?;
         let unit = self.unit(&invariant, &axioms)?;

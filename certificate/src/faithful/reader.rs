@@ -38,8 +38,7 @@ pub(super) struct Applied {
     pub(super) changes: BTreeMap<Key, Linear>,
 }
 
-/// The variables of a quantifier that have an object: for each the objects that are left, and that of an outer variable of
-/// the same name.
+/// The bound variables of a quantifier: for each its remaining candidates, and the object of an outer variable of the same name.
 type Levels = Vec<(std::vec::IntoIter<u32>, Option<u32>)>;
 
 pub(super) struct Reader<'r> {
@@ -65,7 +64,7 @@ pub(super) struct Reader<'r> {
 /// Derived atoms that are being replaced by their rules.
 #[derive(Default)]
 struct Unfolding {
-    /// Those whose rules are being read, outermost first.
+    /// Derived atoms whose rules are being read, outermost first.
     path: Vec<Key>,
     /// The nesting at which the first of them is read.
     base: usize,
@@ -132,7 +131,7 @@ impl<'r> Reader<'r> {
         }
     }
 
-    fn count(&mut self) -> Result<(), Cause> {
+    pub(super) fn count(&mut self) -> Result<(), Cause> {
         self.count_parts(1)
     }
 
@@ -222,7 +221,7 @@ impl<'r> Reader<'r> {
         }
     }
 
-    /// Gives the innermost variable that has another object that object; `false` if there is none.
+    /// Binds the innermost variable that has another candidate to it; returns `false` if no variable has one.
     #[expect(clippy::arithmetic_side_effects, reason = "an entry for each of the first variables")]
     fn next_binding(&mut self, bound: &'r [TypedName], open: &mut Levels) -> bool {
         while !open.is_empty() {
@@ -247,7 +246,7 @@ impl<'r> Reader<'r> {
         };
     }
 
-    fn equal(&self, left: &Term, right: &Term) -> Result<bool, Cause> {
+    pub(super) fn equal(&self, left: &Term, right: &Term) -> Result<bool, Cause> {
         Ok(self.world.object(left, &self.binding)? == self.world.object(right, &self.binding)?)
     }
 
@@ -283,56 +282,6 @@ impl<'r> Reader<'r> {
     pub(super) fn is_touched(&self, symbol: u32) -> bool {
         let touched = self.applied.truths.keys().chain(self.applied.changes.keys());
         self.axioms.depends(symbol, touched.map(|key| key.0))
-    }
-
-    /// Returns `false` if a condition holds in no state of the witness: negations, implications and comparisons that change are
-    /// taken to be possible.
-    pub(super) fn is_possible(&mut self, condition: &'r Condition) -> Result<bool, Cause> {
-        self.count()?;
-        match condition {
-            Condition::And(parts) => {
-                for part in parts {
-                    if !self.is_possible(part)? {
-                        return Ok(false);
-                    }
-                }
-                Ok(true)
-            }
-            Condition::Or(parts) => {
-                for part in parts {
-                    if self.is_possible(part)? {
-                        return Ok(true);
-                    }
-                }
-                Ok(false)
-            }
-            Condition::Exists(bound, inner) => {
-                let mut possible = false;
-                self.each(bound, Some(inner), &mut |own| {
-                    possible = own.is_possible(inner)?;
-                    Ok(!possible)
-                })?;
-                Ok(possible)
-            }
-            Condition::Atom(atom) => {
-                let key = self.world.key(atom, &self.binding)?;
-                Ok(if self.world.rules(key.0).is_some() {
-                    self.axioms.bound.contains(&key)
-                } else {
-                    !self::atom(self.world, self.invariant, key, true).is(false)
-                })
-            }
-            Condition::Equal(left, right, _) => self.equal(left, right),
-            Condition::Not(inner) => Ok(match &**inner {
-                Condition::Equal(left, right, _) => !self.equal(left, right)?,
-                Condition::Atom(atom) if !self.world.is_derived(atom) => {
-                    let key = self.world.key(atom, &self.binding)?;
-                    !self::atom(self.world, self.invariant, key, false).is(false)
-                }
-                _ => true,
-            }),
-            Condition::Imply(..) | Condition::ForAll(..) | Condition::Compare(..) => Ok(true),
-        }
     }
 
     /// The condition under which a derived atom holds.

@@ -35,6 +35,14 @@ impl Relation {
         self.atoms.len()
     }
 
+    /// The number of [`Relation::rows`].
+    pub(super) fn count(&self, predicate: u32, place: Option<(usize, u32)>) -> usize {
+        match place {
+            None => self.rows.get(&predicate).map_or(0, Vec::len),
+            Some((place, object)) => self.rows_with.get(&(predicate, place, object)).map_or(0, Vec::len),
+        }
+    }
+
     /// The atoms of a predicate, or those with an object at a place.
     pub(super) fn rows(&self, predicate: u32, place: Option<(usize, u32)>) -> impl Iterator<Item = &Key> {
         let rows = self.rows.get(&predicate).map_or(&[][..], Vec::as_slice);

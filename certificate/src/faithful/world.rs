@@ -269,6 +269,14 @@ impl<'w> World<'w> {
         all.filter(|object| self.is_of(*object, wanted)).collect()
     }
 
+    /// The number of [`World::rows`].
+    pub(super) fn count(&self, predicate: u32, place: Option<(usize, u32)>) -> usize {
+        match place {
+            None => self.rows.get(&predicate).map_or(0, Vec::len),
+            Some((place, object)) => self.rows_with.get(&(predicate, place, object)).map_or(0, Vec::len),
+        }
+    }
+
     /// The facts of a predicate, or those with an object at a place.
     pub(super) fn rows(&self, predicate: u32, place: Option<(usize, u32)>) -> Vec<&Vec<u32>> {
         let Some(rows) = self.rows.get(&predicate) else { return Vec::new() };

@@ -4,6 +4,14 @@ use std::fmt::Write as _;
 
 use super::{CHARGING, Design, FULL, Form, Robot, Situation};
 
+/// Actions that replace one design by another, in the explicit form.
+const CHANGES: &str = "(:derived (unset ?f - function) (not (exists (?d - functiondesign) (at_work ?d ?f))))
+   (:action set :parameters (?f - function ?d - functiondesign)
+      :precondition (and (unset ?f) (fd_solve_f ?d ?f) (fd_available ?d)) :effect (at_work ?d ?f))
+   (:action reconfigure :parameters (?f - function ?old ?new - functiondesign)
+      :precondition (and (at_work ?old ?f) (fd_solve_f ?new ?f) (fd_available ?new) (not (= ?old ?new)))
+      :effect (and (not (at_work ?old ?f)) (at_work ?new ?f) (increase (total-cost) (change ?new))))\n";
+
 impl Robot {
     /// The knowledge base as Turtle. With other names, individuals have `k` before the names of the problem.
     pub(super) fn document(
@@ -190,16 +198,7 @@ impl Robot {
                    :effect (and (assign (battery) {FULL}) (increase (total-cost) {CHARGING})))\n"
             )
         };
-        let change = if self.reconfiguration && !native {
-            "(:derived (unset ?f - function) (not (exists (?d - functiondesign) (at_work ?d ?f))))
-             (:action set :parameters (?f - function ?d - functiondesign)
-                :precondition (and (unset ?f) (fd_solve_f ?d ?f) (fd_available ?d)) :effect (at_work ?d ?f))
-             (:action reconfigure :parameters (?f - function ?old ?new - functiondesign)
-                :precondition (and (at_work ?old ?f) (fd_solve_f ?new ?f) (fd_available ?new) (not (= ?old ?new)))
-                :effect (and (not (at_work ?old ?f)) (at_work ?new ?f) (increase (total-cost) (change ?new))))\n"
-        } else {
-            ""
-        };
+        let change = if self.reconfiguration && !native { CHANGES } else { "" };
         let predicates = "(at ?p - place) (wide ?a ?b - place) (narrow ?a ?b - place) (quiet ?a - place) (charger ?p - place)";
         let domain = if native {
             let reconfigured = if self.reconfiguration { "(reconfigured)" } else { "" };
