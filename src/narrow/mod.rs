@@ -16,7 +16,7 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use ::mission::Mission;
-use pddl::ast::{Atom, Domain, InitialElement, Name, Problem, Term, TypeExpression};
+use pddl::ast::{Atom, Domain, InitialElement, Name, Problem, Span, Term, TypeExpression};
 use pddl::{Mentioned, TypeHierarchy};
 
 use clause::Fact;
@@ -77,7 +77,7 @@ fn narrow(domain: &Domain, problem: &Problem, known: &HashSet<Name>) -> (Domain,
     let conclusions = conclusions.into_iter().filter(|fact| !facts.contains(fact));
     problem.init.extend(conclusions.map(|(predicate, arguments)| {
         let arguments = arguments.into_iter().map(|name| Term::Constant(name.into())).collect();
-        InitialElement::Fact(Atom { span: Default::default(), predicate: predicate.into(), arguments })
+        InitialElement::Fact(Atom { span: Span::default(), predicate: predicate.into(), arguments })
     }));
     (domain, problem)
 }

@@ -105,7 +105,7 @@ impl Invariant {
             witness.exclusive.push(group);
         }
         let first = Self::initial(world);
-        let missing = first.atoms.atoms().find(|key| !witness.atoms.contains(*key));
+        let missing = first.atoms.atoms().find(|key| !witness.atoms.contains(key));
         let outside = witness
             .numbers
             .iter()
@@ -218,7 +218,7 @@ impl Invariant {
         case: &Case,
     ) -> Result<(), Difference> {
         let mut added = Self::added(structure, case);
-        let new = added.find(|key| !self.atoms.contains(*key));
+        let new = added.find(|key| !self.atoms.contains(key));
         let outside = || {
             case.changes.iter().find_map(|(key, after)| {
                 let interval = self.numbers.get(key)?;

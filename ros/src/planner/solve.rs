@@ -14,7 +14,8 @@ use metaplan::encodings::{
 };
 use metaplan::message::{Errors, Message};
 use metaplan::mission::{
-    Bindings, Mission, PlanLine, Planning as _, Reading, blocking, confirm, instant, plan_lines, spaced,
+    Bindings, Mission, PlanLine, Planning as _, Reading, Unconfirmed, blocking, confirm, instant, plan_lines,
+    spaced,
 };
 use metaplan::pddl::ast::{ActionBody, Problem};
 use metaplan::pddl::{self, Source};
@@ -207,8 +208,10 @@ impl Asked<'_> {
             return Ok(None);
         };
         let mut solution = optimize_concurrent(&task, limits, &mut |_| {});
-        solution.plan =
-            solution.plan.map(|plan| self.confirmed(plan, &Reading::concurrent(&separation))).transpose()?;
+        solution.plan = solution
+            .plan
+            .map(|plan| self.confirmed(plan, &Reading::concurrent(&separation), limits))
+            .transpose()?;
         Ok(Some(solution).filter(|solution| solution.status != Status::Unknown))
     }
 
@@ -233,9 +236,11 @@ impl Asked<'_> {
         let reading = Reading::sequential(task.is_timed());
         let most = self.manner.alternatives;
         let found = if most > 0 { alternatives(&task, &solution, most, &config) } else { None };
-        solution.plan = solution.plan.map(|plan| self.confirmed(plan, &reading)).transpose()?;
+        solution.plan =
+            solution.plan.map(|plan| self.confirmed(plan, &reading, &config.limits)).transpose()?;
         let others = found.into_iter().flat_map(|found| found.plans);
-        let others = others.map(|plan| self.confirmed(plan, &reading)).collect::<Result<_, _>>()?;
+        let others =
+            others.map(|plan| self.confirmed(plan, &reading, &config.limits)).collect::<Result<_, _>>()?;
         Ok((solution, others))
     }
 
@@ -245,14 +250,20 @@ impl Asked<'_> {
             self.mission.ground_exact(self.problem, &[], &config.limits).map_err(NoPlan::Unsupported)?;
         let mut solution = optimize_exact(&task, config);
         let reading = Reading::sequential(task.is_timed());
-        solution.plan = solution.plan.map(|plan| self.confirmed(plan, &reading)).transpose()?;
+        solution.plan =
+            solution.plan.map(|plan| self.confirmed(plan, &reading, &config.limits)).transpose()?;
         Ok(solution)
     }
 
-    /// A plan that the validator has executed, with times that tell what follows what.
-    fn confirmed(&self, plan: Plan, reading: &Reading) -> Result<Plan, NoPlan> {
-        confirm(self.mission, self.problem, &plan, reading).map_err(NoPlan::Fault)?;
-        Ok(spaced(self.mission, self.problem, plan, reading))
+    /// Returns a plan once the validator has executed it, with start times that show which actions follow each other.
+    fn confirmed(&self, plan: Plan, reading: &Reading, limits: &Limits) -> Result<Plan, NoPlan> {
+        match confirm(self.mission, self.problem, &plan, reading, limits) {
+            Ok(()) => Ok(spaced(self.mission, self.problem, plan, reading, limits)),
+            Err(Unconfirmed::Refused(reason)) => Err(NoPlan::Fault(reason)),
+            Err(Unconfirmed::Interrupted) => {
+                Err(NoPlan::None("a limit was reached before the plan was validated".to_owned()))
+            }
+        }
     }
 
     fn reason(&self, solution: &Solution) -> NoPlan {
