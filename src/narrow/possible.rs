@@ -13,7 +13,7 @@ use pddl::ast::{
 };
 
 use super::clause::{Clause, Fact, Literal};
-use super::settle::{additions, classes, same};
+use super::settle::{Additions, additions, same};
 
 /// A fact that an action may add.
 #[derive(Debug, Clone)]
@@ -53,24 +53,13 @@ impl Possible {
         let varying: BTreeSet<Name> = changed.iter().chain(open.keys()).cloned().collect();
         let mut all = Vec::new();
         for action in &domain.actions {
-            let (asked, effects): (Vec<&Condition>, Vec<&Effect>) = match &action.body {
-                ActionBody::Instantaneous { precondition, effect } => (vec![precondition], vec![effect]),
-                ActionBody::Durative { conditions, effects, .. } => (
-                    conditions.iter().map(|(_, own)| own).collect(),
-                    effects.iter().map(|(_, own)| own).collect(),
-                ),
-            };
-            let asked = classes(&asked, &varying);
-            let mut added = Vec::new();
-            for effect in effects {
-                additions(effect, &[], &mut added);
-            }
-            for (atom, bound) in added {
+            let Additions { classes, atoms } = additions(action, &varying);
+            for (atom, bound) in atoms {
                 let argument = |term: &Term| match term {
                     Term::Constant(own) => Some(Argument::Object(own.name.clone())),
                     Term::Variable(own) if bound.contains(&&own.name) => None,
                     Term::Variable(_) => {
-                        let own = asked.iter().filter(|(class, of)| is_class(class) && same(of, term));
+                        let own = classes.iter().filter(|(class, of)| is_class(class) && same(of, term));
                         let own: Vec<Name> = own.map(|(class, _)| class.clone()).collect();
                         (!own.is_empty()).then_some(Argument::Of(own))
                     }

@@ -12,7 +12,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use pddl::ast::{ActionBody, Atom, Condition, Domain, Effect, Name, Term};
+use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Effect, Name, Term};
 
 use super::clause::{Clause, Fact, Literal, Operand};
 
@@ -28,20 +28,8 @@ pub(super) type Guards = BTreeSet<(Name, usize, Name)>;
 pub(super) fn guards(domain: &Domain, varying: &BTreeSet<Name>, timed: &BTreeSet<Name>) -> Guards {
     let mut found: BTreeMap<(Name, usize), BTreeSet<Name>> = BTreeMap::new();
     for action in &domain.actions {
-        let (asked, effects): (Vec<&Condition>, Vec<&Effect>) = match &action.body {
-            ActionBody::Instantaneous { precondition, effect } => (vec![precondition], vec![effect]),
-            // What holds when the action starts need not hold when it adds the fact; classes are never changed.
-            ActionBody::Durative { conditions, effects, .. } => (
-                conditions.iter().map(|(_, own)| own).collect(),
-                effects.iter().map(|(_, own)| own).collect(),
-            ),
-        };
-        let classes = classes(&asked, varying);
-        let mut added = Vec::new();
-        for effect in effects {
-            additions(effect, &[], &mut added);
-        }
-        for (atom, bound) in added {
+        let Additions { classes, atoms } = additions(action, varying);
+        for (atom, bound) in atoms {
             for (position, argument) in atom.arguments.iter().enumerate() {
                 let is_asked = |of: &Term| same(of, argument) && !is_bound(argument, &bound);
                 let own = classes.iter().filter(|(_, of)| is_asked(of)).map(|(class, _)| class.clone());
@@ -58,8 +46,32 @@ pub(super) fn guards(domain: &Domain, varying: &BTreeSet<Name>, timed: &BTreeSet
     .collect()
 }
 
+/// The facts that an action adds, and the classes that it requires of objects.
+pub(super) struct Additions<'a> {
+    /// Predicates of one argument, and the argument.
+    pub classes: Vec<(Name, &'a Term)>,
+    /// Added atoms, each with the variables that quantifiers within the effect bind.
+    pub atoms: Vec<(&'a Atom, Vec<&'a Name>)>,
+}
+
+/// The additions of an action. Predicates in `varying` are no classes.
+pub(super) fn additions<'a>(action: &'a Action, varying: &BTreeSet<Name>) -> Additions<'a> {
+    let (conditions, effects): (Vec<&Condition>, Vec<&Effect>) = match &action.body {
+        ActionBody::Instantaneous { precondition, effect } => (vec![precondition], vec![effect]),
+        // A condition at the start need not hold when the action adds the fact; classes are never changed.
+        ActionBody::Durative { conditions, effects, .. } => {
+            (conditions.iter().map(|(_, own)| own).collect(), effects.iter().map(|(_, own)| own).collect())
+        }
+    };
+    let mut atoms = Vec::new();
+    for effect in effects {
+        added(effect, &[], &mut atoms);
+    }
+    Additions { classes: classes(&conditions, varying), atoms }
+}
+
 /// The unary atoms that a condition requires, without those of `varying` predicates, which may hold of other things in other states.
-pub(super) fn classes<'c>(asked: &[&'c Condition], varying: &BTreeSet<Name>) -> Vec<(Name, &'c Term)> {
+fn classes<'c>(asked: &[&'c Condition], varying: &BTreeSet<Name>) -> Vec<(Name, &'c Term)> {
     let (mut parts, mut found) = (asked.to_vec(), Vec::new());
     while let Some(part) = parts.pop() {
         match part {
@@ -76,23 +88,19 @@ pub(super) fn classes<'c>(asked: &[&'c Condition], varying: &BTreeSet<Name>) -> 
 }
 
 /// The atoms that an effect adds, each with the variables that quantifiers within the effect bind.
-pub(super) fn additions<'e>(
-    effect: &'e Effect,
-    bound: &[&'e Name],
-    found: &mut Vec<(&'e Atom, Vec<&'e Name>)>,
-) {
+fn added<'e>(effect: &'e Effect, bound: &[&'e Name], found: &mut Vec<(&'e Atom, Vec<&'e Name>)>) {
     match effect {
         Effect::And(parts) => {
             for part in parts {
-                additions(part, bound, found);
+                added(part, bound, found);
             }
         }
         Effect::Add(atom) => found.push((atom, bound.to_vec())),
         Effect::ForAll(variables, inner) => {
             let own = variables.iter().map(|own| &own.identifier.name);
-            additions(inner, &bound.iter().copied().chain(own).collect::<Vec<_>>(), found);
+            added(inner, &bound.iter().copied().chain(own).collect::<Vec<_>>(), found);
         }
-        Effect::When(_, inner) => additions(inner, bound, found),
+        Effect::When(_, inner) => added(inner, bound, found),
         Effect::Delete(_) | Effect::Assign(..) => {}
     }
 }

@@ -3,7 +3,7 @@
 
 use std::rc::Rc;
 
-use rustc_hash::FxHashMap;
+use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::faithful::axioms::Axioms;
 use crate::faithful::invariant::Invariant;
@@ -16,7 +16,7 @@ use pddl::ast::{Atom, Condition, Derived, Name, Term, TypedName};
 /// With more derived atoms, nothing is checked.
 const ATOM_LIMIT: usize = 50_000;
 
-/// At most so many conjuncts around an atom are considered.
+/// Upper limit on the conjuncts around an atom that give candidates.
 const CONJUNCT_LIMIT: usize = 64;
 
 /// A place where a rule reads a derived atom that has to hold.
@@ -27,6 +27,8 @@ struct Occurrence<'w> {
     variables: Rc<[&'w TypedName]>,
     /// Conditions that have to hold, too.
     others: Rc<[&'w Condition]>,
+    /// `false` if a variable has the name of another one, so that a name does not tell which of them it is.
+    has_distinct_names: bool,
 }
 
 /// Adds the bound to what is known of derived atoms.
@@ -50,10 +52,10 @@ pub(super) fn add(
             return Err(Cause::Stopped);
         }
         for occurrence in occurrences.get(&key.0).into_iter().flatten() {
-            let heads = if occurrence.hides_a_variable() {
-                all_heads(world, invariant, axioms, occurrence.rule)?
-            } else {
+            let heads = if occurrence.has_distinct_names {
                 occurrence.heads(world, invariant, axioms, &key)?
+            } else {
+                all_heads(world, invariant, axioms, occurrence.rule)?
             };
             insert(axioms, heads, &mut open)?;
         }
@@ -98,13 +100,21 @@ fn collect<'w>(
             collect(world, rule, inner, (&variables, others), found)
         }
         Condition::Atom(atom) if world.is_derived(atom) => {
-            let occurrence =
-                Occurrence { rule, atom, variables: Rc::clone(variables), others: Rc::clone(others) };
+            let (variables, others) = (Rc::clone(variables), Rc::clone(others));
+            let has_distinct_names = has_distinct_names(rule, &variables);
+            let occurrence = Occurrence { rule, atom, variables, others, has_distinct_names };
             found.entry(world.symbol(&atom.predicate.name)?).or_default().push(occurrence);
             Ok(())
         }
         _ => Ok(()),
     }
+}
+
+/// Returns `true` if no parameter of a rule and no variable around an atom has the name of another.
+fn has_distinct_names(rule: &Derived, variables: &[&TypedName]) -> bool {
+    let all = rule.head.parameters.iter().chain(variables.iter().copied());
+    let mut names = FxHashSet::default();
+    all.into_iter().all(|own| names.insert(&own.identifier.name))
 }
 
 /// The heads of a rule that are new, by all its instances.
@@ -130,17 +140,6 @@ fn all_heads(
 }
 
 impl Occurrence<'_> {
-    /// Returns `true` if a quantifier around the atom has a variable with the name of another one, so that a name alone does not say which it is.
-    fn hides_a_variable(&self) -> bool {
-        let parameters = self.rule.head.parameters.iter();
-        let mut names: Vec<&Name> =
-            parameters.chain(self.variables.iter().copied()).map(|own| &own.identifier.name).collect();
-        let count = names.len();
-        names.sort_unstable();
-        names.dedup();
-        names.len() < count
-    }
-
     /// The heads that are new and that the rule concludes from an atom in this place.
     fn heads(
         &self,

@@ -1,4 +1,4 @@
-//! The objects that a variable can stand for where a condition holds: those that an equality, a fact that never changes, an atom of
+//! The candidates of a variable in a condition, that is, the objects for which the condition can hold: those that an equality, a fact that never changes, an atom of
 //! the witness, or a derived atom that may hold gives it. With any other object the condition is false in every state of the witness.
 
 use std::collections::BTreeSet;
@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use crate::faithful::reader::Reader;
 use pddl::ast::{Atom, Condition, Name, Term, TypedName};
 
-/// A conjunct is looked at unless it has this many times as many rows as there are candidates already.
+/// A conjunct is skipped if it has more rows than the known candidates times this factor.
 const WORTHWHILE: usize = 16;
 
 impl Reader<'_> {
@@ -20,7 +20,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The objects that a variable can stand for where all of some conditions hold.
+    /// The candidates of a variable in a conjunction.
     pub(super) fn candidates_where(&self, variable: &TypedName, conditions: &[&Condition]) -> Vec<u32> {
         match self.restricted_by_all(&variable.identifier.name, conditions.iter().copied(), &[]) {
             Some(some) => some.into_iter().filter(|own| self.world.is_of(*own, &variable.r#type)).collect(),
@@ -28,7 +28,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The candidates that a conjunction leaves for a variable, as [`Reader::restricted`].
+    /// The candidates of a variable in a conjunction, as [`Reader::restricted`].
     fn restricted_by_all<'c>(
         &self,
         name: &Name,
@@ -50,7 +50,7 @@ impl Reader<'_> {
         best
     }
 
-    /// The candidates that a condition leaves for a variable; none if it does not restrict the variable. The values of `hidden` variables
+    /// The candidates of a variable in a condition. Returns `None` if the condition does not restrict the variable. The values of `hidden` variables
     /// are not known.
     fn restricted(&self, name: &Name, condition: &Condition, hidden: &[&Name]) -> Option<BTreeSet<u32>> {
         match condition {

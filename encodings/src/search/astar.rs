@@ -114,7 +114,7 @@ pub(crate) struct Search<'a, N, E> {
     is_told: bool,
     /// How many steps it has, if that counts: nothing as dear with as many is looked at.
     fewest: Option<u32>,
-    /// How many states are stored at the first look at how far the search is.
+    /// Number of stored states at which the search first compares its progress with its memory.
     first_look: usize,
     /// How far the search was whenever the number of its states had doubled.
     progress: Vec<N>,

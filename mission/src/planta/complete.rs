@@ -6,7 +6,7 @@ use pddl::TypeHierarchy;
 use pddl::ast::{Declaration, Domain, Identifier, Name, Problem, TypedName};
 
 use super::names::{self, EQUAL, LESS};
-use super::syntax::{identifier, object, typed, untyped};
+use super::syntax::{object, typed, untyped};
 use super::terms::Terms;
 use crate::message::Message;
 
@@ -75,7 +75,7 @@ impl Terms {
                     (None, Some(own)) => own.r#type.clone(),
                     (r#type, _) => typed(r#type.clone()),
                 };
-                domain.constants.push(TypedName { identifier: identifier(name.clone()), r#type });
+                domain.constants.push(TypedName { identifier: name.clone().into(), r#type });
             }
         }
         known.extend(problem.objects.iter().map(|object| object.identifier.name.clone()));
@@ -96,7 +96,7 @@ impl Terms {
         for (name, arity) in own.chain(compared) {
             if known.insert(name.clone()) {
                 let parameters = untyped(&["x", "y"][..arity]);
-                domain.predicates.push(Declaration { identifier: identifier(name), parameters });
+                domain.predicates.push(Declaration { identifier: name.into(), parameters });
             }
         }
     }

@@ -27,7 +27,7 @@ use rules::{Engine, Fact, Literal, Value};
 use crate::message::{Message, did_you_mean};
 use complete::drop_repeated;
 use names::{EQUAL, LESS, NUMBER_TYPES, UNGROUND, UNREALISABLE};
-use syntax::{Fact as PddlFact, atom, identifier, object};
+use syntax::{Fact as PddlFact, atom, object};
 pub use terms::Terms;
 
 /// What an ontology adds to a domain in general, if the domain asks for it: it mentions predicates that it does not declare, and
@@ -119,7 +119,7 @@ impl Planta {
         }
         facts.extend(Self::comparisons(domain, &known));
         problem.init.extend(facts.difference(&said).map(|(predicate, arguments)| {
-            let arguments = arguments.iter().map(|name| Term::Constant(identifier(name.clone())));
+            let arguments = arguments.iter().map(|name| Term::Constant(name.clone().into()));
             InitialElement::Fact(atom(predicate.clone(), arguments.collect()))
         }));
         messages
@@ -142,7 +142,7 @@ impl Planta {
             problem.init.retain(|element| element.fact() != own);
             if !available {
                 let arguments: Vec<Term> =
-                    arguments.into_iter().map(|name| Term::Constant(identifier(name))).collect();
+                    arguments.into_iter().map(|name| Term::Constant(name.into())).collect();
                 problem.init.push(InitialElement::Fact(atom(predicate.clone(), arguments)));
             }
         }

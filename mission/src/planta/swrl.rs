@@ -11,7 +11,7 @@ use ontology::{Argument, Atom, ClassExpression, Iri, ObjectPropertyExpression, R
 use pddl::ast::{Condition, Derived, Name, Span, Term};
 
 use super::names::{self, EQUAL, LESS};
-use super::syntax::{atom, axiom, exists, identifier, variable};
+use super::syntax::{atom, axiom, exists, variable};
 use super::terms::{Terms, is_top};
 
 /// The variables of a rule, each by a name of its own.
@@ -94,8 +94,8 @@ fn conclude(
 fn term(argument: &Argument, variables: &mut Variables, terms: &mut Terms) -> Term {
     match argument {
         Argument::Variable(iri) => variable(&variables.name(iri)),
-        Argument::Individual(iri) => Term::Constant(identifier(terms.individual(iri))),
-        Argument::Literal(literal) => Term::Constant(identifier(terms.literal(literal, true))),
+        Argument::Individual(iri) => Term::Constant(terms.individual(iri).into()),
+        Argument::Literal(literal) => Term::Constant(terms.literal(literal, true).into()),
     }
 }
 

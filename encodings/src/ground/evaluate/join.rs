@@ -79,7 +79,7 @@ struct Join<'j> {
     /// Ascending by variable.
     bound: &'j [Bound],
     guards: &'j [Guard<'j>],
-    /// For each guard, whether its rows are being gone through.
+    /// `true` for each guard whose rows are being enumerated.
     is_used: Vec<bool>,
 }
 
@@ -105,7 +105,7 @@ impl Level {
 }
 
 impl Join<'_> {
-    /// What is to be bound next: what the guard with the fewest open variables leaves open, or else a variable.
+    /// The next options: the rows of the guard with the fewest unbound variables, or else the candidates of a variable.
     fn next_level(
         &mut self,
         world: &mut World<'_>,
