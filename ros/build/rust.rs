@@ -128,7 +128,7 @@ fn constants(text: &mut String, name: &str, constants: &[Constant]) -> Result<()
 /// What is said of a message, service or action as a whole.
 fn whole(text: &mut String, interface: &Interface, hashes: &Hashes) -> Result<(), Box<dyn Error>> {
     let Interface { package, folder, name, .. } = interface;
-    let of = |suffix| hash(hashes, interface, suffix);
+    let of = |suffix: &str| hash(hashes, interface, suffix);
     let names = format!("const PACKAGE: &'static str = {package:?};\nconst NAME: &'static str = {name:?};");
     if *folder == "msg" {
         writeln!(text, "impl crate::interfaces::Msg for {name} {{\n{names}\n}}")?;
@@ -140,19 +140,22 @@ fn whole(text: &mut String, interface: &Interface, hashes: &Hashes) -> Result<()
         writeln!(
             text,
             "impl crate::interfaces::Service for {name} {{\n\
-             type Request = {name}Request;\ntype Response = {name}Response;\n{names}\n\
-             const RIHS01: &'static str = {:?};\n}}",
-            of("")?
+             type Request = {name}Request;\ntype Response = {name}Response;\n{names}\n}}"
         )?;
     } else {
+        let service = |suffix: &str| -> Result<String, Box<dyn Error>> {
+            let (request, response) = (of(&format!("{suffix}_Request"))?, of(&format!("{suffix}_Response"))?);
+            Ok(format!("crate::interfaces::ServiceHashes {{ request: {request:?}, response: {response:?} }}"))
+        };
         writeln!(
             text,
             "impl crate::interfaces::Action for {name} {{\n\
              type Goal = {name}Goal;\ntype Result = {name}Result;\ntype Feedback = {name}Feedback;\n{names}\n\
-             const SEND_GOAL_RIHS01: &'static str = {:?};\nconst GET_RESULT_RIHS01: &'static str = {:?};\n\
+             const SEND_GOAL_RIHS01: crate::interfaces::ServiceHashes = {};\n\
+             const GET_RESULT_RIHS01: crate::interfaces::ServiceHashes = {};\n\
              const FEEDBACK_RIHS01: &'static str = {:?};\n}}",
-            of("_SendGoal")?,
-            of("_GetResult")?,
+            service("_SendGoal")?,
+            service("_GetResult")?,
             of("_FeedbackMessage")?
         )?;
     }

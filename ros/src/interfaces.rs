@@ -23,6 +23,6 @@
 
 mod traits;
 
-pub use traits::{Action, Msg, Service, Structure};
+pub use traits::{Action, Msg, Service, ServiceHashes, Structure};
 
 include!(concat!(env!("OUT_DIR"), "/interfaces.rs"));

@@ -153,21 +153,14 @@ fn a_variant_has_its_own_fields() {
     check(&lyrical, &[&[0, 0, 0, 0, 1, 0, 0, 0], &states]);
 }
 
-/// As `ros2_pyterfaces` 0.3.0 (from `PyPI`) computes them for Jazzy, `hash_rihs01` of its `core` types.
+/// Expected values: `rosidl_generator_type_description` 4.9.5 (from `PyPI`: `ros-rosidl-generator-type-description`), applied to the
+/// definitions below `interfaces/`.
 #[test]
-fn hashes_are_those_of_the_distribution() {
+fn hashes_of_messages_are_those_of_rosidl() {
     let cases = [
         (
             diagnostic_msgs::msg::DiagnosticArray::RIHS01,
             "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e",
-        ),
-        (
-            lifecycle_msgs::srv::ChangeState::RIHS01,
-            "356fe34f0475a43acf54542013af4167b0e729f77ea22ffb045c6ad8e20668e5",
-        ),
-        (
-            lifecycle_msgs::srv::GetState::RIHS01,
-            "800a0a5aae599782b02932de0caf563f6dc4e7e94b794eadde075ba2cbef9795",
         ),
         (
             lifecycle_msgs::msg::TransitionEvent::RIHS01,
@@ -178,45 +171,90 @@ fn hashes_are_those_of_the_distribution() {
             "043e627780fcad87a22d225bc2a037361dba713fca6a6b9f4b869a5aa0393204",
         ),
         (
-            rcl_interfaces::srv::DescribeParameters::RIHS01,
-            "845b484d71eb0673dae682f2e3ba3c4851a65a3dcfb97bddd82c5b57e91e4cff",
-        ),
-        (std_srvs::srv::Empty::RIHS01, "5888399dedec5ccc85ea6451949fd2c9f97bfdf963f9a588821639fcd31b5d19"),
-        (
             unique_identifier_msgs::msg::UUID::RIHS01,
             "1b8e8aca958cbea28fe6ef60bf6c19b683c97a9ef60bb34752067d0f2f7ab437",
         ),
-    ];
-    for (own, expected) in cases {
-        assert_eq!(own, format!("RIHS01_{expected}"));
-    }
-}
-
-/// As `rosbags` 0.11.9 (from `PyPI`) computes them: `hash_rihs01` of definitions written from REP-2011 (a service is its request, response and
-/// event, an action its two services and its feedback message). `ServiceEventInfo` had to be given as it is in ROS, with `uint8[16]`.
-#[test]
-fn hashes_of_services_and_actions_are_those_of_rosbags() {
-    use mros2_msgs::action::ControlQos;
-
-    let cases = [
-        (
-            system_modes_msgs::srv::ChangeMode::RIHS01,
-            "33eb3d2cdf66fa000d2b1b07e27c2abbabeefb4acd8d13a3a1c3f2c397f9094f",
-        ),
-        (
-            action_msgs::srv::CancelGoal::RIHS01,
-            "573d8b0a534451d7bc2ac8c5ffde8ac14b8593b7001175d0cd6516dcbeb8689a",
-        ),
-        (ControlQos::SEND_GOAL_RIHS01, "0f117248cbe8f14039ef077c29716ebdfaebcf07b55539fc798591b231ca6742"),
-        (ControlQos::GET_RESULT_RIHS01, "131c0484088350f36e22f73b0e65ae2cce7350337fa4843fbbf95f6116f43838"),
-        (ControlQos::FEEDBACK_RIHS01, "509605b09dd6de7514326e102088aa11d10a16f133ae7ceb76c81b021e0b776e"),
         (
             lyrical::lifecycle_msgs::msg::TransitionEvent::RIHS01,
             "78b19e2be41a797fc009c96bda68944182edabec7852cccd928a40bc06f6f9d7",
         ),
+        (
+            mros2_msgs::action::ControlQos::FEEDBACK_RIHS01,
+            "509605b09dd6de7514326e102088aa11d10a16f133ae7ceb76c81b021e0b776e",
+        ),
     ];
-    for (own, expected) in cases {
-        assert_eq!(own, format!("RIHS01_{expected}"));
+    for (hash, expected) in cases {
+        assert_eq!(hash, format!("RIHS01_{expected}"));
+    }
+}
+
+/// ROS 2 announces on the topics of a service the hashes of the request and of the response, not the hash of the service. Expected values:
+/// as in [`hashes_of_messages_are_those_of_rosidl`].
+#[test]
+fn topics_of_services_have_the_hashes_of_their_messages() {
+    use mros2_msgs::action::ControlQos;
+    use nav2_msgs::action::NavigateToPose;
+
+    let cases = [
+        (
+            ServiceHashes::of::<lifecycle_msgs::srv::ChangeState>(),
+            "d74c6f524e14cade7b67e7297190360ed749264af300524fc1456f27cc2a553a",
+            "e1ddfed0271fefe63767aa71561926e4d9eac0f1ddf9e71a8873eb46b36deac2",
+        ),
+        (
+            ServiceHashes::of::<rcl_interfaces::srv::DescribeParameters>(),
+            "05dd1c2bc87dec2627105c8070d6f9725c781a4f2ab852975bf105462b82b644",
+            "ad6747319613c6131589e062e095b469a46cc764f7d0f12a001a49e6cd893995",
+        ),
+        (
+            ServiceHashes::of::<std_srvs::srv::Empty>(),
+            "458eaf200a3f63d9cc53d19436edebc0c140ef4c93ca75d5bd4ce19fd7759e35",
+            "0a2858b3f60df644a61d0fa44cfc923a3d3628e0ad9c8ad8534b1a2c92a413dc",
+        ),
+        (
+            ServiceHashes::of::<action_msgs::srv::CancelGoal>(),
+            "3d3c84653c1f96918086887e1dcb236faec88b81a5b14fd4cf4840065bcdf8af",
+            "35e682cf3f510e83c70a82a4aac888496dedee56773bf9d8e5e0aa81f9e1c960",
+        ),
+        (
+            ServiceHashes::of::<system_modes_msgs::srv::ChangeMode>(),
+            "9153cd92dab8169339460ceada3113eacd2a96d31d62cb31305a2c09a3d01fdc",
+            "4771543cc0c34b4b4f7de2d92e443e2ed6e5c24b66f34dc2c923db932d324648",
+        ),
+        (
+            ServiceHashes::of::<plansys2_msgs::srv::GetPlan>(),
+            "9d43913e276abda229462b578ea0927ac98bd5b5b7c21fd169e6b4a64ee0923a",
+            "29edb38da18ac576d3f14b7d2b7a030b9d155b8566b5cc00f7ad0056435088bb",
+        ),
+        (
+            ServiceHashes::of::<suave_msgs::srv::Task>(),
+            "0da395687b2bed9f16a862e0bd2b4edd4f416f4285fd89f5cbd344b80c68fbc3",
+            "d4d4e91304ec2d4b1c7013c36f294084586f02e86ac12684ca4db06d19af4488",
+        ),
+        (
+            ControlQos::SEND_GOAL_RIHS01,
+            "9a2c73d5b6d4b6aa6f6c4a983121059a95f68f2ae027358f70038067f9080658",
+            "b78348af0c53a3e302ac320c27508e01bec9a7eee10c56344c59a13e5ad405b5",
+        ),
+        (
+            ControlQos::GET_RESULT_RIHS01,
+            "0e3a7e2b9902d0edb8c9e2dc1b288a64565b435ca18bca5d316bbbf9ef6b3d54",
+            "4765f95318126115e3bfed38f4c235794705c9f729f53ff4aeb705012d61583c",
+        ),
+        (
+            NavigateToPose::SEND_GOAL_RIHS01,
+            "e9381f2acfe9fa8c4838a277d0cde28a93c483564827b9f13496b9c2092e4f09",
+            "99f97fcbb07daf024df4b8c3f02f19ce7fa3183fcedfb76b8772a61a371a55fa",
+        ),
+        (
+            NavigateToPose::GET_RESULT_RIHS01,
+            "106d3457cf0db4c4a8d3373bab3ff6aa8ba8ad99ae6392ce9784830a7d04ac93",
+            "c59f178c377de5318919c00bdbf7884cb3b185acfdffceba6c9f161e0aa3cc81",
+        ),
+    ];
+    for (hashes, request, response) in cases {
+        assert_eq!(hashes.request, format!("RIHS01_{request}"));
+        assert_eq!(hashes.response, format!("RIHS01_{response}"));
     }
 }
 

@@ -32,8 +32,23 @@ pub trait Service {
     const PACKAGE: &'static str;
     /// As in `Trigger`.
     const NAME: &'static str;
-    /// The type hash of the service, which both of its topics carry.
-    const RIHS01: &'static str;
+}
+
+/// Type hashes of the two topics of a service. ROS 2 announces on each topic the hash of the message on that topic
+/// (`rmw_create_service` and `rmw_create_client` of `rmw_fastrtps_cpp` and `rmw_cyclonedds_cpp`), not the hash of the service.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ServiceHashes {
+    /// Hash of the request message.
+    pub request: &'static str,
+    /// Hash of the response message.
+    pub response: &'static str,
+}
+
+impl ServiceHashes {
+    /// Type hashes of the topics of a service.
+    pub const fn of<S: Service>() -> Self {
+        Self { request: S::Request::RIHS01, response: S::Response::RIHS01 }
+    }
 }
 
 /// An action.
@@ -48,10 +63,10 @@ pub trait Action {
     const PACKAGE: &'static str;
     /// As in `NavigateToPose`.
     const NAME: &'static str;
-    /// The type hash of the service `send_goal`.
-    const SEND_GOAL_RIHS01: &'static str;
-    /// The type hash of the service `get_result`.
-    const GET_RESULT_RIHS01: &'static str;
-    /// The type hash of the topic `feedback`.
+    /// Type hashes of the service `send_goal`.
+    const SEND_GOAL_RIHS01: ServiceHashes;
+    /// Type hashes of the service `get_result`.
+    const GET_RESULT_RIHS01: ServiceHashes;
+    /// Type hash of the topic `feedback`.
     const FEEDBACK_RIHS01: &'static str;
 }

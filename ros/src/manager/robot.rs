@@ -313,7 +313,7 @@ fn hear_function(
     let system = settings.functions.system(function);
     let (name, sender) = (function.to_owned(), inputs.clone());
     node.subscribe::<ModeEvent>(&format!("/{system}/mode_request_info"), depth(10), move |event| {
-        let _ = sender.send(Input::Mode(name.clone(), event.goal_mode.label));
+        let _ = sender.send(Input::ModeRequested(name.clone(), event.goal_mode.label));
     })?;
     let (name, sender) = (function.to_owned(), inputs.clone());
     let topic = format!("/{}/transition_event", settings.functions.node(function));

@@ -18,8 +18,9 @@ use ros2_client::request_id::RmwRequestId;
 use smol::Timer;
 
 use crate::interfaces::action_msgs::srv::CancelGoalRequest;
-use crate::interfaces::{Action, Service, Structure as _};
-use crate::node::graph::{Expected, Graph};
+use crate::interfaces::{Action, Service, ServiceHashes, Structure as _};
+use crate::node::graph::{Expected, Graph, Topics};
+use crate::node::reply_gate::ReplyGate;
 use crate::node::{Node, Severity, client_name, dds_type, latched, not_made, qos};
 
 pub use caller::{Accepted, ActionCaller, GoalError, Pursued};
@@ -97,6 +98,23 @@ pub struct Goals<A: Action> {
 impl<A: Action> std::fmt::Debug for Goals<A> {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         formatter.debug_tuple("Goals").field(&A::NAME).finish()
+    }
+}
+
+/// Requests to the three services of an action.
+struct Gates<A: Action> {
+    goals: ReplyGate<(GoalId, A::Goal)>,
+    cancels: ReplyGate<ros2_client::action::CancelGoalRequest>,
+    results: ReplyGate<GoalId>,
+}
+
+impl<A: Action> Gates<A> {
+    fn new(action: &str) -> Self {
+        Self {
+            goals: ReplyGate::new(&format!("{action}/_action/send_goal")),
+            cancels: ReplyGate::new(&format!("{action}/_action/cancel_goal")),
+            results: ReplyGate::new(&format!("{action}/_action/get_result")),
+        }
     }
 }
 
@@ -202,29 +220,38 @@ impl<A: Action> Goals<A> {
         }
     }
 
-    /// Takes what has been heard since; returns what went wrong.
-    fn poll(&self, take: &mut impl FnMut(GoalEvent<A>)) -> Vec<String> {
+    /// Receives new requests and handles those whose client can receive the reply; returns errors.
+    fn poll(&self, graph: &Graph, gates: &mut Gates<A>, take: &mut impl FnMut(GoalEvent<A>)) -> Vec<String> {
         let Some(server) = self.server.get() else { return Vec::new() };
-        let mut wrong = Vec::new();
+        let mut errors = Vec::new();
         match server.receive_goal() {
-            Ok(Some((request, goal))) if !self.goals().contains_key(&goal.goal_id) => {
-                take(GoalEvent::Wanted(Wanted { request, goal: goal.goal_id }, goal.goal));
-            }
-            // A goal that is known already was sent twice.
-            Ok(_) => {}
-            Err(error) => wrong.push(error.to_string()),
+            Ok(Some((request, goal))) => gates.goals.push(request, (goal.goal_id, goal.goal)),
+            Ok(None) => {}
+            Err(error) => errors.push(error.to_string()),
         }
         match server.receive_cancel_request() {
-            Ok(Some((request, cancel))) => self.cancel(request, &cancel, take),
+            Ok(Some((request, cancel))) => gates.cancels.push(request, cancel),
             Ok(None) => {}
-            Err(error) => wrong.push(error.to_string()),
+            Err(error) => errors.push(error.to_string()),
         }
         match server.receive_result_request() {
-            Ok(Some((request, wanted))) => self.result(request, wanted.goal_id),
+            Ok(Some((request, wanted))) => gates.results.push(request, wanted.goal_id),
             Ok(None) => {}
-            Err(error) => wrong.push(error.to_string()),
+            Err(error) => errors.push(error.to_string()),
         }
-        wrong
+        while let Some((request, (id, goal))) = gates.goals.pop(graph) {
+            // A known goal was sent twice.
+            if !self.goals().contains_key(&id) {
+                take(GoalEvent::Wanted(Wanted { request, goal: id }, goal));
+            }
+        }
+        while let Some((request, cancel)) = gates.cancels.pop(graph) {
+            self.cancel(request, &cancel, take);
+        }
+        while let Some((request, goal)) = gates.results.pop(graph) {
+            self.result(request, goal);
+        }
+        errors
     }
 
     fn result(&self, request: RmwRequestId, goal: GoalId) {
@@ -286,25 +313,29 @@ impl<A: Action> Goals<A> {
     }
 }
 
-/// The types of all topics of an action.
+/// Registers the types of all topics of an action.
 fn expect_action<A: Action>(graph: &Graph, full: &str) {
     use crate::interfaces::action_msgs::srv::CancelGoal;
-    let services =
-        [("send_goal", "SendGoal", A::SEND_GOAL_RIHS01), ("get_result", "GetResult", A::GET_RESULT_RIHS01)];
-    for (service, name, hash) in services {
-        for (topic, part) in [("rq", "Request"), ("rr", "Reply")] {
-            let end = if part == "Reply" { "Response" } else { part };
-            let type_name = dds_type(A::PACKAGE, "action", &format!("{}_{name}_{end}", A::NAME));
-            graph.expect(format!("{topic}{full}/_action/{service}{part}"), Expected { type_name, hash });
-        }
+    let part = |name: &str| format!("{}_{name}", A::NAME);
+    let services = [
+        ("send_goal", A::PACKAGE, "action", part("SendGoal"), A::SEND_GOAL_RIHS01),
+        ("get_result", A::PACKAGE, "action", part("GetResult"), A::GET_RESULT_RIHS01),
+        (
+            "cancel_goal",
+            CancelGoal::PACKAGE,
+            "srv",
+            CancelGoal::NAME.to_owned(),
+            ServiceHashes::of::<CancelGoal>(),
+        ),
+    ];
+    for (service, package, folder, name, hashes) in services {
+        let topics = Topics::of(&format!("{full}/_action/{service}"));
+        let request = dds_type(package, folder, &format!("{name}_Request"));
+        let response = dds_type(package, folder, &format!("{name}_Response"));
+        graph.expect(topics.requests, Expected { type_name: request, hash: hashes.request });
+        graph.expect(topics.replies, Expected { type_name: response, hash: hashes.response });
     }
-    let package = CancelGoal::PACKAGE;
-    for (topic, part, end) in [("rq", "Request", "Request"), ("rr", "Reply", "Response")] {
-        let type_name = dds_type(package, "srv", &format!("CancelGoal_{end}"));
-        let expected = Expected { type_name, hash: CancelGoal::RIHS01 };
-        graph.expect(format!("{topic}{full}/_action/cancel_goal{part}"), expected);
-    }
-    let type_name = dds_type(A::PACKAGE, "action", &format!("{}_FeedbackMessage", A::NAME));
+    let type_name = dds_type(A::PACKAGE, "action", &part("FeedbackMessage"));
     graph.expect(format!("rt{full}/_action/feedback"), Expected { type_name, hash: A::FEEDBACK_RIHS01 });
     let status = crate::interfaces::action_msgs::msg::GoalStatusArray::RIHS01;
     let type_name = dds_type("action_msgs", "msg", "GoalStatusArray");
@@ -347,8 +378,9 @@ impl Node {
                 }
             }
             drop(node);
+            let mut gates = Gates::<A>::new(&full);
             loop {
-                for wrong in served.poll(&mut take) {
+                for wrong in served.poll(&graph, &mut gates, &mut take) {
                     let Some(node) = weak.upgrade() else { return };
                     node.log(Severity::Warn, &format!("what {full} has heard is wrong: {wrong}"));
                 }

@@ -34,6 +34,8 @@ struct Seen {
     participants: BTreeMap<[u8; 12], Vendor>,
     first: Option<Instant>,
     endpoints: BTreeMap<[u8; 16], Endpoint>,
+    /// Remote readers that receive what our writers write.
+    matched_readers: BTreeSet<[u8; 16]>,
     /// The mapping that our own services have, once it is decided on.
     mapping: Option<Mapping>,
     /// The types that we have for topics, as DDS names both, with the type hash.
@@ -51,6 +53,20 @@ pub(crate) struct Expected {
     pub(crate) type_name: String,
     /// `RIHS01_…`; what is compared where the other side says its own.
     pub(crate) hash: &'static str,
+}
+
+/// The two topics of a service, named as DDS names them.
+#[derive(Debug, Clone)]
+pub(crate) struct Topics {
+    pub(crate) requests: String,
+    pub(crate) replies: String,
+}
+
+impl Topics {
+    /// Topics of the service with this full name.
+    pub(crate) fn of(service: &str) -> Self {
+        Self { requests: format!("rq{service}Request"), replies: format!("rr{service}Reply") }
+    }
 }
 
 /// Whoever serves a service.
@@ -105,11 +121,17 @@ impl Graph {
                 let mut seen = self.seen();
                 seen.participants.retain(|prefix, _| prefix != lost);
                 seen.endpoints.retain(|guid, _| &guid[..12] != lost);
+                seen.matched_readers.retain(|guid| &guid[..12] != lost);
             }
             Event::ReaderDetected { reader } => self.found(true, reader),
             Event::WriterDetected { writer } => self.found(false, writer),
             Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => {
-                self.seen().endpoints.remove(&bytes(guid));
+                let mut seen = self.seen();
+                seen.endpoints.remove(&bytes(guid));
+                seen.matched_readers.remove(&bytes(guid));
+            }
+            Event::RemoteReaderMatched { remote_reader, .. } => {
+                self.seen().matched_readers.insert(bytes(remote_reader));
             }
             Event::RemoteReaderQosIncompatible { remote_reader, .. } => self.incompatible(remote_reader),
             Event::RemoteWriterQosIncompatible { remote_writer, .. } => self.incompatible(remote_writer),
@@ -172,23 +194,51 @@ impl Graph {
         self.seen().endpoints.values().any(|endpoint| !endpoint.is_reader && endpoint.topic == topic)
     }
 
-    /// Whoever serves a service, if somebody does, by the topics of requests and replies.
-    pub(crate) fn server(&self, requests: &str, replies: &str) -> Option<Result<Server, String>> {
+    /// Returns the server of a service if there is one. An endpoint with another type name is an error. A differing type hash is
+    /// not: DDS has matched the type names, and the warning has been logged.
+    pub(crate) fn server(&self, topics: &Topics) -> Option<Result<Server, String>> {
         let seen = self.seen();
-        let of = |topic: &str, is_reader: bool| {
+        let endpoint = |topic: &str, is_reader: bool| {
             let is_it = |own: &(&[u8; 16], &Endpoint)| own.1.is_reader == is_reader && own.1.topic == topic;
             seen.endpoints.iter().find(is_it)
         };
-        let ((guid, reader), (_, writer)) = (of(requests, true)?, of(replies, false)?);
+        let ((guid, reader), (_, writer)) =
+            (endpoint(&topics.requests, true)?, endpoint(&topics.replies, false)?);
         for endpoint in [reader, writer] {
             let expected = seen.expected.get(&endpoint.topic);
-            if let Some(complaint) = expected.and_then(|expected| endpoint.complaint(expected)) {
+            if let Some(complaint) = expected.and_then(|expected| endpoint.wrong_type(expected)) {
                 return Some(Err(complaint));
             }
         }
         let vendor = Vendor::new([guid[0], guid[1]]);
         let mapping = self.rmw.fixed().or_else(|| vendor.mapping()).or(seen.mapping);
         Some(Ok(Server { mapping: mapping.unwrap_or(Mapping::Enhanced), reader: *guid }))
+    }
+
+    /// Returns `true` if a reply to this client arrives: its reply reader is matched with our reply writer. A server that replies
+    /// earlier loses the reply.
+    ///
+    /// Fast DDS identifies a client by its reply reader, and other enhanced clients by their request writer. Cyclone DDS sends eight
+    /// bytes that are no GUID, so that every participant that writes requests must have as many reply readers matched.
+    pub(crate) fn can_reply(&self, topics: &Topics, client: Gid) -> bool {
+        let client = client.to_bytes16();
+        let seen = self.seen();
+        let is_known = seen.participants.keys().any(|prefix| *prefix == client[..12]);
+        if is_known && is_reader(client) {
+            return seen.matched_readers.contains(&client);
+        }
+        let mut unmatched: BTreeMap<&[u8], i64> = BTreeMap::new();
+        for (guid, endpoint) in &seen.endpoints {
+            if !endpoint.is_reader && endpoint.topic == topics.requests {
+                *unmatched.entry(&guid[..12]).or_default() += 1;
+            } else if endpoint.topic == topics.replies && seen.matched_readers.contains(guid) {
+                *unmatched.entry(&guid[..12]).or_default() -= 1;
+            }
+        }
+        if is_known {
+            unmatched.retain(|prefix, _| *prefix == &client[..12]);
+        }
+        !unmatched.is_empty() && unmatched.values().all(|count| *count <= 0)
     }
 
     /// Who reads on a topic, named as DDS does.
@@ -250,21 +300,42 @@ impl Seen {
 }
 
 impl Endpoint {
-    /// What is wrong with it where this is expected.
+    /// Describes a difference from the expected type, if there is one.
     fn complaint(&self, expected: &Expected) -> Option<String> {
-        let what = if self.is_reader { "reader" } else { "writer" };
-        if self.type_name != expected.type_name {
-            return Some(format!(
-                "a {what} of {} has the type {}, and should have {}",
-                self.topic, self.type_name, expected.type_name
-            ));
-        }
-        let hash = self.hash.as_deref().filter(|hash| *hash != expected.hash && !expected.hash.is_empty())?;
-        Some(format!(
-            "a {what} of {} has another definition of {}: its type hash is {hash}, ours is {}",
-            self.topic, self.type_name, expected.hash
-        ))
+        self.wrong_type(expected).or_else(|| {
+            let differs = |hash: &&str| *hash != expected.hash && !expected.hash.is_empty();
+            let hash = self.hash.as_deref().filter(differs)?;
+            Some(format!(
+                "a {} of {} has another definition of {}: its type hash is {hash}, ours is {}",
+                self.kind(),
+                self.topic,
+                self.type_name,
+                expected.hash
+            ))
+        })
     }
+
+    /// Describes a difference from the expected type name, if there is one.
+    fn wrong_type(&self, expected: &Expected) -> Option<String> {
+        (self.type_name != expected.type_name).then(|| {
+            format!(
+                "a {} of {} has the type {}, and should have {}",
+                self.kind(),
+                self.topic,
+                self.type_name,
+                expected.type_name
+            )
+        })
+    }
+
+    fn kind(&self) -> &'static str {
+        if self.is_reader { "reader" } else { "writer" }
+    }
+}
+
+/// Returns `true` if a GUID belongs to a reader of user data (RTPS 2.5, table 9.1).
+fn is_reader(guid: [u8; 16]) -> bool {
+    matches!(guid[15], 0x04 | 0x07)
 }
 
 /// What an endpoint of ROS 2 Jazzy and later says of its type: `typehash=RIHS01_…;` in its user data (REP 2011).

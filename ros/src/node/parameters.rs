@@ -26,6 +26,30 @@ pub struct Declared {
     pub value: ParameterValue,
     /// Whether it can be set while the node runs.
     pub is_dynamic: bool,
+    /// Checks a value of the right type; an error says which values are allowed.
+    pub check: fn(&ParameterValue) -> Result<(), &'static str>,
+}
+
+/// Accepts every value of the right type.
+pub(crate) fn any_value(_: &ParameterValue) -> Result<(), &'static str> {
+    Ok(())
+}
+
+/// Accepts a duration in seconds.
+fn duration(value: &ParameterValue) -> Result<(), &'static str> {
+    match value {
+        ParameterValue::Double(seconds) if Duration::try_from_secs_f64(*seconds).is_ok() => Ok(()),
+        _ => Err("must be a number of seconds, 0 or more"),
+    }
+}
+
+impl Declared {
+    /// Converts a value to the type of this parameter and checks it.
+    fn accept(&self, value: ParameterValue) -> Result<ParameterValue, String> {
+        let value = fitting(&self.value, value)?;
+        (self.check)(&value)?;
+        Ok(value)
+    }
 }
 
 type Table = BTreeMap<String, Declared>;
@@ -52,6 +76,7 @@ impl Node {
                 description: "accepted as by every node; times are those of the system",
                 value: ParameterValue::Boolean(false),
                 is_dynamic: true,
+                check: any_value,
             },
         );
         let (mut warnings, mut errors) = (Vec::new(), Vec::new());
@@ -61,7 +86,7 @@ impl Node {
                     let meant = did_you_mean(&name, table.keys().map(String::as_str));
                     warnings.push(Message::warning("N103", format!("there is no parameter `{name}`{meant}")));
                 }
-                Some(own) => match fitting(&own.value, value) {
+                Some(own) => match own.accept(value) {
                     Ok(value) => own.value = value,
                     Err(text) => {
                         errors.push(Message::error("N103", format!("the parameter `{name}` {text}")));
@@ -104,7 +129,7 @@ impl Node {
         set(&value);
         let hear = set.clone();
         let warnings = self.declare(
-            vec![Declared { name, description, value, is_dynamic: true }],
+            vec![Declared { name, description, value, is_dynamic: true, check: duration }],
             move |set, value| {
                 if set == name {
                     hear(value);
@@ -187,7 +212,7 @@ impl Node {
                 return Err(format!("`{name}` cannot be set while the node runs"));
             }
             let value = parameter(value).ok_or_else(|| format!("`{name}` cannot be deleted"))?;
-            let value = fitting(&own.value, value).map_err(|text| format!("`{name}` {text}"))?;
+            let value = own.accept(value).map_err(|text| format!("`{name}` {text}"))?;
             values.push((name, value));
         }
         for (name, value) in values {
@@ -312,7 +337,21 @@ pub(crate) fn parameter(value: msg::ParameterValue) -> Option<ParameterValue> {
 
 #[cfg(test)]
 mod tests {
-    use super::listed;
+    use ros2_client::ParameterValue;
+
+    use super::{Declared, duration, listed};
+
+    #[test]
+    fn durations_that_cannot_be_used_are_refused() {
+        let value = ParameterValue::Double(5.0);
+        let declared = Declared { name: "t", description: "", value, is_dynamic: true, check: duration };
+        for seconds in [-1.0, f64::NAN, f64::INFINITY, 1e30] {
+            assert!(declared.accept(ParameterValue::Double(seconds)).is_err(), "{seconds}");
+        }
+        for value in [ParameterValue::Double(0.0), ParameterValue::Double(0.5), ParameterValue::Integer(3)] {
+            assert!(declared.accept(value.clone()).is_ok(), "{value:?}");
+        }
+    }
 
     #[test]
     fn names_are_listed_below_prefixes() {

@@ -13,9 +13,10 @@ use ros2_client::dds::Client;
 use ros2_client::request_id::RmwRequestId;
 use smol::{Timer, channel};
 
-use crate::interfaces::Service;
-use crate::node::graph::{Expected, Server};
+use crate::interfaces::{Service, ServiceHashes};
+use crate::node::graph::{Expected, Server, Topics};
 use crate::node::qos;
+use crate::node::reply_gate::ReplyGate;
 use crate::node::rmw::Mapping;
 use crate::node::{Node, Severity, client_name, dds_type, not_made};
 
@@ -91,6 +92,7 @@ type Connection<S> = (Server, Client<<S as Service>::Request, <S as Service>::Re
 pub struct Caller<S: Service> {
     node: Arc<Node>,
     full: String,
+    topics: Topics,
     connection: smol::lock::Mutex<Option<Connection<S>>>,
     service: PhantomData<fn() -> S>,
 }
@@ -109,12 +111,12 @@ impl<S: Service> Caller<S> {
 
     /// Whether somebody serves it now.
     pub fn is_served(&self) -> bool {
-        self.node.graph.server(&self.requests(), &self.replies()).is_some()
+        self.node.graph.server(&self.topics).is_some()
     }
 
     /// Who serves it now, by numbers: one that is started again has another one.
     pub fn servers(&self) -> BTreeSet<[u8; 16]> {
-        self.node.graph.readers(&self.requests())
+        self.node.graph.readers(&self.topics.requests)
     }
 
     /// Makes ready to call, as soon as somebody serves it, so that the first call need not wait for discovery.
@@ -157,9 +159,8 @@ impl<S: Service> Caller<S> {
         connection: &'c mut Option<Connection<S>>,
         within: Duration,
     ) -> Result<&'c Connection<S>, CallError> {
-        let (requests, replies) = (self.requests(), self.replies());
         let absent = || CallError::Absent { service: self.full.clone(), waited: seconds(within) };
-        let found = self.node.graph.wait(within, |graph| graph.server(&requests, &replies)).await;
+        let found = self.node.graph.wait(within, |graph| graph.server(&self.topics)).await;
         let server = found
             .ok_or_else(absent)?
             .map_err(|complaint| CallError::Unfit { service: self.full.clone(), complaint })?;
@@ -187,14 +188,6 @@ impl<S: Service> Caller<S> {
             .create_client(mapping.service_mapping(), &name, &kind, qos::service(), qos::service())
             .map_err(|error| not_made(&self.full, &error))
     }
-
-    fn requests(&self) -> String {
-        format!("rq{}Request", self.full)
-    }
-
-    fn replies(&self) -> String {
-        format!("rr{}Reply", self.full)
-    }
 }
 
 fn seconds(duration: Duration) -> String {
@@ -208,6 +201,7 @@ impl Node {
         self.expect_service::<S>(&full);
         Caller {
             node: Arc::clone(self),
+            topics: Topics::of(&full),
             full,
             connection: smol::lock::Mutex::new(None),
             service: PhantomData,
@@ -249,10 +243,16 @@ impl Node {
             let (sender, answers) = channel::unbounded();
             let mut requests = Box::pin(server.receive_request_stream());
             let mut answers = Box::pin(answers);
+            let mut gate = ReplyGate::new(&full);
             loop {
+                while let Some((id, request)) = gate.pop(&graph) {
+                    take(request, Responder { id, answers: sender.clone() });
+                }
+                let mut recheck = Box::pin(gate.recheck()).fuse();
                 futures::select! {
+                    () = recheck => {}
                     request = requests.next() => match request {
-                        Some(Ok((id, request))) => take(request, Responder { id, answers: sender.clone() }),
+                        Some(Ok((id, request))) => gate.push(id, request),
                         Some(Err(error)) => {
                             let Some(node) = weak.upgrade() else { return };
                             node.log(Severity::Warn, &format!("a request to {full} is none: {error}"));
@@ -276,10 +276,12 @@ impl Node {
     }
 
     fn expect_service<S: Service>(&self, full: &str) {
-        for (topic, part) in [(format!("rq{full}Request"), "Request"), (format!("rr{full}Reply"), "Response")]
-        {
-            let type_name = dds_type(S::PACKAGE, "srv", &format!("{}_{part}", S::NAME));
-            self.graph.expect(topic, Expected { type_name, hash: S::RIHS01 });
-        }
+        let topics = Topics::of(full);
+        let hashes = ServiceHashes::of::<S>();
+        let type_name = |part: &str| dds_type(S::PACKAGE, "srv", &format!("{}_{part}", S::NAME));
+        let request = Expected { type_name: type_name("Request"), hash: hashes.request };
+        let response = Expected { type_name: type_name("Response"), hash: hashes.response };
+        self.graph.expect(topics.requests, request);
+        self.graph.expect(topics.replies, response);
     }
 }

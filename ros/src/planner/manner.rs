@@ -6,7 +6,7 @@ use std::time::Duration;
 use metaplan::message::Errors;
 use ros2_client::ParameterValue;
 
-use crate::node::{Declared, Node, Severity};
+use crate::node::{Declared, Node, Severity, any_value};
 use crate::planner::Manner;
 
 /// In seconds; what PlanSys2 has.
@@ -19,34 +19,67 @@ const SHARE: f64 = 0.9;
 const ALTERNATIVES: usize = 3;
 
 fn declared() -> Vec<Declared> {
-    let one = |name, description, value| Declared { name, description, value, is_dynamic: true };
+    let one =
+        |name, description, value, check| Declared { name, description, value, is_dynamic: true, check };
     vec![
         one(
             "plan_solver_timeout",
             "how long whoever asks for a plan waits for it, in seconds",
             ParameterValue::Double(TIMEOUT),
+            timeout,
         ),
         one(
             "plan_solver_plugins",
             "accepted, as PlanSys2's parameter files have it; there are no plugins here",
             ParameterValue::StringArray(Vec::new()),
+            any_value,
         ),
         one(
             "metric",
             "what is minimised where the problem has no metric, as PlanSys2's problems have none: `(cost)`, `total-time`",
             ParameterValue::String(String::new()),
+            any_value,
         ),
         one(
             "overlap",
             "whether durative actions may overlap: `yes`, `no`, or `auto`: unless a knowledge base joins in",
             ParameterValue::String("auto".to_owned()),
+            overlap,
         ),
         one(
             "alternatives",
             "up to so many further plans that are as good, in the answer of get_plan_array",
             ParameterValue::Integer(ALTERNATIVES as i64),
+            alternatives,
         ),
     ]
+}
+
+fn timeout(value: &ParameterValue) -> Result<(), &'static str> {
+    match value {
+        ParameterValue::Double(seconds)
+            if Duration::try_from_secs_f64(*seconds).is_ok_and(|timeout| !timeout.is_zero()) =>
+        {
+            Ok(())
+        }
+        _ => Err("must be a number of seconds above 0"),
+    }
+}
+
+fn overlap(value: &ParameterValue) -> Result<(), &'static str> {
+    match value {
+        ParameterValue::String(text) if ["yes", "true", "no", "false", "auto"].contains(&text.as_str()) => {
+            Ok(())
+        }
+        _ => Err("must be `yes`, `no` or `auto`"),
+    }
+}
+
+fn alternatives(value: &ParameterValue) -> Result<(), &'static str> {
+    match value {
+        ParameterValue::Integer(0..=1000) => Ok(()),
+        _ => Err("must be a number from 0 to 1000"),
+    }
 }
 
 /// The manner that the parameters choose.
@@ -64,18 +97,14 @@ impl Chosen {
         let manner =
             Manner { metric: None, time_limit: Duration::ZERO, overlap: None, alternatives: ALTERNATIVES };
         let chosen = Arc::new(Self { manner: Mutex::new(manner) });
-        let (listener, weak) = (Arc::clone(&chosen), Arc::downgrade(node));
-        let changed = move |name: &str, value: &ParameterValue| {
-            if let Some(node) = weak.upgrade() {
-                listener.set(&node, name, value);
-            }
-        };
+        let listener = Arc::clone(&chosen);
+        let changed = move |name: &str, value: &ParameterValue| listener.set(name, value);
         for warning in node.declare(declared(), changed)? {
             node.log(Severity::Warn, &warning.message);
         }
         for parameter in declared() {
             if let Some(value) = node.parameter(parameter.name) {
-                chosen.set(node, parameter.name, &value);
+                chosen.set(parameter.name, &value);
             }
         }
         Ok(chosen)
@@ -90,19 +119,13 @@ impl Chosen {
         self.manner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn set(&self, node: &Node, name: &str, value: &ParameterValue) {
+    fn set(&self, name: &str, value: &ParameterValue) {
         let mut manner = self.lock();
         match (name, value) {
             ("plan_solver_timeout", ParameterValue::Double(seconds)) => {
-                let wanted = Duration::try_from_secs_f64(*seconds).ok().filter(|time| !time.is_zero());
-                if wanted.is_none() {
-                    let text = format!(
-                        "plan_solver_timeout should be above 0, and is {seconds}: {TIMEOUT} s are taken"
-                    );
-                    node.log(Severity::Warn, &text);
+                if let Ok(timeout) = Duration::try_from_secs_f64(*seconds) {
+                    manner.time_limit = timeout.mul_f64(SHARE);
                 }
-                let timeout = wanted.unwrap_or_else(|| Duration::from_secs_f64(TIMEOUT));
-                manner.time_limit = timeout.mul_f64(SHARE);
             }
             ("metric", ParameterValue::String(text)) => {
                 manner.metric = Some(text.trim().to_owned()).filter(|text| !text.is_empty());

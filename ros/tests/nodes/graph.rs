@@ -151,7 +151,8 @@ fn parameters_are_declared_listed_and_set() {
     let (server, client) = (node(domain, "server", "-p period:=2 -p unknown:=1"), node(domain, "client", ""));
     let changes = Arc::new(Mutex::new(Vec::new()));
     let hear = Arc::clone(&changes);
-    let declared = |name, value, is_dynamic| Declared { name, description: "", value, is_dynamic };
+    let declared =
+        |name, value, is_dynamic| Declared { name, description: "", value, is_dynamic, check: |_| Ok(()) };
     let warnings = server
         .declare(
             vec![

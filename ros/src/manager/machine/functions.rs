@@ -23,6 +23,23 @@ const AGAIN: Duration = Duration::from_secs(2);
 /// After a refusal, the design is tried again so much later.
 const REFUSED: Duration = Duration::from_secs(60);
 
+/// Time during which a granted mode is believed although the mode manager reports another one.
+///
+/// `system_modes` answers `change_mode` before the node has changed, and `get_mode` returns the old mode until its observer has noticed
+/// the change. A manager that believes the old mode requests the new one again, which causes the next report.
+const GRANT: Duration = Duration::from_secs(2);
+
+/// A mode that was granted recently.
+#[derive(Debug)]
+pub(super) struct Grant {
+    /// End of the period in which reports of other modes are not believed.
+    until: Duration,
+    /// Modes that were granted shortly before; reports of them may be late.
+    earlier: Vec<String>,
+    /// Whether another mode was reported.
+    is_contradicted: bool,
+}
+
 impl Machine {
     /// A function that nobody needs gets the mode for that.
     pub(super) fn unground(&mut self, function: &str) {
@@ -50,7 +67,7 @@ impl Machine {
         match outcome {
             Outcome::Done => {
                 self.pending.remove(&function);
-                self.modes.insert(function.clone(), mode.clone());
+                self.grant(&function, &mode);
                 self.trouble.entry(function.clone()).or_default().silences = 0;
                 match effect {
                     Some(effect) => self.acknowledge(effect),
@@ -101,6 +118,35 @@ impl Machine {
         self.outputs.push(Output::Look(function.to_owned()));
     }
 
+    /// Records a granted mode.
+    fn grant(&mut self, function: &str, mode: &str) {
+        let before = self.modes.insert(function.to_owned(), mode.to_owned());
+        let mut earlier = match self.grants.remove(function) {
+            Some(grant) if grant.until > self.now => grant.earlier,
+            _ => Vec::new(),
+        };
+        earlier.extend(before);
+        let grant = Grant { until: self.now + GRANT, earlier, is_contradicted: false };
+        self.grants.insert(function.to_owned(), grant);
+    }
+
+    /// A mode manager has received a request for a mode. Unlike a reported mode, a request for a mode that we have not requested recently comes
+    /// from another client, so that it ends the period of [`GRANT`].
+    pub(super) fn mode_requested(&mut self, function: &str, mode: &str) -> String {
+        if self.modes.get(function).is_some_and(|current| current == mode) {
+            return format!("{function} was requested to have the mode {mode}, which it has");
+        }
+        let is_ours = |grant: &Grant| grant.earlier.iter().any(|earlier| earlier == mode);
+        let is_late = self.grants.get(function).is_some_and(|grant| grant.until > self.now && is_ours(grant));
+        if is_late {
+            return format!("{function} reports the earlier request of the mode {mode}");
+        }
+        if !self.pending.contains_key(function) {
+            self.grants.remove(function);
+        }
+        self.mode(function, mode)
+    }
+
     /// A function was seen with a mode.
     pub(super) fn mode(&mut self, function: &str, mode: &str) -> String {
         let because = format!("{function} was seen with the mode {mode}");
@@ -113,7 +159,12 @@ impl Machine {
             return because;
         }
         if self.modes.get(function).map(String::as_str) == Some(mode) {
+            self.grants.remove(function);
             return because;
+        }
+        if let Some(grant) = self.grants.get_mut(function).filter(|grant| grant.until > self.now) {
+            grant.is_contradicted = true;
+            return format!("{because}, which may be the mode before the change");
         }
         self.modes.insert(function.to_owned(), mode.to_owned());
         self.came_late(function, mode);
@@ -176,6 +227,13 @@ impl Machine {
         for design in back {
             self.say(&Event::Design { design, realisable: true });
         }
+        self.grants.retain(|function, grant| {
+            let is_over = grant.until <= now;
+            if is_over && grant.is_contradicted {
+                self.outputs.push(Output::Look(function.clone()));
+            }
+            !is_over
+        });
         if self.ticks && self.state == State::Execute {
             self.say(&Event::Tick);
         }

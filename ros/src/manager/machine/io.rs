@@ -22,8 +22,10 @@ pub(in crate::manager) enum Input {
     Cancel(u64, String),
     /// A function has answered to a call, or has not.
     Changed(Change, Outcome),
-    /// The mode that a function was seen to have, by what it tells or by asking.
+    /// The current mode of a function, as its mode manager has answered.
     Mode(String, String),
+    /// The mode that a client has requested from a function's mode manager.
+    ModeRequested(String, String),
     /// Something about a function has changed that does not say its mode.
     Touched(String),
     /// An action has ended.

@@ -20,6 +20,8 @@ use serde_json::json;
 use crate::manager::settings::Settings;
 use crate::perform::Call;
 
+use functions::Grant;
+
 pub(super) use io::{Change, Ended, Input, Outcome, Output, State};
 
 /// The goal of nobody.
@@ -68,6 +70,8 @@ pub(super) struct Machine {
     pending: BTreeMap<String, Change>,
     /// The mode that each function was last heard to have.
     modes: BTreeMap<String, String>,
+    /// Modes that were granted recently, by function.
+    grants: BTreeMap<String, Grant>,
     action: Option<Action>,
     /// Who waits for the answer to the request of a task, and to the end of one.
     waiting: Vec<u64>,
@@ -103,6 +107,7 @@ impl Machine {
             task,
             pending: BTreeMap::new(),
             modes: BTreeMap::new(),
+            grants: BTreeMap::new(),
             action: None,
             waiting: Vec::new(),
             ending: Vec::new(),
@@ -160,6 +165,7 @@ impl Machine {
             Input::Cancel(number, task) => self.cancel(Some(number), &task),
             Input::Changed(change, outcome) => self.changed(change, outcome),
             Input::Mode(function, mode) => self.mode(&function, &mode),
+            Input::ModeRequested(function, mode) => self.mode_requested(&function, &mode),
             Input::Touched(function) => {
                 if !self.pending.contains_key(&function) {
                     self.outputs.push(Output::Look(function.clone()));

@@ -222,7 +222,7 @@ fn what_somebody_else_has_changed_is_adopted_or_taken_back() {
     robot.obey(outputs);
     // What we have asked for is not news.
     assert_eq!(robot.hear(Input::Mode(PATH.to_owned(), "fd_spiral_high".to_owned())), []);
-    let outputs = robot.hear(Input::Mode(PATH.to_owned(), "fd_spiral_low".to_owned()));
+    let outputs = robot.hear(Input::ModeRequested(PATH.to_owned(), "fd_spiral_low".to_owned()));
     assert_eq!(
         changes(&outputs),
         [(PATH, "fd_spiral_high")],
@@ -231,11 +231,42 @@ fn what_somebody_else_has_changed_is_adopted_or_taken_back() {
     robot.obey(outputs);
     let outputs = robot.hear(Input::Touched(MOTION.to_owned()));
     assert_eq!(outputs, [Output::Look(MOTION.to_owned())]);
+    robot.now += Duration::from_secs(2);
     let outputs = robot.hear(Input::Mode(MOTION.to_owned(), "fd_unground".to_owned()));
     assert_eq!(changes(&outputs), [(MOTION, "fd_all_thrusters")], "it is needed");
     // A mode that no design has is none.
     let outputs = robot.hear(Input::Mode(RECHARGE.to_owned(), "inactive".to_owned()));
     assert_eq!(changes(&outputs), []);
+}
+
+#[test]
+fn a_granted_mode_is_requested_once_although_the_old_one_is_reported() {
+    let mut robot = Robot::new(None);
+    let outputs = robot.request("search_pipeline");
+    robot.obey(outputs);
+    let outputs = robot.measure("water_visibility", "2.3");
+    assert_eq!(changes(&outputs), [(PATH, "fd_spiral_medium")]);
+    robot.obey(outputs);
+    // Each change of the node causes an event, after which the observer of `system_modes` still has the old mode.
+    let seen = |mode: &str| Input::Mode(PATH.to_owned(), mode.to_owned());
+    for _ in 0..20 {
+        assert_eq!(robot.hear(seen("fd_spiral_high")), []);
+    }
+    let late = Input::ModeRequested(PATH.to_owned(), "fd_spiral_high".to_owned());
+    assert_eq!(robot.hear(late), [], "our own request before this one");
+    robot.now += Duration::from_secs(2);
+    assert_eq!(robot.hear(Input::Tick), [Output::Look(PATH.to_owned())], "asked again after the period");
+    let outputs = robot.hear(seen("fd_spiral_high"));
+    assert_eq!(changes(&outputs), [(PATH, "fd_spiral_medium")], "it really has another mode");
+}
+
+#[test]
+fn a_request_of_another_client_is_believed_at_once() {
+    let mut robot = Robot::new(None);
+    let outputs = robot.request("search_pipeline");
+    robot.obey(outputs);
+    let outputs = robot.hear(Input::ModeRequested(MOTION.to_owned(), "fd_recover_thrusters".to_owned()));
+    assert_eq!(changes(&outputs), [(MOTION, "fd_all_thrusters")]);
 }
 
 #[test]

@@ -13,7 +13,7 @@ use smol::{Timer, channel};
 
 use crate::interfaces::Action;
 use crate::node::action::{GoalEnd, POLL, expect_action};
-use crate::node::graph::{Graph, Server};
+use crate::node::graph::{Graph, Server, Topics};
 use crate::node::rmw::Mapping;
 use crate::node::{Node, client_name, latched, not_made, qos};
 
@@ -148,8 +148,8 @@ impl<A: Action + 'static> ActionCaller<A> {
         connection: &'c mut Option<Arc<Connection<A>>>,
         within: Duration,
     ) -> Result<&'c Arc<Connection<A>>, String> {
-        let (requests, replies) = goal_topics(&self.full);
-        let found = self.node.graph.wait(within, |graph| graph.server(&requests, &replies)).await;
+        let topics = goal_topics(&self.full);
+        let found = self.node.graph.wait(within, |graph| graph.server(&topics)).await;
         let server =
             found.ok_or_else(|| format!("nobody serves it after {:.1} s", within.as_secs_f64()))??;
         if connection.as_ref().is_none_or(|own| own.server != server) {
@@ -193,11 +193,11 @@ impl<A: Action + 'static> Connection<A> {
 
     /// Hands on what is heard of all goals, as long as there are any.
     async fn run(&self, graph: &Graph, full: &str) {
-        let (requests, replies) = goal_topics(full);
+        let topics = goal_topics(full);
         let mut absent = 0;
         loop {
             self.poll();
-            absent = if graph.server(&requests, &replies).is_some() { 0 } else { absent + 1 };
+            absent = if graph.server(&topics).is_some() { 0 } else { absent + 1 };
             if absent > GONE {
                 for followed in std::mem::take(&mut *self.goals()).into_values() {
                     let because = format!("nobody serves {full} any more");
@@ -242,9 +242,9 @@ impl<A: Action + 'static> Connection<A> {
     }
 }
 
-/// The topics of the requests and replies of the service that takes goals.
-fn goal_topics(full: &str) -> (String, String) {
-    (format!("rq{full}/_action/send_goalRequest"), format!("rr{full}/_action/send_goalReply"))
+/// Topics of the service that accepts goals.
+fn goal_topics(action: &str) -> Topics {
+    Topics::of(&format!("{action}/_action/send_goal"))
 }
 
 impl Node {
