@@ -122,7 +122,12 @@ impl Driver {
         stop: &AtomicBool,
     ) -> Result<(), Message> {
         let (mut kept, mut asked, mut said) = (Vec::new(), Vec::new(), Instant::now());
+        let mut next_diagnostic = Instant::now();
         loop {
+            if Instant::now() >= next_diagnostic {
+                next_diagnostic = Instant::now() + PERIOD;
+                self.diagnose();
+            }
             let missing = smol::block_on(self.robot.wait(LOOK));
             // A writer of diagnostics may come later: nothing is changed before it speaks.
             let is_there = missing.iter().all(|text| text.contains("/diagnostics"));

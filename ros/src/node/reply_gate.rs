@@ -92,7 +92,7 @@ mod tests {
     use super::{ReplyGate, RmwRequestId, TIMEOUT};
 
     fn id(client: u8, sequence_number: i64) -> RmwRequestId {
-        let gid = serde_json::from_value(serde_json::json!([client; 16])).expect("a GID");
+        let gid = serde_json::from_value(serde_json::json!(vec![client; 16])).expect("a GID");
         RmwRequestId { writer_gid: gid, sequence_number }
     }
 

@@ -21,6 +21,7 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["ROS_DOMAIN_ID"] = str(random.randrange(1, 100))
 
 import rclpy  # noqa: E402  (reads the environment)
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
 from lifecycle_msgs.srv import GetState  # noqa: E402
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue  # noqa: E402
 from rcl_interfaces.srv import SetParameters  # noqa: E402
@@ -153,6 +154,19 @@ def fresh_clients(count: int) -> None:
     print(f"  {count} answers: median {1000 * median:.1f} ms, longest {1000 * longest:.1f} ms", flush=True)
 
 
+def waiting() -> None:
+    """The manager reports on `/diagnostics` that it waits for the robot."""
+    node, levels = Node("watchdog"), []
+    node.create_subscription(
+        DiagnosticArray, "/diagnostics", lambda array: levels.extend(own.level for own in array.status), 10
+    )
+    with nodes(node), program("--as", "manager", "--mission", str(MISSION)):
+        time.sleep(8.0)
+    check(set(levels), {DiagnosticStatus.STALE}, "levels on /diagnostics")
+    if not 3 <= len(levels) <= 9:
+        raise Failure(f"{len(levels)} diagnostics in 8 s, one a second expected")
+
+
 def parameters() -> None:
     """Values that cannot be used are refused."""
     node = Node("setter")
@@ -170,6 +184,7 @@ SCENARIOS = {
     "manager_500ms": lambda: manager(0.5),
     "fresh_clients": lambda: fresh_clients(20),
     "parameters": parameters,
+    "waiting": waiting,
 }
 
 
