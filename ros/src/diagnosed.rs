@@ -1,16 +1,18 @@
-//! `/diagnostics` to lines of events: what MROS's, ROSA's and PLANTA's monitors say of components and attributes.
+//! `/diagnostics` to lines of events: what MROS's, ROSA's and PLANTA's monitors say of components and attributes, and what the rules
+//! of `ros.toml` make of the diagnostics of drivers.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use metaplan::message::Message;
 
+use crate::diagnostic_rules::{COMPONENT, DiagnosticRule, MEASUREMENT};
 use crate::interfaces::diagnostic_msgs::msg::{DiagnosticArray, DiagnosticStatus, KeyValue};
 use crate::interfaces::std_msgs::msg::Header;
 use crate::node::{Node, keep_all};
 
-/// The messages by which diagnostics say what concerns us, in the spelling of MROS.
-const CONCERN: [&str; 2] = ["QA status", "Component status"];
+/// Upper limit on the number of warnings about statuses that nothing uses.
+const MAX_UNUSED: usize = 20;
 
 /// What was diagnosed and not yet handled: of each thing the last that was said of it, so that nobody falls behind who is told faster than
 /// he can follow.
@@ -27,21 +29,42 @@ struct Waiting {
 }
 
 impl Diagnosed {
-    /// Listens; says when something waits that nothing waited before. What says the same as before does not wait.
-    pub(crate) fn hear(node: &Arc<Node>, waits: impl Fn() + Send + 'static) -> Result<Self, Message> {
+    /// Subscribes; calls `waits` when something waits and nothing waited before. What says the same as before does not wait. A status at
+    /// level WARN or above that nothing uses is reported once, with a rule that would use it.
+    pub(crate) fn hear(
+        node: &Arc<Node>,
+        rules: &[DiagnosticRule],
+        waits: impl Fn() + Send + 'static,
+    ) -> Result<Self, Message> {
         let own = Self::default();
         let waiting = Arc::clone(&own.waiting);
+        let rules = rules.to_vec();
+        let weak = Arc::downgrade(node);
+        let own_name = node.full_name().trim_start_matches('/').to_owned();
+        let mut unused: Vec<String> = Vec::new();
         let mut last: HashMap<String, Vec<KeyValue>> = HashMap::new();
         node.subscribe::<DiagnosticArray>("/diagnostics", keep_all(), move |array| {
             let mut waiting = waiting.lock().unwrap_or_else(PoisonError::into_inner);
             let nobody_waits = waiting.statuses.is_empty();
             waiting.header = array.header;
-            for status in array.status.into_iter().filter(|own| CONCERN.contains(&own.message.as_str())) {
-                let keys: Vec<&str> = status.values.iter().map(|pair| pair.key.as_str()).collect();
-                let key = format!("{}\u{0}{}", status.message, keys.join("\u{0}"));
-                if last.insert(key.clone(), status.values.clone()).as_ref() != Some(&status.values) {
-                    waiting.statuses.retain(|(known, _)| *known != key);
-                    waiting.statuses.push((key, status));
+            for status in array.status {
+                let statuses = translated(&rules, &status);
+                let is_new = statuses.is_empty()
+                    && status.level >= DiagnosticStatus::WARN
+                    && !status.name.starts_with(&own_name)
+                    && unused.len() < MAX_UNUSED
+                    && !unused.contains(&status.name);
+                if is_new && let Some(node) = weak.upgrade() {
+                    node.warn_once(&suggestion(&status));
+                    unused.push(status.name.clone());
+                }
+                for status in statuses {
+                    let keys: Vec<&str> = status.values.iter().map(|pair| pair.key.as_str()).collect();
+                    let key = format!("{}\u{0}{}", status.message, keys.join("\u{0}"));
+                    if last.insert(key.clone(), status.values.clone()).as_ref() != Some(&status.values) {
+                        waiting.statuses.retain(|(known, _)| *known != key);
+                        waiting.statuses.push((key, status));
+                    }
                 }
             }
             if nobody_waits && !waiting.statuses.is_empty() {
@@ -59,4 +82,30 @@ impl Diagnosed {
         // Texts and numbers are always data.
         serde_json::to_string(&DiagnosticArray { header, status }).unwrap_or_default()
     }
+}
+
+/// Statuses that the loop understands: the status itself if a monitor of MROS has published it, and what rules make of it.
+fn translated(rules: &[DiagnosticRule], status: &DiagnosticStatus) -> Vec<DiagnosticStatus> {
+    let mut statuses: Vec<DiagnosticStatus> =
+        rules.iter().filter_map(|rule| rule.translate(status)).collect();
+    let spelling =
+        [MEASUREMENT, COMPONENT].into_iter().find(|known| status.message.eq_ignore_ascii_case(known));
+    statuses
+        .extend(spelling.map(|message| DiagnosticStatus { message: message.to_owned(), ..status.clone() }));
+    statuses
+}
+
+/// A warning about a status that nothing uses.
+fn suggestion(status: &DiagnosticStatus) -> String {
+    let level = match status.level {
+        DiagnosticStatus::WARN => "WARN",
+        DiagnosticStatus::ERROR => "ERROR",
+        _ => "STALE",
+    };
+    format!(
+        "the diagnostic `{name}` ({level}: {message}) changes nothing; a rule in ros.toml makes it the status of a component: \
+         [[diagnostics]] name = {name:?}, component = \"COMPONENT\"",
+        name = status.name,
+        message = status.message
+    )
 }

@@ -2,6 +2,7 @@
 
 pub mod controller;
 mod diagnosed;
+mod diagnostic_rules;
 pub mod interfaces;
 pub mod manager;
 pub mod node;

@@ -57,5 +57,5 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
     let configurator = Configurator::new(knowledge, Wishes::default())?;
     let keeping = Keeping::new(Keeper::new(configurator, Some(LIMIT)), settings.functions);
     let memory = options.journal.as_deref().map(MemoryFile::open).transpose().map_err(one)?;
-    Network::connect(node, keeping, memory)?.run(stop).map_err(one)
+    Network::connect(node, keeping, &settings.diagnostics, memory)?.run(stop).map_err(one)
 }

@@ -72,7 +72,8 @@ impl Robot {
         inputs: Sender<Input>,
     ) -> Result<Self, Message> {
         let heard = inputs.clone();
-        let diagnosed = Diagnosed::hear(node, move || drop(heard.send(Input::Diagnosed)))?;
+        let diagnosed =
+            Diagnosed::hear(node, &settings.diagnostics, move || drop(heard.send(Input::Diagnosed)))?;
         let mut own = BTreeMap::new();
         for function in functions {
             hear_function(node, settings, function, &inputs)?;

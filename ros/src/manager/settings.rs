@@ -6,6 +6,7 @@ use std::path::Path;
 use metaplan::message::Message;
 use serde::Deserialize;
 
+use crate::diagnostic_rules::DiagnosticRule;
 use crate::performer::{By, Offered, Poses};
 
 /// The mode of a function that nobody needs.
@@ -21,6 +22,9 @@ pub struct Settings {
     /// What `system_modes` calls functions and designs, where that differs.
     #[serde(default)]
     pub functions: Functions,
+    /// Diagnostics of drivers that report a component or measure an attribute.
+    #[serde(default)]
+    pub diagnostics: Vec<DiagnosticRule>,
     /// The autopilot, if there is one.
     pub autopilot: Option<Autopilot>,
     /// Who carries out an action, by its name; the rest are done as soon as they are begun.

@@ -10,6 +10,7 @@ use ros2_client::action::GoalId;
 use smol::Task;
 
 use crate::diagnosed::Diagnosed;
+use crate::diagnostic_rules::DiagnosticRule;
 use crate::interfaces::mros2_msgs::action::{ControlQos, ControlQosFeedback, ControlQosResult};
 use crate::interfaces::mros2_msgs::msg::QoS;
 use crate::interfaces::mros2_msgs::srv::{MetacontrolFD, MetacontrolFDRequest};
@@ -61,6 +62,7 @@ impl Network {
     pub(super) fn connect(
         node: &Arc<Node>,
         keeping: Keeping,
+        rules: &[DiagnosticRule],
         memory: Option<MemoryFile>,
     ) -> Result<Self, Errors> {
         let one = |message: Message| vec![message];
@@ -71,7 +73,8 @@ impl Network {
         )?;
         let (sender, inputs) = mpsc::channel();
         let heard = sender.clone();
-        let diagnosed = Diagnosed::hear(node, move || drop(heard.send(Input::Diagnosed))).map_err(one)?;
+        let diagnosed =
+            Diagnosed::hear(node, rules, move || drop(heard.send(Input::Diagnosed))).map_err(one)?;
         let heard = sender.clone();
         let goals = node.serve_action::<ControlQos>("/mros/objective", move |event| {
             let input = match event {

@@ -154,6 +154,31 @@ def fresh_clients(count: int) -> None:
     print(f"  {count} answers: median {1000 * median:.1f} ms, longest {1000 * longest:.1f} ms", flush=True)
 
 
+def driver() -> None:
+    """A driver's own diagnostic adapts the robot with three lines of configuration; without them a warning suggests them."""
+    rule = '\n[[diagnostics]]\nname = "thruster_1: *"\ncomponent = "c_thruster_1"\n'
+    for extra in (rule, ""):
+        modes, monitors = ModeManager(0.0), Monitors()
+        with tempfile.NamedTemporaryFile("w", suffix=".toml") as settings:
+            settings.write((MISSION.parent / "ros.toml").read_text() + extra)
+            settings.flush()
+            arguments = ("--as", "manager", "--mission", str(MISSION), "--settings", settings.name)
+            with nodes(modes, monitors), program(*arguments) as log:
+                time.sleep(2.0)
+                monitors.measure("water_visibility", 3.5)
+                request(monitors, Task, "/task/request", Task.Request(task_name="search_pipeline"), 10.0)
+                settle(modes)
+                status = DiagnosticStatus(
+                    level=DiagnosticStatus.ERROR, name="thruster_1: motor driver", message="No current"
+                )
+                monitors.publisher.publish(DiagnosticArray(status=[status]))
+                found = settle(modes)["f_maintain_motion"]
+                expected = ["fd_all_thrusters", "fd_recover_thrusters"] if extra else ["fd_all_thrusters"]
+                check(found, expected, f"modes after the diagnostic, with rule: {bool(extra)}")
+                warned = "thruster_1: motor driver" in pathlib.Path(log.name).read_text()
+                check(warned, not extra, f"a warning about the diagnostic, with rule: {bool(extra)}")
+
+
 def waiting() -> None:
     """The manager reports on `/diagnostics` that it waits for the robot."""
     node, levels = Node("watchdog"), []
@@ -182,8 +207,9 @@ SCENARIOS = {
     "manager": lambda: manager(0.0),
     "manager_50ms": lambda: manager(0.05),
     "manager_500ms": lambda: manager(0.5),
-    "fresh_clients": lambda: fresh_clients(20),
+    "fresh_clients": lambda: fresh_clients(8),
     "parameters": parameters,
+    "driver": driver,
     "waiting": waiting,
 }
 
