@@ -52,9 +52,9 @@ pub(super) fn tokens(arguments: &[&Literal]) -> Vec<Literal> {
     regex.split(text).filter(|token| seen.insert(*token)).map(|token| Literal::String(token.into())).collect()
 }
 
-/// What is wrong with a pattern and its flags, if anything.
+/// What is wrong with a pattern and its flags, if anything; a pattern that is well-formed and too large matches nothing.
 pub(super) fn fault(pattern: &str, flags: &str) -> Option<String> {
-    build(pattern, flags).err()
+    build(pattern, flags).err().filter(|reason| !reason.contains("size limit"))
 }
 
 fn compile(pattern: &str, flags: &str) -> Option<Regex> {

@@ -66,6 +66,11 @@ impl Equality {
                 || fact.arguments.iter().all(|&symbol| symbols.as_literal(symbol).is_none()))
     }
 
+    /// Whether any two names stand for one individual.
+    pub fn joins(&self) -> bool {
+        !self.classes.edges.is_empty()
+    }
+
     fn is_stated_pair(&self, fact: &Fact) -> bool {
         self.pairs.get(&fact.arguments[0]).is_some_and(|pairs| pairs.contains(fact))
     }

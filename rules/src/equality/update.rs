@@ -12,7 +12,7 @@ use crate::engine::{Delta, Engine};
 use crate::error::Error;
 use crate::fact::Fact;
 use crate::forest::Forest;
-use crate::rule::{Program, Rule, RuleIdentity};
+use crate::rule::Program;
 use crate::store::{Record, state};
 use crate::symbol::Symbol;
 
@@ -135,20 +135,13 @@ impl<'e> Update<'e> {
     }
 
     fn change_classes(&mut self, added: &[Fact], removed: &[Fact]) -> Result<(), Error> {
-        let gone = self.removed_rules();
-        let invalid = self.equality.classes.resting_on(removed, &gone);
+        if let Some(program) = &self.program {
+            self.equality.constants.extend(constants(program));
+        }
+        let invalid = self.equality.classes.resting_on(removed.iter());
         self.take_apart(&invalid, added);
         self.join_stated(added);
         self.flush()
-    }
-
-    /// The identities of the rules that go with this update; the constants of those that come are noted.
-    fn removed_rules(&mut self) -> FxHashSet<RuleIdentity> {
-        let Some(program) = &self.program else { return FxHashSet::default() };
-        self.equality.constants.extend(constants(program));
-        let kept: FxHashSet<&Rule> = program.rules.iter().collect();
-        let gone = self.engine.program.rules.iter().filter(|rule| !kept.contains(rule));
-        gone.map(|rule| rule.identity.clone()).collect()
     }
 
     /// The facts that a row stands for.
