@@ -81,6 +81,12 @@ pub const CODES: &[[&str; 4]] = &[
         "Convert it to Turtle, RDF/XML, OWL/XML, N-Triples or the functional syntax.",
     ],
     [
+        "O114",
+        "A statement about an individual without a name cannot be retracted.",
+        "A blank node of one document is never an individual of another one, so no statement of the knowledge base is meant.",
+        "Give the individual a name in both documents.",
+    ],
+    [
         "O201",
         "A name is used and declared nowhere.",
         "A property or class has no declaration; its kind is taken from its use.",
@@ -115,6 +121,18 @@ pub const CODES: &[[&str; 4]] = &[
         "An import is left out.",
         "It is found nowhere, and `--ignore-missing-imports` was given.",
         "Nothing, if the import does not matter; otherwise see O103.",
+    ],
+    [
+        "O207",
+        "A document retracts what is not stated.",
+        "The statement is misspelt, is stated in other words, or only follows from other statements.",
+        "Retract the statements from which it follows; `reason --why` shows them.",
+    ],
+    [
+        "O208",
+        "The import of an update is not followed.",
+        "Documents for `--assert` and `--retract` mean their own statements only.",
+        "Name the imported file as a document of the knowledge base, or with `--assert` of its own.",
     ],
     [
         "O301",

@@ -157,6 +157,14 @@ pub enum Error {
         /// Why not.
         reason: String,
     },
+    /// O114: a retracted statement about an individual without a name.
+    #[error(
+        "error[O114]: {statement} cannot be retracted: an individual without a name is another one in each document"
+    )]
+    Nameless {
+        /// The statement in functional-style syntax.
+        statement: String,
+    },
     /// O109: the engine cannot make the change.
     #[error("error[O109]: {0}")]
     Engine(#[from] rules::Error),
@@ -175,6 +183,7 @@ impl Error {
             Self::Unknown { .. } => "O106",
             Self::BadName { .. } => "O107",
             Self::Exists { .. } => "O108",
+            Self::Nameless { .. } => "O114",
             Self::Engine(_) => "O109",
             Self::NotANumber { .. } => "O110",
             Self::TooDeep { .. } => "O112",
@@ -256,6 +265,27 @@ pub enum Warning {
         "warning[O206]: {}: the import <{import}> is left out: found nowhere", place(file, position.as_ref())
     )]
     MissingImport {
+        /// The document that imports.
+        file: String,
+        /// Where it names the import, unless the syntax spells it in another way there.
+        position: Option<Position>,
+        /// The IRI that it imports.
+        import: String,
+    },
+    /// O207: a document takes away what is not stated.
+    #[error(
+        "warning[O207]: nothing states {statement}, so it cannot be retracted; what follows from other statements stays"
+    )]
+    NotStated {
+        /// The statement in functional-style syntax.
+        statement: String,
+    },
+    /// O208: a document that changes a knowledge base imports another one.
+    #[error(
+        "warning[O208]: {}: the import <{import}> is not followed, because the document changes a knowledge base; name \
+         its file as a document of the knowledge base", place(file, position.as_ref())
+    )]
+    ImportOfUpdate {
         /// The document that imports.
         file: String,
         /// Where it names the import, unless the syntax spells it in another way there.
@@ -390,6 +420,8 @@ impl Warning {
             Self::UnknownArgument { .. } => "O204",
             Self::SameOntologyTwice { .. } => "O205",
             Self::MissingImport { .. } => "O206",
+            Self::NotStated { .. } => "O207",
+            Self::ImportOfUpdate { .. } => "O208",
             Self::OutsideProfile { .. } => "O301",
             Self::UnusableRule { .. } => "O302",
             Self::DisabledRule { .. } => "O303",

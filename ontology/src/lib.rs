@@ -21,6 +21,7 @@ mod names;
 mod normalize;
 mod ntriples;
 mod read;
+mod revise;
 mod triples;
 mod write;
 
@@ -35,6 +36,7 @@ pub use lower::{AXIOM_SOURCE, Equality, INTERNAL, Lowered, lower, lower_together
 pub use ntriples::ntriples;
 pub use owl::*;
 pub use read::{ReadOptions, Syntax, read_files, read_text};
+pub use revise::{Change, Stated};
 pub use write::{OutputSyntax, convert_files, turtle};
 pub use {num_rational::BigRational, rules};
 

@@ -13,6 +13,7 @@ mod mutations;
 mod read;
 mod real;
 mod real_tomasys;
+mod revise;
 mod robust;
 mod runtime;
 mod trace;

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use ontology::{Error, Ontology, ReadOptions, Syntax, read_files, read_text};
+use ontology::{Error, Ontology, ReadOptions, Syntax, Warning, read_files, read_text};
 
 const PREFIXES: &str = "@prefix : <http://e/#> .
 @prefix owl: <http://www.w3.org/2002/07/owl#> .
@@ -436,5 +436,30 @@ fn triples_in_lines_are_checked() {
         let axioms: Vec<String> =
             ontology.axioms.iter().map(|annotated| annotated.axiom.to_string()).collect();
         assert_eq!(axioms, [expected]);
+    }
+}
+
+/// An axiom that treats an annotation property as another kind of property costs a warning, and not the document.
+#[test]
+fn annotation_properties_have_no_logical_axioms() {
+    let head = "@prefix : <http://e.org/#> . @prefix owl: <http://www.w3.org/2002/07/owl#> . \
+        @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> . @prefix xsd: <http://www.w3.org/2001/XMLSchema#> . \
+        <http://e.org/> a owl:Ontology . :n a owl:AnnotationProperty . :C a owl:Class . :D a owl:Class . :i a :C .\n";
+    let restriction = "[ a owl:Restriction ; owl:onProperty :n ; owl:allValuesFrom xsd:string ]";
+    for text in [
+        ":n owl:equivalentProperty :m . :m a owl:AnnotationProperty . :C rdfs:subClassOf :D .".to_owned(),
+        format!(":C rdfs:subClassOf :D , {restriction} ."),
+        format!(
+            ":C rdfs:subClassOf :D ; owl:equivalentClass [ a owl:Class ; owl:intersectionOf ( :D {restriction} ) ] ."
+        ),
+    ] {
+        let ontology = read_text(&format!("{head}{text}"), "text.ttl", &ReadOptions::default());
+        let ontology = ontology.unwrap_or_else(|errors| panic!("{errors}\n{text}"));
+        let axioms: Vec<String> =
+            ontology.axioms.iter().map(|annotated| annotated.axiom.to_string()).collect();
+        assert_eq!(axioms.len(), 2, "{axioms:?}");
+        let warned =
+            |warning: &Warning| warning.to_string().contains("annotation property has no logical axioms");
+        assert!(ontology.warnings.iter().any(warned), "{text}: {:?}", ontology.warnings);
     }
 }

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use ontology::{
-    Equality, Ontology, OutputSyntax, ReadOptions, convert_files, lower_with, read_files, turtle,
+    Equality, Ontology, OutputSyntax, ReadOptions, convert_files, lower_with, read_files, read_text, turtle,
 };
 use rules::{Engine, Symbols};
 
@@ -93,4 +93,25 @@ fn inferred_triples_as_turtle() {
          @prefix tomasys: <http://metacontrol.org/tomasys#> .\ntomasys:a a tomasys:B .\n"
     );
     assert!(turtle("no triple").is_err());
+}
+
+/// Axioms about annotation properties stay axioms, and an axiom about a single individual, which says nothing, is left out.
+#[test]
+fn functional_documents_are_legal() {
+    let directory = tempfile::tempdir().expect("a folder");
+    let file = directory.path().join("text.ttl");
+    let text = "@prefix : <http://e.org/#> . @prefix owl: <http://www.w3.org/2002/07/owl#> . \
+        @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> . <http://e.org/> a owl:Ontology . \
+        :l a owl:AnnotationProperty ; rdfs:subPropertyOf rdfs:label ; rdfs:domain :C ; rdfs:range rdfs:Literal . \
+        :C a owl:Class . :a a owl:NamedIndividual . [] a owl:AllDifferent ; owl:distinctMembers ( :a ) .";
+    std::fs::write(&file, text).expect("written");
+    for syntax in [OutputSyntax::Functional, OutputSyntax::OwlXml] {
+        let (text, _) = convert_files(&[&file], &ReadOptions::default(), syntax).expect("written");
+        for axiom in ["SubAnnotationPropertyOf", "AnnotationPropertyDomain", "AnnotationPropertyRange"] {
+            assert!(text.contains(axiom), "{axiom}: {text}");
+        }
+        assert!(!text.contains("DifferentIndividuals") && !text.contains("AnnotationAssertion"), "{text}");
+        let known = read_text(&text, "again", &ReadOptions::default()).expect("legal");
+        assert_eq!(known.annotations.len(), 3, "{known:?}");
+    }
 }

@@ -108,7 +108,7 @@ impl Engine {
         // To derive everything anew would take longer than whoever interrupts wants to wait.
         let before = self.limits.interrupt.is_some().then(|| self.clone());
         let result = match self.equality.take() {
-            Some(equality) => self.apply_equally(equality, &delta),
+            Some(equality) => self.apply_equally(equality, &delta, None),
             None => self.apply_plainly(delta),
         };
         if let Ok(changed) = &result {
@@ -124,7 +124,7 @@ impl Engine {
     }
 
     /// On an error also what takes the change back.
-    fn apply_plainly(&mut self, delta: Delta) -> Result<Delta, (Error, Delta)> {
+    pub(crate) fn apply_plainly(&mut self, delta: Delta) -> Result<Delta, (Error, Delta)> {
         self.replan().map_err(|error| (error, Delta::default()))?;
         let stated = state_change(self, delta);
         let mut maintenance = Maintenance::new(self);
@@ -176,7 +176,7 @@ impl Engine {
     }
 }
 
-fn check_fact(fact: &Fact, symbols: &Symbols) -> Result<(), Error> {
+pub(crate) fn check_fact(fact: &Fact, symbols: &Symbols) -> Result<(), Error> {
     if fact.arguments.len() > 32 {
         return Err(Error::FactArity { count: fact.arguments.len() });
     }

@@ -75,10 +75,16 @@ pub const CODES: &[[&str; 4]] = &[
         "Conclude the inner one by a rule of its own, and aggregate its conclusion.",
     ],
     [
+        "R210",
+        "A regular expression cannot be used.",
+        "It is ill-formed, or has a back reference or a named Unicode block, which are not supported.",
+        "Correct the pattern; the message shows it. Patterns are those of XPath, without back references.",
+    ],
+    [
         "R301",
         "The rules do not come to an end.",
         "The budget of steps is used up; usually a rule makes new values of its own conclusions, such as `swrlb:add` in a recursion.",
-        "Bound the recursion by a condition; the message names the rule. `reason --step-limit` raises the budget.",
+        "Bound the recursion by a condition; the message names the rule and the value that it made last. `reason --step-limit` raises the budget.",
     ],
     [
         "R302",

@@ -172,6 +172,11 @@ impl Engine {
         Arc::make_mut(&mut self.symbols)
     }
 
+    /// Takes the names and values of an engine that began as a clone of this one, and has interned more since.
+    pub fn adopt_symbols(&mut self, other: &Self) {
+        self.symbols = Arc::clone(&other.symbols);
+    }
+
     /// The rules.
     pub fn program(&self) -> &Program {
         &self.program

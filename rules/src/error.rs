@@ -174,13 +174,27 @@ pub enum Error {
         /// Which rule.
         rule: RuleIdentity,
     },
+    /// A regular expression that cannot be used.
+    #[error("R210 in rule {rule}, {built_in} has a pattern that cannot be used, `{pattern}`: {reason}")]
+    Pattern {
+        /// Which rule.
+        rule: RuleIdentity,
+        /// The built-in.
+        built_in: &'static str,
+        /// The pattern.
+        pattern: String,
+        /// What is wrong with it.
+        reason: String,
+    },
     /// The evaluation was stopped; the engine is as it was before the update.
-    #[error("R301 step budget of {budget} used up, last in rule {rule}")]
+    #[error("R301 step budget of {budget} used up, last in rule {rule}{}", growing(value.as_deref()))]
     BudgetExhausted {
         /// The rule that was being evaluated.
         rule: RuleIdentity,
         /// In steps.
         budget: u64,
+        /// The value that the rule computed last, in short, where values used up the budget.
+        value: Option<Box<str>>,
     },
     /// The evaluation was interrupted; the engine is as it was before the update.
     #[error("R304 interrupted, last in rule {rule}")]
@@ -221,6 +235,7 @@ impl Error {
             Self::Arity { .. } => "R207",
             Self::UnstratifiedAggregate { .. } => "R208",
             Self::NestedAggregate { .. } => "R209",
+            Self::Pattern { .. } => "R210",
             Self::BudgetExhausted { .. } => "R301",
             Self::UnknownSymbol { .. } => "R302",
             Self::FactArity { .. } => "R303",
@@ -246,4 +261,11 @@ impl Error {
 /// The built-in that the author of an unknown one may have meant.
 fn did_you_mean(iri: &str) -> String {
     BuiltIn::similar(iri).map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
+}
+
+/// That a rule makes new values of its own conclusions.
+fn growing(value: Option<&str>) -> String {
+    value.map_or_else(String::new, |value| {
+        format!(", which makes new values of its own conclusions; the last one is {value}")
+    })
 }

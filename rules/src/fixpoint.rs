@@ -388,7 +388,8 @@ impl Round<'_> {
             let Some(value) = function(&symbols, &block[start..start + width]) else { continue };
             let known = symbols.len();
             block[start + usize::from(result)] = intern(&mut symbols, value);
-            if symbols.len() > known && !self.budget.spend_on_value(rule) {
+            let computed = symbols.as_literal(block[start + usize::from(result)]);
+            if symbols.len() > known && !self.budget.spend_on_value(computed, rule) {
                 return Vec::new();
             }
             block.copy_within(start..start + width, kept);

@@ -1,10 +1,11 @@
 //! When evaluation stops before its end: a budget of steps, and a question that its caller answers.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::fmt;
 use std::sync::Arc;
 
 use crate::error::Error;
+use crate::literal::Literal;
 use crate::rule::RuleIdentity;
 
 /// How many steps one update may take, unless the caller says otherwise.
@@ -14,6 +15,12 @@ pub const DEFAULT_STEP_BUDGET: u64 = 10_000_000_000;
 /// a rule that counts, and its rounds are dear.
 const VALUE_STEPS: u64 = 25_000;
 
+/// A value costs [`VALUE_STEPS`] again for each so many bytes: a rule that doubles a number makes longer and longer ones.
+const BYTES_PER_VALUE: u64 = 8;
+
+/// A message shows at most so many characters of a value.
+const SHOWN_CHARACTERS: usize = 40;
+
 /// The caller is asked after so many rows at most.
 const ROWS_BETWEEN_QUESTIONS: u64 = 1 << 14;
 
@@ -21,7 +28,7 @@ const ROWS_BETWEEN_QUESTIONS: u64 = 1 << 14;
 #[derive(Clone, Debug)]
 pub struct Limits {
     /// How many steps one update may take. A step extends one partial match of a rule's body; a value that a recursive rule
-    /// computes for the first time costs 25,000.
+    /// computes for the first time costs 25,000, and as many for every 8 bytes of its digits or text.
     pub steps: u64,
     /// Asked every few thousand rows, which is some microseconds to a millisecond apart.
     pub interrupt: Option<Interrupt>,
@@ -66,6 +73,8 @@ pub(crate) struct Budget {
     /// Whether the rules that are evaluated feed on their own conclusions.
     pub recursive: Cell<bool>,
     stopped: Cell<Option<(Stop, u32)>>,
+    /// The last value that a recursive rule computed, once the budget is used up by values.
+    value: RefCell<Option<Box<str>>>,
 }
 
 impl Budget {
@@ -76,6 +85,7 @@ impl Budget {
             rows: Cell::new(ROWS_BETWEEN_QUESTIONS),
             recursive: Cell::new(false),
             stopped: Cell::new(None),
+            value: RefCell::new(None),
         }
     }
 
@@ -90,8 +100,16 @@ impl Budget {
     }
 
     /// Notes a value that a rule has computed for the first time; `false` once evaluation has to stop.
-    pub fn spend_on_value(&self, rule: u32) -> bool {
-        !self.recursive.get() || self.spend(VALUE_STEPS, rule)
+    pub fn spend_on_value(&self, value: Option<&Literal>, rule: u32) -> bool {
+        if !self.recursive.get() {
+            return true;
+        }
+        let size = value.map_or(0, Literal::size);
+        let goes_on = self.spend(VALUE_STEPS.saturating_mul(1 + size / BYTES_PER_VALUE), rule);
+        if !goes_on && self.value.borrow().is_none() {
+            self.value.replace(value.map(shown));
+        }
+        goes_on
     }
 
     /// Notes rows that a rule looked at; `false` once evaluation has to stop.
@@ -117,8 +135,23 @@ impl Budget {
     /// The error, once evaluation has stopped; `identity` names compiled rules.
     pub fn error(&self, identity: impl Fn(u32) -> RuleIdentity) -> Option<Error> {
         self.stopped.get().map(|(stop, rule)| match stop {
-            Stop::Exhausted => Error::BudgetExhausted { rule: identity(rule), budget: self.limits.steps },
+            Stop::Exhausted => Error::BudgetExhausted {
+                rule: identity(rule),
+                budget: self.limits.steps,
+                value: self.value.borrow().clone(),
+            },
             Stop::Interrupted => Error::Interrupted { rule: identity(rule) },
         })
     }
+}
+
+/// A value as a message shows it: a long one by its beginning and its length.
+fn shown(value: &Literal) -> Box<str> {
+    let text = value.lexical();
+    let length = text.chars().count();
+    if length <= SHOWN_CHARACTERS {
+        return text.into();
+    }
+    let start: String = text.chars().take(SHOWN_CHARACTERS).collect();
+    format!("{start}… ({length} characters)").into()
 }

@@ -59,6 +59,7 @@ pub(crate) fn compile(
 ) -> Result<Network, Errors> {
     let mut errors: Vec<Error> = program.rules.iter().flat_map(check).collect();
     errors.extend(program.rules.iter().filter_map(|rule| unknown_symbols(rule, symbols)));
+    errors.extend(program.rules.iter().filter_map(|rule| bad_pattern(rule, symbols)));
     if !errors.is_empty() {
         return Err(errors.into());
     }
@@ -101,6 +102,7 @@ pub(crate) fn revise(
 ) -> Result<Option<Revision>, Errors> {
     let mut errors: Vec<Error> = new.rules.iter().flat_map(check).collect();
     errors.extend(new.rules.iter().filter_map(|rule| unknown_symbols(rule, symbols)));
+    errors.extend(new.rules.iter().filter_map(|rule| bad_pattern(rule, symbols)));
     if !errors.is_empty() {
         return Err(errors.into());
     }
@@ -171,6 +173,20 @@ fn unknown_symbols(rule: &Rule, symbols: &Symbols) -> Option<Error> {
     });
     let unknown = predicates.chain(constants).find(|symbol| symbol.index() >= symbols.len())?;
     Some(Error::UnknownSymbol { index: unknown.index() })
+}
+
+/// A constant regular expression that cannot be used: its built-in would never hold.
+fn bad_pattern(rule: &Rule, symbols: &Symbols) -> Option<Error> {
+    let atoms = rule.head.iter().chain(&rule.body).flat_map(|atom| atom.parts().iter().chain([atom]));
+    atoms.into_iter().find_map(|atom| {
+        let Atom::BuiltIn { built_in, arguments } = atom else { return None };
+        let literal = |at: usize| match arguments.get(at)? {
+            Term::Constant(symbol) => symbols.as_literal(*symbol),
+            Term::Variable(_) => None,
+        };
+        let (pattern, reason) = built_in.bad_pattern(&literal)?;
+        Some(Error::Pattern { rule: rule.identity.clone(), built_in: built_in.name(), pattern, reason })
+    })
 }
 
 /// The stratum of each relation. Every relation depends on equality, but needs no stratum after it, since rows are

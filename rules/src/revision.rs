@@ -2,14 +2,18 @@
 //!
 //! The rules that stay keep their recorded derivations. What a removed rule concluded loses its support, as if a fact
 //! of its body had gone, and is rederived where another rule concludes it too; a new rule is evaluated once over
-//! everything that holds. Only where the strata of the rules that stay fall apart, or under equality, is everything derived
-//! anew.
+//! everything that holds. Everything is derived again only
+//! where the strata of the rules that stay fall apart, where equality is switched off, or where a rule goes while names
+//! are one.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use rustc_hash::FxHashSet;
 
+use crate::apply::check_fact;
 use crate::engine::{Delta, Engine};
+use crate::equality::Equality;
 use crate::error::{Error, Errors};
 use crate::fact::Fact;
 use crate::maintain::Maintenance;
@@ -17,6 +21,7 @@ use crate::network::{Revision, compile, revise};
 use crate::record::Records;
 use crate::rule::{Program, Rule, RuleIdentity};
 use crate::store::{RelationId, Store, state};
+use crate::vocabulary::SAME_AS;
 
 impl Engine {
     /// Replaces the rules and returns the net change of all facts that hold, sorted. The cost depends on the rules in
@@ -25,6 +30,9 @@ impl Engine {
     /// # Errors
     /// As [`Engine::new`]; the engine is then as it was before.
     pub fn set_program(&mut self, program: Program) -> Result<Delta, Errors> {
+        if self.equality.is_some() && program.equality {
+            return self.change(Delta::default(), program);
+        }
         if self.equality.is_some() || program.equality {
             return self.rebuild(program);
         }
@@ -39,6 +47,68 @@ impl Engine {
             self.restore(&Delta::default());
             error.into()
         })
+    }
+
+    /// Changes the stated facts and the rules in one step, and returns the net change of all facts that hold, sorted. Where the
+    /// program treats `owl:sameAs` as equality and the engine's did not, equality is switched on; it stays on.
+    ///
+    /// # Errors
+    /// As [`Engine::new`] and [`Engine::apply`]; the engine is then as it was before.
+    pub fn change(&mut self, delta: Delta, program: Program) -> Result<Delta, Errors> {
+        for fact in delta.insert.iter().chain(&delta.delete) {
+            check_fact(fact, &self.symbols)?;
+        }
+        let before = self.clone();
+        let change = match self.equality.is_some() || program.equality {
+            true => self.change_equally(delta, program),
+            false => self.change_plainly(delta, program),
+        };
+        if change.is_err() {
+            *self = before;
+        }
+        change
+    }
+
+    /// Deletes first, so that a rule that comes does not see what goes.
+    fn change_plainly(&mut self, delta: Delta, program: Program) -> Result<Delta, Errors> {
+        let kept: FxHashSet<&Fact> = delta.insert.iter().collect();
+        let delete = delta.delete.iter().filter(|fact| !kept.contains(fact)).cloned().collect();
+        let gone = self.apply(Delta { insert: Vec::new(), delete })?;
+        let changed = self.set_program(program)?;
+        let come = self.apply(Delta { insert: delta.insert, delete: Vec::new() })?;
+        Ok(net([gone, changed, come]))
+    }
+
+    fn change_equally(&mut self, mut delta: Delta, mut program: Program) -> Result<Delta, Errors> {
+        program.equality = true;
+        let kept: FxHashSet<&Rule> = program.rules.iter().collect();
+        let is_gone = |rule: &Rule| !kept.contains(rule);
+        // What a removed rule concluded may have made names one, on which further equalities rest.
+        if self.equality.as_ref().is_some_and(|equality| equality.joins())
+            && self.program.rules.iter().any(is_gone)
+        {
+            return self.rebuild_with(program, &delta);
+        }
+        let switched = if self.equality.is_none() { self.switch_on(&mut delta)? } else { Delta::default() };
+        let Some(equality) = self.equality.take() else { return Ok(switched) };
+        let change = self.apply_equally(equality, &delta, Some(program)).map_err(|(error, _)| error)?;
+        Ok(net([switched, change]))
+    }
+
+    /// Makes `owl:sameAs` equality, of which no rule concludes a pair: stated pairs become part of the change.
+    fn switch_on(&mut self, delta: &mut Delta) -> Result<Delta, Error> {
+        let same = self.symbols_mut().name(SAME_AS);
+        let equality = Equality::new(same, &self.program);
+        let gone: FxHashSet<&Fact> = delta.delete.iter().collect();
+        let pairs = self.matching_rows(same, &[None, None]).map(|row| Fact::new(same, row.iter().copied()));
+        let stated: Vec<Fact> = pairs.filter(|pair| self.is_asserted(pair)).collect();
+        let kept: Vec<Fact> = stated.iter().filter(|pair| !gone.contains(pair)).cloned().collect();
+        delta.insert.extend(kept);
+        let taken = self.apply(Delta { insert: Vec::new(), delete: stated })?;
+        let relation = self.store.relation(same, 2);
+        Arc::make_mut(&mut self.network).same = Some(relation);
+        self.equality = Some(Arc::new(equality));
+        Ok(taken)
     }
 
     /// Adds rules and returns the net change of all facts that hold, sorted.
@@ -129,7 +199,17 @@ impl Engine {
     }
 
     fn rebuild(&mut self, program: Program) -> Result<Delta, Errors> {
-        let stated = self.stated();
+        self.rebuild_with(program, &Delta::default())
+    }
+
+    fn rebuild_with(&mut self, program: Program, delta: &Delta) -> Result<Delta, Errors> {
+        let mut stated: FxHashSet<Fact> = self.stated().into_iter().collect();
+        delta.delete.iter().for_each(|fact| {
+            stated.remove(fact);
+        });
+        stated.extend(delta.insert.iter().cloned());
+        let mut stated: Vec<Fact> = stated.into_iter().collect();
+        stated.sort_unstable();
         let mut engine = Self::with_limits(self.symbols().clone(), program, stated, self.limits.clone())?;
         engine.disabled.clone_from(&self.disabled);
         let insert = engine.facts().filter(|fact| !self.holds(fact)).collect();
@@ -137,6 +217,27 @@ impl Engine {
         *self = engine;
         Ok(Delta { insert, delete })
     }
+}
+
+/// Changes one after another as one, sorted.
+fn net(changes: impl IntoIterator<Item = Delta>) -> Delta {
+    let mut signs: BTreeMap<Fact, i8> = BTreeMap::new();
+    for Delta { insert, delete } in changes {
+        for (facts, sign) in [(insert, 1), (delete, -1)] {
+            for fact in facts {
+                *signs.entry(fact).or_default() += sign;
+            }
+        }
+    }
+    let mut net = Delta::default();
+    for (fact, sign) in signs {
+        match sign {
+            1 => net.insert.push(fact),
+            -1 => net.delete.push(fact),
+            _ => {}
+        }
+    }
+    net
 }
 
 /// Rules that were compiled before give at most the error that they no longer fit together.

@@ -136,7 +136,7 @@ impl fmt::Display for RuleIdentity {
 }
 
 /// If the body holds, every head atom holds. An empty head is an integrity constraint, an empty body states facts.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub struct Rule {
     /// Which rule it is.
     pub identity: RuleIdentity,

@@ -28,7 +28,9 @@ impl Round<'_> {
                 let values: Vec<Symbol> =
                     values.into_iter().map(|value| intern(&mut symbols, value)).collect();
                 let is_new = symbols.len() > before;
-                if !self.budget.spend(1, rule) || (is_new && !self.budget.spend_on_value(rule)) {
+                let largest = values.iter().filter_map(|&value| symbols.as_literal(value));
+                let largest = largest.max_by_key(|value| value.size());
+                if !self.budget.spend(1, rule) || (is_new && !self.budget.spend_on_value(largest, rule)) {
                     return Vec::new();
                 }
                 longer.extend(bind_open(bound, (arguments, known), &values).unwrap_or_default());

@@ -178,6 +178,36 @@ fn constraints_and_ill_typed_literals_are_violations() {
     assert_eq!(shown(&engine), ["<p>(<a>) and <q>(<a>)", ill_typed]);
 }
 
+/// Doubling makes values whose size grows, too: the default budget ends that in less than two seconds.
+#[test]
+fn growing_values_use_up_the_default_budget() {
+    let rules = "[double] v(?x, ?n) ^ swrlb:multiply(?m, ?n, 2) -> v(?x, ?m) .";
+    let mut symbols = Symbols::new();
+    let program = parse_rules(rules, "test", &mut symbols, &Prefixes::new()).expect("rules");
+    let mut engine = Engine::new(symbols, program, []).expect("nothing to double");
+    let start = facts(engine.symbols_mut(), "v(a, 1), v(b, 3), v(c, 5)");
+    let began = std::time::Instant::now();
+    let error = engine.apply(Delta { insert: start, delete: vec![] }).expect_err("it never ends");
+    let took = began.elapsed();
+    let text = error.to_string();
+    assert!(text.contains("(double)") && text.contains(" characters)"), "{text}");
+    assert!(text.len() < 300, "{text}");
+    assert_eq!(engine.facts().count(), 0);
+    // Without optimisation and on a busy machine.
+    assert!(took.as_secs() < 20, "{took:?}");
+}
+
+#[test]
+fn constant_patterns_that_cannot_be_used_are_errors() {
+    for (pattern, reason) in [("(", "unclosed group"), ("(a)\\\\1", "back reference"), ("[a-", "unclosed")] {
+        let rules = format!("p(?x) ^ swrlb:matches(?x, \"{pattern}\") -> q(?x) .");
+        let mut symbols = Symbols::new();
+        let program = parse_rules(&rules, "test", &mut symbols, &Prefixes::new()).expect("rules");
+        let errors = Engine::new(symbols, program, []).expect_err("no pattern").to_string();
+        assert!(errors.contains("R210") && errors.contains(reason), "{errors}");
+    }
+}
+
 #[test]
 fn runaway_rules_end_in_an_error_that_names_them() {
     let rules = "[count] n(?x) ^ swrlb:add(?y, ?x, 1) -> n(?y) . go(?x) -> n(?x) . n(?x) -> seen(?x)";
@@ -190,7 +220,10 @@ fn runaway_rules_end_in_an_error_that_names_them() {
     engine.apply(Delta { insert: vec![start[1].clone()], delete: vec![] }).expect("nothing to count");
     let change = Delta { insert: vec![start[0].clone()], delete: vec![start[1].clone()] };
     let error = engine.apply(change).expect_err("it never ends");
-    assert_eq!(error.to_string(), "R301 step budget of 10000 used up, last in rule test#0 (count)");
+    assert_eq!(
+        error.to_string(),
+        "R301 step budget of 10000 used up, last in rule test#0 (count), which makes new values of its own conclusions; the last one is 2"
+    );
     assert_eq!(engine.facts().collect::<Vec<_>>(), [start[1].clone()]);
     assert!(
         Engine::with_limits(

@@ -178,3 +178,111 @@ fn large_classes_are_listed_in_brief() {
     assert_eq!(brief.len(), 39);
     assert!(brief.iter().all(|fact| fact.arguments[0] == brief[0].arguments[0]));
 }
+
+/// Random changes in each of which one pair of names goes and another comes, with facts about all names: after each, what
+/// holds, what is stated and what has a reason is as in an engine that reads what is stated.
+fn swap_pairs(scripts: u64) {
+    for seed in 0..scripts {
+        let mut random = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+        let mut pick = |bound: usize| {
+            random ^= random << 13;
+            random ^= random >> 7;
+            random ^= random << 17;
+            (random >> 16) as usize % bound
+        };
+        const NAMES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
+        let rules = [
+            "p(?x, ?y) ^ q(?y) -> q(?x) .",
+            "p(?x, ?y) ^ p(?x, ?z) -> sameAs(?y, ?z) .",
+            "q(?x) -> sameAs(?x, c) .",
+            "p(?x, a) -> r(?x) .",
+        ];
+        let text: String = rules.iter().filter(|_| pick(2) == 0).copied().collect::<Vec<_>>().join("\n");
+        let mut fact = |kind: usize| match kind {
+            0 => format!("sameAs({}, {})", NAMES[pick(6)], NAMES[pick(6)]),
+            1 => format!("p({}, {})", NAMES[pick(6)], NAMES[pick(6)]),
+            _ => format!("q({})", NAMES[pick(6)]),
+        };
+        let mut stated: BTreeSet<String> = [0, 0, 1, 1, 1, 2].map(&mut fact).into_iter().collect();
+        let mut incremental = engine(&text, &stated.iter().cloned().collect::<Vec<_>>().join(", "));
+        for step in 0..5 {
+            let mut gone: Vec<String> =
+                stated.iter().filter(|fact| fact.starts_with("sameAs")).take(1).cloned().collect();
+            gone.extend(stated.iter().nth(step % stated.len().max(1)).filter(|_| step % 2 == 1).cloned());
+            let come = [fact(0), fact(step % 3)];
+            gone.retain(|fact| !come.contains(fact));
+            let [insert, delete] = [&come[..], &gone].map(|facts| {
+                facts.iter().map(|text| crate::text::fact(&mut incremental, text)).collect::<Vec<_>>()
+            });
+            gone.iter().for_each(|fact| {
+                stated.remove(fact);
+            });
+            stated.extend(come);
+            let before = shown(&incremental);
+            let change = incremental.apply(Delta { insert, delete }).expect("within the budget");
+            let scratch = engine(&text, &stated.iter().cloned().collect::<Vec<_>>().join(", "));
+            let state = |engine: &Engine| -> BTreeSet<(String, bool, bool)> {
+                let facts = engine.facts().map(|fact| {
+                    (
+                        fact.display(engine.symbols()).to_string(),
+                        engine.is_asserted(&fact),
+                        engine.why(&fact).is_some(),
+                    )
+                });
+                facts.collect()
+            };
+            assert_eq!(state(&incremental), state(&scratch), "seed {seed}, step {step}: {stated:?}\n{text}");
+            let after = shown(&incremental);
+            assert_eq!(change.insert.len(), after.difference(&before).count(), "seed {seed}, step {step}");
+            assert_eq!(change.delete.len(), before.difference(&after).count(), "seed {seed}, step {step}");
+        }
+    }
+}
+
+#[test]
+fn one_pair_goes_while_another_comes() {
+    swap_pairs(200);
+}
+
+#[test]
+#[ignore = "takes a minute without optimisation"]
+fn one_pair_goes_while_another_comes_many_times() {
+    swap_pairs(2_500);
+}
+
+#[test]
+fn rules_that_make_names_one_come_and_go() {
+    let mut engine = engine("p(?x, ?y) ^ p(?x, ?z) -> sameAs(?y, ?z) .", "p(a, b), p(a, c), q(c)");
+    let before = shown(&engine);
+    assert!(before.contains("q(b)"), "{before:?}");
+    let rule = engine
+        .program()
+        .rules
+        .iter()
+        .find(|rule| &*rule.identity.source == "test")
+        .expect("the rule")
+        .clone();
+    let change = engine.remove_rule(&rule.identity).expect("safe rules");
+    assert!(!shown(&engine).contains("q(b)") && change.insert.is_empty(), "{change:?}");
+    engine.add_rules([rule]).expect("safe rules");
+    assert_eq!(shown(&engine), before);
+}
+
+#[test]
+fn equality_is_switched_on_by_a_change() {
+    let mut symbols = Symbols::new();
+    let stated = facts(&mut symbols, "p(a, b), q(c)");
+    let program = parse_rules("q(?x) -> r(?x) .", "test", &mut symbols, &prefixes()).expect("rules");
+    let complete = owl_rl::with_equality(&program, &mut symbols);
+    let mut engine = Engine::new(symbols, program, stated).expect("safe rules");
+    let pair = fact(&mut engine, "sameAs(b, c)");
+    let change =
+        engine.change(Delta { insert: vec![pair.clone()], delete: vec![] }, complete).expect("safe rules");
+    let now = shown(&engine);
+    for expected in ["p(a, c)", "q(b)", "r(b)", "sameAs(b, c)", "sameAs(c, b)"] {
+        assert!(now.contains(expected), "{expected}: {now:?}");
+    }
+    assert!(change.delete.is_empty() && !change.insert.is_empty(), "{change:?}");
+    engine.apply(Delta { insert: vec![], delete: vec![pair] }).expect("within the budget");
+    assert!(!shown(&engine).contains("r(b)"));
+}

@@ -54,6 +54,9 @@ fn values_compare_as_xsd_says() {
         ("\"2024-02-29\"^^xsd:date", "<", "\"2024-03-01\"^^xsd:date"),
         ("\"-0001-12-31\"^^xsd:date", "<", "\"0001-01-01\"^^xsd:date"),
         ("\"23:59:59.5\"^^xsd:time", ">", "\"23:59:59\"^^xsd:time"),
+        ("\"24:00:00\"^^xsd:time", "=", "\"00:00:00\"^^xsd:time"),
+        ("\"24:00:00Z\"^^xsd:time", "=", "\"00:00:00Z\"^^xsd:time"),
+        ("\"24:00:00\"^^xsd:time", "<", "\"23:59:59\"^^xsd:time"),
         ("\"P1Y\"^^xsd:duration", "=", "\"P12M\"^^xsd:yearMonthDuration"),
         ("\"P1D\"^^xsd:duration", "=", "\"PT24H\"^^xsd:dayTimeDuration"),
         ("\"-P1M\"^^xsd:duration", "<", "\"PT1.5S\"^^xsd:duration"),
@@ -312,4 +315,34 @@ fn value_spaces_contain_their_values() {
     assert!(literal("\"a\"@en").is_in(plain) && literal("\"a\"").is_in(plain) && !literal("1").is_in(plain));
     assert!(literal("1").is_in("http://www.w3.org/2002/07/owl#real"));
     assert!(literal("\"x\"^^<urn:d>").is_in("urn:d") && !literal("\"x\"^^<urn:d>").is_in("urn:e"));
+}
+
+#[test]
+fn patterns_are_those_of_xpath() {
+    let matches = |text: &str, pattern: &str| {
+        BuiltIn::Matches.holds(&[&Literal::string(text), &Literal::string(pattern)])
+    };
+    for (text, pattern, expected) in [
+        ("b", "^[a-z-[aeiou]]$", true),
+        ("a", "^[a-z-[aeiou]]$", false),
+        ("-", "^[a-z-[aeiou]]$", false),
+        ("b", "^[a-z-[^b]]$", true),
+        ("c", "^[a-z-[^b]]$", false),
+        ("d", "^[a-z-[a-f-[d]]]$", true),
+        ("e", "^[a-z-[a-f-[d]]]$", false),
+        ("-", "^[-a]$", true),
+        ("-", "^[a-]$", true),
+        ("&", "^[&&]$", true),
+        ("a", "^[a&&b]$", true),
+        ("_x:1-2", "^\\i\\c*$", true),
+        ("1x", "^\\i\\c*$", false),
+        ("é", "^\\i$", true),
+        (" ", "^\\C$", true),
+        ("x", "^\\I$", false),
+        ("1", "^[\\c-[\\i]]$", true),
+        ("x", "^[\\c-[\\i]]$", false),
+        ("[", "^\\[$", true),
+    ] {
+        assert_eq!(matches(text, pattern), expected, "{text} {pattern}");
+    }
 }

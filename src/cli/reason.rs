@@ -8,7 +8,7 @@ use metaplan::answers::{ReasonAnswer, statuses};
 use metaplan::knowledge::{Contradiction, Knowledge, Sources};
 use metaplan::message::Message;
 use ontology::Equality;
-use rules::{DEFAULT_STEP_BUDGET, Delta, Limits};
+use rules::{DEFAULT_STEP_BUDGET, Limits};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::limits::TimeLimit;
@@ -29,10 +29,10 @@ pub struct Arguments {
     rules: Vec<String>,
     #[command(flatten)]
     imports: Imports,
-    /// Assertions to add (a document; repeatable).
+    /// Statements to add: assertions, axioms and rules (a document; repeatable).
     #[arg(long, value_name = "FILE")]
     assert: Vec<PathBuf>,
-    /// Assertions to take away (a document; repeatable).
+    /// Statements to take away: assertions, axioms and rules (a document; repeatable).
     #[arg(long, value_name = "FILE")]
     retract: Vec<PathBuf>,
     /// A measured attribute and its value (repeatable).
@@ -58,14 +58,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let _guard = arguments.time.guard(common)?;
     let mut knowledge = during("reasoning", common, || read(arguments))?;
     output::warnings(common, knowledge.warnings());
-    let mut delta = Delta::default();
-    for file in &arguments.assert {
-        delta.insert.extend(knowledge.assertions(file)?);
+    if !arguments.assert.is_empty() || !arguments.retract.is_empty() {
+        let own = during("reasoning", common, || knowledge.revise(&arguments.assert, &arguments.retract))?;
+        output::warnings(common, &own);
     }
-    for file in &arguments.retract {
-        delta.delete.extend(knowledge.assertions(file)?);
-    }
-    during("reasoning", common, || knowledge.apply(delta))?;
     for component in &arguments.fail {
         knowledge.fail(component).map_err(Failure::usage)?;
     }

@@ -261,3 +261,77 @@ fn what_a_hostile_rule_file_says_is_shown_and_not_obeyed() {
         }
     }
 }
+
+const EMPTY: &str = "@prefix : <urn:x#> . @prefix owl: <http://www.w3.org/2002/07/owl#> . \
+    @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> .\n";
+
+/// Asserted and retracted documents mean what the one remaining document means: status and conclusions.
+#[test]
+fn updates_mean_what_one_document_means() {
+    let negative = "[] a owl:NegativePropertyAssertion ; owl:sourceIndividual :a ; owl:assertionProperty :p ; \
+        owl:targetIndividual :b .";
+    let has_value =
+        ":p a owl:ObjectProperty . :a a [ a owl:Restriction ; owl:onProperty :p ; owl:hasValue :b ] .";
+    let names = ":a a owl:NamedIndividual . :b a owl:NamedIndividual . :A a owl:Class . :B a owl:Class .";
+    let swapped = ":d a owl:NamedIndividual ; owl:sameAs :c .";
+    for (base, plus, minus, rest, status) in [
+        (
+            format!("{names} :a owl:differentFrom :b ."),
+            ":a owl:sameAs :b .",
+            "",
+            ":a owl:differentFrom :b ; owl:sameAs :b .",
+            20,
+        ),
+        (":p a owl:ObjectProperty . :a :p :b .".into(), negative, "", "", 20),
+        (format!("{names} :a a :A ."), ":a a [ a owl:Class ; owl:complementOf :A ] .", "", "", 20),
+        (format!("{names} :a a :A , :B ."), ":A owl:disjointWith :B .", "", "", 20),
+        (format!("{names} :a a :A ."), ":A rdfs:subClassOf :B .", "", ":a a :A . :A rdfs:subClassOf :B .", 0),
+        (":p a owl:ObjectProperty .".into(), has_value, "", has_value, 0),
+        (format!("{names} {has_value}"), "", has_value, "", 0),
+        (format!("{names} :a a :A . :A rdfs:subClassOf :B ."), "", ":A rdfs:subClassOf :B .", ":a a :A .", 0),
+        (
+            ":n a owl:DatatypeProperty . :c owl:sameAs :e . :d :n 2 .".into(),
+            swapped,
+            ":c owl:sameAs :e .",
+            ":n a owl:DatatypeProperty . :d :n 2 ; owl:sameAs :c .",
+            0,
+        ),
+    ] {
+        let directory = tempfile::tempdir().expect("a temporary directory");
+        let write = |name: &str, text: &str| {
+            let text = format!("{EMPTY}{text}");
+            std::fs::write(directory.path().join(name), text).expect("a file");
+        };
+        write("base.ttl", &base);
+        write("plus.ttl", plus);
+        write("minus.ttl", minus);
+        let update =
+            ["reason", "base.ttl", "--assert", "plus.ttl", "--retract", "minus.ttl", "--format", "ntriples"];
+        let found = metaplan_in(directory.path(), &update, "");
+        check(&found, status, &[]);
+        if status == 0 {
+            write("rest.ttl", &format!("{names} {rest}"));
+            let expected = metaplan_in(directory.path(), &["reason", "rest.ttl", "--format", "ntriples"], "");
+            check(&expected, 0, &[]);
+            assert_eq!(found.stdout, expected.stdout, "{base} {plus} {minus}: {}", found.stderr);
+        }
+    }
+}
+
+/// What a document cannot change is named.
+#[test]
+fn what_an_update_cannot_change_is_named() {
+    let change = |option: &str, text: &str| {
+        let directory = tempfile::tempdir().expect("a temporary directory");
+        std::fs::write(directory.path().join("base.ttl"), format!("{EMPTY}:a a :A .")).expect("a file");
+        metaplan_in(directory.path(), &["reason", "base.ttl", option, "-"], &format!("{EMPTY}{text}"))
+    };
+    check(&change("--retract", ":b a :A ."), 0, &["O207", "urn:x#b"]);
+    check(&change("--retract", "_:b a :A ."), 3, &["O114", "_:"]);
+    check(
+        &change("--assert", "<urn:u> a owl:Ontology ; owl:imports <urn:other> ."),
+        0,
+        &["O208", "urn:other"],
+    );
+    check(&change("--assert", ":A rdfs:subClassOf [ a owl:Class ; owl:unionOf ( :B :C ) ] ."), 0, &["O301"]);
+}

@@ -1,7 +1,7 @@
 //! A knowledge base at run time: OWL documents and rule files in an engine, kept in step with the robot.
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
 use num_rational::BigRational;
@@ -9,10 +9,11 @@ use ontology::runtime::{Mode, NewObjective, Runtime};
 use ontology::tomasys::change::Status;
 use ontology::tomasys::{CalledNames, View};
 use ontology::vocab::local_name;
-use ontology::{Annotation, EntityKind, Equality, Iri, ReadOptions};
+use ontology::{Annotation, EntityKind, Equality, Iri};
 use rules::{Delta, Engine, Fact, Literal, Program, Symbols};
 use tracing::info_span;
 
+use crate::file::{discreet, quoted};
 use crate::knowledge::catalogue::Catalogue;
 use crate::knowledge::sources::{Sources, Stated};
 use crate::knowledge::statement::{Statement, Statements};
@@ -44,6 +45,8 @@ pub struct Knowledge {
     annotations: Arc<[(Iri, Annotation)]>,
     /// What the documents add to a domain in PLANTA's form, if they were read for one.
     terms: Option<Arc<Terms>>,
+    /// What the documents and rule files state.
+    documented: Arc<ontology::Stated>,
     /// What is stated, if what holds is not told apart from it by the engine.
     stated: Option<Arc<[Fact]>>,
 }
@@ -85,7 +88,8 @@ impl Knowledge {
     }
 
     fn of_stated(sources: &Sources, stated: Stated) -> Result<Self, Errors> {
-        let Stated { symbols, program, facts, ontology, rule_count, mut warnings, terms } = stated;
+        let Stated { symbols, program, facts, ontology, rules, equality, rule_count, mut warnings, terms } =
+            stated;
         let _span = info_span!("knowledge").entered();
         let engine = Engine::with_limits(symbols, program, facts, sources.limits.clone())
             .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
@@ -94,12 +98,14 @@ impl Knowledge {
         // With names that are all different, two values of a functional property are not taken for one.
         warnings.extend(mistakes.filter(|warning| terms.is_none() || warning.code != "O404"));
         let runtime = Runtime::new(engine, Mode::Retract);
-        let (sources, entities) = (sources.clone(), ontology.entities.into());
-        let documents = ontology.sources.into_iter().map(|source| source.name).collect();
-        let annotations = ontology.annotations.into();
+        let (sources, entities) = (sources.clone(), ontology.entities.as_slice().into());
+        let documents = ontology.sources.iter().map(|source| source.name.clone()).collect();
+        let annotations = ontology.annotations.as_slice().into();
+        let documented = Arc::new(ontology::Stated::new(ontology, rules, equality));
         Ok(Self {
             documents,
             annotations,
+            documented,
             terms,
             ..Self::of(runtime, rule_count, warnings, sources, entities)
         })
@@ -161,6 +167,7 @@ impl Knowledge {
             documents,
             annotations,
             terms: None,
+            documented: Arc::default(),
             stated: None,
         }
     }
@@ -406,16 +413,34 @@ impl Knowledge {
         self.changed(outcome).map(|_| ())
     }
 
-    /// The assertions of a document (without its imports and rules) as facts, to insert or delete.
+    /// States what the first documents say, and no more what the second ones say: assertions, axioms and rules. Afterwards
+    /// everything holds that holds if the one remaining document is read. What both say is stated. Imports of these
+    /// documents are not followed. Returns what is questionable about them, which [`Knowledge::warnings`] has from now on, too.
     ///
     /// # Errors
-    /// All that is wrong with the document.
-    pub fn assertions(&mut self, file: &Path) -> Result<Vec<Fact>, Errors> {
-        let options =
-            ReadOptions { allow_missing_imports: true, allow_empty: true, ..ReadOptions::default() };
-        let ontology = ontology::read_files(&[file], &options)
-            .map_err(|errors| errors.iter().map(Message::from_ontology).collect::<Vec<_>>())?;
-        Ok(ontology::lower(&ontology, self.runtime.engine_mut().symbols_mut()).facts)
+    /// All that is wrong with the documents; one retracts what has no name; a rule runs away. Nothing has changed then.
+    pub fn revise(&mut self, asserted: &[PathBuf], retracted: &[PathBuf]) -> Result<Vec<Message>, Errors> {
+        let read = self.documented.change(asserted, retracted, self.runtime.engine_mut());
+        let change = read.map_err(|errors| {
+            let messages = errors.iter().map(Message::from_ontology).collect();
+            Errors::from(quoted(discreet(messages)))
+        })?;
+        // Restored snapshots start from what the documents say, so that these documents become part of it.
+        let (mut runtime, mut origin) = (self.runtime.clone(), self.origin.clone());
+        origin.engine_mut().adopt_symbols(self.runtime.engine());
+        for runtime in [&mut runtime, &mut origin] {
+            runtime
+                .revise(change.delta.clone(), change.program.clone())
+                .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
+        }
+        (self.runtime, self.origin, self.catalogue) = (runtime, origin, OnceLock::new());
+        let ontology = change.stated.ontology();
+        self.entities = ontology.entities.as_slice().into();
+        self.annotations = ontology.annotations.as_slice().into();
+        self.documented = Arc::new(change.stated);
+        let warnings: Vec<Message> = change.warnings.iter().map(Message::from_ontology_warning).collect();
+        self.warnings.extend(warnings.iter().cloned());
+        Ok(warnings)
     }
 
     /// What follows and is not stated, in an order that depends on what was read only. That names stand for one individual is said of an

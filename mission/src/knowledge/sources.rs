@@ -40,6 +40,9 @@ pub struct Stated {
     /// Assertions.
     pub facts: Vec<Fact>,
     pub(super) ontology: Ontology,
+    /// The rules of rule files.
+    pub(super) rules: Vec<Rule>,
+    pub(super) equality: Equality,
     /// As [`crate::knowledge::Knowledge::rule_count`] has it.
     pub rule_count: usize,
     pub(super) warnings: Vec<Message>,
@@ -90,11 +93,12 @@ impl Stated {
         };
         let rule_count = ontology.rules.len() + own.len();
         let (equality, terms) = meaning(&ontology);
-        let lowered = ontology::lower_together(&ontology, own, equality, &mut symbols);
+        let lowered = ontology::lower_together(&ontology, own.clone(), equality, &mut symbols);
         let warnings =
             ontology.warnings.iter().chain(&lowered.warnings).map(Message::from_ontology_warning).collect();
         let (warnings, program, facts) = (quoted(warnings), lowered.program, lowered.facts);
-        Ok(Self { symbols, program, facts, ontology, rule_count, warnings, terms })
+        let rules = own;
+        Ok(Self { symbols, program, facts, ontology, rules, equality, rule_count, warnings, terms })
     }
 
     /// Changes what is stated.

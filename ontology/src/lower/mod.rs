@@ -26,7 +26,7 @@ use tracing::field::Empty;
 use tracing::info_span;
 
 use crate::error::Warning;
-use crate::owl::Ontology;
+use crate::owl::{AnnotatedAxiom, Ontology};
 use context::Context;
 
 pub use context::{AXIOM_SOURCE, Equality, INTERNAL};
@@ -82,6 +82,13 @@ pub fn lower_together(
     Lowered { program: Program { rules, equality }, facts, duplicates, warnings }
 }
 
+/// The facts that axioms state, in the order of the axioms; rules for axioms are not among them.
+pub(crate) fn lower_assertions(axioms: &[AnnotatedAxiom], symbols: &mut Symbols) -> Vec<Fact> {
+    let mut context = Context::new(symbols, Equality::Owl, &Ontology::default());
+    axiom::lower_assertions(axioms, &mut context);
+    context.facts
+}
+
 impl Context<'_> {
     /// Takes in rules of others. Two names that differ may stand for one individual, so that their `differentFrom` asks for
     /// what is entailed.
@@ -130,6 +137,7 @@ fn culprit(error: &Error) -> Option<&RuleIdentity> {
         | Error::UnsafeBody { rule, .. }
         | Error::BuiltInArity { rule, .. }
         | Error::HeadAtom { rule, .. }
+        | Error::Pattern { rule, .. }
         | Error::Unstratified { rule, .. }
         | Error::Arity { rule, .. } => Some(rule),
         _ => None,

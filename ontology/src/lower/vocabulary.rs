@@ -17,7 +17,7 @@ fn identity(label: &str) -> RuleIdentity {
     RuleIdentity { source: AXIOM_SOURCE.into(), label: Some(label.into()), position: 0 }
 }
 
-/// Adds the constraints, and the rules and facts of `owl:Thing` if anything asks for it: then its name is among the symbols.
+/// Adds the constraints, and the rules and facts of `owl:Thing` if a rule or a fact mentions it.
 pub(crate) fn lower(ontology: &Ontology, context: &mut Context) {
     let mut variables = Variables::default();
     let (x, y) = (variables.fresh("x"), variables.fresh("y"));
@@ -31,14 +31,32 @@ pub(crate) fn lower(ontology: &Ontology, context: &mut Context) {
         let atom = Atom::relation(context.name(name), arguments);
         context.rule(&identity(label), Vec::new(), vec![atom], &variables);
     }
-    if context.symbols.find_name(owl::TOP_OBJECT_PROPERTY).is_some() {
+    if asked_for(context, owl::TOP_OBJECT_PROPERTY).is_some() {
         let body = vec![context.relation(owl::THING, [x]), context.relation(owl::THING, [y])];
         let head = vec![context.relation(owl::TOP_OBJECT_PROPERTY, [x, y])];
         context.rule(&identity("owl:topObjectProperty"), head, body, &variables);
     }
-    if let Some(thing) = context.symbols.find_name(owl::THING) {
+    if let Some(thing) = asked_for(context, owl::THING) {
         things(ontology, thing, context);
     }
+}
+
+/// The symbol of a name that a rule or a fact mentions. That it is among the symbols is not enough: they outlive the rules
+/// and facts of documents that have been retracted.
+fn asked_for(context: &Context, name: &str) -> Option<Symbol> {
+    let symbol = context.symbols.find_name(name)?;
+    let mentions = |atom: &Atom| {
+        let predicate = match atom {
+            Atom::Relation { predicate, .. } | Atom::Not { predicate, .. } => Some(*predicate),
+            _ => None,
+        };
+        predicate == Some(symbol) || atom.terms().contains(&Term::Constant(symbol))
+    };
+    let mut atoms = context.rules.iter().flat_map(|rule| rule.head.iter().chain(&rule.body));
+    let in_rules = atoms.any(|atom| mentions(atom) || atom.parts().iter().any(mentions));
+    let in_facts =
+        || context.facts.iter().any(|fact| fact.predicate == symbol || fact.arguments.contains(&symbol));
+    (in_rules || in_facts()).then_some(symbol)
 }
 
 fn things(ontology: &Ontology, thing: Symbol, context: &mut Context) {

@@ -12,9 +12,11 @@
 //! | `forms` | definitions as OWL 1 writes them, expressions without types, axioms with IRIs |
 //! | `lists` | disjointness of many into pairs, shared lists into copies, property chains checked |
 //! | `anonymous` | blank-node individuals into IRIs |
+//! | `annotative` | axioms that treat an annotation property as another one (taken away) |
 //! | `kinds` | undeclared entities into declared ones |
 //! | `plain` | statements that need no reader into our own structures |
 
+mod annotative;
 mod anonymous;
 mod bulk;
 pub(crate) mod depth;
@@ -96,7 +98,12 @@ pub(crate) fn normalize(
     let files: Vec<String> = documents.iter().map(|document| document.name.clone()).collect();
     let known = bulk::Known::of(&documents, &names);
     let Merged { mut graph, bulk, parts } = merge(documents, &names, |triple| known.is_bulk(triple));
-    let undeclared = known.undeclared(&bulk, &names);
+    let mut undeclared = known.undeclared(&bulk, &names);
+    for (kind, iri) in known_entities {
+        if *kind == EntityKind::Class {
+            undeclared.remove(&**iri);
+        }
+    }
     let mut warnings = Vec::new();
     if let Some((index, about)) = depth::too_deep(&graph) {
         let part = parts.partition_point(|(start, _)| *start <= index).saturating_sub(1);
@@ -107,6 +114,7 @@ pub(crate) fn normalize(
     forms::rewrite(&mut graph);
     let disjoint = lists::rewrite(&mut graph, &mut warnings);
     anonymous::rewrite(&mut graph, &mut warnings);
+    annotative::rewrite(&mut graph, &mut warnings);
     kinds::declare(&mut graph, undeclared, &mut warnings);
     let mut plain = plain::take(&mut graph, bulk, &mut names);
     plain.axioms.extend(disjoint);

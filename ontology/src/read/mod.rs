@@ -142,7 +142,7 @@ fn closure(
     let mut next = 0;
     loop {
         while let Some(item) = pending.pop_front() {
-            match load(item, documents.len(), &mut seen, options, names) {
+            match load(item, options.documents_before + documents.len(), &mut seen, options, names) {
                 Ok(Some((document, path, text))) => {
                     texts.push((document.name.clone(), text));
                     warnings.extend(twice(&document, &documents));
@@ -155,6 +155,11 @@ fn closure(
         }
         let Some(importer) = documents.get(next) else { break };
         for (import, position) in &importer.imports {
+            if options.without_imports {
+                let (file, import) = (importer.name.clone(), import.clone());
+                warnings.push(Warning::ImportOfUpdate { file, position: position.clone(), import });
+                continue;
+            }
             let found = if options.closed {
                 Ok(None)
             } else {

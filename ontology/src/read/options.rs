@@ -18,6 +18,10 @@ pub struct ReadOptions {
     /// Whether documents are N-Triples that import nothing, as for those that nobody vouches for: no file is opened but those
     /// that are named, and no text is larger when it has been read.
     pub closed: bool,
+    /// Whether imports are not followed, as those of a document that changes a knowledge base.
+    pub without_imports: bool,
+    /// The number of documents that have been read before, whose individuals without a name are not those of these documents.
+    pub documents_before: usize,
     /// Entities that documents need not declare, as those of the knowledge base that they ask about.
     pub known: Vec<(EntityKind, Iri)>,
 }

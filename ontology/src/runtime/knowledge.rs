@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use rules::{Delta, Derivation, Engine, Fact, Literal, Symbol, Violation};
+use rules::{Delta, Derivation, Engine, Fact, Literal, Program, Symbol, Violation};
 
 use crate::error::Error;
 use crate::lower::INTERNAL;
@@ -81,6 +81,26 @@ impl Runtime {
             self.reasons.remove(fact);
         }
         self.pending.extend(deleted.into_iter().chain(net.insert.iter().cloned()));
+        Ok(net)
+    }
+
+    /// Changes statements and rules in one step, as [`crate::Stated::change`] has them.
+    ///
+    /// # Errors
+    /// As [`Engine::change`]; nothing has changed then.
+    pub fn revise(&mut self, delta: Delta, program: Option<Program>) -> Result<Delta, rules::Errors> {
+        self.relations.extend(delta.insert.iter().map(|fact| (fact.predicate, fact.arguments.len())));
+        let deleted = delta.delete.clone();
+        let net = match program {
+            Some(program) => self.engine.change(delta, program)?,
+            None => self.engine.apply(delta)?,
+        };
+        if self.mode == Mode::Latch {
+            for fact in &deleted {
+                self.reasons.remove(fact);
+            }
+            self.pending.extend(deleted.into_iter().chain(net.insert.iter().cloned()));
+        }
         Ok(net)
     }
 

@@ -2,8 +2,10 @@
 
 use std::fmt::Write;
 
-use crate::owl::{ANONYMOUS, Annotation, AnnotationValue, Argument, Atom, EntityKind, Iri, Ontology, Rule};
-use crate::vocab::xsd;
+use crate::owl::{
+    ANONYMOUS, Annotation, AnnotationValue, Argument, Atom, Axiom, EntityKind, Iri, Ontology, Rule,
+};
+use crate::vocab::{is_reserved, rdfs, xsd};
 
 /// The document; what stands where depends on the ontology alone.
 pub(super) fn document(ontology: &Ontology) -> String {
@@ -20,13 +22,17 @@ pub(super) fn document(ontology: &Ontology) -> String {
     for (kind, iri) in &ontology.entities {
         line(&mut text, &format!("Declaration({}(<{iri}>))", entity(*kind)));
     }
-    for annotated in &ontology.axioms {
+    for annotated in ontology.axioms.iter().filter(|annotated| says_something(&annotated.axiom)) {
         let annotations: String = annotated.annotations.iter().map(|found| annotation(found) + " ").collect();
         let axiom = annotated.axiom.to_string();
         // The name of an axiom ends at its first parenthesis, where its annotations belong.
         line(&mut text, &axiom.replacen('(', &format!("({annotations}"), 1));
     }
     for (subject, found) in ontology.annotations.iter().filter(|(subject, _)| !about(subject)) {
+        if let Some(axiom) = annotation_axiom(ontology, subject, found) {
+            line(&mut text, &axiom);
+            continue;
+        }
         let (property, value) = (&found.property, value(&found.value));
         line(&mut text, &format!("AnnotationAssertion(<{property}> {} {value})", node(subject)));
     }
@@ -34,6 +40,38 @@ pub(super) fn document(ontology: &Ontology) -> String {
         line(&mut text, &rule(found));
     }
     text + ")\n"
+}
+
+/// Whether an axiom about several entities is about more than one: the syntax has no form for others, which say nothing.
+fn says_something(axiom: &Axiom) -> bool {
+    let several = match axiom {
+        Axiom::SameIndividual(items) | Axiom::DifferentIndividuals(items) => items.len(),
+        Axiom::EquivalentClasses(items) | Axiom::DisjointClasses(items) => items.len(),
+        Axiom::EquivalentObjectProperties(items) | Axiom::DisjointObjectProperties(items) => items.len(),
+        Axiom::EquivalentDataProperties(items) | Axiom::DisjointDataProperties(items) => items.len(),
+        _ => return true,
+    };
+    several > 1
+}
+
+/// An axiom about an annotation property, which an ontology keeps as an annotation.
+fn annotation_axiom(ontology: &Ontology, subject: &Iri, found: &Annotation) -> Option<String> {
+    let AnnotationValue::Iri(value) = &found.value else { return None };
+    let is_annotative = |iri: &Iri| {
+        is_reserved(iri)
+            || ontology.entities.binary_search(&(EntityKind::AnnotationProperty, iri.clone())).is_ok()
+    };
+    if !is_annotative(subject) || value.starts_with(ANONYMOUS) {
+        return None;
+    }
+    match &*found.property {
+        rdfs::SUB_PROPERTY_OF if is_annotative(value) => {
+            Some(format!("SubAnnotationPropertyOf(<{subject}> <{value}>)"))
+        }
+        rdfs::DOMAIN => Some(format!("AnnotationPropertyDomain(<{subject}> <{value}>)")),
+        rdfs::RANGE => Some(format!("AnnotationPropertyRange(<{subject}> <{value}>)")),
+        _ => None,
+    }
 }
 
 fn line(text: &mut String, content: &str) {

@@ -69,6 +69,23 @@ impl BuiltIn {
         }
     }
 
+    /// The pattern among the arguments that are known, and what is wrong with it, if anything.
+    pub(crate) fn bad_pattern<'l>(
+        self,
+        argument: &impl Fn(usize) -> Option<&'l Literal>,
+    ) -> Option<(String, String)> {
+        let (pattern, flags) = match self {
+            Self::Matches => (1, 2),
+            Self::Tokenize => (2, 3),
+            Self::Replace => (2, 4),
+            _ => return None,
+        };
+        let text = |at| argument(at).and_then(text::as_text);
+        let pattern = text(pattern)?;
+        let fault = pattern::fault(pattern, text(flags).unwrap_or_default())?;
+        Some((pattern.to_owned(), fault))
+    }
+
     /// The result of a function on its arguments (without the first); `None` where it is undefined.
     pub fn compute(self, arguments: &[&Literal]) -> Option<Literal> {
         if !self.is_function() || !self.accepts(arguments.len() + 1) {

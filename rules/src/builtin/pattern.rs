@@ -1,5 +1,6 @@
-//! Regular expressions, as far as those of `XPath` and of the `regex` crate agree: no back references, no character
-//! class subtraction. A pattern that cannot be read makes its built-in false.
+//! Regular expressions of `XPath` in the spelling of the `regex` crate, which has no back references and no names of
+//! Unicode blocks. A constant pattern that cannot be used is an error of its rule (R210); one that a variable holds makes its
+//! built-in false.
 //!
 //! [2] W3C `XQuery` 1.0 and `XPath` 2.0 Functions and Operators, 2007.
 
@@ -51,8 +52,18 @@ pub(super) fn tokens(arguments: &[&Literal]) -> Vec<Literal> {
     regex.split(text).filter(|token| seen.insert(*token)).map(|token| Literal::String(token.into())).collect()
 }
 
+/// What is wrong with a pattern and its flags, if anything; a pattern that is well-formed and too large matches nothing.
+pub(super) fn fault(pattern: &str, flags: &str) -> Option<String> {
+    build(pattern, flags).err().filter(|reason| !reason.contains("size limit"))
+}
+
 fn compile(pattern: &str, flags: &str) -> Option<Regex> {
-    let mut builder = RegexBuilder::new(pattern);
+    build(pattern, flags).ok()
+}
+
+fn build(pattern: &str, flags: &str) -> Result<Regex, String> {
+    let translated = translate(pattern)?;
+    let mut builder = RegexBuilder::new(&translated);
     builder.size_limit(SIZE_LIMIT).dfa_size_limit(SIZE_LIMIT);
     for flag in flags.chars() {
         match flag {
@@ -60,10 +71,72 @@ fn compile(pattern: &str, flags: &str) -> Option<Regex> {
             'm' => builder.multi_line(true),
             'i' => builder.case_insensitive(true),
             'x' => builder.ignore_whitespace(true),
-            _ => return None,
+            _ => return Err(format!("`{flag}` is not a flag; there are s, m, i and x")),
         };
     }
-    builder.build().ok()
+    builder.build().map_err(|error| {
+        let text = error.to_string();
+        text.lines().last().unwrap_or_default().trim_start_matches("error: ").to_owned()
+    })
+}
+
+/// The characters with which a name of XML may start, as members of a class (XML 1.0, fifth edition, production 4).
+const INITIAL: &str = ":A-Z_a-z\\x{C0}-\\x{D6}\\x{D8}-\\x{F6}\\x{F8}-\\x{2FF}\\x{370}-\\x{37D}\\x{37F}-\\x{1FFF}\\x{200C}-\\x{200D}\\x{2070}-\\x{218F}\\x{2C00}-\\x{2FEF}\\x{3001}-\\x{D7FF}\\x{F900}-\\x{FDCF}\\x{FDF0}-\\x{FFFD}\\x{10000}-\\x{EFFFF}";
+
+/// Those that may follow, besides.
+const FURTHER: &str = "\\-.0-9\\x{B7}\\x{300}-\\x{36F}\\x{203F}-\\x{2040}";
+
+/// A pattern of XPath in the spelling of the `regex` crate: classes subtract with `--` there, and `\i` and `\c` are
+/// spelled out.
+fn translate(pattern: &str) -> Result<String, String> {
+    let mut translated = String::new();
+    // The depth of classes, and whether the innermost one has members yet.
+    let (mut depth, mut is_empty) = (0, false);
+    let mut rest = pattern.chars().peekable();
+    while let Some(character) = rest.next() {
+        let was_empty = std::mem::replace(&mut is_empty, false);
+        match character {
+            '\\' => {
+                let escaped = rest.next().ok_or("it ends with a backslash")?;
+                match escaped {
+                    'i' => translated += &format!("[{INITIAL}]"),
+                    'c' => translated += &format!("[{INITIAL}{FURTHER}]"),
+                    'I' => translated += &format!("[^{INITIAL}]"),
+                    'C' => translated += &format!("[^{INITIAL}{FURTHER}]"),
+                    '1'..='9' if depth == 0 => {
+                        return Err(format!("the back reference \\{escaped} is not supported"));
+                    }
+                    _ => translated.extend(['\\', escaped]),
+                }
+            }
+            '[' if depth == 0 => {
+                (depth, is_empty) = (1, true);
+                translated.push('[');
+                if rest.next_if_eq(&'^').is_some() {
+                    translated.push('^');
+                }
+            }
+            '-' if depth > 0 && rest.peek() == Some(&'[') && !was_empty => {
+                rest.next();
+                depth += 1;
+                is_empty = true;
+                translated += "--[";
+                if rest.next_if_eq(&'^').is_some() {
+                    translated.push('^');
+                }
+            }
+            ']' if depth > 0 => {
+                depth -= 1;
+                translated.push(']');
+            }
+            '[' => {
+                return Err("a class within a class is written `-[…]`, or `\\[` for the character".to_owned());
+            }
+            '&' | '~' if depth > 0 => translated.extend(['\\', character]),
+            other => translated.push(other),
+        }
+    }
+    Ok(translated)
 }
 
 /// The replacement text of `XPath` in the spelling of the `regex` crate; `None` where it is not one.

@@ -49,12 +49,7 @@ pub(crate) struct Equality {
 impl Equality {
     pub fn new(same: Symbol, program: &Arc<Program>) -> Self {
         let (classes, originals, pairs) = (Classes::default(), FxHashMap::default(), FxHashMap::default());
-        let atoms = program.rules.iter().flat_map(|rule| rule.head.iter().chain(&rule.body));
-        let constants = atoms.flat_map(Atom::terms).filter_map(|term| match term {
-            Term::Constant(symbol) => Some(symbol),
-            Term::Variable(_) => None,
-        });
-        let constants = constants.collect();
+        let constants = constants(program).collect();
         Self { same, classes, originals, pairs, program: Arc::clone(program), constants }
     }
 
@@ -69,6 +64,11 @@ impl Equality {
             && fact.arguments.len() == 2
             && (fact.arguments[0] == fact.arguments[1]
                 || fact.arguments.iter().all(|&symbol| symbols.as_literal(symbol).is_none()))
+    }
+
+    /// Whether any two names stand for one individual.
+    pub fn joins(&self) -> bool {
+        !self.classes.edges.is_empty()
     }
 
     fn is_stated_pair(&self, fact: &Fact) -> bool {
@@ -103,6 +103,15 @@ impl Equality {
         });
         Program { rules: rules.collect(), ..program.clone() }
     }
+}
+
+/// The names and values that rules mention.
+fn constants(program: &Program) -> impl Iterator<Item = Symbol> {
+    let atoms = program.rules.iter().flat_map(|rule| rule.head.iter().chain(&rule.body));
+    atoms.flat_map(Atom::terms).filter_map(|term| match term {
+        Term::Constant(symbol) => Some(symbol),
+        Term::Variable(_) => None,
+    })
 }
 
 impl Atom {

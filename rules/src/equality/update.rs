@@ -5,13 +5,14 @@ use std::sync::Arc;
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::Equality;
 use super::classes::{Classes, Edge, EdgeId};
 use super::proof::edge_of;
+use super::{Equality, constants};
 use crate::engine::{Delta, Engine};
 use crate::error::Error;
 use crate::fact::Fact;
 use crate::forest::Forest;
+use crate::rule::Program;
 use crate::store::{Record, state};
 use crate::symbol::Symbol;
 
@@ -32,6 +33,8 @@ struct Update<'e> {
     silent: bool,
     /// Concluded pairs that join classes.
     joining: Vec<Fact>,
+    /// The rules that replace the engine's with the next [`Update::flush`].
+    program: Option<Program>,
 }
 
 impl Engine {
@@ -40,8 +43,10 @@ impl Engine {
         &mut self,
         equality: Arc<Equality>,
         delta: &Delta,
+        program: Option<Program>,
     ) -> Result<Delta, (Error, Delta)> {
         let mut update = Update::new(self, equality);
+        update.program = program;
         let result = update.apply(delta);
         let equality = update.equality;
         self.equality = Some(Arc::new(equality));
@@ -102,7 +107,8 @@ impl<'e> Update<'e> {
         let equality = Arc::unwrap_or_clone(equality);
         let (open, net, moved) = (BTreeMap::new(), FxHashMap::default(), FxHashMap::default());
         let (before, joining) = (FxHashSet::default(), Vec::new());
-        Self { engine, equality, open, rules_changed: false, net, moved, before, silent: false, joining }
+        let (rules_changed, silent, program) = (false, false, None);
+        Self { engine, equality, open, rules_changed, net, moved, before, silent, joining, program }
     }
 
     /// The change of what holds; on an error, what takes the change back.
@@ -129,8 +135,11 @@ impl<'e> Update<'e> {
     }
 
     fn change_classes(&mut self, added: &[Fact], removed: &[Fact]) -> Result<(), Error> {
+        if let Some(program) = &self.program {
+            self.equality.constants.extend(constants(program));
+        }
         let invalid = self.equality.classes.resting_on(removed.iter());
-        self.take_apart(&invalid);
+        self.take_apart(&invalid, added);
         self.join_stated(added);
         self.flush()
     }
@@ -251,8 +260,10 @@ impl<'e> Update<'e> {
         facts
     }
 
-    /// Removes edges and takes their classes apart into what the others and stated pairs connect.
-    fn take_apart(&mut self, invalid: &BTreeSet<EdgeId>) {
+    /// Removes edges and takes their classes apart into what the others and stated pairs connect, but for the pairs that
+    /// are `added` by this update: [`Update::join_stated`] joins these, and restates the facts of both classes.
+    fn take_apart(&mut self, invalid: &BTreeSet<EdgeId>, added: &[Fact]) {
+        let added: FxHashSet<&Fact> = added.iter().collect();
         let classes = &self.equality.classes;
         let broken: BTreeSet<Symbol> = invalid
             .iter()
@@ -268,7 +279,7 @@ impl<'e> Update<'e> {
             let class = self.equality.classes.class(representative);
             self.equality.classes.split(representative);
             let pairs = class.iter().flat_map(|name| self.equality.pairs.get(name).into_iter().flatten());
-            let pairs: BTreeSet<Fact> = pairs.cloned().collect();
+            let pairs: BTreeSet<Fact> = pairs.filter(|pair| !added.contains(pair)).cloned().collect();
             for pair in &pairs {
                 connect_stated(&mut self.equality.classes, pair);
             }
@@ -383,6 +394,10 @@ impl<'e> Update<'e> {
         }
         let change = self.engine.apply_rows(delta)?;
         self.note(change);
+        if let Some(program) = self.program.take() {
+            self.engine.program = Arc::new(program);
+            self.rules_changed = true;
+        }
         if std::mem::take(&mut self.rules_changed) {
             let normal = self.equality.normal_program(&self.engine.program);
             if normal != *self.equality.program {

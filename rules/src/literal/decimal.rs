@@ -28,6 +28,14 @@ enum Repr {
 }
 
 impl Decimal {
+    /// The number of bytes of the digits, where a machine integer does not hold them.
+    pub(super) fn size(&self) -> usize {
+        match &self.0 {
+            Repr::Small { .. } => 0,
+            Repr::Large { unscaled, .. } => unscaled.bits() as usize / 8,
+        }
+    }
+
     /// Reads `-12.50`, and `1e-05` as Python writes decimals. `None` where the form is not a decimal.
     pub fn parse(lexical: &str) -> Option<Self> {
         let (mantissa, exponent) = match lexical.find(['e', 'E']) {

@@ -59,7 +59,11 @@ impl Moment {
         if local == "dateTimeStamp" && zone.is_none() {
             return None;
         }
-        let clock = time.map_or(Some(Decimal::from(0)), parse_clock)?;
+        let mut clock = time.map_or(Some(Decimal::from(0)), parse_clock)?;
+        // A time of day has one midnight: 24:00:00 is 00:00:00 (XML Schema 1.1, part 2, section 3.3.8).
+        if kind == MomentKind::Time && clock == Decimal::from(DAY) {
+            clock = Decimal::from(0);
+        }
         let offset = days.checked_mul(DAY)?.checked_sub(zone.unwrap_or(0))?;
         Some(Self { kind, seconds: add_seconds(&clock, offset), zone })
     }

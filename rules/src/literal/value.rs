@@ -140,6 +140,19 @@ impl Literal {
         }
     }
 
+    /// The number of bytes that a value takes, besides a constant.
+    pub(crate) fn size(&self) -> u64 {
+        let size = match self {
+            Self::String(text) | Self::Uri(text) | Self::Recurring(text, _) => text.len(),
+            Self::Language { text, .. } => text.len(),
+            Self::Hexadecimal(bytes) | Self::Base64(bytes) => bytes.len(),
+            Self::Decimal(value) => value.size(),
+            Self::Opaque { lexical, .. } | Self::IllTyped { lexical, .. } => lexical.len(),
+            Self::Boolean(_) | Self::Float(_) | Self::Double(_) | Self::Moment(_) | Self::Duration(_) => 0,
+        };
+        size as u64
+    }
+
     /// The order of two values, with numeric promotion. `None` where they are incomparable: different kinds, NaN,
     /// moments with and without time zone that are closer than a time zone can tell apart.
     pub fn compare(&self, other: &Self) -> Option<Ordering> {
