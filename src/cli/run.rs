@@ -18,8 +18,8 @@ use crate::cli::common::{Common, Exit, Failure};
 use crate::cli::configure::Wanted;
 use crate::cli::output;
 use crate::cli::run_lines::Lines;
-use crate::cli::run_session::Session;
 use crate::cli::run_outlet::{Outlet, Outlets};
+use crate::cli::run_session::Session;
 use crate::cli::situation::{Situation, consistent};
 
 /// Arguments of `run`.

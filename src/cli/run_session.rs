@@ -100,9 +100,7 @@ impl<'a> Session<'a> {
         let read = Instant::now();
         let answers = match &mut self.journal {
             None => Vec::new(),
-            Some(journal) => {
-                journal.begin_reacting(&mut self.control).map_err(|error| unwritten(&error))?
-            }
+            Some(journal) => journal.begin_reacting(&mut self.control).map_err(|error| unwritten(&error))?,
         };
         self.open = Some((self.control.beliefs().lines(), read));
         let mut flow = self.say(&answers)?;
@@ -191,7 +189,10 @@ impl<'a> Session<'a> {
         self.stop_thinking();
         // What is safe has to leave at once; otherwise one decision is written, not two.
         let is_safe = answers.iter().all(|answer| answer.effect().is_none());
-        if is_last && is_safe && self.thinking.is_none() && self.control.has_agenda()
+        if is_last
+            && is_safe
+            && self.thinking.is_none()
+            && self.control.has_agenda()
             && let Some(more) = self.control.deliberate_at_once()
         {
             answers.extend(more);
@@ -233,7 +234,8 @@ impl<'a> Session<'a> {
     /// Stops the search for plans if the question is another one now.
     fn stop_thinking(&mut self) {
         let Some(thinking) = &mut self.thinking else { return };
-        if thinking.question != self.control.question() && !thinking.is_stopped && self.stopped < MAX_STOPPED {
+        if thinking.question != self.control.question() && !thinking.is_stopped && self.stopped < MAX_STOPPED
+        {
             thinking.is_stopped = true;
             thinking.stop.store(true, Ordering::Relaxed);
         }

@@ -156,7 +156,8 @@ impl Loop {
         self.planner.made.clear();
         self.beliefs.lines += 1;
         let latest = self.beliefs.now.max(now).saturating_add(MAX_TIME_STEP);
-        self.beliefs.now = self.beliefs.now.max(observation.time.filter(|time| *time <= latest).unwrap_or(now));
+        self.beliefs.now =
+            self.beliefs.now.max(observation.time.filter(|time| *time <= latest).unwrap_or(now));
         if let Some(refusal) =
             observation.sequence.and_then(|sequence| self.beliefs.numbers.refused(sequence))
         {

@@ -94,7 +94,8 @@ impl Receipts {
     /// For a snapshot.
     pub(super) fn to_record(&self) -> Value {
         let function = |(name, own): (&String, &Received)| {
-            let last = own.last.as_ref().map(|last| json!([last.effect, last.design, last.before, last.failed]));
+            let last =
+                own.last.as_ref().map(|last| json!([last.effect, last.design, last.before, last.failed]));
             json!([name, last, own.superseded.iter().collect::<Vec<_>>()])
         };
         json!([self.by_number, self.functions.iter().map(function).collect::<Vec<_>>()])

@@ -149,7 +149,10 @@ fn the_battery_of_the_uuv_drops() {
             (r#"{"event":"action_progress","action":1,"fraction":0.5}"#, &[]),
             (r#"{"event":"fact_changed","name":"battery","value":83.5}"#, &[]),
             // It drops to 15: what is left of the search needs more with any design.
-            (r#"{"event":"fact_changed","name":"battery","value":15}"#, &["reconfigure f_maintain_motion: fd_speed_high to fd_speed_low", "cancel 1"]),
+            (
+                r#"{"event":"fact_changed","name":"battery","value":15}"#,
+                &["reconfigure f_maintain_motion: fd_speed_high to fd_speed_low", "cancel 1"],
+            ),
             (
                 r#"{"event":"action_cancelled","action":1}"#,
                 &[
@@ -408,7 +411,10 @@ fn an_action_is_cancelled_where_another_way_is_better_than_another_design() {
         &mut ugv,
         &[
             // The robot is on its way to wp3, which turns out to be long, when the Kinect is back and the lidar fails.
-            (r#"{"event":"fact_changed","name":"travel_time wp2 wp3","value":30}"#, &["kept: it is still the best"]),
+            (
+                r#"{"event":"fact_changed","name":"travel_time wp2 wp3","value":30}"#,
+                &["kept: it is still the best"],
+            ),
             (
                 r#"{"status":[{"message":"Component status","values":[{"key":"c_lidar","value":"FALSE"},{"key":"c_kinect","value":"RECOVERED"}]}]}"#,
                 &[

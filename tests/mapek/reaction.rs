@@ -121,7 +121,10 @@ fn a_better_value_leads_to_a_better_plan() {
         Answer::PlanFound { cost, .. } => Some(cost.clone()),
         _ => None,
     });
-    assert!(cost.is_some_and(|cost| cost < num_rational::BigRational::from_integer(50.into())), "{answers:?}");
+    assert!(
+        cost.is_some_and(|cost| cost < num_rational::BigRational::from_integer(50.into())),
+        "{answers:?}"
+    );
 }
 
 #[test]
@@ -136,7 +139,10 @@ fn a_wrong_time_is_refused() {
             feed(&mut ugv, &line);
         }
         let answers = feed(&mut ugv, r#"{"event":"tick","time":5000}"#);
-        assert!(kinds(&answers).contains(&"plan_requested".to_owned()), "it is looked for a better plan: {answers:?}");
+        assert!(
+            kinds(&answers).contains(&"plan_requested".to_owned()),
+            "it is looked for a better plan: {answers:?}"
+        );
     }
 }
 
@@ -164,13 +170,13 @@ fn deadlines_have_outcomes() {
     assert!(overdue(&answers).contains(&"failed".to_owned()), "{answers:?}");
     assert!(!ugv2.beliefs().available().contains("fd_amcl_lidar"));
     // A robot that reports starts: a request is repeated, and then cancelled.
-    assert_eq!(overdue(&feed(&mut ugv, &tick(11))), ["repeated"]);
-    assert_eq!(overdue(&feed(&mut ugv, &tick(22))), ["cancelled"]);
+    assert_eq!(overdue(&feed(&mut ugv, &tick(200))), ["repeated"]);
+    assert_eq!(overdue(&feed(&mut ugv, &tick(400))), ["cancelled"]);
     assert!(ugv.beliefs().cancelling());
     // Of a robot that reports nothing, nothing is expected: that is said, less and less often.
     let mut silent = control("ugv");
     silent.start();
-    let said: usize = (1..2000).map(|time| overdue(&feed(&mut silent, &tick(time * 10))).len()).sum();
+    let said: usize = (1..2000).map(|time| overdue(&feed(&mut silent, &tick(time * 60))).len()).sum();
     assert!((2..20).contains(&said), "{said}");
     assert!(!silent.beliefs().cancelling());
 }

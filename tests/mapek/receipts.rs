@@ -7,7 +7,9 @@ use crate::common::{control, feed};
 /// The commands among answers, each in a word.
 fn words(answers: &[Answer]) -> Vec<String> {
     let word = |answer: &Answer| match &answer.effect()?.command {
-        Command::Reconfigure { from, to, .. } => Some(format!("{} to {to}", from.as_deref().unwrap_or("none"))),
+        Command::Reconfigure { from, to, .. } => {
+            Some(format!("{} to {to}", from.as_deref().unwrap_or("none")))
+        }
         Command::Request { step } => Some(format!("request {}", step.action)),
         Command::Cancel { .. } => Some("cancel".to_owned()),
         Command::Suspend { .. } => Some("suspend".to_owned()),
@@ -35,12 +37,18 @@ fn a_report_that_was_on_its_way_acknowledges_nothing() {
     event(&mut ugv, "action_started", "action", 1);
     assert_eq!(words(&feed(&mut ugv, KINECT_FAILS)), ["fd_amcl_kinect to fd_amcl_lidar"]);
     for report in ["action_started", "action_progress"] {
-        let line = format!(r#"{{"event":"{report}","action":1{}}}"#, if report == "action_started" { "" } else { ",\"fraction\":0.3" });
+        let line = format!(
+            r#"{{"event":"{report}","action":1{}}}"#,
+            if report == "action_started" { "" } else { ",\"fraction\":0.3" }
+        );
         assert!(words(&feed(&mut ugv, &line)).is_empty());
     }
     assert_eq!(design(&ugv), Some("fd_amcl_kinect"));
     assert_eq!(ugv.beliefs().pending().collect::<Vec<_>>(), [("f_localization", "fd_amcl_lidar")]);
-    assert!(words(&ugv.repeat()).contains(&"fd_amcl_kinect to fd_amcl_lidar".to_owned()), "it is repeated after a crash");
+    assert!(
+        words(&ugv.repeat()).contains(&"fd_amcl_kinect to fd_amcl_lidar".to_owned()),
+        "it is repeated after a crash"
+    );
     let answers = event(&mut ugv, "reconfiguration_failed", "effect", 3);
     assert!(!answers.iter().any(|answer| matches!(answer, Answer::Error { .. })), "{answers:?}");
     assert_eq!(words(&answers)[0], "fd_amcl_kinect to fd_mrpt_lidar", "the next design is asked for");
@@ -70,7 +78,11 @@ fn what_was_superseded_is_not_believed() {
     ugv.start();
     let bright = r#"{"event":"measured","attribute":"ambient_light","value":0.9}"#;
     let answers = feed(&mut ugv, bright);
-    assert_eq!(words(&answers)[0], "none to fd_amcl_lidar", "what was not acknowledged is not the design before");
+    assert_eq!(
+        words(&answers)[0],
+        "none to fd_amcl_lidar",
+        "what was not acknowledged is not the design before"
+    );
     for _ in 0..10 {
         let Some((effect, _)) = ugv
             .beliefs()
