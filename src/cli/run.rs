@@ -1,6 +1,5 @@
 //! `metaplan run`: lines of events to lines of adaptations.
 
-use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -18,7 +17,7 @@ use crate::cli::common::{Common, Exit, Failure};
 use crate::cli::configure::Wanted;
 use crate::cli::output;
 use crate::cli::run_lines::Lines;
-use crate::cli::run_outlet::{Outlet, Outlets};
+use crate::cli::run_outlet::{Outlet, Outlets, is_over};
 use crate::cli::run_session::Session;
 use crate::cli::situation::{Situation, consistent};
 
@@ -168,19 +167,6 @@ fn keep_going(
         answers = keeper.handle(&Observation::parse(&next.text));
         written = Ok(());
     }
-}
-
-/// Whether nobody reads the answers any more.
-pub(super) fn is_over(written: io::Result<()>) -> Result<bool, Message> {
-    match written {
-        Ok(()) => Ok(false),
-        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(true),
-        Err(error) => Err(Message::error("M109", format!("the answer cannot be written: {error}"))),
-    }
-}
-
-pub(super) fn unwritten(error: &io::Error) -> Message {
-    Message::error("M321", format!("the journal cannot be written: {error}"))
 }
 
 /// So long planning may take before a word is said, and from one word to the next.

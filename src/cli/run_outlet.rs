@@ -161,6 +161,19 @@ impl Outlet {
     }
 }
 
+/// Whether nobody reads the answers any more.
+pub(super) fn is_over(written: io::Result<()>) -> Result<bool, Message> {
+    match written {
+        Ok(()) => Ok(false),
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(true),
+        Err(error) => Err(Message::error("M109", format!("the answer cannot be written: {error}"))),
+    }
+}
+
+pub(super) fn unwritten(error: &io::Error) -> Message {
+    Message::error("M321", format!("the journal cannot be written: {error}"))
+}
+
 /// Begins a recording, which a signal ends as a whole.
 fn record(path: &Path, events: Recorded, mission: &str) -> Result<(Recorder, String), Message> {
     let form = match events {

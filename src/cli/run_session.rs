@@ -16,9 +16,8 @@ use metaplan::mapek::{Answer, Clock as _, Loop, Observation, SystemClock, Though
 use metaplan::message::Message;
 
 use crate::cli::common::{Common, Failure};
-use crate::cli::run::{is_over, unwritten};
 use crate::cli::run_lines::{Line, Lines};
-use crate::cli::run_outlet::Outlet;
+use crate::cli::run_outlet::{Outlet, is_over, unwritten};
 
 /// Upper limit on the lines that were read and not reacted to.
 const MAX_WAITING: usize = 1024;

@@ -13,11 +13,13 @@
 //! - \[1\] J. Kephart, D. Chess: The vision of autonomic computing, Computer 36, 2003.
 //! - \[2\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
 
+mod acknowledge;
 mod adapt;
 mod analyze;
 mod answer;
 mod ask;
 mod beliefs;
+mod changes;
 mod control;
 mod deadlines;
 mod digest;

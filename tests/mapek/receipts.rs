@@ -136,3 +136,111 @@ fn silent_robots_are_believed_to_begin_as_they_were_asked_to() {
     assert_eq!(design(&ugv), Some("fd_amcl_kinect"));
     assert_eq!(ugv.beliefs().pending().count(), 1);
 }
+
+/// The situation of a row: a reconfiguration from A to B, effect 3, in the state that the row names. A is the Kinect, B the lidar, C the camera.
+fn situation(state: &str) -> Loop {
+    let mut ugv = control("ugv");
+    ugv.start();
+    event(&mut ugv, "acknowledged", "effect", 1);
+    event(&mut ugv, "action_started", "action", 1);
+    feed_reconfiguration(&mut ugv, KINECT_FAILS, 3);
+    let (first, second) = state.split_once(", ").unwrap_or((state, ""));
+    match first {
+        "asked" => {}
+        "acknowledged" => drop(event(&mut ugv, "acknowledged", "effect", 3)),
+        "failed" => {
+            fail_quietly(&mut ugv, 3);
+        }
+        "superseded" => feed_reconfiguration(
+            &mut ugv,
+            r#"{"event":"component_status","component":"c_lidar","status":"FALSE"}"#,
+            4,
+        ),
+        other => panic!("unknown state {other}"),
+    }
+    match second {
+        "" => {}
+        "C acknowledged" => drop(event(&mut ugv, "acknowledged", "effect", 4)),
+        "C failed" => {
+            fail_quietly(&mut ugv, 4);
+        }
+        other => panic!("unknown state {other}"),
+    }
+    ugv
+}
+
+/// Reacts to a line, which must lead to the reconfiguration with that number; nothing is planned.
+fn feed_reconfiguration(ugv: &mut Loop, line: &str, number: u64) {
+    let answers = react(ugv, line);
+    let found = answers.iter().filter_map(Answer::effect).find(|effect| effect.number == number);
+    assert!(found.is_some_and(|effect| matches!(effect.command, Command::Reconfigure { .. })), "{answers:?}");
+}
+
+fn react(ugv: &mut Loop, line: &str) -> Vec<Answer> {
+    let now = ugv.beliefs().now() + std::time::Duration::from_millis(100);
+    ugv.react(&metaplan::mapek::Observation::parse(line), now)
+}
+
+/// A failure, after which the action stands still or has another design: what the row is about is not that.
+fn fail_quietly(ugv: &mut Loop, effect: u64) {
+    react(ugv, &format!(r#"{{"event":"reconfiguration_failed","effect":{effect}}}"#));
+}
+
+/// The table of the book: state × message.
+#[test]
+fn the_table_of_the_book_is_what_the_loop_does() {
+    let page = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/reference/events.md");
+    let page = std::fs::read_to_string(page).expect("the page");
+    let table = page.split("<!-- table: receipts -->").nth(1).expect("the table");
+    let table = table.split("<!-- end of table -->").next().expect("its end");
+    let rows = table.lines().filter(|line| line.starts_with('|')).skip(2);
+    let names = [("A", "fd_amcl_kinect"), ("B", "fd_amcl_lidar")];
+    let mut count = 0;
+    for row in rows {
+        let cells: Vec<&str> = row.trim_matches('|').split('|').map(str::trim).collect();
+        let [state, message, believed, pending, refused] = cells[..] else { panic!("{row}") };
+        let mut ugv = situation(state);
+        let third = ugv.beliefs().pending().map(|(_, design)| design.to_owned()).next();
+        let third = third.or_else(|| design(&ugv).map(ToOwned::to_owned)).unwrap_or_default();
+        let name = |letter: &str| {
+            let known = names.iter().find(|(own, _)| *own == letter).map(|(_, name)| (*name).to_owned());
+            known.unwrap_or_else(|| third.clone())
+        };
+        let before = if state.starts_with("superseded") { 4 } else { 3 };
+        let line = match message.trim_matches('`') {
+            "action_progress" => r#"{"event":"action_progress","action":1,"fraction":0.5}"#.to_owned(),
+            "action_succeeded" => r#"{"event":"action_succeeded","action":1}"#.to_owned(),
+            kind => format!(r#"{{"event":"{kind}","effect":3}}"#),
+        };
+        let answers = react(&mut ugv, &line);
+        assert!(!answers.iter().any(|answer| matches!(answer, Answer::Error { .. })), "{row}: {answers:?}");
+        assert_eq!(design(&ugv), Some(name(believed).as_str()), "{row}");
+        // What was asked for in answer to the message itself is another reconfiguration.
+        let is_older = |effect: &&metaplan::mapek::Effect| effect.number <= before;
+        let waiting = ugv.beliefs().outstanding().filter(is_older).find_map(|effect| match &effect.command {
+            Command::Reconfigure { to, .. } => Some(to.clone()),
+            _ => None,
+        });
+        let is_superseded =
+            answers.iter().filter_map(Answer::effect).any(|own| own.supersedes.contains(&before));
+        if pending != "no" {
+            assert!(is_superseded || waiting == Some(name(pending)), "{row}: {waiting:?}");
+        } else if !state.ends_with("failed") {
+            assert_eq!(waiting, None, "{row}");
+        }
+        let is_refused = ugv.snapshot().0.to_string().contains("fd_realisability");
+        assert_eq!(is_refused && lidar_refused(&ugv), refused == "yes", "{row}");
+        count += 1;
+    }
+    assert_eq!(count, 16);
+}
+
+/// Whether the lidar design was reported to be not realisable.
+fn lidar_refused(ugv: &Loop) -> bool {
+    let snapshot = ugv.snapshot().0;
+    let added = snapshot["added"].as_array().expect("statements");
+    added.iter().any(|own| {
+        let text = own.to_string();
+        text.contains("fd_realisability") && text.contains("fd_amcl_lidar") && text.contains("false")
+    })
+}
