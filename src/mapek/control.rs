@@ -199,7 +199,7 @@ impl Loop {
                 objectives(&mut self.beliefs, Some(&step), &mut answers);
             }
             let findings = follow(&mut self.beliefs, changes.base, &mut answers);
-            react(&mut self.beliefs, &self.settings, &mut changes, &mut answers);
+            react(&mut self.beliefs, &self.settings, &findings, &mut changes, &mut answers);
             self.question += u64::from(changes.is_news() || !findings.is_empty());
             let agenda = self.agenda.get_or_insert_default();
             agenda.changes.extend(changes);

@@ -7,6 +7,7 @@
 use num_rational::BigRational;
 use pddl::ast::Direction;
 
+use crate::mapek::analyze::Findings;
 use crate::mapek::answer::{Answer, Command};
 use crate::mapek::ask::Ask;
 use crate::mapek::beliefs::{Beliefs, Running};
@@ -20,12 +21,15 @@ use crate::mapek::step::PlannedStep;
 pub(super) fn react(
     beliefs: &mut Beliefs,
     settings: &Settings,
+    findings: &Findings,
     changes: &mut Changes,
     answers: &mut Vec<Answer>,
 ) {
     let running = beliefs.running.clone().filter(|own| !own.cancelling && !own.suspended);
     let Some(mut running) = running else { return };
-    let Some(reason) = trouble(beliefs, &running, changes.facts) else { return };
+    // A design may be a condition of an action without being a part of its configuration.
+    let facts = changes.facts || !findings.lost.is_empty();
+    let Some(reason) = trouble(beliefs, &running, facts) else { return };
     let other = match settings.safe_reaction {
         SafeReaction::Reconfigure => other_designs(beliefs, &running),
         SafeReaction::Suspend => None,

@@ -194,9 +194,16 @@ fn a_planner_that_never_ends_does_not_delay_the_safe_effect() {
     assert!(begun.elapsed() < Duration::from_secs(5));
 }
 
+/// The processor time of this thread so far; zero where the system does not say.
+fn processor_time() -> Duration {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    let nanoseconds = text.split(' ').next().and_then(|word| word.parse().ok());
+    Duration::from_nanos(nanoseconds.unwrap_or_default())
+}
+
 /// The time from an observation to its safe effect, beside a search that never ends.
 #[test]
-#[ignore = "measures; the bound holds for one core of a quiet machine"]
+#[ignore = "measures; the measures wall time; meaningless on a busy machine"]
 #[expect(clippy::print_stdout, reason = "figures are what this test is for")]
 fn the_safe_effect_comes_within_five_milliseconds() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -205,14 +212,18 @@ fn the_safe_effect_comes_within_five_milliseconds() {
     let thinker = ferry.thinker();
     let stop = thinker.stop();
     let search = std::thread::spawn(move || thinker.think());
-    for mission in ["ugv", "uuv", "camara_like"] {
+    let mut late = Vec::new();
+    for (mission, count) in [("camara_like", 200), ("ugv", 1_000), ("uuv", 1_000)] {
         let mut robot = control(mission);
         robot.start();
         feed(&mut robot, r#"{"event":"action_started","action":1}"#);
-        let mut times = Vec::new();
-        for number in 0..5_000 {
+        let (mut times, before) = (Vec::new(), processor_time());
+        for number in 0..count {
             let (_, step) = robot.beliefs().running().expect("an action is under way");
-            let design = step.configuration[number % step.configuration.len()].1.clone();
+            let designs: Vec<&String> = step.configuration.iter().map(|(_, design)| design).collect();
+            // A design that is an argument and serves no function of the action.
+            let design =
+                designs.get(number % designs.len().max(1)).map_or(&step.arguments[0], |own| own).to_string();
             let line = |realisable: bool| {
                 format!(r#"{{"event":"design_status","design":"{design}","realisable":{realisable}}}"#)
             };
@@ -227,9 +238,14 @@ fn the_safe_effect_comes_within_five_milliseconds() {
         }
         times.sort_unstable();
         let [median, most] = [times.len() / 2, times.len() * 999 / 1000].map(|place| times[place]);
-        println!("{mission}: median {median:?}, p99.9 {most:?}, greatest {:?}", times[times.len() - 1]);
-        assert!(most <= Duration::from_millis(5), "{mission}: {most:?}");
+        let greatest = times[times.len() - 1];
+        println!("{mission}: median {median:?}, p99.9 {most:?}, greatest {greatest:?}");
+        // Two lines each: the loss, and the return.
+        let each = (processor_time() - before) / (2 * times.len() as u32);
+        println!("{mission}: {each:?} of processor time for each line");
+        late.extend((most > Duration::from_millis(5)).then_some((mission, most)));
     }
+    assert!(late.is_empty(), "{late:?}");
     assert!(!search.is_finished(), "the search has never ended");
     stop.store(true, std::sync::atomic::Ordering::Relaxed);
     search.join().expect("it stops");
