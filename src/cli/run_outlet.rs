@@ -127,6 +127,15 @@ impl Outlet {
         Ok(())
     }
 
+    /// Writes answers to a line, each with the line's number; there may be more.
+    pub(super) fn answer_so_far(&self, line: u64, answers: &[impl Serialize]) -> io::Result<()> {
+        if answers.is_empty() {
+            return Ok(());
+        }
+        let lines = answers.iter().map(|answer| output::line(&NumberedAnswer::new(answer, line)));
+        self.say(&lines.collect::<String>())
+    }
+
     /// Writes the answers to a line, each with the line's number, and that it was handled.
     pub(super) fn answer(&self, line: u64, answers: &[impl Serialize], read: Instant) -> io::Result<()> {
         let mut text = String::new();
@@ -150,6 +159,19 @@ impl Outlet {
             Message::at("M331", name, None, text)
         })
     }
+}
+
+/// Whether nobody reads the answers any more.
+pub(super) fn is_over(written: io::Result<()>) -> Result<bool, Message> {
+    match written {
+        Ok(()) => Ok(false),
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(true),
+        Err(error) => Err(Message::error("M109", format!("the answer cannot be written: {error}"))),
+    }
+}
+
+pub(super) fn unwritten(error: &io::Error) -> Message {
+    Message::error("M321", format!("the journal cannot be written: {error}"))
 }
 
 /// Begins a recording, which a signal ends as a whole.

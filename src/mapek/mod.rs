@@ -13,12 +13,15 @@
 //! - \[1\] J. Kephart, D. Chess: The vision of autonomic computing, Computer 36, 2003.
 //! - \[2\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
 
+mod acknowledge;
 mod adapt;
 mod analyze;
 mod answer;
 mod ask;
 mod beliefs;
+mod changes;
 mod control;
+mod deadlines;
 mod digest;
 mod drive;
 mod effects;
@@ -30,15 +33,18 @@ mod live;
 mod memo;
 mod monitor;
 mod plan;
+mod react;
+mod receipts;
 mod record;
 mod resume;
 mod sequence;
 mod settings;
 mod step;
+mod think;
 mod watch;
 
 pub(crate) use analyze::{available, changes, doubts, inferred, ruled_out, said, unavailable};
-pub use answer::{Answer, Command, DesignChange, Effect, ObjectiveChange};
+pub use answer::{Answer, Command, DesignChange, Effect, ObjectiveChange, OverdueOutcome};
 pub use beliefs::{Beliefs, Outlook};
 pub use control::Loop;
 pub use drive::{Clock, Effector, Observer, SystemClock, drive};
@@ -47,6 +53,7 @@ pub use fields::Refusal;
 pub use record::{Decision, Snapshot};
 pub(crate) use resume::resume;
 pub(crate) use sequence::Numbers;
-pub use settings::{AdaptationSection, Settings};
+pub use settings::{AdaptationSection, SafeReaction, Settings};
 pub use step::PlannedStep;
+pub use think::{Thinker, Thoughts};
 pub use watch::{Planning, Watch};

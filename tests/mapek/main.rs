@@ -12,6 +12,8 @@ mod fuzz;
 mod journal;
 mod kill;
 mod numbers;
+mod reaction;
+mod receipts;
 mod runaway;
 mod soak;
 mod worlds;

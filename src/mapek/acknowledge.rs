@@ -1,0 +1,115 @@
+//! Acknowledgements: messages about reconfigurations to the design that a function is believed to have.
+//!
+//! A function has the design that was acknowledged last. A reconfiguration is acknowledged by an event that names its number, and
+//! messages may cross, be doubled or come out of order: of two acknowledged reconfigurations of a function the later one counts.
+//! A reconfiguration that was superseded before it was answered may still be acknowledged; until then it is not believed, and the
+//! function's design is not certain.
+//!
+//! A report that an action has started, progressed or succeeded implies that its request has arrived, and that is all. Robots
+//! that acknowledge nothing would never have any design then. So, as long as no reconfiguration was ever acknowledged by its
+//! number, such a report also implies the reconfigurations that preceded the request: an action begins with the configuration of
+//! its request.
+
+use crate::mapek::answer::Command;
+use crate::mapek::beliefs::Beliefs;
+use crate::mapek::receipts::Acknowledged;
+
+/// The consequence of a reconfiguration's failure.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Failure {
+    /// The design cannot be realised.
+    Design(String),
+    /// None: it is old or a duplicate.
+    Stale,
+    /// The effect is not a reconfiguration, or there was none.
+    NotReconfiguration,
+}
+
+impl Beliefs {
+    /// Takes an acknowledgement of an effect. Returns `false` if there was no such effect.
+    pub(super) fn acknowledge(&mut self, effect: u64) -> bool {
+        if effect == 0 || effect > self.effects {
+            return false;
+        }
+        self.waits.remove(&effect);
+        if let Some(outstanding) = self.outstanding.remove(&effect) {
+            if let Command::Reconfigure { function, to, .. } = outstanding.command {
+                self.receipts.by_number = true;
+                self.configured(effect, &function, to);
+            }
+        } else if let Some((function, design)) = self.receipts.superseded(effect) {
+            let (function, design) = (function.clone(), design.clone());
+            self.receipts.by_number = true;
+            self.configured(effect, &function, design);
+        }
+        true
+    }
+
+    /// Takes a report of an action that has started: its request has arrived, and with a robot that never acknowledges also what
+    /// was asked for before that.
+    pub(super) fn confirm_request(&mut self, request: u64) {
+        self.outstanding.remove(&request);
+        self.waits.remove(&request);
+        if self.receipts.by_number {
+            return;
+        }
+        let before = self.outstanding.range(..request);
+        let implied: Vec<(u64, String, String)> = before
+            .filter_map(|(number, effect)| match &effect.command {
+                Command::Reconfigure { function, to, .. } => Some((*number, function.clone(), to.clone())),
+                _ => None,
+            })
+            .collect();
+        for (number, function, design) in implied {
+            self.outstanding.remove(&number);
+            self.waits.remove(&number);
+            self.configured(number, &function, design);
+        }
+    }
+
+    /// Takes the failure of a reconfiguration.
+    pub(super) fn reconfiguration_failed(&mut self, effect: u64) -> Failure {
+        if effect == 0 || effect > self.effects {
+            return Failure::NotReconfiguration;
+        }
+        match self.outstanding.get(&effect).map(|own| &own.command) {
+            Some(Command::Reconfigure { to, .. }) => {
+                let design = to.clone();
+                self.outstanding.remove(&effect);
+                self.waits.remove(&effect);
+                return Failure::Design(design);
+            }
+            Some(_) => return Failure::NotReconfiguration,
+            None => {}
+        }
+        for (function, own) in &mut self.receipts.functions {
+            if let Some(design) = own.superseded.remove(&effect) {
+                return Failure::Design(design);
+            }
+            let Some(last) = own.last.as_mut().filter(|last| last.effect == effect && !last.failed) else {
+                continue;
+            };
+            last.failed = true;
+            let design = last.design.clone();
+            match last.before.clone() {
+                // Somebody else may have changed it since.
+                _ if self.configuration.get(function) != Some(&design) => {}
+                Some(before) => drop(self.configuration.insert(function.clone(), before)),
+                None => drop(self.configuration.remove(function)),
+            }
+            return Failure::Design(design);
+        }
+        Failure::Stale
+    }
+
+    /// Believes that a function has got a design by a reconfiguration, unless a later one was acknowledged.
+    fn configured(&mut self, effect: u64, function: &str, design: String) {
+        let own = self.receipts.functions.entry(function.to_owned()).or_default();
+        own.superseded.retain(|number, _| *number > effect);
+        if own.last.as_ref().is_some_and(|last| last.effect >= effect) {
+            return;
+        }
+        let before = self.configuration.insert(function.to_owned(), design.clone());
+        own.last = Some(Acknowledged { effect, design, before, failed: false });
+    }
+}
