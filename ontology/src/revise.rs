@@ -84,14 +84,14 @@ impl Stated {
         options.documents_before += come.sources.len();
         options.known.extend(come.entities.iter().filter(is_kind).cloned());
         let go = read(retracted, &options)?;
-        self.change_by(come, go, engine)
+        self.change_by(&come, &go, engine)
     }
 
     /// As [`Stated::change`], for documents that have been read.
     ///
     /// # Errors
     /// O114.
-    pub fn change_by(&self, come: Ontology, go: Ontology, engine: &mut Engine) -> Result<Change, Errors> {
+    pub fn change_by(&self, come: &Ontology, go: &Ontology, engine: &mut Engine) -> Result<Change, Errors> {
         let mut warnings: Vec<Warning> = come.warnings.iter().chain(&go.warnings).cloned().collect();
         let known: HashSet<&Iri> =
             self.ontology.sources.iter().filter_map(|source| source.iri.as_ref()).collect();
@@ -99,10 +99,10 @@ impl Stated {
             Warning::ImportOfUpdate { import, .. } => !known.contains(&Iri::from(import.as_str())),
             _ => true,
         });
-        nameless(&go)?;
+        nameless(go)?;
         let mut stated = self.clone();
-        let removed = stated.remove(&go, engine, &mut warnings);
-        stated.add(&come);
+        let removed = stated.remove(go, engine, &mut warnings);
+        stated.add(come);
         let change = [&come.axioms[..], &removed].concat();
         let is_plain = come.rules.is_empty()
             && go.rules.is_empty()

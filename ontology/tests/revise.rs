@@ -64,7 +64,7 @@ impl Revised {
     fn change(&mut self, come: &str, go: &str) -> Vec<Warning> {
         let known = Some(self.stated.ontology());
         let (come, go) = (read(come, known), read(go, known));
-        let change = self.stated.change_by(come, go, &mut self.engine).expect("names");
+        let change = self.stated.change_by(&come, &go, &mut self.engine).expect("names");
         let changed = match change.program {
             Some(program) => self.engine.change(change.delta, program).expect("safe rules"),
             None => self.engine.apply(change.delta).expect("within the budget"),
@@ -380,7 +380,8 @@ fn what_cannot_be_retracted_is_named() {
     let shown: Vec<String> = warnings.iter().map(ToString::to_string).collect();
     assert!(shown.iter().any(|text| text.contains("O207") && text.contains("<urn:x#B>")), "{shown:?}");
     let go = read(&document(&["ClassAssertion(:A _:one)".into()], true), None);
-    let error = revised.stated.change_by(Ontology::default(), go, &mut revised.engine).expect_err("no name");
+    let error =
+        revised.stated.change_by(&Ontology::default(), &go, &mut revised.engine).expect_err("no name");
     assert!(matches!(&error[0], Error::Nameless { .. }), "{error}");
 }
 
@@ -405,7 +406,7 @@ fn individuals_without_a_name_stay_apart() {
     let known = revised.stated.ontology().entities.clone();
     let options = ReadOptions { documents_before: 1, known, ..ReadOptions::default() };
     let come = read_text(&text, "update", &options).expect("well-formed");
-    let change = revised.stated.change_by(come, Ontology::default(), &mut revised.engine).expect("names");
+    let change = revised.stated.change_by(&come, &Ontology::default(), &mut revised.engine).expect("names");
     assert_eq!(change.delta.insert.len(), 1);
     revised.engine.apply(change.delta).expect("within the budget");
     assert_eq!(answers(&revised.engine).0.len(), 2);

@@ -175,16 +175,12 @@ pub enum Error {
         rule: RuleIdentity,
     },
     /// A regular expression that cannot be used.
-    #[error("R210 in rule {rule}, {built_in} has a pattern that cannot be used, `{pattern}`: {reason}")]
+    #[error("R210 rule {rule} has a pattern that cannot be used, {fault}")]
     Pattern {
         /// Which rule.
         rule: RuleIdentity,
-        /// The built-in.
-        built_in: &'static str,
-        /// The pattern.
-        pattern: String,
-        /// What is wrong with it.
-        reason: String,
+        /// The pattern in quotes, and what is wrong with it.
+        fault: Box<str>,
     },
     /// The evaluation was stopped; the engine is as it was before the update.
     #[error("R301 step budget of {budget} used up, last in rule {rule}{}", growing(value.as_deref()))]

@@ -185,7 +185,7 @@ fn bad_pattern(rule: &Rule, symbols: &Symbols) -> Option<Error> {
             Term::Variable(_) => None,
         };
         let (pattern, reason) = built_in.bad_pattern(&literal)?;
-        Some(Error::Pattern { rule: rule.identity.clone(), built_in: built_in.name(), pattern, reason })
+        Some(Error::Pattern { rule: rule.identity.clone(), fault: format!("`{pattern}`: {reason}").into() })
     })
 }
 

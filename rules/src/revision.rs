@@ -59,9 +59,10 @@ impl Engine {
             check_fact(fact, &self.symbols)?;
         }
         let before = self.clone();
-        let change = match self.equality.is_some() || program.equality {
-            true => self.change_equally(delta, program),
-            false => self.change_plainly(delta, program),
+        let change = if self.equality.is_some() || program.equality {
+            self.change_equally(delta, program)
+        } else {
+            self.change_plainly(delta, program)
         };
         if change.is_err() {
             *self = before;

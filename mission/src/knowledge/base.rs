@@ -105,8 +105,8 @@ impl Knowledge {
         Ok(Self {
             documents,
             annotations,
-            documented,
             terms,
+            documented,
             ..Self::of(runtime, rule_count, warnings, sources, entities)
         })
     }

@@ -6,6 +6,7 @@ use crate::owl::{EntityKind, Iri};
 
 /// Where to look for what a document imports.
 #[derive(Clone, Debug, Default)]
+#[allow(clippy::struct_excessive_bools)] // independent choices
 pub struct ReadOptions {
     /// OASIS XML catalogs.
     pub catalogs: Vec<PathBuf>,

@@ -45,10 +45,12 @@ pub(super) fn document(ontology: &Ontology) -> String {
 /// Whether an axiom about several entities is about more than one: the syntax has no form for others, which say nothing.
 fn says_something(axiom: &Axiom) -> bool {
     let several = match axiom {
-        Axiom::SameIndividual(items) | Axiom::DifferentIndividuals(items) => items.len(),
+        Axiom::SameIndividual(items)
+        | Axiom::DifferentIndividuals(items)
+        | Axiom::EquivalentDataProperties(items)
+        | Axiom::DisjointDataProperties(items) => items.len(),
         Axiom::EquivalentClasses(items) | Axiom::DisjointClasses(items) => items.len(),
         Axiom::EquivalentObjectProperties(items) | Axiom::DisjointObjectProperties(items) => items.len(),
-        Axiom::EquivalentDataProperties(items) | Axiom::DisjointDataProperties(items) => items.len(),
         _ => return true,
     };
     several > 1

@@ -86,7 +86,7 @@ const INITIAL: &str = ":A-Z_a-z\\x{C0}-\\x{D6}\\x{D8}-\\x{F6}\\x{F8}-\\x{2FF}\\x
 /// Those that may follow, besides.
 const FURTHER: &str = "\\-.0-9\\x{B7}\\x{300}-\\x{36F}\\x{203F}-\\x{2040}";
 
-/// A pattern of XPath in the spelling of the `regex` crate: classes subtract with `--` there, and `\i` and `\c` are
+/// A pattern of `XPath` in the spelling of the `regex` crate: classes subtract with `--` there, and `\i` and `\c` are
 /// spelled out.
 fn translate(pattern: &str) -> Result<String, String> {
     let mut translated = String::new();
@@ -99,10 +99,10 @@ fn translate(pattern: &str) -> Result<String, String> {
             '\\' => {
                 let escaped = rest.next().ok_or("it ends with a backslash")?;
                 match escaped {
-                    'i' => translated += &format!("[{INITIAL}]"),
-                    'c' => translated += &format!("[{INITIAL}{FURTHER}]"),
-                    'I' => translated += &format!("[^{INITIAL}]"),
-                    'C' => translated += &format!("[^{INITIAL}{FURTHER}]"),
+                    'i' => translated.extend(["[", INITIAL, "]"]),
+                    'c' => translated.extend(["[", INITIAL, FURTHER, "]"]),
+                    'I' => translated.extend(["[^", INITIAL, "]"]),
+                    'C' => translated.extend(["[^", INITIAL, FURTHER, "]"]),
                     '1'..='9' if depth == 0 => {
                         return Err(format!("the back reference \\{escaped} is not supported"));
                     }

@@ -143,8 +143,9 @@ impl Literal {
     /// The number of bytes that a value takes, besides a constant.
     pub(crate) fn size(&self) -> u64 {
         let size = match self {
-            Self::String(text) | Self::Uri(text) | Self::Recurring(text, _) => text.len(),
-            Self::Language { text, .. } => text.len(),
+            Self::String(text) | Self::Uri(text) | Self::Language { text, .. } | Self::Recurring(text, _) => {
+                text.len()
+            }
             Self::Hexadecimal(bytes) | Self::Base64(bytes) => bytes.len(),
             Self::Decimal(value) => value.size(),
             Self::Opaque { lexical, .. } | Self::IllTyped { lexical, .. } => lexical.len(),
