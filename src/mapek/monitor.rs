@@ -430,7 +430,7 @@ mod tests {
         let event = Observation::parse(line).events.remove(0).expect("an event");
         let taken = monitor.take(&mut beliefs, &event, &mut changes);
         let found = taken.map_err(|refusal| refusal.code);
-        let Changes { base, facts, predicates, goal, must } = &changes;
+        let Changes { base, facts, predicates, goal, must, .. } = &changes;
         assert_eq!(found.is_err() || line.contains("tick"), !changes.any(), "{line}");
         let must: Vec<&str> = must.iter().map(String::as_str).collect();
         let found = found.map(|()| (*base, [*facts, *predicates, *goal], &must[..]));
