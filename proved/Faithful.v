@@ -363,6 +363,9 @@ Definition faithful : bool :=
   forallb (fun ia => action_ok (fst ia) (snd ia)) (combine (seq 0 (length (actions P))) (actions P)).
 End Faithful.
 
+Definition is_linear (P : problem) (N : names) : bool :=
+  match linear_of P N unchanged Undefined [] (metric P) with Is _ => true | _ => false end.
+
 (* The whole check: the plan, the comparison and the argument. *)
 Definition check_certificate (P : problem) (T : task) (N : names) (case : nat -> list key -> tree) (goal_case : tree)
     (A : argument) (oracle : state -> list positive) (plan : list (nat * list key)) (claim : option Q) : bool :=
@@ -370,7 +373,7 @@ Definition check_certificate (P : problem) (T : task) (N : names) (case : nat ->
   match eval (initial P) None [] (metric P), claim with
   | _, None => check T A None oracle
   | Some first, Some m =>
-      match execute P false (initial P) 0 plan with
+      is_linear P N && match execute P false (initial P) 0 plan with
       | Some (w, spent) => match final_metric P w spent with Some m' => Qeq_bool m' m | None => false end
       | None => false
       end &&
