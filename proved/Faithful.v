@@ -1,0 +1,383 @@
+(* Compares a ground task with PDDL: every instance of an action is simulated by an operator that requires no more, has the same
+   effects, and costs no more. Instances are evaluated symbolically; case trees, which need no trust, name the operators. *)
+From Coq Require Import ZArith QArith List Bool FMapPositive.
+From Proved Require Import Task Check Lifted.
+Import ListNotations.
+Open Scope Q_scope.
+
+(* Linear forms over the fluents of the state before a step. *)
+Definition form := (list (atom * Q) * Q)%type.
+Fixpoint plus_term (f : atom) (q : Q) (l : list (atom * Q)) : list (atom * Q) :=
+  match l with
+  | [] => [(f, q)]
+  | (g, y) :: r => if atom_eqb f g then (let s := Qred (y + q) in if Qeq_bool s 0 then r else (g, s) :: r) else (g, y) :: plus_term f q r
+  end.
+Definition plus_form (a : form) (c : Q) (b : form) : form :=
+  (fold_left (fun l t => plus_term (fst t) (c * snd t) l) (fst b) (fst a), Qred (snd a + c * snd b)).
+Definition constant (q : Q) : form := ([], q).
+Definition fluent (f : atom) : form := ([(f, 1)], 0).
+Inductive result := Undefined | Unknown | Is (f : form).
+Definition plus_result (a : result) (c : Q) (b : result) : result :=
+  match a, b with
+  | Undefined, _ => Undefined | _, Undefined => Undefined
+  | Is x, Is y => Is (plus_form x c y) | _, _ => Unknown
+  end.
+
+(* What a task and its names say; none of it is trusted. *)
+Record names := Names {
+  variables : M.t (list (Z * atom));             (* atoms of the values of a variable *)
+  fluents : M.t atom;                            (* fluents of the numbers *)
+  fact_of : index (key * Z); number_of : index key;
+  changing : key -> bool;                        (* predicates and functions that actions change *)
+  may_hold : index unit;                         (* atoms of changing predicates that may hold in some state *)
+  scale : positive;                              (* a number of the task is the value of its fluent times this *)
+  cost_scale : positive }.
+Inductive tree :=
+  | Leaf (o : option (nat * choice))             (* an operator with a choice, or none *)
+  | Impossible
+  | SplitAtom (a : atom) (t u : tree)            (* it holds, it does not hold *)
+  | SplitForm (f : form) (t u : tree).           (* it is at least 0, it is less *)
+
+Definition mem {X} (m : index X) (a : atom) : bool := match find m a with Some _ => true | None => false end.
+
+Section Faithful.
+Variables (P : problem) (T : task) (N : names).
+
+(* Knowledge of the state before a step. *)
+Record knowledge := Knowledge { literals : list (atom * bool); bounds : list (bool * form) }. (* form > 0 if strict, else >= 0 *)
+Definition in_variable (k : knowledge) (v : key) : list (Z * bool) :=
+  flat_map (fun l => match find (fact_of N) (fst l) with
+                     | Some (u, x) => if Pos.eqb u v then [(x, snd l)] else [] | None => [] end) (literals k).
+(* The values that a variable may have. *)
+Definition possible (k : knowledge) (v : key) : list Z :=
+  let known := in_variable k v in
+  filter (fun y => forallb (fun xb => Bool.eqb (Z.eqb y (fst xb)) (snd xb)) known)
+         (match List.find snd known with Some (x, _) => [x] | None => range (get (size T) v) end).
+Definition fact3 (k : knowledge) (v : key) (x : Z) : option bool :=
+  match M.find v (variables N) with
+  | None => None
+  | Some _ => let ys := possible k v in
+      if forallb (Z.eqb x) ys then Some true else if forallb (fun y => negb (Z.eqb x y)) ys then Some false else None
+  end.
+Definition base_truth (k : knowledge) (a : atom) : option bool :=
+  if negb (changing N (fst a)) then Some (holds_in (initial P) a)
+  else match assoc a (literals k) with
+       | Some b => Some b
+       | None => if negb (mem (may_hold N) a) then Some false
+                 else match find (fact_of N) a with Some (v, x) => fact3 k v x | None => None end
+       end.
+(* A state in terms of the one before the step: atoms and fluents that have changed. *)
+Record symbolic := Symbolic { new_truths : list (atom * bool); new_values : list (atom * form) }.
+Definition unchanged := Symbolic [] [].
+Definition atom3 (k : knowledge) (s : symbolic) (a : atom) : option bool :=
+  match assoc a (new_truths s) with Some b => Some b | None => base_truth k a end.
+Definition value3 (s : symbolic) (f : atom) : result :=
+  match assoc f (new_values s) with
+  | Some g => Is g
+  | None => if changing N (fst f) then Is (fluent f)
+            else match value_in (initial P) f with Some q => Is (constant q) | None => Undefined end
+  end.
+Fixpoint linear_of (s : symbolic) (d : result) (env : list key) (e : expression) : result :=
+  match e with
+  | Constant q => Is (constant q)
+  | Fluent f ts => match ground env ts with Some l => value3 s (f, l) | None => Undefined end
+  | Duration => d
+  | Plus a b => plus_result (linear_of s d env a) 1 (linear_of s d env b)
+  | Minus a b => plus_result (linear_of s d env a) (-1 # 1) (linear_of s d env b)
+  | Times a b => match linear_of s d env a, linear_of s d env b with
+                 | Undefined, _ => Undefined | _, Undefined => Undefined
+                 | Is ([], x), Is y => Is (plus_form (constant 0) x y)
+                 | Is x, Is ([], y) => Is (plus_form (constant 0) y x)
+                 | _, _ => Unknown end
+  | Over a b => match linear_of s d env a, linear_of s d env b with
+                | Undefined, _ => Undefined | _, Undefined => Undefined
+                | Is x, Is ([], y) => if Qeq_bool y 0 then Undefined else Is (plus_form (constant 0) (/ y) x)
+                | _, _ => Unknown end
+  end.
+Definition implied (k : knowledge) (strict : bool) (f : form) : bool :=
+  existsb (fun b => match plus_form f (-1 # 1) (snd b) with
+                    | ([], c) => if strict && negb (fst b) then less 0 c else Qle_bool 0 c
+                    | _ => false end) ((false, constant 0) :: bounds k)
+  || match f with ([], c) => strict && less 0 c | _ => false end.
+Definition compare3 (k : knowledge) (strict : bool) (r : result) : option bool :=
+  match r with
+  | Undefined => Some false
+  | Unknown => None
+  | Is f => if implied k strict f then Some true
+            else if implied k (negb strict) (plus_form (constant 0) (-1 # 1) f) then Some false else None
+  end.
+(* [Some b] means that the condition does not have the other truth value; it may be undefined. *)
+Fixpoint truth3 (k : knowledge) (s : symbolic) (d : result) (env : list key) (f : formula) : option bool :=
+  match f with
+  | Truth b => Some b
+  | Atom p ts => match ground env ts with Some l => atom3 k s (p, l) | None => Some false end
+  | Same t u => match object env t, object env u with Some a, Some b => Some (Pos.eqb a b) | _, _ => Some false end
+  | Compare strict a b => compare3 k strict (linear_of s d env (Minus a b))
+  | Not g => option_map negb (truth3 k s d env g)
+  | And g h => match truth3 k s d env g with
+               | Some false => Some false
+               | x => and3 x (truth3 k s d env h) end
+  | Forall t g => fold_right (fun o r => and3 (truth3 k s d (env ++ [o]) g) r) (Some true) (objects P t)
+  end.
+Inductive symbolic_change := SFact (a : atom) (holds : bool) | SNumber (a : atom) (assigns : bool) (f : form).
+Fixpoint changes3 (k : knowledge) (s : symbolic) (d : result) (env : list key) (e : effect) : option (list symbolic_change) :=
+  match e with
+  | Nothing => Some []
+  | Put b p ts => match ground env ts with Some l => Some [SFact (p, l) b] | None => None end
+  | Change assigns f ts x => match ground env ts, linear_of s d env x with
+                             | Some l, Is g => Some [SNumber (f, l) assigns g] | _, _ => None end
+  | Both a b => both (changes3 k s d env a) (changes3 k s d env b)
+  | When f a => match truth3 k s d env f with
+                | Some true => changes3 k s d env a | Some false => Some [] | None => None end
+  | Each t a => fold_right (fun o r => both (changes3 k s d (env ++ [o]) a) r) (Some []) (objects P t)
+  end.
+Definition on3 (f : atom) (cs : list symbolic_change) : list (bool * form) :=
+  flat_map (fun c => match c with SNumber f' b g => if atom_eqb f f' then [(b, g)] else [] | _ => [] end) cs.
+Definition combine3 (old : result) (l : list (bool * form)) : option form :=
+  match l with
+  | [(true, g)] => Some g
+  | (false, _) :: _ => match existsb fst l, old with
+                       | false, Is x => Some (fold_left (fun s c => plus_form s 1 (snd c)) l x) | _, _ => None end
+  | _ => None
+  end.
+Fixpoint targets3 (cs : list symbolic_change) : list atom :=
+  match cs with [] => [] | SNumber f _ _ :: r => f :: targets3 r | SFact _ _ :: r => targets3 r end.
+Fixpoint updates3 (s : symbolic) (cs : list symbolic_change) (fs : list atom) : option (list (atom * form)) :=
+  match fs with
+  | [] => Some []
+  | f :: r => match combine3 (value3 s f) (on3 f cs), updates3 s cs r with
+              | Some g, Some l => Some ((f, g) :: l) | _, _ => None end
+  end.
+Definition truths3 (cs : list symbolic_change) (b : bool) : list (atom * bool) :=
+  flat_map (fun c => match c with SFact a b' => if Bool.eqb b b' then [(a, b)] else [] | _ => [] end) cs.
+Inductive outcome := Never | Unclear | After (s : symbolic) (time : Q).
+Definition happening3 (k : knowledge) (s : symbolic) (d : result) (time : Q) (env : list key) (f : formula) (e : effect) : outcome :=
+  match truth3 k s d env f with
+  | Some false => Never
+  | _ => match changes3 k s d env e with
+         | None => Unclear
+         | Some cs => match updates3 s cs (targets3 cs) with
+                      | None => Unclear
+                      | Some l => After (Symbolic (truths3 cs true ++ truths3 cs false ++ new_truths s) (l ++ new_values s)) time
+                      end
+         end
+  end.
+Definition length3 (a : action) (env : list key) : result :=
+  match duration a with Some e => linear_of unchanged Undefined env e | None => Undefined end.
+Definition step3 (k : knowledge) (a : action) (env : list key) : outcome :=
+  match duration a, length3 a env with
+  | None, _ => happening3 k unchanged Undefined 0 env (at_start a) (start_effect a)
+  | Some _, Undefined => Never
+  | Some _, Is ([], d) =>
+      if less d 0 then Never
+      else if Qeq_bool d 0 then
+        happening3 k unchanged (Is (constant d)) d env (And (at_start a) (at_end a)) (Both (start_effect a) (end_effect a))
+      else match happening3 k unchanged (Is (constant d)) d env (at_start a) (start_effect a) with
+           | After s _ => happening3 k s (Is (constant d)) d env (And (over_all a) (at_end a)) (end_effect a)
+           | r => r
+           end
+  | Some _, _ => Unclear
+  end.
+(* Knowledge from a condition that holds. *)
+Fixpoint conjuncts (s : symbolic) (d : result) (env : list key) (f : formula) : knowledge :=
+  match f with
+  | And g h => let a := conjuncts s d env g in let b := conjuncts s d env h in
+               Knowledge (literals a ++ literals b) (bounds a ++ bounds b)
+  | Atom p ts => match ground env ts with
+                 | Some l => match assoc (p, l) (new_truths s) with
+                             | None => if changing N p then Knowledge [((p, l), true)] [] else Knowledge [] []
+                             | Some _ => Knowledge [] [] end
+                 | None => Knowledge [] [] end
+  | Not (Atom p ts) => match ground env ts with
+                 | Some l => match assoc (p, l) (new_truths s) with
+                             | None => if changing N p then Knowledge [((p, l), false)] [] else Knowledge [] []
+                             | Some _ => Knowledge [] [] end
+                 | None => Knowledge [] [] end
+  | Compare strict a b => match linear_of s d env (Minus a b) with Is g => Knowledge [] [(strict, g)] | _ => Knowledge [] [] end
+  | _ => Knowledge [] []
+  end.
+Definition join (k l : knowledge) := Knowledge (literals k ++ literals l) (bounds k ++ bounds l).
+Definition gathered (a : action) (env : list key) : knowledge :=
+  match duration a, length3 a env with
+  | None, _ => conjuncts unchanged Undefined env (at_start a)
+  | Some _, Is ([], d) =>
+      let time := Is (constant d) in
+      let k := conjuncts unchanged time env (at_start a) in
+      if Qeq_bool d 0 then join k (conjuncts unchanged time env (at_end a))
+      else match happening3 k unchanged time d env (at_start a) (start_effect a) with
+           | After s _ => join k (conjuncts s time env (And (over_all a) (at_end a)))
+           | _ => k
+           end
+  | _, _ => Knowledge [] []
+  end.
+Definition impossible (k : knowledge) : bool :=
+  existsb (fun l => match base_truth (Knowledge [] (bounds k)) (fst l) with Some b => negb (Bool.eqb b (snd l)) | None => false end
+                    || match find (fact_of N) (fst l) with
+                       | Some (v, _) => match possible k v with [] => true | _ => false end
+                       | None => false end) (literals k)
+  || existsb (fun b : bool * form => match snd b with ([], c) => if fst b then Qle_bool c 0 else less c 0 | _ => false end) (bounds k).
+
+(* Comparisons of the task as forms times the scale. *)
+Definition scaled := Zpos (scale N) # 1.
+Fixpoint factors_of (l : list (key * Z)) : option form :=
+  match l with
+  | [] => Some (constant 0)
+  | (n, f) :: r => match M.find n (fluents N), factors_of r with
+                   | Some a, Some g => Some (plus_form g 1 ([(a, inject_Z f)], 0)) | _, _ => None end
+  end.
+Definition form_of (l : linear) (szs : list Z) (ch : choice) : option form :=
+  match factors_of (factors l) with
+  | Some g => Some (plus_form g 1 (constant (inject_Z (amount (rest l) szs ch) / scaled)))
+  | None => None
+  end.
+(* The form times the scale is an integer, so more than -1 is enough. *)
+Definition required (k : knowledge) (f : form) : bool :=
+  implied k true (plus_form f 1 (constant (/ scaled))).
+Definition literal3 (k : knowledge) (l : literal) : option bool :=
+  option_map (fun b => Bool.eqb b (snd l)) (fact3 k (fst (fst l)) (snd (fst l))).
+Definition is_true (r : option bool) : bool := match r with Some b => b | None => false end.
+Definition is_false (r : option bool) : bool := match r with Some b => negb b | None => false end.
+Definition condition3 (k : knowledge) (c : condition) (szs : list Z) (ch : choice) : bool :=
+  forallb (fun f => is_true (fact3 k (fst f) (snd f))) (Task.facts c) &&
+  forallb (existsb (fun l => is_true (literal3 k l))) (clauses c) &&
+  forallb (fun l => match form_of l szs ch with Some f => required k f | None => false end) (comparisons c).
+Fixpoint fired3 (k : knowledge) (cs : list (list literal * list fact)) : option (list fact) :=
+  match cs with
+  | [] => Some []
+  | c :: r => if existsb (fun l => is_false (literal3 k l)) (fst c) then fired3 k r
+              else if forallb (fun l => is_true (literal3 k l)) (fst c) then option_map (app (snd c)) (fired3 k r)
+              else None
+  end.
+Definition admitted_choice (o : operator) (ch : choice) : bool :=
+  Nat.eqb (length ch) (length (sizes o)) &&
+  forallb (fun xn : Z * Z => Z.leb 0 (fst xn) && Z.ltb (fst xn) (snd xn)) (combine ch (sizes o)) && admits o ch.
+(* What a variable becomes, for each value that it may have. *)
+Definition variable_ok (k : knowledge) (s : symbolic) (made : list fact) (v : key) : bool :=
+  match M.find v (variables N) with
+  | None => true
+  | Some vals => forallb (fun y => let z := last_put made v y in
+      forallb (fun xa => Bool.eqb (match assoc (snd xa) (new_truths s) with Some b => b | None => Z.eqb y (fst xa) end)
+                                  (Z.eqb z (fst xa))) vals) (possible k v)
+  end.
+Definition is_zero (f : form) : bool := match f with ([], c) => Qeq_bool c 0 | _ => false end.
+Definition number_ok (s : symbolic) (o : option (operator * choice)) (n : key) : bool :=
+  match M.find n (fluents N) with
+  | None => true
+  | Some f =>
+      let after := match assoc f (new_values s) with Some g => g | None => fluent f end in
+      let made := match o with
+                  | Some (o, ch) => match List.find (fun c => Pos.eqb (fst c) n) (Task.changes o) with
+                                    | Some c => form_of (snd c) (sizes o) ch | None => Some (fluent f) end
+                  | None => Some (fluent f) end in
+      match made with Some g => is_zero (plus_form after (-1 # 1) g) | None => false end
+  end.
+Definition growth (s : symbolic) (time : Q) : option Q :=
+  match plus_result (linear_of s Undefined [] (metric P)) (-1 # 1) (linear_of unchanged Undefined [] (metric P)) with
+  | Is ([], c) => Some (c + per_time P * time + per_step P)
+  | _ => None
+  end.
+Definition step_cost (o : option (operator * choice)) : Z :=
+  match o with Some (o, ch) => amount (cost o) (sizes o) ch | None => 0 end.
+Definition simulated (k : knowledge) (s : symbolic) (time : Q) (o : option (operator * choice)) : bool :=
+  match match o with
+        | Some (o, ch) => if admitted_choice o ch && condition3 k (pre o) (sizes o) ch && distinct (map fst (Task.changes o))
+                          then option_map (app (Task.effects o)) (fired3 k (conditional o)) else None
+        | None => Some [] end with
+  | None => false
+  | Some made =>
+      forallb (variable_ok k s made)
+        (map fst made ++ flat_map (fun l => match find (fact_of N) (fst l) with Some f => [fst f] | None => [] end) (new_truths s)) &&
+      forallb (number_ok s o)
+        (match o with Some (o, _) => map fst (Task.changes o) | None => [] end
+         ++ flat_map (fun l => match find (number_of N) (fst l) with Some n => [n] | None => [] end) (new_values s)) &&
+      match growth s time with
+      | Some g => Qle_bool (inject_Z (step_cost o)) (g * (Zpos (cost_scale N) # 1))
+      | None => false
+      end
+  end.
+Definition leaf_ok (k : knowledge) (a : action) (env : list key) (o : option (operator * choice)) : bool :=
+  match step3 k a env with
+  | Never => true
+  | Unclear => false
+  | After s time =>
+      forallb (fun l => match assoc (fst l) (new_truths s) with Some true => mem (may_hold N) (fst l) | _ => true end) (new_truths s) &&
+      simulated k s time o
+  end.
+Fixpoint tree_ok (leaf : knowledge -> option (nat * choice) -> bool) (k : knowledge) (t : tree) : bool :=
+  match t with
+  | Leaf o => leaf k o
+  | Impossible => impossible k
+  | SplitAtom a t u => tree_ok leaf (Knowledge ((a, true) :: literals k) (bounds k)) t &&
+                       tree_ok leaf (Knowledge ((a, false) :: literals k) (bounds k)) u
+  | SplitForm f t u => tree_ok leaf (Knowledge (literals k) ((false, f) :: bounds k)) t &&
+                       tree_ok leaf (Knowledge (literals k) ((true, plus_form (constant 0) (-1 # 1) f) :: bounds k)) u
+  end.
+Definition instance_leaf (a : action) (env : list key) (k : knowledge) (o : option (nat * choice)) : bool :=
+  match o with
+  | None => leaf_ok k a env None
+  | Some (i, ch) => match nth_error (operators T) i with Some o => leaf_ok k a env (Some (o, ch)) | None => false end
+  end.
+Definition goal_leaf (k : knowledge) (_ : option (nat * choice)) : bool :=
+  match truth3 k unchanged Undefined [] (wanted P) with Some false => true | _ => condition3 k (goal T) [] [] end.
+
+(* Instances for which the conditions on what never changes may hold: parameters are bound one after another. *)
+Fixpoint static_false (env : list key) (f : formula) : bool :=
+  match f with
+  | And g h => static_false env g || static_false env h
+  | Atom p ts => negb (changing N p) && match ground env ts with Some l => negb (holds_in (initial P) (p, l)) | None => false end
+  | Not (Atom p ts) => negb (changing N p) && match ground env ts with Some l => holds_in (initial P) (p, l) | None => false end
+  | Same t u => match object env t, object env u with Some a, Some b => negb (Pos.eqb a b) | _, _ => false end
+  | Not (Same t u) => match object env t, object env u with Some a, Some b => Pos.eqb a b | _, _ => false end
+  | _ => false
+  end.
+Fixpoint instances (prune : list key -> bool) (types : list key) (env : list key) : list (list key) :=
+  match types with
+  | [] => [env]
+  | t :: r => flat_map (fun o => if prune (env ++ [o]) then [] else instances prune r (env ++ [o])) (objects P t)
+  end.
+Definition pruned (a : action) (env : list key) : bool :=
+  static_false env (at_start a) || match duration a with Some _ => static_false env (at_end a) | None => false end.
+Fixpoint effect_heads (e : effect) : list key :=
+  match e with
+  | Nothing => [] | Put _ p _ => [p] | Change _ f _ _ => [f]
+  | Both a b => effect_heads a ++ effect_heads b | When _ a => effect_heads a | Each _ a => effect_heads a
+  end.
+Variables (case : nat -> list key -> tree) (goal_case : tree).
+Definition action_ok (i : nat) (a : action) : bool :=
+  forallb (changing N) (effect_heads (start_effect a) ++ effect_heads (end_effect a)) &&
+  forallb (fun env => tree_ok (instance_leaf a env) (gathered a env) (case i env)) (instances (pruned a) (parameters a) []).
+Definition all_entries {X} (m : index X) : list (atom * X) := flat_map snd (PositiveMap.elements m).
+Definition same_atom (r : option atom) (a : atom) : bool := match r with Some b => atom_eqb b a | None => false end.
+Definition faithful : bool :=
+  forallb (fun e => negb (changing N (fst (fst e))) || mem (may_hold N) (fst e)) (all_entries (facts P)) &&
+  forallb (fun vl => let '(v, vals) := vl in is_basic T v &&
+     forallb (fun xa => let '(x, a) := xa in Bool.eqb (holds_in (initial P) a) (Z.eqb (val (init T) v) x) &&
+       match find (fact_of N) a with Some (u, y) => Pos.eqb u v && Z.eqb y x | None => false end) vals) (M.elements (variables N)) &&
+  forallb (fun e => let '(a, (v, x)) := e in
+     match M.find v (variables N) with Some vals => existsb (fun xa => Z.eqb (fst xa) x && atom_eqb (snd xa) a) vals | None => false end)
+     (all_entries (fact_of N)) &&
+  forallb (fun nf => let '(n, f) := nf in memb n (numbers T) && changing N (fst f) &&
+     match value_in (initial P) f with Some q => Qeq_bool (q * scaled) (inject_Z (num (init T) n)) | None => false end &&
+     match find (number_of N) f with Some m => Pos.eqb m n | None => false end) (M.elements (fluents N)) &&
+  tree_ok goal_leaf (conjuncts unchanged Undefined [] (wanted P)) goal_case &&
+  forallb (fun ia => action_ok (fst ia) (snd ia)) (combine (seq 0 (length (actions P))) (actions P)).
+End Faithful.
+
+Definition is_linear (P : problem) (N : names) : bool :=
+  match linear_of P N unchanged Undefined [] (metric P) with Is _ => true | _ => false end.
+
+(* The whole check: the plan, the comparison and the argument. *)
+Definition check_certificate (P : problem) (T : task) (N : names) (case : nat -> list key -> tree) (goal_case : tree)
+    (A : argument) (oracle : state -> list positive) (plan : list (nat * list key)) (claim : option Q) : bool :=
+  check_task T && faithful P T N case goal_case &&
+  match eval (initial P) None [] (metric P), claim with
+  | _, None => check T A None oracle
+  | Some first, Some m =>
+      is_linear P N && match execute P false (initial P) 0 plan with
+      | Some (w, spent) => match final_metric P w spent with Some m' => Qeq_bool m' m | None => false end
+      | None => false
+      end &&
+      let cost := Qred ((m - first) * (Zpos (cost_scale N) # 1)) in
+      Pos.eqb (Qden cost) 1 && check T A (Some (Qnum cost)) oracle
+  | None, Some _ => false
+  end.

@@ -1,0 +1,192 @@
+(* Semantics of PDDL actions executed one after another: the formal counterpart of pddl/src/validate/definition.md
+   for tasks without derived predicates, timed initial literals and chosen durations. This file, the statement of
+   the theorem [optimal], and the readers are all that has to be believed. *)
+From Coq Require Import ZArith QArith List Bool FMapPositive.
+Import ListNotations.
+
+Definition key := positive.                      (* predicates, functions, types and objects are numbered *)
+Definition atom := (key * list key)%type.        (* a predicate or a function, applied to objects *)
+Definition atom_eqb (a b : atom) : bool :=
+  Pos.eqb (fst a) (fst b) && if list_eq_dec Pos.eq_dec (snd a) (snd b) then true else false.
+Fixpoint assoc {X} (a : atom) (l : list (atom * X)) : option X :=
+  match l with [] => None | (b, x) :: r => if atom_eqb a b then Some x else assoc a r end.
+
+(* Finite maps from atoms: buckets in a search tree. Collisions of [bucket] cost time only. *)
+Definition index X := PositiveMap.t (list (atom * X)).
+Definition bucket (a : atom) : positive :=
+  fold_left (fun h o => Pos.add (xO (xO (xO (xO (xO (xO (xO (xO (xO (xO (xO (xO h)))))))))))) o) (snd a) (fst a).
+Definition entries {X} (m : index X) (a : atom) : list (atom * X) :=
+  match PositiveMap.find (bucket a) m with Some l => l | None => [] end.
+Definition find {X} (m : index X) (a : atom) : option X := assoc a (entries m a).
+Definition insert {X} (a : atom) (x : X) (m : index X) : index X :=
+  PositiveMap.add (bucket a) ((a, x) :: entries m a) m.
+
+(* Syntax. [Var i] is the variable at position i: parameters first, then variables of enclosing quantifiers. *)
+Inductive term := Var (i : nat) | Object (o : key).
+Inductive expression :=
+  | Constant (q : Q) | Fluent (f : key) (ts : list term) | Duration
+  | Plus (a b : expression) | Minus (a b : expression) | Times (a b : expression) | Over (a b : expression).
+Inductive formula :=
+  | Truth (b : bool) | Atom (p : key) (ts : list term) | Same (t u : term)
+  | Compare (strict : bool) (a b : expression)          (* a > b if strict, else a >= b *)
+  | Not (f : formula) | And (f g : formula) | Forall (type : key) (f : formula).
+Definition Or (f g : formula) := Not (And (Not f) (Not g)).
+Definition Imply (f g : formula) := Not (And f (Not g)).
+Definition Exists (type : key) (f : formula) := Not (Forall type (Not f)).
+Definition Equal (a b : expression) := And (Compare false a b) (Compare false b a).
+Inductive effect :=
+  | Nothing | Put (holds : bool) (p : key) (ts : list term)          (* adds or deletes an atom *)
+  | Change (assigns : bool) (f : key) (ts : list term) (e : expression) (* assigns or increases *)
+  | Both (a b : effect) | When (f : formula) (a : effect) | Each (type : key) (a : effect).
+Record action := Action {
+  parameters : list key;                         (* types *)
+  duration : option expression;                  (* none: instantaneous; only the part at start is used *)
+  at_start : formula; start_effect : effect; over_all : formula; at_end : formula; end_effect : effect }.
+Record world := World { holds_in : atom -> bool; value_in : atom -> option Q }.
+Record problem := Problem {
+  objects : key -> list key;                     (* the objects of a type *)
+  actions : list action;
+  facts : index unit; values : index Q;          (* the initial state *)
+  wanted : formula;                              (* the goal *)
+  metric : expression;                           (* to be minimized, with *)
+  per_time : Q; per_step : Q }.                  (* weights of the total time and of the number of steps *)
+Definition initial (P : problem) : world :=
+  World (fun a => match find (facts P) a with Some _ => true | None => false end) (find (values P)).
+
+(* Terms, expressions, conditions. [None] is undefined. *)
+Definition object (env : list key) (t : term) : option key := match t with Var i => nth_error env i | Object o => Some o end.
+Fixpoint ground (env : list key) (ts : list term) : option (list key) :=
+  match ts with
+  | [] => Some []
+  | t :: r => match object env t, ground env r with Some o, Some l => Some (o :: l) | _, _ => None end
+  end.
+Definition lift (f : Q -> Q -> Q) (a b : option Q) : option Q :=
+  match a, b with Some x, Some y => Some (f x y) | _, _ => None end.
+Fixpoint eval (w : world) (d : option Q) (env : list key) (e : expression) : option Q :=
+  match e with
+  | Constant q => Some q
+  | Fluent f ts => match ground env ts with Some l => value_in w (f, l) | None => None end
+  | Duration => d
+  | Plus a b => lift Qplus (eval w d env a) (eval w d env b)
+  | Minus a b => lift Qminus (eval w d env a) (eval w d env b)
+  | Times a b => lift Qmult (eval w d env a) (eval w d env b)
+  | Over a b => match eval w d env b with
+                | Some y => if Qeq_bool y 0 then None else lift Qdiv (eval w d env a) (Some y)
+                | None => None end
+  end.
+Definition less (x y : Q) : bool := negb (Qle_bool y x).
+Definition and3 (a b : option bool) : option bool :=          (* undefined only where the truth depends on it *)
+  match a, b with
+  | Some false, _ => Some false | _, Some false => Some false
+  | Some true, Some true => Some true | _, _ => None
+  end.
+Section Conditions.
+Variable P : problem.
+Fixpoint truth (w : world) (d : option Q) (env : list key) (f : formula) : option bool :=
+  match f with
+  | Truth b => Some b
+  | Atom p ts => match ground env ts with Some l => Some (holds_in w (p, l)) | None => None end
+  | Same t u => match object env t, object env u with Some a, Some b => Some (Pos.eqb a b) | _, _ => None end
+  | Compare strict a b => match eval w d env a, eval w d env b with
+                          | Some x, Some y => Some (if strict then less y x else Qle_bool y x) | _, _ => None end
+  | Not g => option_map negb (truth w d env g)
+  | And g h => and3 (truth w d env g) (truth w d env h)
+  | Forall t g => fold_right (fun o r => and3 (truth w d (env ++ [o]) g) r) (Some true) (objects P t)
+  end.
+
+(* The changes that an effect makes; undefined if it needs an undefined value. *)
+Inductive change := Fact (a : atom) (holds : bool) | Number (a : atom) (assigns : bool) (q : Q).
+Definition both {X} (a b : option (list X)) : option (list X) :=
+  match a, b with Some x, Some y => Some (x ++ y) | _, _ => None end.
+Fixpoint changes (w : world) (d : option Q) (env : list key) (e : effect) : option (list change) :=
+  match e with
+  | Nothing => Some []
+  | Put b p ts => match ground env ts with Some l => Some [Fact (p, l) b] | None => None end
+  | Change assigns f ts x => match ground env ts, eval w d env x with
+                             | Some l, Some q => Some [Number (f, l) assigns q] | _, _ => None end
+  | Both a b => both (changes w d env a) (changes w d env b)
+  | When f a => match truth w d env f with
+                | Some true => changes w d env a | Some false => Some [] | None => None end
+  | Each t a => fold_right (fun o r => both (changes w d (env ++ [o]) a) r) (Some []) (objects P t)
+  end.
+(* Of an atom that is both added and deleted, the addition counts. *)
+Definition puts (cs : list change) (a : atom) (b : bool) : bool :=
+  existsb (fun c => match c with Fact a' b' => atom_eqb a a' && Bool.eqb b b' | _ => false end) cs.
+(* Several changes of one number: increases together, or assignments of one value. *)
+Definition on (f : atom) (cs : list change) : list (bool * Q) :=
+  flat_map (fun c => match c with Number f' b q => if atom_eqb f f' then [(b, q)] else [] | _ => [] end) cs.
+Definition changed_value (old : option Q) (l : list (bool * Q)) : option Q :=
+  match l with
+  | [] => old
+  | (true, q) :: r => if forallb (fun c => fst c && Qeq_bool (snd c) q) r then Some q else None
+  | (false, _) :: _ => if existsb fst l then None
+                       else option_map (fun x => fold_left (fun s c => Qred (s + snd c)) l x) old
+  end.
+Fixpoint targets (cs : list change) : list atom :=
+  match cs with [] => [] | Number f _ _ :: r => f :: targets r | Fact _ _ :: r => targets r end.
+Fixpoint updates (w : world) (cs : list change) (fs : list atom) : option (list (atom * Q)) :=
+  match fs with
+  | [] => Some []
+  | f :: r => match changed_value (value_in w f) (on f cs), updates w cs r with
+              | Some q, Some l => Some ((f, q) :: l) | _, _ => None end
+  end.
+(* One happening: everything is evaluated in the state before it. *)
+Definition happening (w : world) (d : option Q) (env : list key) (f : formula) (e : effect) : option world :=
+  match truth w d env f, changes w d env e with
+  | Some true, Some cs =>
+      match updates w cs (targets cs) with
+      | Some l => Some (World (fun a => puts cs a true || (negb (puts cs a false) && holds_in w a))
+                              (fun a => match assoc a l with Some q => Some q | None => value_in w a end))
+      | None => None
+      end
+  | _, _ => None
+  end.
+(* One step: the state after it and its duration. With duration 0, start and end are one happening. The definition forbids
+   that start and end interfere then; [zero] says whether such steps are allowed at all. *)
+Definition step (zero : bool) (w : world) (a : action) (env : list key) : option (world * Q) :=
+  if negb (Nat.eqb (length env) (length (parameters a)) &&
+           forallb (fun x => existsb (Pos.eqb (fst x)) (objects P (snd x))) (combine env (parameters a)))
+  then None else
+  match duration a with
+  | None => option_map (fun w => (w, 0)) (happening w None env (at_start a) (start_effect a))
+  | Some e =>
+      match eval w None env e with
+      | None => None
+      | Some d =>
+          if less d 0 then None
+          else if Qeq_bool d 0 then
+            if zero then option_map (fun w => (w, d))
+              (happening w (Some d) env (And (at_start a) (at_end a)) (Both (start_effect a) (end_effect a)))
+            else None
+          else match happening w (Some d) env (at_start a) (start_effect a) with
+               | None => None
+               | Some w1 => option_map (fun w => (w, d))
+                   (happening w1 (Some d) env (And (over_all a) (at_end a)) (end_effect a))
+               end
+      end
+  end.
+(* A plan names actions by their positions. The goal state in which it ends, with what its steps add to the metric. *)
+Fixpoint execute (zero : bool) (w : world) (spent : Q) (plan : list (nat * list key)) : option (world * Q) :=
+  match plan with
+  | [] => match truth w None [] (wanted P) with Some true => Some (w, spent) | _ => None end
+  | (i, env) :: r =>
+      match nth_error (actions P) i with
+      | None => None
+      | Some a => match step zero w a env with
+                  | Some (w', d) => execute zero w' (Qred (spent + per_time P * d + per_step P)) r
+                  | None => None
+                  end
+      end
+  end.
+End Conditions.
+Definition final_metric (P : problem) (w : world) (spent : Q) : option Q :=
+  option_map (fun m => m + spent) (eval w None [] (metric P)).
+(* The claim of a certificate: [Some m], an optimal plan has metric m; [None], there is no plan. The plan of the certificate
+   has no step of duration 0; the other plans may have some. *)
+Definition is_optimal (P : problem) (plan : list (nat * list key)) (claim : option Q) : Prop :=
+  match claim with
+  | Some m =>
+      (exists w spent m', execute P false (initial P) 0 plan = Some (w, spent) /\ final_metric P w spent = Some m' /\ m' == m) /\
+      forall other w spent m', execute P true (initial P) 0 other = Some (w, spent) -> final_metric P w spent = Some m' -> m <= m'
+  | None => forall other, execute P true (initial P) 0 other = None
+  end.
