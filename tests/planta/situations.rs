@@ -1,9 +1,9 @@
 //! What fails, what is measured, and what is asked of a mission in PLANTA's form; and its maps.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
-use std::io::Write as _;
+use std::io::{Seek as _, Write as _};
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use metaplan::mission::Planning;
 use pddl::ast::{InitialElement, Problem, Term};
@@ -153,16 +153,15 @@ fn run_with(manifest: &str, line: &str) -> Vec<Value> {
     run(&["run", manifest, "--quiet"], line)
 }
 
-/// What the loop answers to a line, with other arguments.
+/// Answers of the loop to a line, with other arguments. The line comes from a file, so that the first plan comes before it.
 pub fn run(arguments: &[&str], line: &str) -> Vec<Value> {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_metaplan"))
+    let mut input = tempfile::tempfile().expect("a temporary file");
+    input.write_all(line.as_bytes()).and_then(|()| input.rewind()).expect("a line");
+    let output = Command::new(env!("CARGO_BIN_EXE_metaplan"))
         .args(arguments)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("the program starts");
-    child.stdin.take().expect("a pipe").write_all(line.as_bytes()).expect("the program reads");
-    let output = child.wait_with_output().expect("the program ends");
+        .stdin(input)
+        .output()
+        .expect("the program runs");
     let text = String::from_utf8(output.stdout).expect("UTF-8");
     text.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect()
 }
