@@ -4,12 +4,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
 use encodings::Limits;
+use ontology::tomasys::change::Status;
 use serde::Serialize;
 
 use crate::configure::choice::{Choice, Verdict, current};
 use crate::configure::configurator::{Configurator, Goal};
 use crate::knowledge::{Fault, RobotReport};
-use crate::mapek::{Answer, Event, Numbers, Observation, Refusal, available, changes, doubts, inferred};
+use crate::mapek::{
+    Accepted, Answer, Event, FilterSettings, FilterStates, Filters, Numbers, Observation, Refusal, available,
+    changes, doubts, inferred,
+};
 use crate::message::Message;
 
 /// One line of output, in the format `metaplan-events/1`.
@@ -80,14 +84,18 @@ pub struct Keeper {
     fault: Option<Fault>,
     /// What was said last of objectives that no design can serve.
     unserved: BTreeMap<String, Vec<String>>,
+    filters: Filters,
+    states: FilterStates,
+    /// Time of the last line, since the start.
+    now: Duration,
 }
 
 impl Keeper {
-    /// Takes charge; for each choice there is so much time.
+    /// Takes charge; for each choice there is so much time. Every report is believed at once.
     pub fn new(configurator: Configurator, limit: Option<Duration>) -> Self {
         let available = available(configurator.knowledge());
+        let filters = Filters::new(&FilterSettings::none(), Some(configurator.knowledge()));
         Self {
-            configurator,
             limit,
             numbers: Numbers::default(),
             effects: 0,
@@ -97,7 +105,24 @@ impl Keeper {
             violated: BTreeSet::new(),
             fault: None,
             unserved: BTreeMap::new(),
+            states: filters.states(Some(configurator.knowledge())),
+            filters,
+            configurator,
+            now: Duration::ZERO,
         }
+    }
+
+    /// The same with filters of what is measured and of what components report.
+    #[must_use]
+    pub fn with_filters(self, settings: &FilterSettings) -> Self {
+        let filters = Filters::new(settings, Some(self.configurator.knowledge()));
+        let states = filters.states(Some(self.configurator.knowledge()));
+        Self { filters, states, ..self }
+    }
+
+    /// Time since the start at which a filter needs a tick, if nothing else is reported.
+    pub fn due(&self) -> Option<Duration> {
+        self.filters.due(&self.states)
     }
 
     /// What is known, and how the objectives are served.
@@ -112,12 +137,19 @@ impl Keeper {
         answers
     }
 
-    /// Takes a line over and says what follows.
+    /// Takes a line over at its own time, or else at that of the line before, and says what follows.
     pub fn handle(&mut self, observation: &Observation) -> Vec<KeeperAnswer> {
+        self.handle_at(observation, self.now)
+    }
+
+    /// Takes a line over, at a time since the start that never goes back, and says what follows.
+    pub fn handle_at(&mut self, observation: &Observation, now: Duration) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
+        self.now = self.now.max(observation.time.unwrap_or(now));
         if let Some(refusal) = observation.sequence.and_then(|seq| self.numbers.refused(seq)) {
             return vec![KeeperAnswer::Loop(refusal)];
         }
+        self.elapse(&mut answers);
         let mut understood = false;
         for event in &observation.events {
             match event.clone().and_then(|event| self.take(&event, &mut answers)) {
@@ -139,11 +171,14 @@ impl Keeper {
         let knowledge = self.configurator.knowledge_mut();
         match event {
             Event::Measured { attribute, value } => {
-                knowledge.take(attribute, RobotReport::measured(value)).map_err(refused)?;
+                let mut held = Vec::new();
+                let value = self.filters.sample(&mut self.states, self.now, attribute, value, &mut held);
+                answers.extend(held.into_iter().map(KeeperAnswer::Loop));
+                if let Some(value) = value {
+                    knowledge.take(attribute, RobotReport::measured(&value)).map_err(refused)?;
+                }
             }
-            Event::Component { component, status } => {
-                knowledge.take(component, RobotReport::Component(*status)).map_err(refused)?;
-            }
+            Event::Component { component, status } => self.component(component, *status, answers)?,
             Event::ObjectiveAdded { objective, function, requirements, always_improve } => {
                 let (name, function) = (objective.clone(), function.clone());
                 let (requirements, always_improve) = (requirements.clone(), *always_improve);
@@ -169,6 +204,39 @@ impl Keeper {
             }
         }
         Ok(())
+    }
+
+    /// Takes the status of a component over, unless its filter holds it back.
+    fn component(
+        &mut self,
+        component: &str,
+        status: Status,
+        answers: &mut Vec<KeeperAnswer>,
+    ) -> Result<(), Refusal> {
+        let knowledge = self.configurator.knowledge_mut();
+        let mut held = Vec::new();
+        let is_believed = knowledge
+            .known_component(component)
+            .is_none_or(|name| self.filters.report(&mut self.states, self.now, &name, status, &mut held));
+        answers.extend(held.into_iter().map(KeeperAnswer::Loop));
+        if is_believed {
+            let taken = knowledge.take(component, RobotReport::Component(status));
+            taken.map_err(|message| Refusal::new("M306", message.message.clone()))?;
+        }
+        Ok(())
+    }
+
+    /// Takes over what filters have held back and what is due.
+    fn elapse(&mut self, answers: &mut Vec<KeeperAnswer>) {
+        let mut said = Vec::new();
+        let due: Vec<Accepted> = self.filters.elapse(&mut self.states, self.now, &mut said);
+        answers.extend(said.into_iter().map(KeeperAnswer::Loop));
+        for accepted in due {
+            let (name, report) = accepted.report();
+            if let Err(message) = self.configurator.knowledge_mut().take(name, report) {
+                answers.push(wrong(&message));
+            }
+        }
     }
 
     fn give_up(&mut self, name: &str, answers: &mut Vec<KeeperAnswer>) -> Result<(), Refusal> {

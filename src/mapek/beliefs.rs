@@ -14,6 +14,7 @@ use pddl::validate::{Options, Verdict, Violation, advance, validate};
 
 use crate::knowledge::Fault;
 use crate::mapek::answer::Effect;
+use crate::mapek::filter::FilterStates;
 use crate::mapek::resume::{resume, resumed_goal};
 use crate::mapek::sequence::Numbers;
 use crate::mapek::step::{PlannedStep, plan_text};
@@ -64,6 +65,8 @@ pub struct Beliefs {
     pub(super) numbers: Numbers,
     /// The time of the last line, since the start of the mission.
     pub(super) now: Duration,
+    /// Memory of the filters of what is measured and of what components report.
+    pub(super) filters: FilterStates,
 }
 
 /// An action that was requested and has not ended.
@@ -120,6 +123,7 @@ impl Beliefs {
             lines: 0,
             numbers: Numbers::default(),
             now: Duration::ZERO,
+            filters: FilterStates::default(),
         }
     }
 

@@ -56,13 +56,14 @@ impl Loop {
                 format!("the knowledge is inconsistent: {}: {}", first.violated, first.facts.join(", "));
             return Err(vec![Message::error("M110", text)].into());
         }
-        let monitor = Monitor::new(&mission);
+        let monitor = Monitor::new(&mission, &settings);
         let digest = digest(&mission, &settings);
         let planner = Planner { time_limit: settings.time_limit, ..Planner::default() };
         let mut beliefs = Beliefs::new(mission);
         if let Some(base) = beliefs.mission.knowledge_mut() {
             base.limit(STEPS);
         }
+        beliefs.filters = monitor.filters().states(beliefs.mission.knowledge());
         if let Some(base) = beliefs.mission.knowledge() {
             beliefs.available = available(base);
         }
@@ -125,16 +126,17 @@ impl Loop {
         }
         let mut changes = Changes::default();
         let mut understood = false;
+        let due = self.monitor.elapse(&mut self.beliefs, &mut changes);
+        answers.extend(due.into_iter().map(refused));
         for event in &observation.events {
             let outcome =
                 event.clone().and_then(|event| self.monitor.take(&mut self.beliefs, &event, &mut changes));
             match outcome {
                 Ok(()) => understood = true,
-                Err(Refusal { code, message }) => {
-                    answers.push(Answer::Error { code: code.to_owned(), message });
-                }
+                Err(refusal) => answers.push(refused(refusal)),
             }
         }
+        answers.append(&mut changes.filtered);
         if changes.goal {
             self.planner.memo.forget();
         }
@@ -154,6 +156,14 @@ impl Loop {
     /// The station that decides.
     fn adapting(&mut self) -> Adapting<'_> {
         Adapting { beliefs: &mut self.beliefs, planner: &mut self.planner, settings: &self.settings }
+    }
+
+    /// Time since the start of the mission at which something becomes due without an event: a report that a filter holds
+    /// back, a sensor that counts as silent, or a better plan. A tick at that time takes it.
+    pub fn due(&self) -> Option<Duration> {
+        let hope = self.beliefs.hoped.saturating_add(self.settings.settle);
+        let hope = (!self.beliefs.hopes.is_empty() && hope > self.beliefs.now).then_some(hope);
+        self.monitor.filters().due(&self.beliefs.filters).into_iter().chain(hope).min()
     }
 
     /// Effects that were asked for and not acknowledged, to be asked for again after a restart.
@@ -176,6 +186,11 @@ impl Loop {
         // What was consistent and came to an end does so again.
         let _ = base.restore(&statements);
     }
+}
+
+/// A refusal as an answer.
+fn refused(Refusal { code, message }: Refusal) -> Answer {
+    Answer::Error { code: code.to_owned(), message }
 }
 
 /// What the journal keeps, and what is made of it again.
@@ -227,6 +242,7 @@ impl Loop {
         self.beliefs.lines += 1;
         self.beliefs.now = self.beliefs.now.max(now);
         let mut changes = Changes::default();
+        let _ = self.monitor.elapse(&mut self.beliefs, &mut changes);
         for event in observation.events.iter().flatten() {
             // What the loop would answer with an error changes nothing.
             let _ = self.monitor.take(&mut self.beliefs, event, &mut changes);

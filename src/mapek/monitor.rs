@@ -1,17 +1,20 @@
 //! Monitor: events to changes of what is believed.
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use num_rational::BigRational;
+use ontology::tomasys::change::Status;
 use ontology::vocab::local_name;
 use pddl::validate::{Advance, advance};
 use rules::{Delta, Fact};
 
 use crate::knowledge::RobotReport;
-use crate::mapek::answer::Command;
+use crate::mapek::answer::{Answer, Command};
 use crate::mapek::beliefs::{Beliefs, Running};
 use crate::mapek::event::Event;
 use crate::mapek::fields::Refusal;
+use crate::mapek::filter::{Accepted, Filters};
+use crate::mapek::settings::Settings;
 use crate::mapek::step::PlannedStep;
 use crate::message::{Message, did_you_mean};
 use crate::mission::Mission;
@@ -30,6 +33,8 @@ pub(super) struct Changes {
     pub(super) goal: bool,
     /// Reasons to plan whatever the plan is like: sentences.
     pub(super) must: Vec<String>,
+    /// What filters have held back, and sensors that are silent.
+    pub(super) filtered: Vec<Answer>,
 }
 
 /// What has changed in the knowledge base.
@@ -76,15 +81,31 @@ pub(super) struct Monitor {
     attributes: BTreeSet<String>,
     /// Facts and functions that were found to fit the domain, as text.
     checked: HashSet<String>,
+    filters: Filters,
+    /// Names under which components have reported, with their local names.
+    components: HashMap<String, String>,
 }
 
 impl Monitor {
     /// For the reports of a robot with this mission.
-    pub(super) fn new(mission: &Mission) -> Self {
+    pub(super) fn new(mission: &Mission, settings: &Settings) -> Self {
         let kinds =
             mission.knowledge().map(|knowledge| knowledge.view().attribute_types()).unwrap_or_default();
         let attributes = kinds.into_iter().flat_map(|kind| [kind.iri, kind.name]).collect();
-        Self { attributes, checked: HashSet::new() }
+        let filters = Filters::new(&settings.filters, mission.knowledge());
+        Self { attributes, checked: HashSet::new(), filters, components: HashMap::new() }
+    }
+
+    /// Filters of what is measured and of what components report.
+    pub(super) fn filters(&self) -> &Filters {
+        &self.filters
+    }
+
+    /// Takes over what filters have held back and what is due at the time of the beliefs.
+    pub(super) fn elapse(&mut self, beliefs: &mut Beliefs, changes: &mut Changes) -> Vec<Refusal> {
+        let due = self.filters.elapse(&mut beliefs.filters, beliefs.now, &mut changes.filtered);
+        let mut taking = Taking { monitor: self, beliefs, changes };
+        due.into_iter().filter_map(|accepted| taking.accept(accepted).err()).collect()
     }
 
     /// Takes an event over into what is believed, and notes what that changes.
@@ -111,10 +132,8 @@ struct Taking<'a> {
 impl Taking<'_> {
     fn take(&mut self, event: &Event) -> Result<(), Refusal> {
         match event {
-            Event::Measured { attribute, value } => self.measured(attribute, value),
-            Event::Component { component, status } => {
-                self.report("component", component, RobotReport::Component(*status))
-            }
+            Event::Measured { attribute, value } => self.sampled(attribute, value),
+            Event::Component { component, status } => self.component(component, *status),
             Event::Design { design, realisable } => {
                 self.report("design", design, RobotReport::Design(*realisable))
             }
@@ -222,6 +241,47 @@ impl Taking<'_> {
                 .push(format!("{function} has no design any more, and action {action} needs it"));
         }
         Ok(())
+    }
+
+    /// Takes over what a filter has accepted.
+    fn accept(&mut self, accepted: Accepted) -> Result<(), Refusal> {
+        match accepted {
+            Accepted::Value(attribute, value) => self.measured(&attribute, &value),
+            Accepted::Status(component, status) => {
+                self.report("component", &component, RobotReport::Component(status))
+            }
+            Accepted::Unknown(attribute) => self.report("attribute", &attribute, RobotReport::Unmeasured),
+        }
+    }
+
+    /// Takes a sample over, unless its filter holds it back.
+    fn sampled(&mut self, attribute: &str, value: &BigRational) -> Result<(), Refusal> {
+        let is_known = self.monitor.attributes.contains(attribute);
+        let (states, now, filtered) =
+            (&mut self.beliefs.filters, self.beliefs.now, &mut self.changes.filtered);
+        if !is_known {
+            return self.measured(attribute, value);
+        }
+        match self.monitor.filters.sample(states, now, attribute, value, filtered) {
+            Some(value) => self.measured(attribute, &value),
+            None => Ok(()),
+        }
+    }
+
+    /// Takes the status of a component over, unless its filter holds it back.
+    fn component(&mut self, component: &str, status: Status) -> Result<(), Refusal> {
+        let name = match self.monitor.components.get(component) {
+            Some(name) => Some(name.clone()),
+            None => self.beliefs.mission.knowledge().and_then(|base| base.known_component(component)),
+        };
+        if let Some(name) = &name {
+            self.monitor.components.insert(component.to_owned(), name.clone());
+        }
+        let (states, now, filtered) =
+            (&mut self.beliefs.filters, self.beliefs.now, &mut self.changes.filtered);
+        let is_held =
+            name.is_some_and(|name| !self.monitor.filters.report(states, now, &name, status, filtered));
+        if is_held { Ok(()) } else { self.report("component", component, RobotReport::Component(status)) }
     }
 
     fn measured(&mut self, attribute: &str, value: &BigRational) -> Result<(), Refusal> {
@@ -414,18 +474,20 @@ mod tests {
     use super::{Base, Changes, Monitor};
     use crate::mapek::beliefs::Beliefs;
     use crate::mapek::event::Observation;
+    use crate::mapek::settings::Settings;
     use crate::setup::Setup;
 
     /// What an event changes in the mission `ugv`; or the code of its refusal.
     fn check(line: &str, expected: Result<(Base, [bool; 3], &[&str]), &str>) {
         let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
         let mission = Setup::read(&manifest).expect("the mission is read").mission;
-        let (mut monitor, mut beliefs) = (Monitor::new(&mission), Beliefs::new(mission));
+        let (mut monitor, mut beliefs) =
+            (Monitor::new(&mission, &Settings::default()), Beliefs::new(mission));
         let mut changes = Changes::default();
         let event = Observation::parse(line).events.remove(0).expect("an event");
         let taken = monitor.take(&mut beliefs, &event, &mut changes);
         let found = taken.map_err(|refusal| refusal.code);
-        let Changes { base, facts, predicates, goal, must } = &changes;
+        let Changes { base, facts, predicates, goal, must, .. } = &changes;
         assert_eq!(found.is_err() || line.contains("tick"), !changes.any(), "{line}");
         let must: Vec<&str> = must.iter().map(String::as_str).collect();
         let found = found.map(|()| (*base, [*facts, *predicates, *goal], &must[..]));

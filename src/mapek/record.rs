@@ -10,6 +10,7 @@ use crate::knowledge::{Knowledge, Part, Statement, Statements, Waiting};
 use crate::mapek::analyze::available;
 use crate::mapek::answer::{Command, Effect};
 use crate::mapek::beliefs::{Beliefs, Running};
+use crate::mapek::filter::FilterStates;
 use crate::mapek::sequence::Numbers;
 use crate::mapek::step::PlannedStep;
 use crate::message::Message;
@@ -93,6 +94,7 @@ pub(super) fn snapshot(known: &Beliefs) -> Snapshot {
         "lines": known.lines,
         "numbers": known.numbers.to_record(),
         "now": micros(known.now),
+        "filters": known.filters.to_record(),
     }))
 }
 
@@ -167,6 +169,7 @@ fn restore_work(known: &mut Beliefs, data: &Value) -> Option<()> {
     (known.actions, known.effects, known.lines) = (number("actions")?, number("effects")?, number("lines")?);
     known.numbers = Numbers::from_record(data.get("numbers")?)?;
     known.now = Duration::from_micros(number("now")?);
+    known.filters = FilterStates::from_record(data.get("filters")?)?;
     let effects = data.get("outstanding")?.as_array()?.iter().map(effect_from_record);
     known.outstanding =
         effects.collect::<Option<Vec<_>>>()?.into_iter().map(|effect| (effect.number, effect)).collect();

@@ -1,5 +1,6 @@
 //! How eager the loop is: the section `adaptation` of a manifest.
 
+use std::path::Path;
 use std::time::Duration;
 
 use num_rational::BigRational;
@@ -7,8 +8,10 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
 
-use crate::manifest::{self, ManifestPath};
-use crate::message::Message;
+use crate::knowledge::Knowledge;
+use crate::manifest::{self, Key, ManifestPath, Part};
+use crate::mapek::filter::{ComponentsSection, FilterSettings, MeasuredsSection, filters};
+use crate::message::{Errors, Message};
 use crate::number;
 
 /// The section `adaptation` of a manifest.
@@ -19,7 +22,7 @@ pub struct AdaptationSection {
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     minimum_benefit: Option<Spanned<toml::Value>>,
-    /// For so many seconds must a design be back before a better plan is looked for; of the clock, whatever the unit of the domain's times.
+    /// For so many seconds must a design be back before a better plan is looked for (5 if nothing is said); of the clock, whatever the unit of the domain's times.
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     settle: Option<Spanned<toml::Value>>,
@@ -32,6 +35,29 @@ pub struct AdaptationSection {
     /// situation alone.
     #[serde(default)]
     stay_close: bool,
+    /// For so many seconds must a component report a failure before it is believed (0 if nothing is said: a failure counts at once).
+    #[serde(default)]
+    #[schemars(schema_with = "manifest::decimal")]
+    confirm_time: Option<Spanned<toml::Value>>,
+    /// For so many seconds must a component that has failed be in order again before that is believed (2 if nothing is said).
+    #[serde(default)]
+    #[schemars(schema_with = "manifest::decimal")]
+    heal_time: Option<Spanned<toml::Value>>,
+    /// Times of single components, by local name.
+    #[serde(default)]
+    components: ComponentsSection,
+    /// Filters of measured attributes, by local name.
+    #[serde(default)]
+    measured: MeasuredsSection,
+}
+
+/// A file with the section `adaptation` alone.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Section {
+    /// How eager the loop is.
+    #[serde(default)]
+    adaptation: AdaptationSection,
 }
 
 impl AdaptationSection {
@@ -40,7 +66,8 @@ impl AdaptationSection {
     /// # Errors
     /// A value that is not a number, or negative.
     pub fn settings(&self, origin: &ManifestPath) -> Result<Settings, Message> {
-        let mut settings = Settings { stay_close: self.stay_close, ..Settings::default() };
+        let filters = filters(&self.confirm_time, &self.heal_time, &self.components, &self.measured, origin)?;
+        let mut settings = Settings { stay_close: self.stay_close, filters, ..Settings::default() };
         if let Some(value) = &self.minimum_benefit {
             settings.minimum_benefit = origin.number("minimum_benefit", value)?;
         }
@@ -73,16 +100,65 @@ impl AdaptationSection {
 pub struct Settings {
     /// Another plan replaces one that could be kept only if its metric is better by this much, in the metric's unit.
     pub minimum_benefit: BigRational,
-    /// So long must a design be available again before a better plan is looked for.
+    /// So long must a design be available again before a better plan is looked for. Five seconds unless said otherwise.
     pub settle: Duration,
     /// How long one plan may take; the best so far is used then, if there is one. Ten seconds unless said otherwise.
     pub time_limit: Option<Duration>,
     /// Whether, of plans that are as good and as long, one is chosen that has most steps of the plan at hand. The choice then
     /// depends on what has happened, and no longer on the situation alone.
     pub stay_close: bool,
+    /// Filters of what is measured and of what components report.
+    pub filters: FilterSettings,
 }
 
 impl Settings {
+    /// Nothing is damped: every report is believed at once, and a better plan is looked for at once.
+    pub fn immediate() -> Self {
+        Self { settle: Duration::ZERO, filters: FilterSettings::none(), ..Self::default() }
+    }
+
+    /// Reads a file with the section `adaptation` alone; names in it are those of a knowledge base.
+    ///
+    /// # Errors
+    /// The file cannot be read, or all that is wrong with the section.
+    pub fn read(file: &Path, knowledge: Option<&Knowledge>) -> Result<Self, Errors> {
+        let (section, origin) = manifest::read::<Section>(file)?;
+        let settings = section.adaptation.settings(&origin)?;
+        settings.check(knowledge, &origin)?;
+        Ok(settings)
+    }
+
+    /// Compares the names of filters with those of a knowledge base.
+    ///
+    /// # Errors
+    /// M143 for each name that it does not have.
+    pub(crate) fn check(&self, knowledge: Option<&Knowledge>, origin: &ManifestPath) -> Result<(), Errors> {
+        let mistakes = self.filters.mistakes(knowledge).into_iter().map(|(key, name, message)| {
+            let path: [Key; 3] = ["adaptation".into(), key.into(), name.as_str().into()];
+            let place = origin.place_of(&path, Part::Key);
+            Message::at(&message.code, origin.file(), place, message.message.clone())
+        });
+        Errors::unless_empty(origin.quote(mistakes))
+    }
+
+    /// Settings that let noise switch designs, each as a warning; for `lint`.
+    pub(crate) fn doubts(&self, knowledge: Option<&Knowledge>) -> Vec<Message> {
+        let mut doubts = self.filters.doubts(knowledge);
+        if self.settle.is_zero() && knowledge.is_some() {
+            let text = "each design that comes back is followed by a search for a better plan at once: `settle` is 0";
+            doubts.push(
+                Message::warning("M144", text).with_help("set `settle` in `[adaptation]` to some seconds"),
+            );
+        }
+        doubts
+    }
+
+    /// Filters of what is measured and of what components report.
+    #[must_use]
+    pub fn with_filters(self, filters: FilterSettings) -> Self {
+        Self { filters, ..self }
+    }
+
     /// Another plan replaces one that could be kept only if its metric is better by this much.
     #[must_use]
     pub fn with_minimum_benefit(self, minimum_benefit: BigRational) -> Self {
@@ -112,12 +188,17 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             minimum_benefit: BigRational::from_integer(0.into()),
-            settle: Duration::ZERO,
+            settle: SETTLE,
             time_limit: Some(TIME_LIMIT),
             stay_close: false,
+            filters: FilterSettings::default(),
         }
     }
 }
+
+/// Time for which a design must be back unless said otherwise. Nothing is urgent about a better plan, and a driver that is
+/// restarted by its supervisor comes and goes within seconds.
+const SETTLE: Duration = Duration::from_secs(5);
 
 /// How long one plan may take unless said otherwise. A robot waits meanwhile.
 const TIME_LIMIT: Duration = Duration::from_secs(10);

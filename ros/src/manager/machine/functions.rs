@@ -176,7 +176,8 @@ impl Machine {
         for design in back {
             self.say(&Event::Design { design, realisable: true });
         }
-        if self.ticks && self.state == State::Execute {
+        let is_due = self.control.due().is_some_and(|due| due <= self.now);
+        if is_due && self.state == State::Execute {
             self.say(&Event::Tick);
         }
         "time has passed".to_owned()
