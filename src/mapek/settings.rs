@@ -43,6 +43,11 @@ pub struct AdaptationSection {
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     heal_time: Option<Spanned<toml::Value>>,
+    /// Share of a bound by which it must be kept again after it was missed (0.02 if nothing is said; 0 for none), unless the attribute has
+    /// its own `hysteresis`.
+    #[serde(default)]
+    #[schemars(schema_with = "manifest::decimal")]
+    band: Option<Spanned<toml::Value>>,
     /// Times of single components, by local name.
     #[serde(default)]
     components: ComponentsSection,
@@ -68,6 +73,9 @@ impl AdaptationSection {
     pub fn settings(&self, origin: &ManifestPath) -> Result<Settings, Message> {
         let filters = filters(&self.confirm_time, &self.heal_time, &self.components, &self.measured, origin)?;
         let mut settings = Settings { stay_close: self.stay_close, filters, ..Settings::default() };
+        if let Some(value) = &self.band {
+            settings.filters.band = origin.number("band", value)?;
+        }
         if let Some(value) = &self.minimum_benefit {
             settings.minimum_benefit = origin.number("minimum_benefit", value)?;
         }
