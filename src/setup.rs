@@ -127,6 +127,7 @@ impl Setup {
         mission.change_warnings(|warnings| origin.quote(warnings));
         let Sections { description, planning, probabilistic: roles, report, scenarios, .. } = sections;
         let time_unit = planning.time_unit;
+        let settings = settings.with_time_unit(time_unit);
         Ok(Self { mission, description, settings, time_unit, roles, scenarios, report, origin })
     }
 

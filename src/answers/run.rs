@@ -24,6 +24,8 @@ struct RecoveryPart {
     resumed: bool,
     lines: u64,
     seq: Option<u64>,
+    /// Ranges of numbers below `seq` that were not seen, with both ends.
+    missing: Vec<[u64; 2]>,
     cut_bytes: u64,
     warnings: Vec<String>,
 }
@@ -40,6 +42,7 @@ impl ReadyLine {
             resumed: recovery.replayed.is_some(),
             lines: beliefs.lines(),
             seq: beliefs.sequence(),
+            missing: beliefs.missing(),
             cut_bytes: recovery.cut,
             warnings: recovery.warnings.iter().map(|own| own.message.clone()).collect(),
         });

@@ -33,6 +33,7 @@ mod report;
 mod run;
 mod run_lines;
 mod run_outlet;
+mod run_session;
 mod schema;
 mod simulate;
 mod situation;

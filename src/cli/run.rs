@@ -20,6 +20,7 @@ use crate::cli::configure::Wanted;
 use crate::cli::output;
 use crate::cli::run_lines::Lines;
 use crate::cli::run_outlet::{Outlet, Outlets};
+use crate::cli::run_session::Session;
 use crate::cli::situation::{Situation, consistent};
 
 /// Arguments of `run`.
@@ -115,13 +116,13 @@ fn ended(result: Result<(), Failure>, outlet: &Outlet) -> Result<Exit, Failure> 
     Ok(Exit::Done)
 }
 
-/// The loop from its first line to its last. Who does not read any more has had enough, and all is well.
+/// The loop from its first line to its last.
 fn drive(
     common: &Common,
-    mut control: Loop,
-    mut journal: Option<Journal>,
+    control: Loop,
+    journal: Option<Journal>,
     ready: &ReadyLine,
-    mut events: Lines,
+    events: Lines,
     outlet: &Outlet,
 ) -> Result<(), Failure> {
     if is_over(outlet.say(&output::line(ready)))? {
@@ -130,36 +131,8 @@ fn drive(
     outlet.begin(&control);
     let line = Arc::new(AtomicU64::new(control.beliefs().lines()));
     heartbeat(control.watch(), Arc::clone(&line), outlet.clone());
-    let read = Instant::now();
-    let answers = match &mut journal {
-        None => control.start(),
-        Some(journal) => journal.begin(&mut control).map_err(|error| unwritten(&error))?,
-    };
-    let number = control.beliefs().lines();
-    if is_over(outlet.answer(number, &answers, read))? {
-        return Ok(());
-    }
-    outlet.plan(control.beliefs(), &answers);
-    let mut clock = SystemClock::default();
-    let begun = control.beliefs().now();
-    while let Some(event) = events.next(common)? {
-        let read = Instant::now();
-        let now = begun + event.now.unwrap_or_else(|| clock.now());
-        let number = control.beliefs().lines() + 1;
-        line.store(number, Ordering::Relaxed);
-        outlet.heard(number, now, &event.text);
-        let answers = match &mut journal {
-            None => control.handle(&Observation::parse(&event.text), now),
-            Some(journal) => {
-                journal.handle(&mut control, &event.text, now).map_err(|error| unwritten(&error))?
-            }
-        };
-        if is_over(outlet.answer(control.beliefs().lines(), &answers, read))? {
-            return Ok(());
-        }
-        outlet.plan(control.beliefs(), &answers);
-    }
-    Ok(())
+    let session = Session::new(common, control, journal, outlet, line);
+    if events.is_file() { session.replay(events) } else { session.live(events) }
 }
 
 /// The loop without a task plan.
@@ -210,7 +183,7 @@ fn keep_going(
 }
 
 /// Whether nobody reads the answers any more.
-fn is_over(written: io::Result<()>) -> Result<bool, Message> {
+pub(super) fn is_over(written: io::Result<()>) -> Result<bool, Message> {
     match written {
         Ok(()) => Ok(false),
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(true),
@@ -218,7 +191,7 @@ fn is_over(written: io::Result<()>) -> Result<bool, Message> {
     }
 }
 
-fn unwritten(error: &io::Error) -> Message {
+pub(super) fn unwritten(error: &io::Error) -> Message {
     Message::error("M321", format!("the journal cannot be written: {error}"))
 }
 

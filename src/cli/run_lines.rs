@@ -22,13 +22,16 @@ pub(super) struct Line {
 pub(super) struct Lines {
     name: String,
     source: Source,
+    is_file: bool,
 }
+
+type Reader = Box<dyn BufRead + Send>;
 
 enum Source {
     /// Not looked at: standard input may have nothing yet.
-    Fresh(Option<Box<dyn BufRead>>),
-    Text(Box<dyn BufRead>),
-    Recorded(Box<Replay<Box<dyn BufRead>>>),
+    Fresh(Option<Reader>),
+    Text(Reader),
+    Recorded(Box<Replay<Reader>>),
 }
 
 /// Opens a file; a pipe is read as it comes, and any other thing that is not a file is refused.
@@ -45,15 +48,21 @@ impl Lines {
     /// Opens a file, or standard input for `-`.
     pub(super) fn open(path: &Path) -> Result<Self, Message> {
         let name = path.display().to_string();
-        let reader: Box<dyn BufRead> = if name == "-" {
-            Box::new(BufReader::new(io::stdin()))
+        let (is_file, reader): (bool, Reader) = if name == "-" {
+            (stdin_is_file(), Box::new(BufReader::new(io::stdin())))
         } else {
             let file = regular(path).map_err(|error| {
                 Message::at("M101", &name, None, format!("the file cannot be read: {error}"))
             })?;
-            Box::new(BufReader::new(file))
+            let is_file = file.metadata().is_ok_and(|data| data.is_file());
+            (is_file, Box::new(BufReader::new(file)))
         };
-        Ok(Self { name, source: Source::Fresh(Some(reader)) })
+        Ok(Self { name, source: Source::Fresh(Some(reader)), is_file })
+    }
+
+    /// Returns `true` if all lines are there already: each of them is then answered before the next one is read.
+    pub(super) fn is_file(&self) -> bool {
+        self.is_file
     }
 
     /// The next line; none at the end.
@@ -89,7 +98,21 @@ impl Lines {
     }
 }
 
-fn next_text(reader: &mut Box<dyn BufRead>) -> io::Result<Option<Line>> {
+/// Returns `true` if standard input is a file on disk.
+fn stdin_is_file() -> bool {
+    #[cfg(unix)]
+    {
+        use std::os::fd::AsFd as _;
+        let copy = io::stdin().as_fd().try_clone_to_owned();
+        copy.is_ok_and(|copy| File::from(copy).metadata().is_ok_and(|data| data.is_file()))
+    }
+    #[cfg(not(unix))]
+    {
+        false
+    }
+}
+
+fn next_text(reader: &mut Reader) -> io::Result<Option<Line>> {
     loop {
         let Some(bytes) = read_line(reader)? else { return Ok(None) };
         let text = String::from_utf8_lossy(&bytes);
@@ -101,7 +124,7 @@ fn next_text(reader: &mut Box<dyn BufRead>) -> io::Result<Option<Line>> {
     }
 }
 
-fn read_line(reader: &mut Box<dyn BufRead>) -> io::Result<Option<Vec<u8>>> {
+fn read_line(reader: &mut Reader) -> io::Result<Option<Vec<u8>>> {
     let mut bytes = Vec::new();
     let limit = LONGEST_LINE as u64 + 2;
     if reader.by_ref().take(limit).read_until(b'\n', &mut bytes)? == 0 {

@@ -127,6 +127,15 @@ impl Outlet {
         Ok(())
     }
 
+    /// Writes answers to a line, each with the line's number; there may be more.
+    pub(super) fn answer_so_far(&self, line: u64, answers: &[impl Serialize]) -> io::Result<()> {
+        if answers.is_empty() {
+            return Ok(());
+        }
+        let lines = answers.iter().map(|answer| output::line(&NumberedAnswer::new(answer, line)));
+        self.say(&lines.collect::<String>())
+    }
+
     /// Writes the answers to a line, each with the line's number, and that it was handled.
     pub(super) fn answer(&self, line: u64, answers: &[impl Serialize], read: Instant) -> io::Result<()> {
         let mut text = String::new();

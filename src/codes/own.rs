@@ -279,6 +279,12 @@ pub const CODES: &[[&str; 4]] = &[
         "Number lines one after another.",
     ],
     [
+        "M308",
+        "The time of a line is too far ahead.",
+        "`time` is in seconds since the start of the mission, and may skip at most a million; nanoseconds or the time of day are larger.",
+        "Send seconds since the start of the mission, or no `time` at all.",
+    ],
+    [
         "M320",
         "A snapshot does not fit the mission.",
         "It is damaged, or of another mission.",

@@ -198,12 +198,13 @@ fn check_opening(record: &Record, number: u64) -> Result<(), String> {
     match (record.text(0), record.count(2)) {
         (Some(FORMAT), Some(own)) if own == number => Ok(()),
         (Some(FORMAT), own) => Err(format!("has the number {} in it", own.unwrap_or_default())),
+        (Some("metaplan-journal/2"), _) => Err(OLD_FORMAT.to_owned()),
         (format, _) => Err(format!("has the format `{}`, not `{FORMAT}`", format.unwrap_or_default())),
     }
 }
 
 /// What is to be said of a segment that an older version has written.
-pub(super) const OLD_FORMAT: &str = "is of the format `metaplan-journal/1`, which this version does not read; let the version that \
+pub(super) const OLD_FORMAT: &str = "is of the format `metaplan-journal/2` or older, which this version does not read; let the version that \
                                      wrote it bring its mission to an end, or begin the mission anew with a journal in another \
                                      directory";
 

@@ -109,7 +109,7 @@ impl Journal {
             }
             let (file, link) = create_segment(&directory, &Link::first(), &digest, 0)
                 .map_err(|error| broken(&directory, &error.to_string()))?;
-            let unfinished = Some(Unfinished::Start);
+            let unfinished = Some(Unfinished::Agenda);
             let (segment, observations) = (0, 0);
             let journal =
                 Self { directory, policy, segment, file, link, lock, observations, unfinished, digest };
@@ -166,7 +166,7 @@ impl Journal {
         let mut answers = Vec::new();
         if let Some(unfinished) = self.unfinished.take() {
             answers = match unfinished {
-                Unfinished::Start => control.start(),
+                Unfinished::Agenda => control.deliberate(),
                 Unfinished::Observation(line, now) => {
                     self.observations += 1;
                     control.handle(&Observation::parse(&line), Duration::from_micros(now))
@@ -175,6 +175,25 @@ impl Journal {
             let decision = control.decision(&answers);
             self.decide(&decision)?;
         }
+        self.again(control, answers)
+    }
+
+    /// As [`Journal::begin`], without planning: what was begun is reacted to, and remains to be deliberated on.
+    ///
+    /// # Errors
+    /// The journal cannot be written; the answers must not leave the program.
+    pub fn begin_reacting(&mut self, control: &mut Loop) -> io::Result<Vec<Answer>> {
+        let mut answers = Vec::new();
+        if let Some(Unfinished::Observation(line, now)) = self.unfinished.take() {
+            self.observations += 1;
+            answers = control.react(&Observation::parse(&line), Duration::from_micros(now));
+            self.reacted(control, &answers)?;
+        }
+        self.again(control, answers)
+    }
+
+    /// Answers, and effects that were not acknowledged.
+    fn again(&mut self, control: &Loop, mut answers: Vec<Answer>) -> io::Result<Vec<Answer>> {
         self.file.sync_data()?;
         self.lock.note(self.link.next)?;
         let fresh: Vec<u64> = answers.iter().filter_map(Answer::effect).map(|effect| effect.number).collect();
@@ -190,11 +209,51 @@ impl Journal {
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
     pub fn handle(&mut self, control: &mut Loop, line: &str, now: Duration) -> io::Result<Vec<Answer>> {
+        let mut answers = self.observe(control, line, now)?;
+        answers.extend(control.deliberate());
+        self.decided(control, &answers)?;
+        Ok(answers)
+    }
+
+    /// Writes an observation, and lets the loop react to it. The answers may leave the program after [`Journal::reacted`], or with those
+    /// of the deliberation after [`Journal::decided`].
+    ///
+    /// # Errors
+    /// The journal cannot be written; the answers must not leave the program.
+    pub fn observe(&mut self, control: &mut Loop, line: &str, now: Duration) -> io::Result<Vec<Answer>> {
         let micros = u64::try_from(now.as_micros()).unwrap_or(u64::MAX);
         self.append("event", &[json!(micros), json!(line)])?;
-        let answers = control.handle(&Observation::parse(line), Duration::from_micros(micros));
-        let decision = control.decision(&answers);
+        self.observations += 1;
+        Ok(control.react(&Observation::parse(line), Duration::from_micros(micros)))
+    }
+
+    /// Writes the answers of [`Journal::observe`].
+    ///
+    /// # Errors
+    /// The journal cannot be written; the answers must not leave the program.
+    pub fn reacted(&mut self, control: &mut Loop, answers: &[Answer]) -> io::Result<()> {
+        let decision = control.decision(answers);
+        self.append("reaction", &[json!(decision.answers)])?;
+        self.keep(answers)
+    }
+
+    /// Writes the answers of a deliberation, after those of the observation before it if these were not written.
+    ///
+    /// # Errors
+    /// The journal cannot be written; the answers must not leave the program.
+    pub fn decided(&mut self, control: &mut Loop, answers: &[Answer]) -> io::Result<()> {
+        let decision = control.decision(answers);
         self.decide(&decision)?;
+        self.keep(answers)?;
+        // A snapshot has no place for what is still to be deliberated on.
+        if self.observations >= self.policy.snapshot_every && !control.has_agenda() {
+            self.checkpoint(control)?;
+        }
+        Ok(())
+    }
+
+    /// Forces answers to the disk as the policy demands.
+    fn keep(&mut self, answers: &[Answer]) -> io::Result<()> {
         let must = match self.policy.sync {
             Sync::Always => true,
             Sync::Effects => answers.iter().any(|answer| answer.effect().is_some()),
@@ -203,12 +262,7 @@ impl Journal {
         if must {
             self.file.sync_data()?;
         }
-        self.lock.note(self.link.next)?;
-        self.observations += 1;
-        if self.observations >= self.policy.snapshot_every {
-            self.checkpoint(control)?;
-        }
-        Ok(answers)
+        self.lock.note(self.link.next)
     }
 
     fn decide(&mut self, decision: &Decision) -> io::Result<()> {

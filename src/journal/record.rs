@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use sha2::{Digest as _, Sha256};
 
 /// The version of all that is written.
-pub(super) const FORMAT: &str = "metaplan-journal/2";
+pub(super) const FORMAT: &str = "metaplan-journal/3";
 
 /// How many digits stand before a record.
 const DIGITS: usize = 16;

@@ -15,8 +15,8 @@ use crate::message::Message;
 /// What is to be decided first.
 #[derive(Debug)]
 pub(super) enum Unfinished {
-    /// What the loop does before the first observation.
-    Start,
+    /// What was reacted to, or what the loop does before the first observation: it was not deliberated on.
+    Agenda,
     /// An observation, and its time in microseconds.
     Observation(String, u64),
 }
@@ -77,36 +77,49 @@ impl Replay<'_> {
     pub(super) fn segment(&mut self, segment: &Segment) -> Result<(), Message> {
         self.observations = 0;
         let mut records = segment.records.iter().filter(|record| record.kind != "end").peekable();
-        // What a loop does first stands in the first segment only.
-        if segment.number == 0 {
-            match records.next_if(|record| record.kind == "decision") {
-                Some(decision) => {
-                    let answers = self.control.start_again(&decision.list(1));
-                    self.compare(decision, &answers)?;
-                }
-                None => self.unfinished = Some(Unfinished::Start),
-            }
-        }
         while let Some(record) = records.next() {
             let wrong =
                 || broken(self.directory, &format!("record {} is not where it belongs", record.number));
-            let (Some(now), Some(line)) = (record.count(0), record.text(1)) else { return Err(wrong()) };
-            if record.kind != "event" || self.unfinished.is_some() {
+            if self.unfinished.take().is_some_and(|own| matches!(own, Unfinished::Observation(..))) {
                 return Err(wrong());
             }
-            match records.next_if(|record| record.kind == "decision") {
-                Some(decision) => {
-                    let observation = Observation::parse(line);
-                    let now = Duration::from_micros(now);
-                    let answers = self.control.handle_again(&observation, now, &decision.list(1));
-                    self.compare(decision, &answers)?;
-                    self.observations += 1;
+            match record.kind.as_str() {
+                // The decision on what was reacted to before, or the first one.
+                "decision" if self.control.has_agenda() => {
+                    let answers = self.control.deliberate_again(&record.list(1));
+                    self.compare(record, &answers)?;
                 }
-                None => self.unfinished = Some(Unfinished::Observation(line.to_owned(), now)),
+                "event" => {
+                    let (Some(now), Some(line)) = (record.count(0), record.text(1)) else {
+                        return Err(wrong());
+                    };
+                    let next = records.next_if(|next| ["decision", "reaction"].contains(&next.kind.as_str()));
+                    self.event(line, now, next)?;
+                }
+                _ => return Err(wrong()),
             }
-            self.recovery.replayed = self.recovery.replayed.map(|count| count + 1);
+        }
+        let is_begun = matches!(self.unfinished, Some(Unfinished::Observation(..)));
+        if self.control.has_agenda() && !is_begun {
+            self.unfinished = Some(Unfinished::Agenda);
         }
         Ok(())
+    }
+
+    /// Handles an observation again, and compares the answers with those in the record that follows it, if there is one.
+    fn event(&mut self, line: &str, now: u64, next: Option<&Record>) -> Result<(), Message> {
+        self.recovery.replayed = self.recovery.replayed.map(|count| count + 1);
+        let Some(next) = next else {
+            self.unfinished = Some(Unfinished::Observation(line.to_owned(), now));
+            return Ok(());
+        };
+        let (observation, now) = (Observation::parse(line), Duration::from_micros(now));
+        let answers = match next.kind.as_str() {
+            "reaction" => self.control.react(&observation, now),
+            _ => self.control.handle_again(&observation, now, &next.list(1)),
+        };
+        self.observations += 1;
+        self.compare(next, &answers)
     }
 
     /// Compares answers with those that were written.

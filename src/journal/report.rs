@@ -28,11 +28,11 @@ pub struct Entry {
     pub record: u64,
     /// The number of its segment.
     pub segment: u64,
-    /// `event`, `decision` or `end`.
+    /// `event`, `reaction`, `decision` or `end`.
     pub kind: String,
     /// Of an event: its time since the start of the mission, in microseconds.
     pub time: Option<u64>,
-    /// Of an event the line, of a decision the answers.
+    /// Of an event the line, of a reaction or decision the answers.
     pub content: Value,
 }
 
@@ -62,7 +62,7 @@ impl JournalReport {
                         time: record.count(0).filter(|_| record.kind == "event"),
                         content: match record.kind.as_str() {
                             "event" => json!(record.text(1)),
-                            "decision" => json!(record.list(0)),
+                            "decision" | "reaction" => json!(record.list(0)),
                             _ => Value::Null,
                         },
                     }));

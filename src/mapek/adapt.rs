@@ -16,6 +16,7 @@ use crate::mapek::effects::{cancel, reconfigure, resume_suspended, suspend};
 use crate::mapek::interrupt::{Interruption, weigh};
 use crate::mapek::monitor::Changes;
 use crate::mapek::plan::Planner;
+use crate::mapek::react::trouble;
 use crate::mapek::settings::Settings;
 use crate::mapek::step::PlannedStep;
 use crate::number;
@@ -42,13 +43,18 @@ impl Adapting<'_> {
         if self.gave_up(&changes, answers) {
             return;
         }
+        let upset = std::mem::take(&mut changes.upset);
         if let Some(running) = self.beliefs.running.clone() {
             if running.cancelling {
                 return;
             }
+            if !upset.is_empty() {
+                self.replan(upset, true, answers);
+                return;
+            }
             // A suspended action is in trouble as long as nothing changes for the better.
             let is_news = is_change || !running.suspended;
-            if let Some(reason) = self.trouble(&running, &changes).filter(|_| is_news) {
+            if let Some(reason) = trouble(self.beliefs, &running, changes.facts).filter(|_| is_news) {
                 self.replan(vec![reason], true, answers);
                 return;
             }
@@ -58,7 +64,12 @@ impl Adapting<'_> {
         if let Some(design) = lost.first() {
             changes.must.push(format!("{design}, which the plan uses, is not available any more"));
         }
+        changes.must.extend(upset);
         changes.must.extend(findings.errors);
+        if self.beliefs.reached && changes.must.is_empty() && changes.facts {
+            let is_undone = self.beliefs.violation().is_some();
+            changes.must.extend(is_undone.then(|| "the goal does not hold any more".to_owned()));
+        }
         if changes.must.is_empty() && changes.facts && self.beliefs.plan.is_some() {
             changes.must.extend(self.beliefs.violation());
         }
@@ -98,7 +109,7 @@ impl Adapting<'_> {
         hopes.retain(|design| !findings.lost.contains(design));
         let before = hopes.len();
         hopes.extend(findings.gained.iter().cloned());
-        hopes.extend(changes.predicates.then(|| FACTS.to_owned()));
+        hopes.extend((changes.predicates || changes.values).then(|| FACTS.to_owned()));
         // Time was up when the plan was made, and now the question is another one.
         let is_news = changes.facts || !findings.gained.is_empty() || !findings.lost.is_empty();
         hopes.extend((is_news && self.beliefs.unproved).then(|| FACTS.to_owned()));
@@ -107,19 +118,15 @@ impl Adapting<'_> {
         }
     }
 
-    /// Why the action under way cannot go on as it is.
-    fn trouble(&self, running: &Running, changes: &Changes) -> Option<String> {
-        let lost = running.step.configuration.iter().find(|(_, design)| !self.beliefs.is_available(design));
-        if let Some((_, design)) = lost {
-            return Some(format!(
-                "{design}, which action {} uses, is not available any more",
-                running.action
-            ));
+    /// Lets the action under way go on if it stands still only until it was decided what becomes of it, and it can go on.
+    pub(super) fn release(&mut self, answers: &mut Vec<Answer>) {
+        let Some(mut running) = self.beliefs.running.clone().filter(|own| own.provisional) else { return };
+        running.provisional = false;
+        if !running.cancelling && self.can_go_on(&running) {
+            reconfigure(self.beliefs, running.action, &running.step.clone(), answers);
+            resume_suspended(self.beliefs, &mut running, answers);
         }
-        if !changes.facts {
-            return None;
-        }
-        self.beliefs.obstacle(running).map(|obstacle| format!("action {}: {obstacle}", running.action))
+        self.beliefs.running = Some(running);
     }
 
     /// Looks for a better plan if there may be one, and there has been for long enough.
@@ -130,7 +137,7 @@ impl Adapting<'_> {
         } else if self.beliefs.fault.is_some() {
             // It is not known what there is to hope for.
         } else if !self.beliefs.hopes.is_empty()
-            && self.beliefs.now >= self.beliefs.hoped + self.settings.settle
+            && self.beliefs.now >= self.beliefs.hoped.saturating_add(self.settings.settle)
         {
             self.replan(vec!["there may be a better plan".to_owned()], false, answers);
         }
@@ -142,6 +149,9 @@ impl Adapting<'_> {
         answers.push(Answer::PlanRequested { because });
         self.beliefs.hopes.clear();
         let outcome = self.plan(true);
+        if self.planner.is_missing {
+            return;
+        }
         if must && self.interrupt(&reason, &outcome, answers) {
             return;
         }
@@ -164,7 +174,7 @@ impl Adapting<'_> {
     fn configure_again(&mut self, answers: &mut Vec<Answer>) {
         let Some(running) = &self.beliefs.running else { return };
         let has = |(function, design): &(String, String)| {
-            self.beliefs.configuration.get(function).is_some_and(|own| own == design)
+            self.beliefs.expected(function).is_some_and(|own| own == design)
         };
         if !running.step.configuration.iter().all(has) {
             let (action, step) = (running.action, running.step.clone());
@@ -181,6 +191,9 @@ impl Adapting<'_> {
             return false;
         }
         let without = self.plan(false);
+        if self.planner.is_missing {
+            return true;
+        }
         let gained = benefit(self.beliefs, self.settings, &going_on.cost, &without.cost);
         match weigh(reason, can_go_on, going_on, without, gained) {
             Interruption::None => false,

@@ -10,7 +10,7 @@ use crate::mapek::beliefs::Beliefs;
 use crate::mapek::monitor::Base;
 
 /// What the analysis has found.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Findings {
     /// Designs that are available no more.
     pub(super) lost: BTreeSet<String>,
@@ -18,6 +18,28 @@ pub(super) struct Findings {
     pub(super) gained: BTreeSet<String>,
     /// Objectives that have come into error, with their statuses.
     pub(super) errors: Vec<String>,
+}
+
+impl Findings {
+    /// Returns `true` if nothing was found.
+    pub(super) fn is_empty(&self) -> bool {
+        self.lost.is_empty() && self.gained.is_empty() && self.errors.is_empty()
+    }
+
+    /// Adds what was found later: a design that was lost and has come back is neither.
+    pub(super) fn extend(&mut self, later: Self) {
+        for design in later.lost {
+            if !self.gained.remove(&design) {
+                self.lost.insert(design);
+            }
+        }
+        for design in later.gained {
+            if !self.lost.remove(&design) {
+                self.gained.insert(design);
+            }
+        }
+        self.errors.extend(later.errors);
+    }
 }
 
 /// The designs that are available, by local name; none where it is not known what follows.

@@ -63,6 +63,17 @@ pub enum Answer {
     },
     /// Something is to be done.
     Effect(Effect),
+    /// An effect was not acknowledged, or nothing was heard of an action, for longer than the deadline.
+    Overdue {
+        /// The effect, where it is about one.
+        effect: Option<u64>,
+        /// The action.
+        action: u64,
+        /// Seconds since it was asked for, or since the last report.
+        seconds: u64,
+        /// What follows from it.
+        outcome: OverdueOutcome,
+    },
     /// The goal holds; nothing is to be done.
     GoalReached,
     /// A report is held back by a filter: the first, tenth, hundredth … one since the value or status last changed.
@@ -106,6 +117,21 @@ pub enum Answer {
         /// One sentence.
         message: String,
     },
+}
+
+/// What follows from a deadline that has passed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum OverdueOutcome {
+    /// The effect is asked for again.
+    Repeated,
+    /// The reconfiguration counts as failed.
+    Failed,
+    /// The action is to be brought to a safe end.
+    Cancelled,
+    /// Nothing: the robot may be one that does not report this.
+    Waiting,
 }
 
 /// A design that has become available, or is available no more.
@@ -238,6 +264,7 @@ impl Answer {
             Self::PlanKept { .. } => "plan_kept",
             Self::PlanNone { .. } => "plan_none",
             Self::Effect(effect) => effect.command.kind(),
+            Self::Overdue { .. } => "overdue",
             Self::GoalReached => "goal_reached",
             Self::Filtered { .. } => "filtered",
             Self::Silent { .. } => "silent",
@@ -272,6 +299,12 @@ impl Answer {
                 object.serialize_entry("status", status)?;
                 object.serialize_entry("because", because)?;
                 object.serialize_entry("blocking", blocking)
+            }
+            Self::Overdue { effect, action, seconds, outcome } => {
+                object.serialize_entry("effect", effect)?;
+                object.serialize_entry("action", action)?;
+                object.serialize_entry("seconds", seconds)?;
+                object.serialize_entry("outcome", outcome)
             }
             Self::Effect(_) | Self::GoalReached => Ok(()),
             Self::Filtered { name, value, because, held, due } => {

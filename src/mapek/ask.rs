@@ -49,6 +49,11 @@ impl Ask<'_> {
 }
 
 impl Outcome {
+    /// No plan.
+    pub(super) fn none(proved: bool, because: String) -> Self {
+        Self { steps: None, cost: BigRational::default(), proved, because, blocking: Vec::new() }
+    }
+
     /// For the journal.
     pub fn to_record(&self) -> Value {
         let steps: Option<Vec<Value>> =

@@ -13,8 +13,9 @@ use pddl::ast::{Domain, Problem};
 use pddl::validate::{Options, Verdict, Violation, advance, validate};
 
 use crate::knowledge::Fault;
-use crate::mapek::answer::Effect;
+use crate::mapek::answer::{Command, Effect};
 use crate::mapek::filter::FilterStates;
+use crate::mapek::receipts::Receipts;
 use crate::mapek::resume::{resume, resumed_goal};
 use crate::mapek::sequence::Numbers;
 use crate::mapek::step::{PlannedStep, plan_text};
@@ -35,7 +36,7 @@ pub struct Beliefs {
     pub(super) violated: BTreeSet<String>,
     /// Why it is not known what follows, as was said last.
     pub(super) fault: Option<Fault>,
-    /// Function to the design that it has.
+    /// Function to the design that it has: the one that was acknowledged last.
     pub(super) configuration: BTreeMap<String, String>,
     /// What is still to be requested, if there is a plan.
     pub(super) plan: Option<VecDeque<PlannedStep>>,
@@ -59,6 +60,12 @@ pub struct Beliefs {
     pub(super) effects: u64,
     /// Effects that are not acknowledged.
     pub(super) outstanding: BTreeMap<u64, Effect>,
+    /// Acknowledgements so far, by function.
+    pub(super) receipts: Receipts,
+    /// For each outstanding effect, when it was asked for last and how often.
+    pub(super) waits: BTreeMap<u64, Wait>,
+    /// Whether the robot has ever reported that an action has started or progressed.
+    pub(super) reports_actions: bool,
     /// How many lines were handled.
     pub(super) lines: u64,
     /// The numbers of the lines that had one and were taken over.
@@ -82,6 +89,25 @@ pub(super) struct Running {
     pub(super) cancelling: bool,
     /// Whether it was asked to stand still.
     pub(super) suspended: bool,
+    /// Whether it stands still only until planning has decided what becomes of it.
+    pub(super) provisional: bool,
+    /// The number of the effect that requested it.
+    pub(super) request: u64,
+    /// When it was requested or last reported.
+    pub(super) heard: Duration,
+    /// Number of deadlines that have passed since then.
+    pub(super) overdue: u32,
+    /// Whether its progress was reported.
+    pub(super) progressed: bool,
+}
+
+/// How long an effect has been outstanding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Wait {
+    /// When it was asked for last, since the start of the mission.
+    pub(super) since: Duration,
+    /// How often it was repeated.
+    pub(super) repeats: u32,
 }
 
 /// What is about to be done, as a task and its plan.
@@ -120,6 +146,9 @@ impl Beliefs {
             actions: 0,
             effects: 0,
             outstanding: BTreeMap::new(),
+            receipts: Receipts::default(),
+            waits: BTreeMap::new(),
+            reports_actions: false,
             lines: 0,
             numbers: Numbers::default(),
             now: Duration::ZERO,
@@ -147,9 +176,33 @@ impl Beliefs {
         &self.statuses
     }
 
-    /// Function to the design that it has.
+    /// Function to the design that it has: the one that was acknowledged last. What was asked for since then is
+    /// [pending](Self::pending).
     pub fn configuration(&self) -> &BTreeMap<String, String> {
         &self.configuration
+    }
+
+    /// Functions with the design that was asked for and is not acknowledged.
+    pub fn pending(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.outstanding.values().filter_map(|effect| match &effect.command {
+            Command::Reconfigure { function, to, .. } => Some((function.as_str(), to.as_str())),
+            _ => None,
+        })
+    }
+
+    /// Returns `true` if a reconfiguration of the function was asked for and never answered, be it outstanding or superseded:
+    /// the function may then have another design than the one that was acknowledged last.
+    pub fn is_unsettled(&self, function: &str) -> bool {
+        self.pending().any(|(own, _)| own == function) || self.receipts.has_superseded(function)
+    }
+
+    /// The design that a function has or is about to get; none where it is not certain.
+    pub(super) fn expected(&self, function: &str) -> Option<&str> {
+        if let Some((_, design)) = self.pending().find(|(own, _)| *own == function) {
+            return Some(design);
+        }
+        let design = self.configuration.get(function).map(String::as_str);
+        design.filter(|_| !self.receipts.has_superseded(function))
     }
 
     /// The number of the action that is under way, and the action as it runs now.
@@ -200,6 +253,12 @@ impl Beliefs {
     /// The greatest number of a line that was taken over.
     pub fn sequence(&self) -> Option<u64> {
         self.numbers.greatest()
+    }
+
+    /// The numbers of lines that are missing below the greatest one, as ranges with both ends: these lines were on their way, or were
+    /// refused.
+    pub fn missing(&self) -> Vec<[u64; 2]> {
+        self.numbers.missing()
     }
 
     /// The time of the last line, since the start of the mission.

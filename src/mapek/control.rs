@@ -1,5 +1,6 @@
 //! The loop itself: an observation goes through the stations, one after the other, and answers come out.
 
+use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
 use encodings::Limits;
@@ -8,17 +9,19 @@ use tracing::info_span;
 
 use crate::knowledge::Knowledge;
 use crate::mapek::adapt::Adapting;
-use crate::mapek::analyze::{analyze, available, follow, judged};
-use crate::mapek::answer::{Answer, DesignChange, Effect};
+use crate::mapek::analyze::{Findings, analyze, available, follow, judged};
+use crate::mapek::answer::{Answer, Command, DesignChange, Effect};
 use crate::mapek::ask::Outcome;
 use crate::mapek::beliefs::Beliefs;
+use crate::mapek::deadlines::overdue;
 use crate::mapek::digest::digest;
-use crate::mapek::effects::{reconfigure, request};
-use crate::mapek::event::Observation;
+use crate::mapek::effects::{objectives, reconfigure, request};
+use crate::mapek::event::{Event, Observation};
 use crate::mapek::execute::execute;
 use crate::mapek::fields::Refusal;
 use crate::mapek::monitor::{Base, Changes, Monitor};
 use crate::mapek::plan::Planner;
+use crate::mapek::react::react;
 use crate::mapek::record::{self, Decision, Snapshot};
 use crate::mapek::settings::Settings;
 use crate::mapek::step::PlannedStep;
@@ -32,6 +35,28 @@ const STEPS: u64 = 100_000_000;
 /// So many names and values may be interned before the knowledge is made anew without what is not used any more.
 const GROWTH: usize = 1024;
 
+/// Upper limit on the step from the time of one line to that of the next. Sequence numbers skip no more than a million either.
+const MAX_TIME_STEP: Duration = Duration::from_secs(1_000_000);
+
+/// What there is to deliberate on.
+#[derive(Debug, Clone, Default)]
+struct Agenda {
+    changes: Changes,
+    findings: Findings,
+    /// Whether the loop has not begun: nothing has changed that could be adapted to.
+    is_start: bool,
+}
+
+/// What deliberation changes before the first plan is asked for.
+#[derive(Debug)]
+pub(super) struct Checkpoint {
+    agenda: Option<Agenda>,
+    hopes: (BTreeSet<String>, Duration),
+    failures: Option<(PlannedStep, u32)>,
+    plan: Option<VecDeque<PlannedStep>>,
+    flags: [bool; 2],
+}
+
 /// The adaptation loop of one robot.
 #[derive(Debug, Clone)]
 pub struct Loop {
@@ -39,6 +64,10 @@ pub struct Loop {
     pub(super) beliefs: Beliefs,
     monitor: Monitor,
     pub(super) planner: Planner,
+    /// What has changed since the last deliberation, if anything has.
+    agenda: Option<Agenda>,
+    /// Number of times that the question for the planner has changed.
+    pub(super) question: u64,
     digest: String,
 }
 
@@ -67,7 +96,8 @@ impl Loop {
         if let Some(base) = beliefs.mission.knowledge() {
             beliefs.available = available(base);
         }
-        Ok(Self { settings, beliefs, monitor, planner, digest })
+        let agenda = Some(Agenda { is_start: true, ..Agenda::default() });
+        Ok(Self { settings, beliefs, monitor, planner, agenda, question: 0, digest })
     }
 
     /// What the loop believes and has asked for.
@@ -89,13 +119,11 @@ impl Loop {
 
     /// Makes the first plan and requests the first action.
     pub fn start(&mut self) -> Vec<Answer> {
-        let mut answers = Vec::new();
-        self.planner.made.clear();
-        execute(&mut self.adapting(), &mut answers);
-        answers
+        self.deliberate()
     }
 
-    /// Takes an observation over, at a time since the start of the mission that never goes back, and says what follows.
+    /// Takes an observation over, at a time since the start of the mission that never goes back, and says what follows:
+    /// [`react`](Self::react) and [`deliberate`](Self::deliberate) at once.
     ///
     /// ```
     /// use std::{path::Path, time::Duration};
@@ -113,16 +141,37 @@ impl Loop {
     /// # }
     /// ```
     pub fn handle(&mut self, observation: &Observation, now: Duration) -> Vec<Answer> {
-        let _span = info_span!("handle", line = self.beliefs.lines + 1).entered();
+        let mut answers = self.react(observation, now);
+        answers.extend(self.deliberate());
+        answers
+    }
+
+    /// Takes an observation over, and asks for a safe effect if the action under way cannot go on as it is: other designs with which
+    /// what is left of it can be done, or a standstill. Nothing is planned, whatever the time limit of plans.
+    ///
+    /// Several observations may be reacted to before [`deliberate`](Self::deliberate) is called.
+    pub fn react(&mut self, observation: &Observation, now: Duration) -> Vec<Answer> {
+        let _span = info_span!("react", line = self.beliefs.lines + 1).entered();
         let mut answers = Vec::new();
         // Plans that nobody has asked for are of no use to anybody.
         self.planner.made.clear();
         self.beliefs.lines += 1;
-        self.beliefs.now = self.beliefs.now.max(observation.time.unwrap_or(now));
+        let latest = self.beliefs.now.max(now).saturating_add(MAX_TIME_STEP);
+        self.beliefs.now =
+            self.beliefs.now.max(observation.time.filter(|time| *time <= latest).unwrap_or(now));
         if let Some(refusal) =
             observation.sequence.and_then(|sequence| self.beliefs.numbers.refused(sequence))
         {
             return vec![refusal];
+        }
+        if let Some(time) = observation.time.filter(|time| *time > latest) {
+            let text = format!(
+                "`time` is {} s, but may be {} s at most: it is in seconds since the start of the mission, and skips a million at \
+                 most",
+                time.as_secs_f64(),
+                latest.as_secs()
+            );
+            return vec![Answer::Error { code: "M308".to_owned(), message: text }];
         }
         let mut changes = Changes::default();
         let mut understood = false;
@@ -136,6 +185,9 @@ impl Loop {
                 Err(refusal) => answers.push(refused(refusal)),
             }
         }
+        for effect in overdue(&mut self.beliefs, &self.settings, &mut answers) {
+            self.give_up(effect, &mut changes);
+        }
         answers.append(&mut changes.filtered);
         if changes.goal {
             self.planner.memo.forget();
@@ -144,13 +196,80 @@ impl Loop {
             if let Some(sequence) = observation.sequence {
                 self.beliefs.numbers.insert(sequence);
             }
+            if let Some(running) = self.beliefs.running.as_ref().filter(|_| changes.observed) {
+                let step = running.step.clone();
+                objectives(&mut self.beliefs, Some(&step), &mut answers);
+            }
             let findings = follow(&mut self.beliefs, changes.base, &mut answers);
-            let mut adapting = self.adapting();
-            adapting.adapt(changes, findings, &mut answers);
-            execute(&mut adapting, &mut answers);
-            self.forget();
+            react(&mut self.beliefs, &self.settings, &mut changes, &mut answers);
+            self.question += u64::from(changes.is_news() || !findings.is_empty());
+            let agenda = self.agenda.get_or_insert_default();
+            agenda.changes.extend(changes);
+            agenda.findings.extend(findings);
         }
         answers
+    }
+
+    /// Plans if what was reacted to calls for it, adopts the plan, and requests the next action. This may take as long as the time
+    /// limit of plans allows, several times. Without anything to deliberate on it does nothing.
+    pub fn deliberate(&mut self) -> Vec<Answer> {
+        let _span = info_span!("deliberate", line = self.beliefs.lines).entered();
+        let mut answers = Vec::new();
+        self.planner.made.clear();
+        let Some(Agenda { changes, findings, is_start }) = self.agenda.take() else { return answers };
+        let mut adapting = self.adapting();
+        if !is_start || changes.is_news() || !findings.is_empty() {
+            adapting.adapt(changes, findings, &mut answers);
+        }
+        execute(&mut adapting, &mut answers);
+        if !adapting.planner.is_missing {
+            adapting.release(&mut answers);
+        }
+        self.forget();
+        answers
+    }
+
+    /// Returns `true` if something was reacted to and not deliberated on.
+    pub fn has_agenda(&self) -> bool {
+        self.agenda.is_some()
+    }
+
+    /// A reconfiguration that was not acknowledged in time counts as failed, and it is not known which design the function has.
+    fn give_up(&mut self, effect: u64, changes: &mut Changes) {
+        let Some(Command::Reconfigure { function, .. }) =
+            self.beliefs.outstanding.get(&effect).map(|effect| effect.command.clone())
+        else {
+            return;
+        };
+        let failed = Event::ReconfigurationFailed { effect };
+        // Without a knowledge base there is nothing to be noted of the design.
+        let _ = self.monitor.take(&mut self.beliefs, &failed, changes);
+        self.beliefs.outstanding.remove(&effect);
+        self.beliefs.waits.remove(&effect);
+        self.beliefs.configuration.remove(&function);
+    }
+
+    /// What deliberation changes before the first plan is asked for.
+    pub(super) fn checkpoint(&self) -> Checkpoint {
+        let known = &self.beliefs;
+        Checkpoint {
+            agenda: self.agenda.clone(),
+            hopes: (known.hopes.clone(), known.hoped),
+            failures: known.failures.clone(),
+            plan: known.plan.clone(),
+            flags: [known.stuck, known.reached],
+        }
+    }
+
+    /// Goes back to where no plan had been asked for.
+    pub(super) fn roll_back(&mut self, to: Checkpoint) {
+        let known = &mut self.beliefs;
+        self.agenda = to.agenda;
+        (known.hopes, known.hoped) = to.hopes;
+        known.failures = to.failures;
+        known.plan = to.plan;
+        [known.stuck, known.reached] = to.flags;
+        self.planner.made.clear();
     }
 
     /// The station that decides.
@@ -220,7 +339,12 @@ impl Loop {
         answers
     }
 
-    /// All that the loop knows.
+    /// As [`Loop::deliberate`], with the plans that were made then.
+    pub fn deliberate_again(&mut self, plans: &[Value]) -> Vec<Answer> {
+        self.start_again(plans)
+    }
+
+    /// All that the loop knows, once it has deliberated on all that it has reacted to.
     pub fn snapshot(&self) -> Snapshot {
         record::snapshot(&self.beliefs)
     }
@@ -231,6 +355,7 @@ impl Loop {
     /// The snapshot is damaged, or belongs to another mission.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), Message> {
         self.planner.memo.forget();
+        self.agenda = None;
         record::restore(&mut self.beliefs, snapshot)
     }
 }
@@ -241,6 +366,7 @@ impl Loop {
     pub(crate) fn observe(&mut self, observation: &Observation, now: Duration) {
         self.beliefs.lines += 1;
         self.beliefs.now = self.beliefs.now.max(now);
+        self.agenda = None;
         let mut changes = Changes::default();
         let _ = self.monitor.elapse(&mut self.beliefs, &mut changes);
         for event in observation.events.iter().flatten() {

@@ -3,7 +3,7 @@
 
 use crate::mapek::analyze::{analyze, contradict};
 use crate::mapek::answer::{Answer, Command, Effect};
-use crate::mapek::beliefs::{Beliefs, Running};
+use crate::mapek::beliefs::{Beliefs, Running, Wait};
 use crate::mapek::step::PlannedStep;
 
 /// The goal holds: nothing is to be done any more.
@@ -21,14 +21,25 @@ pub(super) fn request(beliefs: &mut Beliefs, step: PlannedStep, answers: &mut Ve
     reconfigure(beliefs, action, &step, answers);
     effect(beliefs, action, Command::Request { step: step.clone() }, answers);
     let progress = num_rational::BigRational::from_integer(0.into());
-    beliefs.running = Some(Running { action, step, progress, cancelling: false, suspended: false });
+    beliefs.running = Some(Running {
+        action,
+        step,
+        progress,
+        cancelling: false,
+        suspended: false,
+        provisional: false,
+        request: beliefs.effects,
+        heard: beliefs.now,
+        overdue: 0,
+        progressed: false,
+    });
 }
 
 /// Gives functions the designs of a step, and the knowledge base its objectives.
 pub(super) fn reconfigure(beliefs: &mut Beliefs, action: u64, step: &PlannedStep, answers: &mut Vec<Answer>) {
     for (function, design) in &step.configuration {
-        let from = beliefs.configuration.insert(function.clone(), design.clone());
-        if from.as_ref() != Some(design) {
+        if beliefs.expected(function) != Some(design) {
+            let from = beliefs.configuration.get(function).cloned();
             let command = Command::Reconfigure { function: function.clone(), from, to: design.clone() };
             effect(beliefs, action, command, answers);
         }
@@ -44,14 +55,22 @@ pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answe
     let is_replaced = |old: &Effect| command.replaces(&old.command, old.action == action);
     let supersedes: Vec<u64> =
         outstanding.values().filter(|old| is_replaced(old)).map(|old| old.number).collect();
-    outstanding.retain(|number, _| !supersedes.contains(number));
+    for number in &supersedes {
+        beliefs.waits.remove(number);
+        if let Some(Command::Reconfigure { function, to, .. }) =
+            outstanding.remove(number).map(|old| old.command)
+        {
+            beliefs.receipts.supersede(*number, function, to);
+        }
+    }
+    beliefs.waits.insert(number, Wait { since: beliefs.now, repeats: 0 });
     let effect = Effect { number, action, command, repeated: false, supersedes };
     outstanding.insert(number, effect.clone());
     answers.push(Answer::Effect(effect));
 }
 
 /// Makes the functions of a step, and no others, the objectives of the knowledge base, grounded as the step says.
-fn objectives(beliefs: &mut Beliefs, step: Option<&PlannedStep>, answers: &mut Vec<Answer>) {
+pub(super) fn objectives(beliefs: &mut Beliefs, step: Option<&PlannedStep>, answers: &mut Vec<Answer>) {
     let mission = &beliefs.mission;
     let mut wanted = step.map_or_else(Vec::new, |step| step.configuration.clone());
     wanted.retain(|(_, design)| !mission.decides_on(design));
@@ -74,17 +93,18 @@ pub(super) fn cancel(beliefs: &mut Beliefs, running: Running, because: String, a
 pub(super) fn suspend(beliefs: &mut Beliefs, running: Running, reason: &str, answers: &mut Vec<Answer>) {
     beliefs.plan = None;
     beliefs.stuck = true;
-    if running.suspended {
-        return;
+    if !running.suspended {
+        let because = format!("{reason}; no other design serves, and there is no plan without it");
+        effect(beliefs, running.action, Command::Suspend { because }, answers);
     }
-    let because = format!("{reason}; no other design serves, and there is no plan without it");
-    effect(beliefs, running.action, Command::Suspend { because }, answers);
-    beliefs.running = Some(Running { suspended: true, ..running });
+    beliefs.running = Some(Running { suspended: true, provisional: false, ..running });
 }
 
 /// Lets a suspended action go on.
 pub(super) fn resume_suspended(beliefs: &mut Beliefs, running: &mut Running, answers: &mut Vec<Answer>) {
+    running.provisional = false;
     if std::mem::take(&mut running.suspended) {
+        (running.heard, running.overdue) = (beliefs.now, 0);
         effect(beliefs, running.action, Command::Resume, answers);
     }
 }

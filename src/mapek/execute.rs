@@ -13,7 +13,12 @@ pub(super) fn execute(adapting: &mut Adapting<'_>, answers: &mut Vec<Answer>) {
     for attempt in 0..2 {
         let beliefs = &mut *adapting.beliefs;
         let is_known = beliefs.fault.is_none();
-        if beliefs.running.is_some() || beliefs.stuck || beliefs.reached || !is_known {
+        if adapting.planner.is_missing
+            || beliefs.running.is_some()
+            || beliefs.stuck
+            || beliefs.reached
+            || !is_known
+        {
             return;
         }
         let is_planned = beliefs.plan.is_some();

@@ -107,7 +107,7 @@ fn none(blocking: Vec<String>) -> Outcome {
 }
 
 /// What is left of the action under way, with each configuration that it can go on with; none if those are too many, or unknown.
-fn first_steps(ask: &Ask<'_>) -> Option<Vec<(PlannedStep, First)>> {
+pub(super) fn first_steps(ask: &Ask<'_>) -> Option<Vec<(PlannedStep, First)>> {
     let running = ask.running?;
     let mut steps = vec![running.step.clone()];
     for (function, _) in &running.step.configuration {

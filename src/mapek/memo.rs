@@ -20,7 +20,7 @@ pub(crate) struct Memo(VecDeque<(Asked, Outcome)>);
 
 /// What a plan depends on. The domain and the metric stay; for another goal there is another memo.
 #[derive(Debug, Clone)]
-struct Asked {
+pub(crate) struct Asked {
     problem: Problem,
     running: Option<Running>,
     /// The plan at hand, where the choice depends on it.
@@ -40,9 +40,7 @@ impl Memo {
     /// Remembers a plan; one that may not be the best is looked for again.
     pub(super) fn note(&mut self, ask: &Ask<'_>, outcome: &Outcome) {
         if outcome.proved {
-            let old = ask.old.filter(|_| ask.stay_close).map(<[_]>::to_vec);
-            let situation = Asked { problem: ask.problem.clone(), running: ask.running.cloned(), old };
-            self.0.push_front((situation, outcome.clone()));
+            self.0.push_front((Asked::new(ask), outcome.clone()));
             self.0.truncate(SITUATIONS);
         }
     }
@@ -54,7 +52,19 @@ impl Memo {
 }
 
 impl Asked {
-    fn is(&self, ask: &Ask<'_>) -> bool {
+    /// Keeps what a plan depends on.
+    pub(super) fn new(ask: &Ask<'_>) -> Self {
+        let old = ask.old.filter(|_| ask.stay_close).map(<[_]>::to_vec);
+        Self { problem: ask.problem.clone(), running: ask.running.cloned(), old }
+    }
+
+    /// Returns `true` if the same action comes first, or none.
+    pub(super) fn is_about(&self, ask: &Ask<'_>) -> bool {
+        self.running.as_ref().map(|own| own.action) == ask.running.map(|own| own.action)
+    }
+
+    /// Returns `true` if it is the same question.
+    pub(super) fn is(&self, ask: &Ask<'_>) -> bool {
         let (own, other) = (&self.problem, ask.problem);
         let objects = |problem: &Problem| problem.objects.len();
         own.init.len() == other.init.len()

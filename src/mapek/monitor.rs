@@ -5,15 +5,17 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 use num_rational::BigRational;
 use ontology::tomasys::change::Status;
 use ontology::vocab::local_name;
+use pddl::ast::{InitialElement, Name, Term};
 use pddl::validate::{Advance, advance};
 use rules::{Delta, Fact};
 
 use crate::knowledge::RobotReport;
-use crate::mapek::answer::{Answer, Command};
+use crate::mapek::answer::{Answer, Command, Effect};
 use crate::mapek::beliefs::{Beliefs, Running};
 use crate::mapek::event::Event;
 use crate::mapek::fields::Refusal;
 use crate::mapek::filter::{Accepted, Filters};
+use crate::mapek::receipts::Failure;
 use crate::mapek::settings::Settings;
 use crate::mapek::step::PlannedStep;
 use crate::message::{Message, did_you_mean};
@@ -21,7 +23,7 @@ use crate::mission::Mission;
 use crate::number;
 
 /// What a line has changed, for the analysis.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Changes {
     /// What the knowledge base says.
     pub(super) base: Base,
@@ -31,6 +33,14 @@ pub(super) struct Changes {
     pub(super) predicates: bool,
     /// What is to be reached: plans for another goal are of no use any more.
     pub(super) goal: bool,
+    /// Values of the problem that were reported and differ from the expected ones.
+    pub(super) values: bool,
+    /// An action has ended.
+    pub(super) ended: bool,
+    /// The action under way has got another design that nobody here has asked for.
+    pub(super) observed: bool,
+    /// Why the action under way cannot go on as it was; a safe effect was asked for.
+    pub(super) upset: Vec<String>,
     /// Reasons to plan whatever the plan is like: sentences.
     pub(super) must: Vec<String>,
     /// What filters have held back, and sensors that are silent.
@@ -52,6 +62,26 @@ impl Changes {
     /// Whether anything has changed, though the line was not taken over as a whole.
     pub(super) fn any(&self) -> bool {
         self.base > Base::Nothing || self.facts || self.predicates || !self.must.is_empty()
+    }
+
+    /// Returns `true` if another question is to be planned for than before.
+    pub(super) fn is_news(&self) -> bool {
+        self.facts || self.goal || self.ended || !self.upset.is_empty() || !self.must.is_empty()
+    }
+
+    /// Adds what has changed since.
+    pub(super) fn extend(&mut self, later: Self) {
+        let Self { base, facts, predicates, goal, values, ended, observed, upset, must, filtered } = later;
+        self.base = self.base.max(base);
+        self.facts |= facts;
+        self.predicates |= predicates;
+        self.goal |= goal;
+        self.values |= values;
+        self.ended |= ended;
+        self.observed |= observed;
+        self.upset.extend(upset);
+        self.must.extend(must);
+        self.filtered.extend(filtered);
     }
 }
 
@@ -139,9 +169,9 @@ impl Taking<'_> {
             }
             Event::Observed { function, design } => self.observed(function, design.as_deref()),
             Event::ReconfigurationFailed { effect } => self.not_configured(*effect),
-            Event::Started { action } => self.running(*action).map(|_| ()),
+            Event::Started { action } => self.begun(*action).map(|_| ()),
             Event::Progress { action, fraction } => {
-                self.running(*action)?;
+                self.begun(*action)?.progressed = true;
                 self.progress(fraction)
             }
             Event::Succeeded { action } => self.succeeded(*action),
@@ -165,11 +195,10 @@ impl Taking<'_> {
                 Ok(())
             }
             Event::Fact { name, value } => self.fact(name, value),
-            Event::Acknowledged { effect } => match self.beliefs.outstanding.remove(effect) {
-                Some(_) => Ok(()),
-                None if *effect >= 1 && *effect <= self.beliefs.effects => Ok(()),
-                None => Err(Refusal::new("M305", format!("there was no effect {effect}"))),
-            },
+            Event::Acknowledged { effect } => {
+                let none = || Refusal::new("M305", format!("there was no effect {effect}"));
+                self.beliefs.acknowledge(*effect).then_some(()).ok_or_else(none)
+            }
             Event::ObjectiveAdded { .. } | Event::ObjectiveRemoved { .. } => {
                 let text =
                     format!("`{}` goes with `run --configure`; here the plan needs functions", event.kind());
@@ -191,20 +220,19 @@ impl Taking<'_> {
         Ok(())
     }
 
-    /// A function could not take the design that was asked for: it has the one before, and nobody asks for the other again until the
-    /// function says that it can take it.
+    /// A function could not take the design that was asked for: it has the one that was acknowledged before, and nobody asks for the
+    /// other again until the function says that it can take it.
     fn not_configured(&mut self, effect: u64) -> Result<(), Refusal> {
-        let asked = self.beliefs.outstanding.get(&effect).map(|effect| &effect.command);
-        let Some(Command::Reconfigure { function, from, to }) = asked.cloned() else {
-            return Err(Refusal::new("M305", format!("no reconfiguration {effect} is waited for")));
-        };
-        self.report("design", &to, RobotReport::Design(false))?;
-        self.beliefs.outstanding.remove(&effect);
-        if self.beliefs.configuration.get(&function) == Some(&to) {
-            self.beliefs.configuration.remove(&function);
-            self.beliefs.configuration.extend(from.map(|from| (function, from)));
+        if self.beliefs.mission.knowledge().is_none() {
+            return Err(Refusal::new("M306", "there is no knowledge base that has designs"));
         }
-        Ok(())
+        match self.beliefs.reconfiguration_failed(effect) {
+            Failure::Design(design) => self.report("design", &design, RobotReport::Design(false)),
+            Failure::Stale => Ok(()),
+            Failure::NotReconfiguration => {
+                Err(Refusal::new("M305", format!("no reconfiguration {effect} was asked for")))
+            }
+        }
     }
 
     /// A function was seen with a design that was not asked for: it has it from now on, and so has the action under way. Whether that is
@@ -223,7 +251,10 @@ impl Taking<'_> {
             Some(design) => self.beliefs.configuration.insert(function.to_owned(), design.to_owned()),
             None => self.beliefs.configuration.remove(function),
         };
-        if before.as_deref() == design {
+        self.beliefs.receipts.observe(function);
+        // What was asked for may be on its way: the action goes on with that.
+        let is_pending = self.beliefs.pending().any(|(own, _)| own == function);
+        if before.as_deref() == design || is_pending {
             return Ok(());
         }
         let Some(running) = self.beliefs.running.as_mut().filter(|own| own.step.design(function).is_some())
@@ -234,6 +265,7 @@ impl Taking<'_> {
             running.step = running.step.with_design(function, design);
             self.changes.facts = true;
             self.changes.predicates = true;
+            self.changes.observed = true;
         } else {
             let action = running.action;
             self.changes
@@ -345,28 +377,40 @@ impl Taking<'_> {
         self.changes.facts |= delta.insert.iter().any(is_concluded) || delta.delete.iter().any(is_lost);
     }
 
-    /// The action with that number, which must be under way; whatever was asked for it has arrived, then.
+    /// The action with that number, which must be under way.
     fn running(&mut self, action: u64) -> Result<&mut Running, Refusal> {
         let running = self.beliefs.running.as_mut().filter(|running| running.action == action);
-        let Some(running) = running else {
-            return Err(Refusal::new("M305", format!("no action {action} is under way")));
-        };
-        self.beliefs
-            .outstanding
-            .retain(|_, effect| effect.action > action || effect.command.is_about_going_on());
+        running.ok_or_else(|| Refusal::new("M305", format!("no action {action} is under way")))
+    }
+
+    /// The action with that number, which has started: its request has arrived.
+    fn begun(&mut self, action: u64) -> Result<&mut Running, Refusal> {
+        let request = self.running(action)?.request;
+        self.beliefs.confirm_request(request);
+        self.beliefs.reports_actions = true;
+        let now = self.beliefs.now;
+        let running = self.running(action)?;
+        (running.heard, running.overdue) = (now, 0);
         Ok(running)
     }
 
-    /// Ends the action with that number; nothing about it is outstanding any more.
+    /// Ends the action with that number; nothing about it is outstanding any more but reconfigurations, which belong to functions.
     fn end(&mut self, action: u64) -> Result<Running, Refusal> {
         self.running(action)?;
-        self.beliefs.outstanding.retain(|_, effect| effect.action > action);
+        let is_moot = |effect: &Effect| {
+            effect.action <= action && !matches!(effect.command, Command::Reconfigure { .. })
+        };
+        self.beliefs.outstanding.retain(|_, effect| !is_moot(effect));
+        let outstanding = &self.beliefs.outstanding;
+        self.beliefs.waits.retain(|number, _| outstanding.contains_key(number));
+        self.changes.ended = true;
         let none = || Refusal::new("M305", format!("no action {action} is under way"));
         self.beliefs.running.take().ok_or_else(none)
     }
 
     fn succeeded(&mut self, action: u64) -> Result<(), Refusal> {
-        self.running(action)?;
+        let request = self.running(action)?.request;
+        self.beliefs.confirm_request(request);
         // What it has not used up yet is used up now; the robot knows better than our conditions whether it has succeeded.
         self.progress(&BigRational::from_integer(1.into()))?;
         let running = self.end(action)?;
@@ -427,9 +471,14 @@ impl Taking<'_> {
         let mut words = name.split_whitespace();
         let name = words.by_ref().collect::<Vec<_>>().join(" ");
         if !self.beliefs.mission.is_function(&name) {
+            let predicate = name.split(' ').next().unwrap_or(&name).to_owned();
+            let before = self.facts(&predicate);
             self.set(&name, value)?;
-            self.changes.predicates = true;
-            self.changes.facts = true;
+            // A report of what is known is no change.
+            if self.facts(&predicate) != before {
+                self.changes.predicates = true;
+                self.changes.facts = true;
+            }
             return Ok(());
         }
         let wrong = || Refusal::new("M302", format!("the value `{value}` of {name} is not a decimal number"));
@@ -437,8 +486,24 @@ impl Taking<'_> {
         if self.beliefs.mission.value(&name).as_ref() != Some(&value) {
             self.set(&name, &number::decimal(&value))?;
             self.changes.facts = true;
+            self.changes.values = true;
         }
         Ok(())
+    }
+
+    /// The facts of a predicate that hold, as words in alphabetical order.
+    fn facts(&self, predicate: &str) -> BTreeSet<Vec<String>> {
+        let predicate = Name::new(predicate);
+        let word = |term: &Term| match term {
+            Term::Constant(identifier) | Term::Variable(identifier) => identifier.name.to_string(),
+        };
+        let words = |element: &InitialElement| match element {
+            InitialElement::Fact(atom) if atom.predicate.name == predicate => {
+                Some(atom.arguments.iter().map(word).collect())
+            }
+            _ => None,
+        };
+        self.beliefs.mission.problem().init.iter().filter_map(words).collect()
     }
 
     /// Sets a fact or value of the problem, if the problem is still right then.

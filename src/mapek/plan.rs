@@ -8,11 +8,10 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use encodings::{Config, Limits, Status, optimize};
-use num_rational::BigRational;
 
 use crate::mapek::ask::{Ask, Outcome};
 use crate::mapek::live::Live;
-use crate::mapek::memo::Memo;
+use crate::mapek::memo::{Asked, Memo};
 use crate::mapek::resume::{resume, resumed_goal};
 use crate::mapek::step::PlannedStep;
 use crate::mapek::watch::Watch;
@@ -30,6 +29,14 @@ pub(crate) struct Planner {
     pub recorded: VecDeque<Outcome>,
     /// Plans made since the last look.
     pub made: Vec<Outcome>,
+    /// Whether plans are made only where no search is needed for them.
+    pub is_idle: bool,
+    /// Whether a plan was needed that would have taken a search.
+    pub is_missing: bool,
+    /// The questions that were asked since the last look, if they are kept, with the answers.
+    pub asked: Option<Vec<(Asked, Outcome)>>,
+    /// Questions that were answered elsewhere, in the order in which they come up.
+    pub prepared: VecDeque<(Asked, Outcome)>,
     /// What is kept from one plan to the next.
     pub live: Live,
     /// Plans of situations that may come back.
@@ -41,10 +48,33 @@ pub(crate) struct Planner {
 impl Planner {
     /// The best plan for a situation.
     pub fn plan(&mut self, ask: &Ask<'_>) -> Outcome {
-        let recorded = self.recorded.pop_front();
-        let outcome = recorded.or_else(|| self.memo.recall(ask)).unwrap_or_else(|| self.solve(ask));
+        let recorded = self.recorded.pop_front().or_else(|| self.prepared(ask));
+        let known = recorded.or_else(|| self.memo.recall(ask));
+        if known.is_none() && self.is_idle {
+            self.is_missing = true;
+            return Outcome::none(false, "no plan was looked for".to_owned());
+        }
+        let outcome = known.unwrap_or_else(|| self.solve(ask));
+        if let Some(asked) = &mut self.asked {
+            asked.push((Asked::new(ask), outcome.clone()));
+        }
         self.made.push(outcome.clone());
         outcome
+    }
+
+    /// The answer that was found elsewhere. Time has passed since, and the action under way has gone on: then the plan serves, but is
+    /// not proved to be the best.
+    fn prepared(&mut self, ask: &Ask<'_>) -> Option<Outcome> {
+        let (asked, mut outcome) = self.prepared.pop_front()?;
+        if !asked.is_about(ask) {
+            return None;
+        }
+        if asked.is(ask) {
+            self.memo.note(ask, &outcome);
+        } else {
+            outcome.proved = false;
+        }
+        Some(outcome)
     }
 
     fn solve(&mut self, ask: &Ask<'_>) -> Outcome {
@@ -62,13 +92,7 @@ impl Planner {
 
 /// The best plan of a task that is ground for it alone.
 pub(super) fn from_scratch(ask: &Ask<'_>, limits: Limits, watch: &Watch) -> Outcome {
-    let none = |proved, because: String| Outcome {
-        steps: None,
-        cost: BigRational::default(),
-        proved,
-        because,
-        blocking: Vec::new(),
-    };
+    let none = Outcome::none;
     let (mut domain, mut problem) = (Cow::Borrowed(ask.mission.domain()), Cow::Borrowed(ask.problem));
     if let Some(running) = ask.running {
         domain = Cow::Owned(resume(&domain, &running.step, &running.progress));

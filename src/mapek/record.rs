@@ -9,8 +9,9 @@ use serde_json::{Value, json};
 use crate::knowledge::{Knowledge, Part, Statement, Statements, Waiting};
 use crate::mapek::analyze::available;
 use crate::mapek::answer::{Command, Effect};
-use crate::mapek::beliefs::{Beliefs, Running};
+use crate::mapek::beliefs::{Beliefs, Running, Wait};
 use crate::mapek::filter::FilterStates;
+use crate::mapek::receipts::Receipts;
 use crate::mapek::sequence::Numbers;
 use crate::mapek::step::PlannedStep;
 use crate::message::Message;
@@ -67,7 +68,12 @@ pub(super) fn snapshot(known: &Beliefs) -> Snapshot {
             running.step.to_record(),
             running.progress.to_string(),
             running.cancelling,
-            running.suspended
+            running.suspended,
+            running.provisional,
+            running.request,
+            micros(running.heard),
+            running.overdue,
+            running.progressed,
         ])
     });
     Snapshot(json!({
@@ -91,6 +97,9 @@ pub(super) fn snapshot(known: &Beliefs) -> Snapshot {
         "actions": known.actions,
         "effects": known.effects,
         "outstanding": known.outstanding.values().map(effect_to_record).collect::<Vec<_>>(),
+        "receipts": known.receipts.to_record(),
+        "waits": known.waits.iter().map(|(number, own)| json!([number, micros(own.since), own.repeats])).collect::<Vec<_>>(),
+        "reports_actions": known.reports_actions,
         "lines": known.lines,
         "numbers": known.numbers.to_record(),
         "now": micros(known.now),
@@ -170,6 +179,14 @@ fn restore_work(known: &mut Beliefs, data: &Value) -> Option<()> {
     known.numbers = Numbers::from_record(data.get("numbers")?)?;
     known.now = Duration::from_micros(number("now")?);
     known.filters = FilterStates::from_record(data.get("filters")?)?;
+    known.receipts = Receipts::from_record(data.get("receipts")?)?;
+    let wait = |record: &Value| {
+        let (since, repeats) = (record.get(1)?.as_u64()?, record.get(2)?.as_u64()?);
+        let wait = Wait { since: Duration::from_micros(since), repeats: u32::try_from(repeats).ok()? };
+        Some((record.get(0)?.as_u64()?, wait))
+    };
+    known.waits = data.get("waits")?.as_array()?.iter().map(wait).collect::<Option<_>>()?;
+    known.reports_actions = truth("reports_actions")?;
     let effects = data.get("outstanding")?.as_array()?.iter().map(effect_from_record);
     known.outstanding =
         effects.collect::<Option<Vec<_>>>()?.into_iter().map(|effect| (effect.number, effect)).collect();
@@ -187,6 +204,11 @@ fn running_from_record(record: &Value) -> Option<Running> {
         progress: record.get(2)?.as_str()?.parse().ok()?,
         cancelling: record.get(3)?.as_bool()?,
         suspended: record.get(4)?.as_bool()?,
+        provisional: record.get(5)?.as_bool()?,
+        request: record.get(6)?.as_u64()?,
+        heard: Duration::from_micros(record.get(7)?.as_u64()?),
+        overdue: u32::try_from(record.get(8)?.as_u64()?).ok()?,
+        progressed: record.get(9)?.as_bool()?,
     })
 }
 

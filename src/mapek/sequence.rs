@@ -94,6 +94,13 @@ impl Numbers {
         self.ranges.last_key_value().map(|(_, last)| *last)
     }
 
+    /// The numbers that are missing between those that were seen, as ranges with both ends.
+    pub(crate) fn missing(&self) -> Vec<[u64; 2]> {
+        let ends = self.ranges.values().map(|last| last + 1);
+        let starts = self.ranges.keys().skip(1).map(|first| first - 1);
+        ends.zip(starts).map(|(from, to)| [from, to]).collect()
+    }
+
     /// For a snapshot.
     pub(crate) fn to_record(&self) -> Value {
         json!([self.mark, self.ranges.iter().collect::<Vec<_>>()])
@@ -150,5 +157,8 @@ mod tests {
         numbers.insert(4);
         numbers.insert(6);
         assert_eq!(numbers.to_record().to_string(), "[null,[[4,6]]]");
+        assert!(numbers.missing().is_empty());
+        [9, 12, 10].map(|number| numbers.insert(number));
+        assert_eq!(numbers.missing(), [[7, 8], [11, 11]]);
     }
 }

@@ -12,6 +12,7 @@ use crate::knowledge::Knowledge;
 use crate::manifest::{self, Key, ManifestPath, Part};
 use crate::mapek::filter::{ComponentsSection, FilterSettings, MeasuredsSection, filters};
 use crate::message::{Errors, Message};
+use crate::mission::TimeUnit;
 use crate::number;
 
 /// The section `adaptation` of a manifest.
@@ -54,6 +55,19 @@ pub struct AdaptationSection {
     /// Filters of measured attributes, by local name.
     #[serde(default)]
     measured: MeasuredsSection,
+    /// What is done at once, before any planning, where the action under way loses a design or cannot go on: `reconfigure` gives it other
+    /// available designs if what is left of it can be done with them, and suspends it otherwise; `suspend` always suspends it.
+    #[serde(default)]
+    safe_reaction: SafeReaction,
+    /// So many seconds may an effect remain without acknowledgement, and an action without a report, at least, before it is overdue
+    /// (10 if nothing is said; 0 for ever).
+    #[serde(default)]
+    #[schemars(schema_with = "manifest::decimal")]
+    deadline: Option<Spanned<toml::Value>>,
+    /// An action is overdue when nothing was heard of it for its expected duration times this (3 if nothing is said).
+    #[serde(default)]
+    #[schemars(schema_with = "manifest::decimal")]
+    deadline_factor: Option<Spanned<toml::Value>>,
 }
 
 /// A file with the section `adaptation` alone.
@@ -65,6 +79,17 @@ struct Section {
     adaptation: AdaptationSection,
 }
 
+/// The safe effect that precedes planning.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum SafeReaction {
+    /// Other available designs if what is left of the action can be done with them; a standstill otherwise.
+    #[default]
+    Reconfigure,
+    /// A standstill.
+    Suspend,
+}
+
 impl AdaptationSection {
     /// What it says, and what is so unless it says otherwise.
     ///
@@ -72,7 +97,8 @@ impl AdaptationSection {
     /// A value that is not a number, or negative.
     pub fn settings(&self, origin: &ManifestPath) -> Result<Settings, Message> {
         let filters = filters(&self.confirm_time, &self.heal_time, &self.components, &self.measured, origin)?;
-        let mut settings = Settings { stay_close: self.stay_close, filters, ..Settings::default() };
+        let (stay_close, safe_reaction) = (self.stay_close, self.safe_reaction);
+        let mut settings = Settings { stay_close, safe_reaction, filters, ..Settings::default() };
         if let Some(value) = &self.band {
             settings.filters.band = origin.number("band", value)?;
         }
@@ -86,6 +112,12 @@ impl AdaptationSection {
         };
         if let Some(value) = &self.settle {
             settings.settle = seconds("settle", value)?;
+        }
+        if let Some(value) = &self.deadline {
+            settings.deadline = seconds("deadline", value)?;
+        }
+        if let Some(value) = &self.deadline_factor {
+            settings.deadline_factor = number::to_f64(&origin.number("deadline_factor", value)?);
         }
         if let Some(value) = &self.time_limit {
             settings.time_limit = Some(seconds("time_limit", value)?);
@@ -117,6 +149,15 @@ pub struct Settings {
     pub stay_close: bool,
     /// Filters of what is measured and of what components report.
     pub filters: FilterSettings,
+    /// What is done at once where the action under way cannot go on as it is.
+    pub safe_reaction: SafeReaction,
+    /// How long an effect may remain without acknowledgement, and an action without a report, at least. Ten seconds unless said
+    /// otherwise; zero means for ever.
+    pub deadline: Duration,
+    /// An action is overdue when nothing was heard of it for its expected duration times this.
+    pub deadline_factor: f64,
+    /// The unit of the domain's times.
+    pub time_unit: TimeUnit,
 }
 
 impl Settings {
@@ -167,6 +208,24 @@ impl Settings {
         Self { filters, ..self }
     }
 
+    /// What is done at once where the action under way cannot go on as it is.
+    #[must_use]
+    pub fn with_safe_reaction(self, safe_reaction: SafeReaction) -> Self {
+        Self { safe_reaction, ..self }
+    }
+
+    /// How long an effect may remain without acknowledgement, and an action without a report, at least; zero means for ever.
+    #[must_use]
+    pub fn with_deadline(self, deadline: Duration) -> Self {
+        Self { deadline, ..self }
+    }
+
+    /// The unit of the domain's times.
+    #[must_use]
+    pub fn with_time_unit(self, time_unit: TimeUnit) -> Self {
+        Self { time_unit, ..self }
+    }
+
     /// Another plan replaces one that could be kept only if its metric is better by this much.
     #[must_use]
     pub fn with_minimum_benefit(self, minimum_benefit: BigRational) -> Self {
@@ -200,6 +259,10 @@ impl Default for Settings {
             time_limit: Some(TIME_LIMIT),
             stay_close: false,
             filters: FilterSettings::default(),
+            safe_reaction: SafeReaction::default(),
+            deadline: DEADLINE,
+            deadline_factor: 3.0,
+            time_unit: TimeUnit::default(),
         }
     }
 }
@@ -207,6 +270,9 @@ impl Default for Settings {
 /// Time for which a design must be back unless said otherwise. Nothing is urgent about a better plan, and a driver that is
 /// restarted by its supervisor comes and goes within seconds.
 const SETTLE: Duration = Duration::from_secs(5);
+
+/// How long an effect may remain without acknowledgement unless said otherwise.
+const DEADLINE: Duration = Duration::from_secs(10);
 
 /// How long one plan may take unless said otherwise. A robot waits meanwhile.
 const TIME_LIMIT: Duration = Duration::from_secs(10);

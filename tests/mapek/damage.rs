@@ -264,6 +264,7 @@ fn said(answers: &[Answer]) -> Vec<String> {
             Command::Reconfigure { to, .. } => Some(to.clone()),
             Command::Request { step } => Some(step.summary()),
             Command::Cancel { .. } => Some("cancel".to_owned()),
+            Command::Suspend { .. } => Some("suspend".to_owned()),
             other => Some(format!("{other:?}")),
         },
         _ => None,
@@ -277,7 +278,7 @@ fn a_second_fault_while_an_action_waits_for_its_cancellation_is_kept() {
     ugv.start();
     feed(&mut ugv, r#"{"event":"action_started","action":1}"#);
     feed(&mut ugv, r#"{"event":"action_succeeded","action":1}"#);
-    assert_eq!(said(&feed(&mut ugv, &kinect("FALSE"))), ["cancel"]);
+    assert_eq!(said(&feed(&mut ugv, &kinect("FALSE"))), ["suspend", "cancel"]);
     let bright = r#"{"event":"measured","attribute":"ambient_light","value":0.95}"#;
     assert_eq!(said(&feed(&mut ugv, bright)), [""; 0]);
     let both = vec!["IN_ERROR_COMPONENT".to_owned(), "IN_ERROR_NFR".to_owned()];

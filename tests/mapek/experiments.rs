@@ -14,7 +14,7 @@ fn words(answer: &Answer) -> Option<String> {
             let objectives = objectives.iter().map(|o| format!("{} [{}]", o.objective, o.statuses.join(" ")));
             designs.chain(objectives).collect::<Vec<_>>().join(", ")
         }
-        Answer::PlanRequested { .. } => return None,
+        Answer::PlanRequested { .. } | Answer::Overdue { .. } => return None,
         Answer::PlanFound { cost, steps, optimal } => {
             assert!(optimal, "{answer:?}");
             let steps: Vec<String> = steps.iter().map(metaplan::mapek::PlannedStep::summary).collect();
@@ -85,7 +85,7 @@ fn the_kinect_fails_at_wp2() {
         &mut ugv,
         &[
             // No other design is safe enough among the obstacles: the action is cancelled, and then route and design change.
-            (KINECT_FAILS, &[KINECT_LOST, "cancel 2"]),
+            (KINECT_FAILS, &[KINECT_LOST, "suspend 2", "cancel 2"]),
             (
                 r#"{"event":"action_cancelled","action":2}"#,
                 &[
@@ -115,14 +115,14 @@ fn the_kinect_fails_on_the_way_to_wp2() {
     check(
         &mut ugv,
         &[(
-            // Another design serves: the action goes on with it, and the rest of the way changes.
+            // Another design serves: the action goes on with it at once, and then the rest of the way changes.
             KINECT_FAILS,
             &[
                 KINECT_LOST,
+                "reconfigure f_localization: none to fd_amcl_lidar",
+                "o_f_localization []",
                 "plan 516: move wp1 wp2 (f_localization = fd_amcl_lidar); move wp2 wp3 (f_localization = fd_amcl_lidar); \
                  move wp3 wp6 (f_localization = fd_amcl_lidar); move_in_the_dark wp6 wp9 (f_localization = fd_amcl_lidar)",
-                "reconfigure f_localization: fd_amcl_kinect to fd_amcl_lidar",
-                "o_f_localization []",
             ],
         )],
     );
@@ -149,14 +149,16 @@ fn the_battery_of_the_uuv_drops() {
             (r#"{"event":"action_progress","action":1,"fraction":0.5}"#, &[]),
             (r#"{"event":"fact_changed","name":"battery","value":83.5}"#, &[]),
             // It drops to 15: what is left of the search needs more with any design.
-            (r#"{"event":"fact_changed","name":"battery","value":15}"#, &["cancel 1"]),
+            (
+                r#"{"event":"fact_changed","name":"battery","value":15}"#,
+                &["reconfigure f_maintain_motion: fd_speed_high to fd_speed_low", "cancel 1"],
+            ),
             (
                 r#"{"event":"action_cancelled","action":1}"#,
                 &[
                     "plan 60: recharge (f_maintain_motion = fd_speed_low, f_recharge = fd_recharge); search_pipeline pl1 \
                      (f_generate_search_path = fd_search_high, f_maintain_motion = fd_speed_high); follow_pipeline pl1 \
                      (f_follow_pipeline = fd_follow, f_maintain_motion = fd_speed_high)",
-                    "reconfigure f_maintain_motion: fd_speed_high to fd_speed_low",
                     "reconfigure f_recharge: none to fd_recharge",
                     "request 2: recharge (f_maintain_motion = fd_speed_low, f_recharge = fd_recharge)",
                 ],
@@ -409,11 +411,16 @@ fn an_action_is_cancelled_where_another_way_is_better_than_another_design() {
         &mut ugv,
         &[
             // The robot is on its way to wp3, which turns out to be long, when the Kinect is back and the lidar fails.
-            (r#"{"event":"fact_changed","name":"travel_time wp2 wp3","value":30}"#, &[]),
+            (
+                r#"{"event":"fact_changed","name":"travel_time wp2 wp3","value":30}"#,
+                &["kept: it is still the best"],
+            ),
             (
                 r#"{"status":[{"message":"Component status","values":[{"key":"c_lidar","value":"FALSE"},{"key":"c_kinect","value":"RECOVERED"}]}]}"#,
                 &[
                     "+fd_amcl_kinect, -fd_amcl_lidar, +fd_mrpt_kinect, -fd_mrpt_lidar, o_f_localization [IN_ERROR_COMPONENT]",
+                    "reconfigure f_localization: fd_amcl_kinect to fd_amcl_kinect",
+                    "o_f_localization []",
                     "cancel 3",
                 ],
             ),
@@ -422,8 +429,6 @@ fn an_action_is_cancelled_where_another_way_is_better_than_another_design() {
                 &[
                     "plan 306: move_with_obstacles wp2 wp5 (f_localization = fd_amcl_kinect); move wp5 wp8 (f_localization = \
                      fd_amcl_kinect); move wp8 wp9 (f_localization = fd_amcl_kinect)",
-                    "reconfigure f_localization: fd_amcl_lidar to fd_amcl_kinect",
-                    "o_f_localization []",
                     "request 4: move_with_obstacles wp2 wp5 (f_localization = fd_amcl_kinect)",
                 ],
             ),

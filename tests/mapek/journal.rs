@@ -21,14 +21,14 @@ pub fn script() -> Vec<String> {
         r#""event":"action_succeeded","action":1"#,
         r#""event":"action_started","action":2"#,
         r#""event":"component_status","component":"c_kinect","status":"FALSE""#,
-        r#""event":"acknowledged","effect":4"#,
+        r#""event":"acknowledged","effect":5"#,
         r#""event":"nonsense""#,
         r#""event":"action_cancelled","action":2"#,
-        r#""event":"acknowledged","effect":5"#,
+        r#""event":"acknowledged","effect":6"#,
         r#""event":"action_started","action":3"#,
         r#""event":"tick""#,
         r#""event":"component_status","component":"c_kinect","status":"RECOVERED""#,
-        r#""event":"acknowledged","effect":7"#,
+        r#""event":"acknowledged","effect":8"#,
         r#""event":"action_succeeded","action":3"#,
         r#""event":"goal_changed","goal":"(robot_at wp8)""#,
         r#""event":"action_failed","action":4,"reason":"lost""#,
@@ -83,6 +83,12 @@ pub struct Robot {
 }
 
 impl Robot {
+    /// The effects that no other one replaces: only these have to arrive.
+    fn needed(&self) -> Vec<&Effect> {
+        let replaced: Vec<u64> = self.effects.values().flat_map(|effect| effect.supersedes.clone()).collect();
+        self.effects.values().filter(|effect| !replaced.contains(&effect.number)).collect()
+    }
+
     fn take(&mut self, control: &Loop, answers: &[Answer]) {
         for effect in answers.iter().filter_map(Answer::effect) {
             let plain = Effect { repeated: false, ..effect.clone() };
@@ -176,7 +182,7 @@ fn check(cuts: usize) {
         robot.take(&control, &answers);
         go_on(&mut journal, &mut control, &mut robot);
         assert_eq!(self::state(&control), state, "stopped after {stop}, kept {keep} of {}", text.len());
-        assert_eq!(robot, effects);
+        assert_eq!(robot.needed(), effects.needed());
     }
 }
 

@@ -13,6 +13,8 @@ mod journal;
 mod kill;
 mod noise;
 mod numbers;
+mod reaction;
+mod receipts;
 mod runaway;
 mod soak;
 mod worlds;

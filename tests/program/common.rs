@@ -100,16 +100,18 @@ pub fn verifier() -> &'static Path {
 }
 
 fn outcome(program: &Path, directory: &Path, arguments: &[&str], input: &str) -> Outcome {
-    use std::io::Write as _;
-    let mut child = Command::new(program)
+    use std::io::{Seek as _, Write as _};
+    // A file, so that `run` answers each line before it reads the next one.
+    let mut stdin = tempfile::tempfile().expect("a file");
+    stdin.write_all(input.as_bytes()).and_then(|()| stdin.rewind()).expect("written");
+    let child = Command::new(program)
         .args(arguments)
         .current_dir(directory)
-        .stdin(Stdio::piped())
+        .stdin(Stdio::from(stdin))
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .expect("the program starts");
-    child.stdin.take().expect("a pipe").write_all(input.as_bytes()).expect("the program reads");
     let output = child.wait_with_output().expect("the program ends");
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
     Outcome {

@@ -33,6 +33,7 @@ mod outputs;
 mod paper;
 mod phases;
 mod probabilistic;
+mod reaction;
 mod real;
 mod reason;
 mod recording;

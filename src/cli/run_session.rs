@@ -1,0 +1,352 @@
+//! The loop between its input and its output, in two ways.
+//!
+//! Where all input is there already, as in a file, each line is answered completely before the next one is read: the same lines give
+//! the same answers. Where lines come as they happen, from a pipe or a terminal, the loop reacts to all lines that wait before
+//! it deliberates, and plans are looked for on another thread while it goes on reacting. A line that changes the question stops the
+//! search for a plan.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+use std::time::{Duration, Instant};
+
+use metaplan::journal::Journal;
+use metaplan::mapek::{Answer, Clock as _, Loop, Observation, SystemClock, Thoughts};
+use metaplan::message::Message;
+
+use crate::cli::common::{Common, Failure};
+use crate::cli::run::{is_over, unwritten};
+use crate::cli::run_lines::{Line, Lines};
+use crate::cli::run_outlet::Outlet;
+
+/// Upper limit on the lines that were read and not reacted to.
+const MAX_WAITING: usize = 1024;
+
+/// After this number of searches in a row that were stopped, the next one runs to its end: otherwise input that changes all the time
+/// would prevent every plan.
+const MAX_STOPPED: u32 = 3;
+
+/// What the loop waits for.
+enum Input {
+    Line(Line, Instant),
+    Thoughts(Thoughts),
+    End,
+    Failed(Message),
+}
+
+/// A search for plans on another thread.
+struct Thinking {
+    question: u64,
+    stop: Arc<AtomicBool>,
+    is_stopped: bool,
+}
+
+/// Whether the loop goes on.
+#[derive(PartialEq, Eq)]
+enum Flow {
+    GoesOn,
+    /// Who reads the answers has had enough, and all is well.
+    Over,
+}
+
+/// A loop with where its answers go.
+pub(super) struct Session<'a> {
+    common: &'a Common,
+    control: Loop,
+    journal: Option<Journal>,
+    outlet: &'a Outlet,
+    clock: SystemClock,
+    /// The time of the last line before this program was started.
+    begun: Duration,
+    /// The number of the line that is being handled, for signs of life.
+    line: Arc<AtomicU64>,
+    /// The last line, with when it was read, as long as there may be more answers to it.
+    open: Option<(u64, Instant)>,
+    thinking: Option<Thinking>,
+    stopped: u32,
+}
+
+impl<'a> Session<'a> {
+    pub(super) fn new(
+        common: &'a Common,
+        control: Loop,
+        journal: Option<Journal>,
+        outlet: &'a Outlet,
+        line: Arc<AtomicU64>,
+    ) -> Self {
+        let begun = control.beliefs().now();
+        let clock = SystemClock::default();
+        Self { common, control, journal, outlet, clock, begun, line, open: None, thinking: None, stopped: 0 }
+    }
+
+    /// Answers each line completely before the next one is read.
+    pub(super) fn replay(mut self, mut events: Lines) -> Result<(), Failure> {
+        if self.begin(Instant::now())? == Flow::Over {
+            return Ok(());
+        }
+        while let Some(line) = events.next(self.common)? {
+            if self.answer_line(&line, Instant::now())? == Flow::Over {
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    /// Reacts to lines as they come.
+    pub(super) fn live(mut self, events: Lines) -> Result<(), Failure> {
+        let (sender, inputs) = sync_channel(MAX_WAITING);
+        read(events, self.common.clone(), sender.clone());
+        let read = Instant::now();
+        let answers = match &mut self.journal {
+            None => Vec::new(),
+            Some(journal) => journal.begin_reacting(&mut self.control).map_err(|error| unwritten(&error))?,
+        };
+        self.open = Some((self.control.beliefs().lines(), read));
+        let mut flow = self.say(&answers)?;
+        let (mut waiting, mut is_ended) = (VecDeque::new(), false);
+        while flow == Flow::GoesOn {
+            gather(&inputs, &mut waiting);
+            flow = match waiting.pop_front() {
+                Some(Input::Line(line, read)) if self.is_early(&line) => {
+                    waiting.push_front(Input::Line(line, read));
+                    self.catch_up(&sender, &inputs, &mut waiting)?
+                }
+                Some(Input::Line(line, read)) => self.line(&line, read, waiting.is_empty())?,
+                Some(Input::Thoughts(thoughts)) => self.conclude(thoughts)?,
+                Some(Input::End) => {
+                    is_ended = true;
+                    Flow::GoesOn
+                }
+                Some(Input::Failed(message)) => return Err(message.into()),
+                None if self.control.has_agenda() && self.thinking.is_none() => self.deliberate(&sender)?,
+                None if is_ended && self.thinking.is_none() => {
+                    self.close()?;
+                    return Ok(());
+                }
+                None => {
+                    if self.thinking.is_none() {
+                        flow = self.close()?;
+                    }
+                    // The sender is kept here, so that there is always one.
+                    waiting.extend(inputs.recv().ok());
+                    flow
+                }
+            };
+        }
+        Ok(())
+    }
+
+    /// The first decision, or what was begun before the program was started.
+    fn begin(&mut self, read: Instant) -> Result<Flow, Failure> {
+        let answers = match &mut self.journal {
+            None => self.control.start(),
+            Some(journal) => journal.begin(&mut self.control).map_err(|error| unwritten(&error))?,
+        };
+        let number = self.control.beliefs().lines();
+        self.answer(number, &answers, read)
+    }
+
+    /// Handles a line completely.
+    fn answer_line(&mut self, line: &Line, read: Instant) -> Result<Flow, Failure> {
+        let now = self.heard(line);
+        let answers = match &mut self.journal {
+            None => self.control.handle(&Observation::parse(&line.text), now),
+            Some(journal) => {
+                journal.handle(&mut self.control, &line.text, now).map_err(|error| unwritten(&error))?
+            }
+        };
+        let number = self.control.beliefs().lines();
+        self.answer(number, &answers, read)
+    }
+
+    /// Passes a line on to whoever watches; returns its time since the start of the mission.
+    fn heard(&mut self, line: &Line) -> Duration {
+        let now = self.begun + line.now.unwrap_or_else(|| self.clock.now());
+        let number = self.control.beliefs().lines() + 1;
+        self.line.store(number, Ordering::Relaxed);
+        self.outlet.heard(number, now, &line.text);
+        now
+    }
+
+    /// Reacts to a line; `is_last` says whether none waits behind it.
+    fn line(&mut self, line: &Line, read: Instant, is_last: bool) -> Result<Flow, Failure> {
+        if self.close()? == Flow::Over {
+            return Ok(Flow::Over);
+        }
+        // A recording has its own clock: it is played as a file is.
+        if line.now.is_some() {
+            return self.recorded(line, read);
+        }
+        let now = self.heard(line);
+        let mut answers = match &mut self.journal {
+            None => self.control.react(&Observation::parse(&line.text), now),
+            Some(journal) => {
+                journal.observe(&mut self.control, &line.text, now).map_err(|error| unwritten(&error))?
+            }
+        };
+        self.open = Some((self.control.beliefs().lines(), read));
+        self.stop_thinking();
+        // What is safe has to leave at once; otherwise one decision is written, not two.
+        let is_safe = answers.iter().all(|answer| answer.effect().is_none());
+        if is_last
+            && is_safe
+            && self.thinking.is_none()
+            && self.control.has_agenda()
+            && let Some(more) = self.control.deliberate_at_once()
+        {
+            answers.extend(more);
+            self.decided(&answers)?;
+        } else if let Some(journal) = &mut self.journal {
+            journal.reacted(&mut self.control, &answers).map_err(|error| unwritten(&error))?;
+        }
+        self.say(&answers)
+    }
+
+    /// Returns `true` if a line is about an action or effect to come, and nothing is under way that could have to react: whoever has
+    /// written it knows what the loop is going to say, as where a file is piped in.
+    fn is_early(&self, line: &Line) -> bool {
+        let is_idle = self.control.has_agenda() && self.control.beliefs().running().is_none();
+        is_idle && self.control.is_ahead(&Observation::parse(&line.text))
+    }
+
+    /// Deliberates before the next line.
+    fn catch_up(
+        &mut self,
+        sender: &SyncSender<Input>,
+        inputs: &Receiver<Input>,
+        waiting: &mut VecDeque<Input>,
+    ) -> Result<Flow, Failure> {
+        if self.thinking.is_none() {
+            return self.deliberate(sender);
+        }
+        let place = waiting.iter().position(|own| matches!(own, Input::Thoughts(_)));
+        match place.and_then(|place| waiting.remove(place)).map_or_else(|| inputs.recv(), Ok) {
+            Ok(Input::Thoughts(thoughts)) => self.conclude(thoughts),
+            Ok(other) => {
+                waiting.push_back(other);
+                Ok(Flow::GoesOn)
+            }
+            Err(_) => Ok(Flow::GoesOn),
+        }
+    }
+
+    /// Stops the search for plans if the question is another one now.
+    fn stop_thinking(&mut self) {
+        let Some(thinking) = &mut self.thinking else { return };
+        if thinking.question != self.control.question() && !thinking.is_stopped && self.stopped < MAX_STOPPED
+        {
+            thinking.is_stopped = true;
+            thinking.stop.store(true, Ordering::Relaxed);
+        }
+    }
+
+    /// Deliberates at once if that takes no search, and begins a search on another thread otherwise.
+    fn deliberate(&mut self, sender: &SyncSender<Input>) -> Result<Flow, Failure> {
+        if let Some(answers) = self.control.deliberate_at_once() {
+            self.decided(&answers)?;
+            return self.say(&answers);
+        }
+        let thinker = self.control.thinker();
+        let (question, stop) = (self.control.question(), thinker.stop());
+        self.thinking = Some(Thinking { question, stop, is_stopped: false });
+        let sender = sender.clone();
+        std::thread::spawn(move || {
+            // The other end is gone where nobody reads the answers any more.
+            let _ = sender.send(Input::Thoughts(thinker.think()));
+        });
+        Ok(Flow::GoesOn)
+    }
+
+    /// Deliberates with what was found on another thread; otherwise it is looked for anew.
+    fn conclude(&mut self, thoughts: Thoughts) -> Result<Flow, Failure> {
+        let was_stopped = self.thinking.take().is_some_and(|own| own.is_stopped);
+        let is_late = self.stopped >= MAX_STOPPED;
+        match self.control.deliberate_with(thoughts, is_late) {
+            Some(answers) => {
+                self.stopped = 0;
+                self.decided(&answers)?;
+                self.say(&answers)
+            }
+            None => {
+                self.stopped = if was_stopped { self.stopped + 1 } else { 0 };
+                Ok(Flow::GoesOn)
+            }
+        }
+    }
+
+    fn recorded(&mut self, line: &Line, read: Instant) -> Result<Flow, Failure> {
+        if let Some(thinking) = self.thinking.take() {
+            thinking.stop.store(true, Ordering::Relaxed);
+        }
+        if self.control.has_agenda() {
+            let answers = self.control.deliberate();
+            self.decided(&answers)?;
+            if self.say(&answers)? == Flow::Over {
+                return Ok(Flow::Over);
+            }
+        }
+        self.answer_line(line, read)
+    }
+
+    fn decided(&mut self, answers: &[Answer]) -> Result<(), Failure> {
+        if let Some(journal) = &mut self.journal {
+            journal.decided(&mut self.control, answers).map_err(|error| unwritten(&error))?;
+        }
+        Ok(())
+    }
+
+    /// Writes answers to the last line; there may be more.
+    fn say(&self, answers: &[Answer]) -> Result<Flow, Failure> {
+        let number = self.control.beliefs().lines();
+        let flow = self.flow(self.outlet.answer_so_far(number, answers))?;
+        self.outlet.plan(self.control.beliefs(), answers);
+        Ok(flow)
+    }
+
+    /// Writes answers to a line, and that it was handled.
+    fn answer(&self, number: u64, answers: &[Answer], read: Instant) -> Result<Flow, Failure> {
+        let flow = self.flow(self.outlet.answer(number, answers, read))?;
+        self.outlet.plan(self.control.beliefs(), answers);
+        Ok(flow)
+    }
+
+    /// Says that the last line was handled.
+    fn close(&mut self) -> Result<Flow, Failure> {
+        match self.open.take() {
+            None => Ok(Flow::GoesOn),
+            Some((number, read)) => self.flow(self.outlet.answer(number, &[] as &[Answer], read)),
+        }
+    }
+
+    fn flow(&self, written: std::io::Result<()>) -> Result<Flow, Failure> {
+        Ok(if is_over(written)? { Flow::Over } else { Flow::GoesOn })
+    }
+}
+
+/// Adds all inputs that have come.
+fn gather(inputs: &Receiver<Input>, waiting: &mut VecDeque<Input>) {
+    while waiting.len() < MAX_WAITING {
+        match inputs.try_recv() {
+            Ok(input) => waiting.push_back(input),
+            Err(TryRecvError::Empty | TryRecvError::Disconnected) => return,
+        }
+    }
+}
+
+/// Reads lines on a thread of its own.
+fn read(mut events: Lines, common: Common, sender: SyncSender<Input>) {
+    std::thread::spawn(move || {
+        loop {
+            let input = match events.next(&common) {
+                Ok(Some(line)) => Input::Line(line, Instant::now()),
+                Ok(None) => Input::End,
+                Err(message) => Input::Failed(message),
+            };
+            let is_last = !matches!(input, Input::Line(..));
+            if sender.send(input).is_err() || is_last {
+                return;
+            }
+        }
+    });
+}

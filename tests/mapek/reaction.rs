@@ -1,0 +1,195 @@
+//! Safe first, then optimal: what is asked for before anything is planned, and changes that are none.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use metaplan::mapek::{Answer, Command, Loop, Observation, SafeReaction, Settings};
+use metaplan::setup::Setup;
+
+use crate::common::{control, feed};
+
+fn with(settings: impl Fn(Settings) -> Settings) -> Loop {
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
+    let Setup { mission, settings: own, .. } = Setup::read(&manifest).expect("the mission is read");
+    let mut control = Loop::new(mission, settings(own)).expect("a loop");
+    control.start();
+    feed(&mut control, r#"{"event":"action_started","action":1}"#);
+    control
+}
+
+fn react(control: &mut Loop, line: &str) -> Vec<Answer> {
+    let now = control.beliefs().now() + Duration::from_millis(100);
+    control.react(&Observation::parse(line), now)
+}
+
+fn kinds(answers: &[Answer]) -> Vec<String> {
+    answers.iter().map(|answer| answer.to_json()["answer"].as_str().expect("a kind").to_owned()).collect()
+}
+
+fn status(component: &str, status: &str) -> String {
+    format!(r#"{{"event":"component_status","component":"{component}","status":"{status}"}}"#)
+}
+
+#[test]
+fn a_lost_design_is_replaced_before_planning() {
+    let mut ugv = with(|settings| settings);
+    let answers = react(&mut ugv, &status("c_kinect", "FALSE"));
+    assert_eq!(kinds(&answers), ["inferred", "reconfigure", "inferred"]);
+    // The next loss is reacted to before anything is planned, too.
+    let answers = react(&mut ugv, &status("c_lidar", "FALSE"));
+    assert_eq!(kinds(&answers)[..2], ["inferred", "reconfigure"]);
+    assert!(ugv.has_agenda());
+    // Planning then keeps a design that is there, or another: none that is lost is asked for.
+    for answer in ugv.deliberate() {
+        if let Some(Command::Reconfigure { to, .. }) = answer.effect().map(|effect| &effect.command) {
+            assert!(ugv.beliefs().available().contains(to), "{to}");
+        }
+    }
+    assert!(!ugv.has_agenda() && ugv.deliberate().is_empty());
+}
+
+#[test]
+fn a_standstill_can_be_preferred() {
+    let mut ugv = with(|settings| settings.with_safe_reaction(SafeReaction::Suspend));
+    let answers = react(&mut ugv, &status("c_kinect", "FALSE"));
+    assert_eq!(kinds(&answers), ["inferred", "suspend_action"]);
+    let answers = ugv.deliberate();
+    let effects: Vec<String> = kinds(&answers).into_iter().filter(|kind| kind.contains("re")).collect();
+    assert_eq!(effects, ["plan_requested", "reconfigure", "inferred", "resume_action"]);
+    // What is well again before it is decided on goes on as it was.
+    let mut ugv = with(|settings| settings.with_safe_reaction(SafeReaction::Suspend));
+    react(&mut ugv, &status("c_kinect", "FALSE"));
+    react(&mut ugv, &status("c_kinect", "OK"));
+    assert!(kinds(&ugv.deliberate()).contains(&"resume_action".to_owned()));
+    assert!(!ugv.beliefs().suspended());
+}
+
+/// A plan that was found beside the loop is adopted where only progress and time have passed, and dropped after any news.
+#[test]
+fn plans_are_found_beside_the_loop() {
+    for (line, serves) in [
+        (r#"{"event":"tick"}"#.to_owned(), true),
+        (r#"{"event":"action_progress","action":1,"fraction":0.5}"#.to_owned(), true),
+        (status("c_lidar", "FALSE"), false),
+        (r#"{"event":"goal_changed","goal":"(robot_at wp2)"}"#.to_owned(), false),
+    ] {
+        let mut ugv = with(|settings| settings);
+        react(&mut ugv, &status("c_kinect", "FALSE"));
+        let before = ugv.snapshot();
+        assert!(ugv.deliberate_at_once().is_none(), "a plan is needed");
+        assert_eq!(ugv.snapshot(), before, "nothing has changed");
+        let thinker = ugv.thinker();
+        let thoughts = std::thread::spawn(move || thinker.think()).join().expect("plans");
+        react(&mut ugv, &line);
+        let answers = ugv.deliberate_with(thoughts, false);
+        assert_eq!(answers.is_some(), serves, "{line}");
+        assert_eq!(ugv.has_agenda(), !serves, "{line}");
+        let answers = answers.unwrap_or_else(|| ugv.deliberate());
+        assert!(kinds(&answers).contains(&"plan_found".to_owned()), "{line}: {answers:?}");
+    }
+}
+
+#[test]
+fn what_is_known_is_no_change() {
+    let mut ugv = with(|settings| settings);
+    let here = r#"{"event":"fact_changed","name":"robot_at","value":"wp1"}"#;
+    assert_eq!(feed(&mut ugv, here), Vec::new());
+    for action in 1..=3 {
+        feed(&mut ugv, &format!(r#"{{"event":"action_failed","action":{action}}}"#));
+    }
+    assert_eq!(feed(&mut ugv, here), Vec::new(), "what was given up is not tried again");
+}
+
+#[test]
+fn a_goal_that_is_undone_is_pursued_again() {
+    let mut ugv = with(|settings| settings);
+    feed(&mut ugv, r#"{"event":"goal_changed","goal":"(robot_at wp2)"}"#);
+    let answers = feed(&mut ugv, r#"{"event":"action_succeeded","action":1}"#);
+    assert!(answers.contains(&Answer::GoalReached), "{answers:?}");
+    let answers = feed(&mut ugv, r#"{"event":"fact_changed","name":"robot_at","value":"wp1"}"#);
+    assert!(kinds(&answers).contains(&"request_action".to_owned()), "{answers:?}");
+}
+
+#[test]
+fn a_better_value_leads_to_a_better_plan() {
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/templates/warehouse/mission.toml");
+    let Setup { mission, settings, .. } = Setup::read(&manifest).expect("the mission is read");
+    let mut control = Loop::new(mission, settings.with_settle(Duration::ZERO)).expect("a loop");
+    control.start();
+    let answers = feed(&mut control, r#"{"event":"measured","attribute":"battery","value":30}"#);
+    let cost = answers.iter().find_map(|answer| match answer {
+        Answer::PlanFound { cost, .. } => Some(cost.clone()),
+        _ => None,
+    });
+    assert!(
+        cost.is_some_and(|cost| cost < num_rational::BigRational::from_integer(50.into())),
+        "{answers:?}"
+    );
+}
+
+#[test]
+fn a_wrong_time_is_refused() {
+    for time in ["1700000000000000000", "18446744073709549568", "1700000000"] {
+        let mut ugv = with(|settings| settings.with_settle(Duration::from_secs(3600)));
+        let answers = feed(&mut ugv, &format!(r#"{{"event":"tick","time":{time}}}"#));
+        assert!(matches!(&answers[..], [Answer::Error { code, .. }] if code == "M308"), "{answers:?}");
+        assert!(ugv.beliefs().now() < Duration::from_secs(10));
+        for (status_, time) in [("FALSE", 5), ("TRUE", 6)] {
+            let line = status("c_kinect", status_).replace('}', &format!(r#","time":{time}}}"#));
+            feed(&mut ugv, &line);
+        }
+        let answers = feed(&mut ugv, r#"{"event":"tick","time":5000}"#);
+        assert!(
+            kinds(&answers).contains(&"plan_requested".to_owned()),
+            "it is looked for a better plan: {answers:?}"
+        );
+    }
+}
+
+#[test]
+fn deadlines_have_outcomes() {
+    let overdue = |answers: &[Answer]| {
+        let outcome = |answer: &Answer| match answer {
+            Answer::Overdue { .. } => answer.to_json()["outcome"].as_str().map(ToOwned::to_owned),
+            _ => None,
+        };
+        answers.iter().filter_map(outcome).collect::<Vec<_>>()
+    };
+    let tick = |time: u32| format!(r#"{{"event":"tick","time":{time}}}"#);
+    // A robot that acknowledges: a reconfiguration is repeated, and then counts as failed.
+    let mut ugv = with(|settings| settings);
+    feed(&mut ugv, r#"{"event":"action_succeeded","action":1}"#);
+    let mut ugv2 = control("ugv");
+    ugv2.start();
+    feed(&mut ugv2, r#"{"event":"acknowledged","effect":1}"#);
+    feed(&mut ugv2, &status("c_kinect", "FALSE"));
+    assert!(overdue(&feed(&mut ugv2, &tick(9))).is_empty());
+    let answers = feed(&mut ugv2, &tick(11));
+    assert!(overdue(&answers).contains(&"repeated".to_owned()), "{answers:?}");
+    let answers = feed(&mut ugv2, &tick(22));
+    assert!(overdue(&answers).contains(&"failed".to_owned()), "{answers:?}");
+    assert!(!ugv2.beliefs().available().contains("fd_amcl_lidar"));
+    // A robot that reports starts: a request is repeated, and then cancelled.
+    assert_eq!(overdue(&feed(&mut ugv, &tick(11))), ["repeated"]);
+    assert_eq!(overdue(&feed(&mut ugv, &tick(22))), ["cancelled"]);
+    assert!(ugv.beliefs().cancelling());
+    // Of a robot that reports nothing, nothing is expected: that is said, less and less often.
+    let mut silent = control("ugv");
+    silent.start();
+    let said: usize = (1..2000).map(|time| overdue(&feed(&mut silent, &tick(time * 10))).len()).sum();
+    assert!((2..20).contains(&said), "{said}");
+    assert!(!silent.beliefs().cancelling());
+}
+
+/// Whatever planning takes, the safe effect does not wait for it: nothing is planned here at all.
+#[test]
+fn a_planner_that_never_ends_does_not_delay_the_safe_effect() {
+    let mut ugv = with(|settings| settings.with_time_limit(None));
+    let begun = Instant::now();
+    for _ in 0..50 {
+        assert!(kinds(&react(&mut ugv, &status("c_kinect", "FALSE"))).len() < 4);
+        react(&mut ugv, &status("c_kinect", "OK"));
+    }
+    assert!(ugv.has_agenda());
+    assert!(begun.elapsed() < Duration::from_secs(5));
+}

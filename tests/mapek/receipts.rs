@@ -1,0 +1,138 @@
+//! Acknowledgements: messages that cross, are doubled, or come out of order.
+
+use metaplan::mapek::{Answer, Command, Loop};
+
+use crate::common::{control, feed};
+
+/// The commands among answers, each in a word.
+fn words(answers: &[Answer]) -> Vec<String> {
+    let word = |answer: &Answer| match &answer.effect()?.command {
+        Command::Reconfigure { from, to, .. } => {
+            Some(format!("{} to {to}", from.as_deref().unwrap_or("none")))
+        }
+        Command::Request { step } => Some(format!("request {}", step.action)),
+        Command::Cancel { .. } => Some("cancel".to_owned()),
+        Command::Suspend { .. } => Some("suspend".to_owned()),
+        Command::Resume => Some("resume".to_owned()),
+        _ => None,
+    };
+    answers.iter().filter_map(word).collect()
+}
+
+fn design(control: &Loop) -> Option<&str> {
+    control.beliefs().configuration().get("f_localization").map(String::as_str)
+}
+
+fn event(control: &mut Loop, event: &str, field: &str, number: u64) -> Vec<Answer> {
+    feed(control, &format!(r#"{{"event":"{event}","{field}":{number}}}"#))
+}
+
+const KINECT_FAILS: &str = r#"{"event":"component_status","component":"c_kinect","status":"FALSE"}"#;
+
+/// A report of progress that was on its way does not acknowledge a reconfiguration asked for in mid-action.
+#[test]
+fn a_report_that_was_on_its_way_acknowledges_nothing() {
+    let mut ugv = control("ugv");
+    ugv.start();
+    event(&mut ugv, "action_started", "action", 1);
+    assert_eq!(words(&feed(&mut ugv, KINECT_FAILS)), ["fd_amcl_kinect to fd_amcl_lidar"]);
+    for report in ["action_started", "action_progress"] {
+        let line = format!(
+            r#"{{"event":"{report}","action":1{}}}"#,
+            if report == "action_started" { "" } else { ",\"fraction\":0.3" }
+        );
+        assert!(words(&feed(&mut ugv, &line)).is_empty());
+    }
+    assert_eq!(design(&ugv), Some("fd_amcl_kinect"));
+    assert_eq!(ugv.beliefs().pending().collect::<Vec<_>>(), [("f_localization", "fd_amcl_lidar")]);
+    assert!(
+        words(&ugv.repeat()).contains(&"fd_amcl_kinect to fd_amcl_lidar".to_owned()),
+        "it is repeated after a crash"
+    );
+    let answers = event(&mut ugv, "reconfiguration_failed", "effect", 3);
+    assert!(!answers.iter().any(|answer| matches!(answer, Answer::Error { .. })), "{answers:?}");
+    assert_eq!(words(&answers)[0], "fd_amcl_kinect to fd_mrpt_lidar", "the next design is asked for");
+}
+
+/// Any sender with receipts acknowledges a reconfiguration when it arrives, and may report its failure later.
+#[test]
+fn a_reconfiguration_may_fail_after_it_was_acknowledged() {
+    let mut ugv = control("ugv");
+    ugv.start();
+    event(&mut ugv, "acknowledged", "effect", 1);
+    assert_eq!(design(&ugv), Some("fd_amcl_kinect"));
+    let answers = event(&mut ugv, "reconfiguration_failed", "effect", 1);
+    assert!(!answers.iter().any(|answer| matches!(answer, Answer::Error { .. })), "{answers:?}");
+    assert_eq!(design(&ugv), None, "the function has what it had before");
+    assert!(!ugv.beliefs().available().contains("fd_amcl_kinect"));
+    assert_eq!(words(&answers)[0], "none to fd_amcl_lidar");
+    // The failure is reported twice.
+    assert!(event(&mut ugv, "reconfiguration_failed", "effect", 1).is_empty());
+}
+
+/// A reconfiguration that supersedes one that was never carried out fails: the superseded design is not believed, and the suspended
+/// action does not go on before a design was asked for.
+#[test]
+fn what_was_superseded_is_not_believed() {
+    let mut ugv = control("ugv");
+    ugv.start();
+    let bright = r#"{"event":"measured","attribute":"ambient_light","value":0.9}"#;
+    let answers = feed(&mut ugv, bright);
+    assert_eq!(
+        words(&answers)[0],
+        "none to fd_amcl_lidar",
+        "what was not acknowledged is not the design before"
+    );
+    for _ in 0..10 {
+        let Some((effect, _)) = ugv
+            .beliefs()
+            .outstanding()
+            .filter(|effect| matches!(effect.command, Command::Reconfigure { .. }))
+            .map(|effect| (effect.number, effect.action))
+            .last()
+        else {
+            break;
+        };
+        event(&mut ugv, "reconfiguration_failed", "effect", effect);
+        assert_eq!(design(&ugv), None);
+    }
+    assert!(ugv.beliefs().suspended());
+    let answers = feed(&mut ugv, r#"{"event":"measured","attribute":"ambient_light","value":0.3}"#);
+    let words = words(&answers);
+    let resume = words.iter().position(|word| word == "resume").expect("it goes on");
+    assert!(words[..resume].iter().any(|word| word.starts_with("none to ")), "{words:?}");
+}
+
+/// Acknowledgements out of order: the greatest number counts.
+#[test]
+fn of_two_acknowledged_reconfigurations_the_later_one_counts() {
+    for order in [[1, 3], [3, 1]] {
+        let mut ugv = control("ugv");
+        ugv.start();
+        feed(&mut ugv, KINECT_FAILS);
+        for effect in order {
+            event(&mut ugv, "acknowledged", "effect", effect);
+            event(&mut ugv, "acknowledged", "effect", effect);
+        }
+        assert_eq!(design(&ugv), Some("fd_amcl_lidar"), "{order:?}");
+        assert!(!ugv.beliefs().is_unsettled("f_localization"));
+    }
+}
+
+/// A robot that acknowledges nothing: the start of an action implies what was asked for before its request, and no more.
+#[test]
+fn silent_robots_are_believed_to_begin_as_they_were_asked_to() {
+    let mut ugv = control("ugv");
+    ugv.start();
+    event(&mut ugv, "action_started", "action", 1);
+    assert_eq!(design(&ugv), Some("fd_amcl_kinect"));
+    // A robot that acknowledges by number is not believed to have what it has not acknowledged.
+    let mut ugv = control("ugv");
+    ugv.start();
+    event(&mut ugv, "acknowledged", "effect", 1);
+    feed(&mut ugv, KINECT_FAILS);
+    event(&mut ugv, "action_succeeded", "action", 1);
+    event(&mut ugv, "action_started", "action", 2);
+    assert_eq!(design(&ugv), Some("fd_amcl_kinect"));
+    assert_eq!(ugv.beliefs().pending().count(), 1);
+}
