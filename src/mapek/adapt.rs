@@ -27,6 +27,17 @@ const FAILURES: u32 = 3;
 /// What stands among designs for facts that have changed.
 const FACTS: &str = "facts";
 
+/// Why a plan is looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Need {
+    /// The action under way could not go on as it was, and a safe effect was asked for.
+    Upset,
+    /// The plan at hand cannot be kept.
+    Must,
+    /// There may be a better one.
+    Better,
+}
+
 /// The station between what has changed and a plan that fits: it decides, and the planner makes the plans.
 #[derive(Debug)]
 pub(super) struct Adapting<'a> {
@@ -49,13 +60,13 @@ impl Adapting<'_> {
                 return;
             }
             if !upset.is_empty() {
-                self.replan(upset, true, answers);
+                self.replan(upset, Need::Upset, answers);
                 return;
             }
             // A suspended action is in trouble as long as nothing changes for the better.
             let is_news = is_change || !running.suspended;
             if let Some(reason) = trouble(self.beliefs, &running, changes.facts).filter(|_| is_news) {
-                self.replan(vec![reason], true, answers);
+                self.replan(vec![reason], Need::Must, answers);
                 return;
             }
         }
@@ -84,7 +95,7 @@ impl Adapting<'_> {
             self.improve(answers);
         } else {
             self.beliefs.reached = false;
-            self.replan(changes.must, true, answers);
+            self.replan(changes.must, Need::Must, answers);
         }
     }
 
@@ -139,12 +150,13 @@ impl Adapting<'_> {
         } else if !self.beliefs.hopes.is_empty()
             && self.beliefs.now >= self.beliefs.hoped.saturating_add(self.settings.settle)
         {
-            self.replan(vec!["there may be a better plan".to_owned()], false, answers);
+            self.replan(vec!["there may be a better plan".to_owned()], Need::Better, answers);
         }
     }
 
     /// Looks for a plan, and adopts it if it must, or if it is better by enough.
-    pub(super) fn replan(&mut self, because: Vec<String>, must: bool, answers: &mut Vec<Answer>) {
+    pub(super) fn replan(&mut self, because: Vec<String>, need: Need, answers: &mut Vec<Answer>) {
+        let must = need != Need::Better;
         let reason = because.first().cloned().unwrap_or_default();
         answers.push(Answer::PlanRequested { because });
         self.beliefs.hopes.clear();
@@ -152,7 +164,7 @@ impl Adapting<'_> {
         if self.planner.is_missing {
             return;
         }
-        if must && self.interrupt(&reason, &outcome, answers) {
+        if must && self.interrupt(&reason, need, &outcome, answers) {
             return;
         }
         let Some(steps) = &outcome.steps else {
@@ -184,10 +196,10 @@ impl Adapting<'_> {
 
     /// Cancels or suspends the action under way if that is better than `going_on`, the plan that begins with what is left of
     /// it. Returns whether it did.
-    fn interrupt(&mut self, reason: &str, going_on: &Outcome, answers: &mut Vec<Answer>) -> bool {
+    fn interrupt(&mut self, reason: &str, need: Need, going_on: &Outcome, answers: &mut Vec<Answer>) -> bool {
         let Some(running) = self.beliefs.running.clone() else { return false };
         let can_go_on = self.can_go_on(&running);
-        if can_go_on && (going_on.steps.is_some() || !going_on.proved) {
+        if need != Need::Upset && can_go_on && (going_on.steps.is_some() || !going_on.proved) {
             return false;
         }
         let without = self.plan(false);

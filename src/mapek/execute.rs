@@ -4,7 +4,7 @@
 
 use std::collections::VecDeque;
 
-use crate::mapek::adapt::Adapting;
+use crate::mapek::adapt::{Adapting, Need};
 use crate::mapek::answer::Answer;
 use crate::mapek::effects::{finish, request};
 
@@ -35,7 +35,7 @@ pub(super) fn execute(adapting: &mut Adapting<'_>, answers: &mut Vec<Answer>) {
             }
             Some(because) if attempt == 0 => {
                 let because = if is_planned { because } else { "there is no plan".to_owned() };
-                adapting.replan(vec![because], true, answers);
+                adapting.replan(vec![because], Need::Must, answers);
             }
             Some(because) => {
                 answers.push(Answer::PlanNone { status: "unknown", because, blocking: Vec::new() });
