@@ -71,7 +71,8 @@ fn action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<Answer>)
     let (action, request) = (running.action, running.request);
     let is_unheard = beliefs.outstanding.contains_key(&request);
     let is_first = running.overdue == 1;
-    let is_expected = if is_unheard { beliefs.reports_actions } else { running.progressed };
+    let is_expected =
+        if is_unheard { beliefs.reports_actions || beliefs.receipts.are_sent() } else { running.progressed };
     let outcome = match (is_first, is_unheard, is_expected) {
         (true, true, true) => OverdueOutcome::Repeated,
         (false, _, true) => OverdueOutcome::Cancelled,

@@ -136,14 +136,14 @@ impl Beliefs {
             return false;
         }
         self.waits.remove(&effect);
+        // A report of the action may have confirmed the effect before its acknowledgement came.
+        self.receipts.by_number = true;
         if let Some(outstanding) = self.outstanding.remove(&effect) {
             if let Command::Reconfigure { function, to, .. } = outstanding.command {
-                self.receipts.by_number = true;
                 self.configured(effect, &function, to);
             }
         } else if let Some((function, design)) = self.receipts.superseded(effect) {
             let (function, design) = (function.clone(), design.clone());
-            self.receipts.by_number = true;
             self.configured(effect, &function, design);
         }
         true
