@@ -158,7 +158,9 @@ mod tests {
         numbers.insert(6);
         assert_eq!(numbers.to_record().to_string(), "[null,[[4,6]]]");
         assert!(numbers.missing().is_empty());
-        [9, 12, 10].map(|number| numbers.insert(number));
+        for number in [9, 12, 10] {
+            numbers.insert(number);
+        }
         assert_eq!(numbers.missing(), [[7, 8], [11, 11]]);
     }
 }

@@ -38,7 +38,7 @@ fn a_section_is_refused_whoever_uses_it() {
     check(
         "[adaptation]\nsetle = 1",
         "10:1: error[M104]: unknown field `setle`, expected one of `minimum_benefit`, `settle`, `time_limit`, \
-         `stay_close`; did you mean `settle`?",
+         `stay_close`, `safe_reaction`, `deadline`, `deadline_factor`; did you mean `settle`?",
     );
     check(
         "[adaptation]\nsettle = -1",
@@ -70,8 +70,8 @@ fn all_mistakes_of_a_manifest_are_told() {
          m.toml:11:2: error[M104]: unknown field `scenaros`, expected one of `name`, `description`, `knowledge`, `planning`, \
          `bindings`, `adaptation`, `probabilistic`, `report`, `scenarios`; did you mean `scenarios`?\n\
          m.toml:14:1: error[M104]: unknown field `setle`, expected one of `minimum_benefit`, `settle`, `time_limit`, \
-         `stay_close`; did you mean `settle`?\n\
+         `stay_close`, `safe_reaction`, `deadline`, `deadline_factor`; did you mean `settle`?\n\
          m.toml:16:1: error[M104]: unknown field `min`, expected one of `minimum_benefit`, `settle`, `time_limit`, \
-         `stay_close`",
+         `stay_close`, `safe_reaction`, `deadline`, `deadline_factor`",
     );
 }

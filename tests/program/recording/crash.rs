@@ -22,7 +22,8 @@ pub(super) fn salvaged(file: &Path, topic: &str) -> usize {
     stream.map_while(Result::ok).filter(|message| message.channel.topic == topic).count()
 }
 
-/// Starts a run that is recorded, tells it all, waits for the answers, and until they are in the file.
+/// Starts a run that is recorded, sends each line when the one before is answered, as a replay reads them, and waits until all
+/// answers are in the file.
 fn begun(file: &Path) -> (Child, Vec<Value>) {
     let mut child = Command::new(env!("CARGO_BIN_EXE_metaplan"))
         .args(["run", "missions/ugv.toml", "--mcap"])
@@ -32,18 +33,21 @@ fn begun(file: &Path) -> (Child, Vec<Value>) {
         .stdout(Stdio::piped())
         .spawn()
         .expect("the program starts");
-    let text = input() + "\n";
-    child.stdin.as_mut().expect("a pipe").write_all(text.as_bytes()).expect("the program reads");
+    let text = input();
+    let mut events = text.lines();
+    let mut pipe = child.stdin.take().expect("a pipe");
     let mut answers = Vec::new();
     let lines = BufReader::new(child.stdout.as_mut().expect("a pipe")).lines();
     for line in lines {
         let answer = decision(&line.expect("a line"));
-        let is_last = answer["answer"] == "handled" && answer["line"] == input().lines().count();
+        let is_handled = answer["answer"] == "handled";
         answers.push(answer);
-        if is_last {
-            break;
+        if is_handled {
+            let Some(event) = events.next() else { break };
+            writeln!(pipe, "{event}").expect("the program reads");
         }
     }
+    child.stdin = Some(pipe);
     let begun = Instant::now();
     let handled = |answer: &&Value| {
         ["ready", "error", "duplicate", "handled"].iter().any(|kind| answer["answer"] == *kind)
