@@ -30,8 +30,15 @@ pub struct DiagnosticRule {
 enum Target {
     /// A component has failed at this level and above, and works below it.
     Component { component: String, fails_at: Level },
-    /// The number behind a key, times `scale` plus `offset`, is the value of an attribute.
-    Attribute { attribute: String, key: String, scale: f64, offset: f64 },
+    /// The number behind a key is the value of an attribute, in another unit if there is a conversion.
+    Attribute { attribute: String, key: String, conversion: Option<Conversion> },
+}
+
+/// A linear conversion of units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Conversion {
+    scale: f64,
+    offset: f64,
 }
 
 /// Level of a diagnostic status. STALE counts as the highest: nothing is known of the device any more.
@@ -81,8 +88,8 @@ impl TryFrom<Entry> for DiagnosticRule {
             (None, Some(attribute)) => Target::Attribute {
                 attribute,
                 key: key.ok_or("an `attribute` needs the `key` of the pair that has its value")?,
-                scale: scale.unwrap_or(1.0),
-                offset: offset.unwrap_or(0.0),
+                conversion: (scale.is_some() || offset.is_some())
+                    .then(|| Conversion { scale: scale.unwrap_or(1.0), offset: offset.unwrap_or(0.0) }),
             },
             (Some(_), Some(_)) | (None, None) => {
                 return Err("name either a `component` or an `attribute` of the knowledge base");
@@ -106,13 +113,14 @@ impl DiagnosticRule {
                 let value = if status.level >= *fails_at as u8 { "FALSE" } else { "TRUE" };
                 (COMPONENT, component, value.to_owned())
             }
-            Target::Attribute { attribute, key, scale, offset } => {
-                let text = &status.values.iter().find(|pair| pair.key == *key)?.value;
-                let is_plain = *scale == 1.0 && *offset == 0.0 && text.trim().parse::<f64>().is_ok();
-                let value = if is_plain {
-                    text.trim().to_owned()
-                } else {
-                    (leading_number(text)? * scale + offset).to_string()
+            Target::Attribute { attribute, key, conversion } => {
+                let text = status.values.iter().find(|pair| pair.key == *key)?.value.trim();
+                let number = leading_number(text)?;
+                let value = match conversion {
+                    Some(Conversion { scale, offset }) => (number * scale + offset).to_string(),
+                    // All digits stay as they were written.
+                    None if text.parse::<f64>().is_ok() => text.to_owned(),
+                    None => number.to_string(),
                 };
                 (MEASUREMENT, attribute, value)
             }

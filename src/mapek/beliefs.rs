@@ -22,6 +22,7 @@ use crate::mission::Mission;
 
 /// Everything that the loop knows.
 #[derive(Debug, Clone)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub struct Beliefs {
     /// Knowledge base and problem, as they are believed to be.
     pub(super) mission: Mission,
@@ -75,6 +76,7 @@ pub struct Beliefs {
 
 /// An action that was requested and has not ended.
 #[derive(Debug, Clone, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(super) struct Running {
     /// The number of the request.
     pub(super) action: u64,

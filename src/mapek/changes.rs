@@ -2,6 +2,7 @@
 
 /// What a line has changed, for the analysis.
 #[derive(Debug, Clone, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
 pub(super) struct Changes {
     /// What the knowledge base says.
     pub(super) base: Base,

@@ -34,16 +34,13 @@ pub(super) fn react(
         SafeReaction::Reconfigure => other_designs(beliefs, &running),
         SafeReaction::Suspend => None,
     };
-    match other {
-        Some(step) => {
-            reconfigure(beliefs, running.action, &step, answers);
-            running.step = step;
-        }
-        None => {
-            let because = format!("{reason}; it stands still until it is decided what becomes of it");
-            effect(beliefs, running.action, Command::Suspend { because }, answers);
-            (running.suspended, running.provisional) = (true, true);
-        }
+    if let Some(step) = other {
+        reconfigure(beliefs, running.action, &step, answers);
+        running.step = step;
+    } else {
+        let because = format!("{reason}; it stands still until it is decided what becomes of it");
+        effect(beliefs, running.action, Command::Suspend { because }, answers);
+        (running.suspended, running.provisional) = (true, true);
     }
     beliefs.running = Some(running);
     changes.upset.push(reason);
