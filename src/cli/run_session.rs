@@ -261,16 +261,13 @@ impl<'a> Session<'a> {
     fn conclude(&mut self, thoughts: Thoughts) -> Result<Flow, Failure> {
         let was_stopped = self.thinking.take().is_some_and(|own| own.is_stopped);
         let is_late = self.stopped >= MAX_STOPPED;
-        match self.control.deliberate_with(thoughts, is_late) {
-            Some(answers) => {
-                self.stopped = 0;
-                self.decided(&answers)?;
-                self.say(&answers)
-            }
-            None => {
-                self.stopped = if was_stopped { self.stopped + 1 } else { 0 };
-                Ok(Flow::GoesOn)
-            }
+        if let Some(answers) = self.control.deliberate_with(thoughts, is_late) {
+            self.stopped = 0;
+            self.decided(&answers)?;
+            self.say(&answers)
+        } else {
+            self.stopped = if was_stopped { self.stopped + 1 } else { 0 };
+            Ok(Flow::GoesOn)
         }
     }
 
@@ -298,14 +295,14 @@ impl<'a> Session<'a> {
     /// Writes answers to the last line; there may be more.
     fn say(&self, answers: &[Answer]) -> Result<Flow, Failure> {
         let number = self.control.beliefs().lines();
-        let flow = self.flow(self.outlet.answer_so_far(number, answers))?;
+        let flow = flow(self.outlet.answer_so_far(number, answers))?;
         self.outlet.plan(self.control.beliefs(), answers);
         Ok(flow)
     }
 
     /// Writes answers to a line, and that it was handled.
     fn answer(&self, number: u64, answers: &[Answer], read: Instant) -> Result<Flow, Failure> {
-        let flow = self.flow(self.outlet.answer(number, answers, read))?;
+        let flow = flow(self.outlet.answer(number, answers, read))?;
         self.outlet.plan(self.control.beliefs(), answers);
         Ok(flow)
     }
@@ -314,13 +311,14 @@ impl<'a> Session<'a> {
     fn close(&mut self) -> Result<Flow, Failure> {
         match self.open.take() {
             None => Ok(Flow::GoesOn),
-            Some((number, read)) => self.flow(self.outlet.answer(number, &[] as &[Answer], read)),
+            Some((number, read)) => flow(self.outlet.answer(number, &[] as &[Answer], read)),
         }
     }
+}
 
-    fn flow(&self, written: std::io::Result<()>) -> Result<Flow, Failure> {
-        Ok(if is_over(written)? { Flow::Over } else { Flow::GoesOn })
-    }
+/// Ends the run where nobody reads its answers any more.
+fn flow(written: std::io::Result<()>) -> Result<Flow, Failure> {
+    Ok(if is_over(written)? { Flow::Over } else { Flow::GoesOn })
 }
 
 /// Adds all inputs that have come.

@@ -47,7 +47,7 @@ impl Run {
     fn until(&self, fits: impl Fn(&Value) -> bool) -> (Vec<Value>, Instant) {
         let mut all = Vec::new();
         loop {
-            let (time, answer) = self.answers.recv_timeout(Duration::from_mins(2)).expect("an answer");
+            let (time, answer) = self.answers.recv_timeout(Duration::from_secs(120)).expect("an answer");
             let is_it = fits(&answer);
             if answer["answer"] != "planning" {
                 all.push(answer);
