@@ -190,7 +190,7 @@ fn swap_pairs(scripts: u64) {
             random ^= random << 17;
             (random >> 16) as usize % bound
         };
-        const NAMES: [&str; 6] = ["a", "b", "c", "d", "e", "f"];
+        let names = ["a", "b", "c", "d", "e", "f"];
         let rules = [
             "p(?x, ?y) ^ q(?y) -> q(?x) .",
             "p(?x, ?y) ^ p(?x, ?z) -> sameAs(?y, ?z) .",
@@ -199,9 +199,9 @@ fn swap_pairs(scripts: u64) {
         ];
         let text: String = rules.iter().filter(|_| pick(2) == 0).copied().collect::<Vec<_>>().join("\n");
         let mut fact = |kind: usize| match kind {
-            0 => format!("sameAs({}, {})", NAMES[pick(6)], NAMES[pick(6)]),
-            1 => format!("p({}, {})", NAMES[pick(6)], NAMES[pick(6)]),
-            _ => format!("q({})", NAMES[pick(6)]),
+            0 => format!("sameAs({}, {})", names[pick(6)], names[pick(6)]),
+            1 => format!("p({}, {})", names[pick(6)], names[pick(6)]),
+            _ => format!("q({})", names[pick(6)]),
         };
         let mut stated: BTreeSet<String> = [0, 0, 1, 1, 1, 2].map(&mut fact).into_iter().collect();
         let mut incremental = engine(&text, &stated.iter().cloned().collect::<Vec<_>>().join(", "));
@@ -214,9 +214,9 @@ fn swap_pairs(scripts: u64) {
             let [insert, delete] = [&come[..], &gone].map(|facts| {
                 facts.iter().map(|text| crate::text::fact(&mut incremental, text)).collect::<Vec<_>>()
             });
-            gone.iter().for_each(|fact| {
+            for fact in &gone {
                 stated.remove(fact);
-            });
+            }
             stated.extend(come);
             let before = shown(&incremental);
             let change = incremental.apply(Delta { insert, delete }).expect("within the budget");

@@ -223,7 +223,7 @@ fn the_safe_effect_comes_within_five_milliseconds() {
             let designs: Vec<&String> = step.configuration.iter().map(|(_, design)| design).collect();
             // A design that is an argument and serves no function of the action.
             let design =
-                designs.get(number % designs.len().max(1)).map_or(&step.arguments[0], |own| own).to_string();
+                designs.get(number % designs.len().max(1)).copied().unwrap_or(&step.arguments[0]).clone();
             let line = |realisable: bool| {
                 format!(r#"{{"event":"design_status","design":"{design}","realisable":{realisable}}}"#)
             };
@@ -241,7 +241,7 @@ fn the_safe_effect_comes_within_five_milliseconds() {
         let greatest = times[times.len() - 1];
         println!("{mission}: median {median:?}, p99.9 {most:?}, greatest {greatest:?}");
         // Two lines each: the loss, and the return.
-        let each = (processor_time() - before) / (2 * times.len() as u32);
+        let each = processor_time().saturating_sub(before) / (2 * times.len() as u32);
         println!("{mission}: {each:?} of processor time for each line");
         late.extend((most > Duration::from_millis(5)).then_some((mission, most)));
     }
