@@ -3,8 +3,6 @@
 //! A driver publishes `diagnostic_msgs/DiagnosticStatus` with a level and a text of its own. A rule selects such statuses by patterns, and
 //! names the component whose status the level is, or the attribute whose value one of the key/value pairs is.
 
-use std::fmt;
-
 use serde::Deserialize;
 
 use crate::interfaces::diagnostic_msgs::msg::{DiagnosticStatus, KeyValue};
@@ -151,12 +149,6 @@ struct Pattern(String);
 impl Default for Pattern {
     fn default() -> Self {
         Self("*".to_owned())
-    }
-}
-
-impl fmt::Display for Pattern {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(&self.0)
     }
 }
 

@@ -42,8 +42,6 @@ PACKAGE = """<?xml version="1.0"?>
 DEPENDENCIES = {
     "suave_msgs": ["action_msgs", "geometry_msgs"],
     "system_modes_msgs": [],
-    "mros2_msgs": ["diagnostic_msgs"],
-    "plansys2_msgs": ["builtin_interfaces", "std_msgs", "lifecycle_msgs", "action_msgs"],
 }
 
 
