@@ -175,7 +175,7 @@ impl Robot {
                 let Some(template) = missions.get(name) else { return Ok(Err(Refused::Mission)) };
                 let mut control = template.control.clone();
                 let answers = match before {
-                    Some(before) => control.start_again(&before.plans),
+                    Some(before) => control.deliberate_again(&before.plans),
                     None => control.start(),
                 };
                 let made = control.decision(&answers);

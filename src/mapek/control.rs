@@ -308,14 +308,6 @@ impl Loop {
         }
     }
 
-    /// As [`Loop::start`], with the plans that were made then.
-    pub fn start_again(&mut self, plans: &[Value]) -> Vec<Answer> {
-        self.planner.recorded = plans.iter().filter_map(Outcome::from_record).collect();
-        let answers = self.start();
-        self.planner.recorded.clear();
-        answers
-    }
-
     /// As [`Loop::handle`], with the plans that were made then.
     pub fn handle_again(&mut self, observation: &Observation, now: Duration, plans: &[Value]) -> Vec<Answer> {
         self.planner.recorded = plans.iter().filter_map(Outcome::from_record).collect();
@@ -324,9 +316,12 @@ impl Loop {
         answers
     }
 
-    /// As [`Loop::deliberate`], with the plans that were made then.
+    /// Repeats [`Loop::start`] or [`Loop::deliberate`] with recorded plans.
     pub fn deliberate_again(&mut self, plans: &[Value]) -> Vec<Answer> {
-        self.start_again(plans)
+        self.planner.recorded = plans.iter().filter_map(Outcome::from_record).collect();
+        let answers = self.deliberate();
+        self.planner.recorded.clear();
+        answers
     }
 
     /// All that the loop knows, once it has deliberated on all that it has reacted to.
