@@ -63,63 +63,63 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Subcommands {
-    /// A new directory with a mission that plans at once, to start from.
+    /// Create a directory with a small mission to start from.
     #[command(after_long_help = examples::INIT)]
     Init(init::Arguments),
-    /// A jointly optimal task plan and configuration.
+    /// Plan a mission: optimal actions and the configuration for each of them.
     #[command(after_long_help = examples::PLAN)]
     Plan(plan::Arguments),
-    /// All errors and warnings of a mission: knowledge base, rules, PDDL and manifest; without planning.
+    /// Check a mission for errors and warnings without planning: knowledge base, rules, PDDL and manifest.
     #[command(after_long_help = examples::LINT)]
     Lint(lint::Arguments),
-    /// What follows from knowledge bases and rules: assertions, availability, objectives in error.
+    /// Query what follows from knowledge bases and rules: assertions, availability, objectives in error.
     #[command(after_long_help = examples::REASON)]
     Reason(reason::Arguments),
-    /// A knowledge base with its imports as one document in another syntax.
+    /// Convert a knowledge base with its imports to one document in another syntax.
     #[command(after_long_help = examples::CONVERT)]
     Convert(convert::Arguments),
-    /// Model checking of a PRISM-language model: a value with bounds, and its policy.
+    /// Model-check a PRISM-language model: a value with bounds, and its policy.
     Check(check::Arguments),
-    /// Metaplan and probabilistic model checking side by side, on one co-adaptation mission.
+    /// Compare Metaplan with probabilistic model checking on a co-adaptation mission.
     #[command(after_long_help = examples::COMPARE)]
     Compare(compare::Arguments),
-    /// A design for every function in need, as MROS chooses it, without a task plan.
+    /// Choose a design for each function in need as MROS does, without a task plan.
     #[command(after_long_help = examples::CONFIGURE)]
     Configure(configure::Arguments),
-    /// A mission from the files of another tool.
+    /// Import a mission from the files of another tool.
     Import(import::Arguments),
-    /// Why a design is available or not, why it is chosen or not, what would change the answer; or what a code means.
+    /// Explain why a design is available or chosen, what would change the answer, or what a code means.
     #[command(after_long_help = examples::EXPLAIN)]
     Explain(explain::Arguments),
-    /// A mission for other planners, with what the knowledge base has contributed.
+    /// Export a mission for other planners, with the facts from the knowledge base.
     #[command(after_long_help = examples::EXPORT)]
     Export(export::Arguments),
-    /// An answer as a page to look at: plan, numbers, map, search, designs with reasons; before and after.
+    /// Write a plan as an HTML page or picture: timeline, map, search, designs with reasons, before and after.
     #[command(after_long_help = examples::REPORT)]
     Report(report::Arguments),
-    /// The adaptation loop: events in, adaptations out, one JSON object a line.
+    /// Run the adaptation loop: events in, adaptations out, one JSON object per line.
     #[command(after_long_help = examples::RUN)]
     Run(run::Arguments),
-    /// What is in the journal of a loop, and whether it can be used; nothing is changed.
+    /// Show and check the journal of a loop without changing it.
     #[command(after_long_help = examples::JOURNAL)]
     Journal(journal::Arguments),
-    /// The loop against a simulated robot, beside other ways of control.
+    /// Simulate a robot under the loop and under other controllers.
     #[command(after_long_help = examples::SIMULATE)]
     Simulate(simulate::Arguments),
-    /// One command with every combination of what is varied, in shards; and a table of all of them.
+    /// Run one command with each combination of parameters, in shards, and write a table of the results.
     #[command(after_long_help = examples::SWEEP)]
     Sweep(sweep::Arguments),
-    /// Whether a plan is executable, reaches the goal, and what it costs; independent of the planner.
+    /// Validate a plan independently of the planner: executable, reaches the goal, cost.
     #[command(after_long_help = examples::VALIDATE)]
     Validate(validate::Arguments),
-    /// Checks a certificate without trusting the planner.
+    /// Verify a certificate without trusting the planner.
     #[command(after_long_help = examples::VERIFY)]
     Verify(verify::Arguments),
-    /// The JSON Schema of a format, or of manifests: for editors and for programs.
+    /// Print the JSON Schema of an output format or of manifests.
     Schema(schema::Arguments),
-    /// A script that completes commands and options in a shell.
+    /// Print a script that completes commands and options in a shell.
     Completions(completions::Arguments),
-    /// Pages for `man`, one for each command.
+    /// Write manual pages, one for each command.
     Man(completions::ManArguments),
 }
 
