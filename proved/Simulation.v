@@ -1,4 +1,4 @@
-(* Lemmas for the comparison of a ground task with PDDL: operators simulate instances, and instances are enumerated completely. *)
+(* Every plan of the PDDL problem is simulated by a plan of the ground task that costs no more. *)
 From Coq Require Import ZArith QArith List Bool FMapPositive Lia Lqa Setoid.
 From Proved Require Import Task Check Proof Sound Lifted Faithful Symbolic.
 Import ListNotations.
@@ -472,5 +472,53 @@ Proof.
   - intros v vals x a F I. destruct (A2 _ _ F) as [_ B]. apply B, I.
   - intros n f F. apply A4, F.
   - apply wf_init; exact task_ok.
+Qed.
+Lemma simulation : forall steps w s spent w' spent', execute P true w spent steps = Some (w', spent') -> Rel w s ->
+  exists ps c, Task.plan T s ps c /\ inject_Z c <= (measure w' + spent' - measure w - spent) * (Zpos (cost_scale N) # 1) /\ exists s', Rel w' s'.
+Proof.
+  induction steps as [|[i env] steps IH]; intros w s spent w' spent' H R; cbn [execute] in H.
+  - destruct (truth P w None [] (wanted P)) as [[]|] eqn:G; try discriminate. injection H as <- <-. exists [], 0%Z.
+    split; [|split; [setoid_replace (measure w + spent - measure w - spent) with 0 by ring; change (inject_Z 0) with 0; lra|exists s; exact R]].
+    constructor. destruct parts as [_ [_ [_ [_ [B _]]]]]. 
+    eapply (tree_cases w s R (goal_leaf P T N)); [|apply (conjuncts_ok w s R w unchanged None Undefined); [apply describes_itself|exact eq_refl|exact G]|exact B].
+    intros k o K L. unfold goal_leaf in L. destruct (truth3 P T N k unchanged Undefined [] (wanted P)) as [[]|] eqn:E.
+    2: { exfalso. apply (truth3_ok P T N w k (base_truth_ok w s R k K) (static_value w s R) K w unchanged None Undefined (describes_itself w) eq_refl) in E. apply E. exact G. }
+    all: apply (condition3_ok w s R k K); exact L.
+  - destruct (nth_error (actions P) i) as [a|] eqn:Ni; [|discriminate]. destruct (step P true w a env) as [[w1 d]|] eqn:S; [|discriminate].
+    destruct parts as [_ [_ [_ [_ [_ B]]]]]. specialize (B _ _ Ni). unfold action_ok in B. apply andb_true_iff in B. destruct B as [C B].
+    pose proof (step_statics w a env w1 d C (r_fact _ _ R) S) as [[K1 K2] Pr].
+    rewrite forallb_forall in B. specialize (B env).
+    assert (I : In env (instances P (pruned P N a) (parameters a) [])).
+    { pose proof S as S'. unfold step in S'. destruct (negb _) eqn:Ng; [discriminate|]. apply negb_false_iff in Ng. apply andb_true_iff in Ng. destruct Ng as [N1 N2].
+      apply (instances_ok _ env _ [] env); auto. apply Nat.eqb_eq, N1. }
+    specialize (B I).
+    assert (Go : exists o sy t, match o with Some (o, _) => In o (operators T) | None => True end /\ Rel w1 (after_of s o) /\
+       match o with Some (o, ch) => admitted o ch /\ holds (pre o) (derive T s) (sizes o) ch = true | None => True end /\ Describes w w1 sy /\ t == d /\
+       exists g, growth P N sy t = Some g /\ inject_Z (step_cost o) <= g * (Zpos (cost_scale N) # 1)).
+    { eapply (tree_cases w s R); [|eapply gathered_ok; eassumption|exact B]. intros k o K L.
+      assert (L' : exists o, match o with Some (o, _) => In o (operators T) | None => True end /\ leaf_ok P T N k a env o = true).
+      { unfold instance_leaf in L. destruct o as [[j ch]|]; [|exists None; split; [exact Logic.I|exact L]].
+        destruct (nth_error (operators T) j) as [o|] eqn:Nj; [|discriminate]. exists (Some (o, ch)). split; [eapply nth_error_In, Nj|exact L]. }
+      clear L. destruct L' as [o' [Io L]]. unfold leaf_ok in L.
+      pose proof (step3_ok P T N w k (base_truth_ok w s R k K) (static_value w s R) K a env w1 d S) as Q.
+      destruct (step3 P T N k a env) as [| |sy t]; [destruct Q|discriminate|]. destruct Q as [Q D]. apply andb_true_iff in L. destruct L as [L1 L2].
+      destruct (simulated_ok w s R k K sy t o' w1 D K1 K2 L1 Io L2) as [R1 [Ad G]]. exists o', sy, t. tauto. }
+    destruct Go as [o [sy [t [Io [R1 [Ad [D [Td [g [Gr Co]]]]]]]]]].
+    destruct (IH _ _ _ _ _ H R1) as [ps [c [Pl [Le End]]]].
+    assert (M : g == measure w1 - measure w + per_time P * d + per_step P).
+    { unfold growth in Gr. unfold measure. destruct (linear_of P N unchanged Undefined [] (metric P)) as [| |f] eqn:E0;
+        destruct (linear_of P N sy Undefined [] (metric P)) as [| |h] eqn:E1; cbn [plus_result] in Gr; try discriminate.
+      pose proof (measure_changes w w1 s sy (metric P) f h R K2 D E0 E1) as X. pose proof (ev_plus_form w h (-1 # 1) f) as Y.
+      destruct (plus_form h (-1 # 1) f) as [[|] z]; [|discriminate]. injection Gr as <-. rewrite ev_empty in Y. rewrite X, Y, Td. ring. }
+    rewrite Qred_correct in Le.
+    set (k := Zpos (cost_scale N) # 1) in *.
+    assert (Sum : inject_Z (step_cost o + c) <= (measure w' + spent' - measure w - spent) * k).
+    { rewrite inject_Z_plus. rewrite M in Co.
+      setoid_replace ((measure w' + spent' - measure w - spent) * k) with
+        ((measure w1 - measure w + per_time P * d + per_step P) * k + (measure w' + spent' - measure w1 - (spent + per_time P * d + per_step P)) * k) by ring.
+      lra. }
+    destruct o as [[o ch]|].
+    + exists ((o, ch) :: ps), (amount (cost o) (sizes o) ch + c)%Z. split; [destruct Ad; constructor; assumption|split; [exact Sum|exact End]].
+    + exists ps, c. split; [exact Pl|split; [exact Sum|exact End]].
 Qed.
 End Simulation.
