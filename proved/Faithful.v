@@ -32,11 +32,11 @@ Record names := Names {
   may_hold : index unit;                         (* atoms of changing predicates that may hold in some state *)
   scale : positive;                              (* a number of the task is the value of its fluent times this *)
   cost_scale : positive }.
-Inductive tree :=
-  | Leaf (o : option (nat * choice))             (* an operator with a choice, or none *)
+Inductive case_tree :=
+  | Decided (o : option (nat * choice))             (* an operator with a choice, or none *)
   | Impossible
-  | SplitAtom (a : atom) (t u : tree)            (* it holds, it does not hold *)
-  | SplitForm (f : form) (t u : tree).           (* it is at least 0, it is less *)
+  | SplitAtom (a : atom) (t u : case_tree)            (* it holds, it does not hold *)
+  | SplitForm (f : form) (t u : case_tree).           (* it is at least 0, it is less *)
 
 Definition mem {X} (m : index X) (a : atom) : bool := match find m a with Some _ => true | None => false end.
 
@@ -303,9 +303,9 @@ Definition leaf_ok (k : knowledge) (a : action) (env : list key) (o : option (op
       forallb (fun l => match assoc (fst l) (new_truths s) with Some true => mem (may_hold N) (fst l) | _ => true end) (new_truths s) &&
       simulated k s time o
   end.
-Fixpoint tree_ok (leaf : knowledge -> option (nat * choice) -> bool) (k : knowledge) (t : tree) : bool :=
+Fixpoint tree_ok (leaf : knowledge -> option (nat * choice) -> bool) (k : knowledge) (t : case_tree) : bool :=
   match t with
-  | Leaf o => leaf k o
+  | Decided o => leaf k o
   | Impossible => impossible k
   | SplitAtom a t u => tree_ok leaf (Knowledge ((a, true) :: literals k) (bounds k)) t &&
                        tree_ok leaf (Knowledge ((a, false) :: literals k) (bounds k)) u
@@ -318,7 +318,7 @@ Definition instance_leaf (a : action) (env : list key) (k : knowledge) (o : opti
   | Some (i, ch) => match nth_error (operators T) i with Some o => leaf_ok k a env (Some (o, ch)) | None => false end
   end.
 Definition goal_leaf (k : knowledge) (_ : option (nat * choice)) : bool :=
-  match truth3 k unchanged Undefined [] (wanted P) with Some false => true | _ => condition3 k (goal T) [] [] end.
+  match truth3 k unchanged Undefined [] (goal_formula P) with Some false => true | _ => condition3 k (goal T) [] [] end.
 
 (* Instances for which the conditions on what never changes may hold: parameters are bound one after another. *)
 Fixpoint static_false (env : list key) (f : formula) : bool :=
@@ -342,14 +342,14 @@ Fixpoint effect_heads (e : effect) : list key :=
   | Nothing => [] | Put _ p _ => [p] | Change _ f _ _ => [f]
   | Both a b => effect_heads a ++ effect_heads b | When _ a => effect_heads a | Each _ a => effect_heads a
   end.
-Variables (case : nat -> list key -> tree) (goal_case : tree).
+Variables (case : nat -> list key -> case_tree) (goal_case : case_tree).
 Definition action_ok (i : nat) (a : action) : bool :=
   forallb (changing N) (effect_heads (start_effect a) ++ effect_heads (end_effect a)) &&
   forallb (fun env => tree_ok (instance_leaf a env) (gathered a env) (case i env)) (instances (pruned a) (parameters a) []).
 Definition all_entries {X} (m : index X) : list (atom * X) := flat_map snd (PositiveMap.elements m).
 Definition same_atom (r : option atom) (a : atom) : bool := match r with Some b => atom_eqb b a | None => false end.
 Definition faithful : bool :=
-  forallb (fun e => negb (changing N (fst (fst e))) || mem (may_hold N) (fst e)) (all_entries (facts P)) &&
+  forallb (fun e => negb (changing N (fst (fst e))) || mem (may_hold N) (fst e)) (all_entries (initial_atoms P)) &&
   forallb (fun vl => let '(v, vals) := vl in is_basic T v &&
      forallb (fun xa => let '(x, a) := xa in Bool.eqb (holds_in (initial P) a) (Z.eqb (val (init T) v) x) &&
        match find (fact_of N) a with Some (u, y) => Pos.eqb u v && Z.eqb y x | None => false end) vals) (M.elements (variables N)) &&
@@ -359,7 +359,7 @@ Definition faithful : bool :=
   forallb (fun nf => let '(n, f) := nf in memb n (numbers T) && changing N (fst f) &&
      match value_in (initial P) f with Some q => Qeq_bool (q * scaled) (inject_Z (num (init T) n)) | None => false end &&
      match find (number_of N) f with Some m => Pos.eqb m n | None => false end) (M.elements (fluents N)) &&
-  tree_ok goal_leaf (conjuncts unchanged Undefined [] (wanted P)) goal_case &&
+  tree_ok goal_leaf (conjuncts unchanged Undefined [] (goal_formula P)) goal_case &&
   forallb (fun ia => action_ok (fst ia) (snd ia)) (combine (seq 0 (length (actions P))) (actions P)).
 End Faithful.
 
@@ -367,7 +367,7 @@ Definition is_linear (P : problem) (N : names) : bool :=
   match linear_of P N unchanged Undefined [] (metric P) with Is _ => true | _ => false end.
 
 (* The whole check: the plan, the comparison and the argument. *)
-Definition check_certificate (P : problem) (T : task) (N : names) (case : nat -> list key -> tree) (goal_case : tree)
+Definition check_certificate (P : problem) (T : task) (N : names) (case : nat -> list key -> case_tree) (goal_case : case_tree)
     (A : argument) (oracle : state -> list positive) (plan : list (nat * list key)) (claim : option Q) : bool :=
   check_task T && faithful P T N case goal_case &&
   match eval (initial P) None [] (metric P), claim with

@@ -46,12 +46,12 @@ Record world := World { holds_in : atom -> bool; value_in : atom -> option Q }.
 Record problem := Problem {
   objects : key -> list key;                     (* the objects of a type *)
   actions : list action;
-  facts : index unit; values : index Q;          (* the initial state *)
-  wanted : formula;                              (* the goal *)
+  initial_atoms : index unit; initial_values : index Q;
+  goal_formula : formula;
   metric : expression;                           (* to be minimized, with *)
   per_time : Q; per_step : Q }.                  (* weights of the total time and of the number of steps *)
 Definition initial (P : problem) : world :=
-  World (fun a => match find (facts P) a with Some _ => true | None => false end) (find (values P)).
+  World (fun a => match find (initial_atoms P) a with Some _ => true | None => false end) (find (initial_values P)).
 
 (* Terms, expressions, conditions. [None] is undefined. *)
 Definition object (env : list key) (t : term) : option key := match t with Var i => nth_error env i | Object o => Some o end.
@@ -168,7 +168,7 @@ Definition step (zero : bool) (w : world) (a : action) (env : list key) : option
 (* A plan names actions by their positions. The goal state in which it ends, with what its steps add to the metric. *)
 Fixpoint execute (zero : bool) (w : world) (spent : Q) (plan : list (nat * list key)) : option (world * Q) :=
   match plan with
-  | [] => match truth w None [] (wanted P) with Some true => Some (w, spent) | _ => None end
+  | [] => match truth w None [] (goal_formula P) with Some true => Some (w, spent) | _ => None end
   | (i, env) :: r =>
       match nth_error (actions P) i with
       | None => None

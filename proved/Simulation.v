@@ -5,7 +5,7 @@ Import ListNotations.
 Open Scope Q_scope.
 
 Section Simulation.
-Variables (P : problem) (T : task) (N : names) (case : nat -> list key -> tree) (goal_case : tree).
+Variables (P : problem) (T : task) (N : names) (case : nat -> list key -> case_tree) (goal_case : case_tree).
 Hypothesis task_ok : check_task T = true.
 Hypothesis ok : faithful P T N case goal_case = true.
 
@@ -24,12 +24,12 @@ Lemma parts :
   (forall a v x, find (fact_of N) a = Some (v, x) -> exists vals, M.find v (variables N) = Some vals /\ In (x, a) vals) /\
   (forall n f, M.find n (fluents N) = Some f -> memb n (numbers T) = true /\ changing N (fst f) = true /\
      find (number_of N) f = Some n /\ exists q, value_in (initial P) f = Some q /\ q * scaled N == inject_Z (num (init T) n)) /\
-  tree_ok P T N (goal_leaf P T N) (conjuncts P N unchanged Undefined [] (wanted P)) goal_case = true /\
+  tree_ok P T N (goal_leaf P T N) (conjuncts P N unchanged Undefined [] (goal_formula P)) goal_case = true /\
   (forall i a, nth_error (actions P) i = Some a -> action_ok P T N case i a = true).
 Proof.
   unfold faithful in ok. rewrite !andb_true_iff in ok. destruct ok as [[[[[H1 H2] H3] H4] H5] H6].
   rewrite forallb_forall in H1, H2, H3, H4, H6. split; [|split; [|split; [|split; [|split]]]].
-  - intros a C H. simpl in H. destruct (find (facts P) a) as [u|] eqn:F; [|discriminate]. apply find_entries in F.
+  - intros a C H. simpl in H. destruct (find (initial_atoms P) a) as [u|] eqn:F; [|discriminate]. apply find_entries in F.
     specialize (H1 _ F). cbn [fst] in H1. rewrite C in H1. exact H1.
   - intros v vals F. apply M.elements_correct in F. specialize (H2 _ F). cbn beta iota in H2. apply andb_true_iff in H2. destruct H2 as [B H2].
     split; [exact B|]. intros x a I. rewrite forallb_forall in H2. specialize (H2 _ I). cbn beta iota in H2. apply andb_true_iff in H2.
@@ -477,11 +477,11 @@ Lemma simulation : forall steps w s spent w' spent', execute P true w spent step
   exists ps c, Task.plan T s ps c /\ inject_Z c <= (measure w' + spent' - measure w - spent) * (Zpos (cost_scale N) # 1) /\ exists s', Rel w' s'.
 Proof.
   induction steps as [|[i env] steps IH]; intros w s spent w' spent' H R; cbn [execute] in H.
-  - destruct (truth P w None [] (wanted P)) as [[]|] eqn:G; try discriminate. injection H as <- <-. exists [], 0%Z.
+  - destruct (truth P w None [] (goal_formula P)) as [[]|] eqn:G; try discriminate. injection H as <- <-. exists [], 0%Z.
     split; [|split; [setoid_replace (measure w + spent - measure w - spent) with 0 by ring; change (inject_Z 0) with 0; lra|exists s; exact R]].
     constructor. destruct parts as [_ [_ [_ [_ [B _]]]]]. 
     eapply (tree_cases w s R (goal_leaf P T N)); [|apply (conjuncts_ok w s R w unchanged None Undefined); [apply describes_itself|exact eq_refl|exact G]|exact B].
-    intros k o K L. unfold goal_leaf in L. destruct (truth3 P T N k unchanged Undefined [] (wanted P)) as [[]|] eqn:E.
+    intros k o K L. unfold goal_leaf in L. destruct (truth3 P T N k unchanged Undefined [] (goal_formula P)) as [[]|] eqn:E.
     2: { exfalso. apply (truth3_ok P T N w k (base_truth_ok w s R k K) (static_value w s R) K w unchanged None Undefined (describes_itself w) eq_refl) in E. apply E. exact G. }
     all: apply (condition3_ok w s R k K); exact L.
   - destruct (nth_error (actions P) i) as [a|] eqn:Ni; [|discriminate]. destruct (step P true w a env) as [[w1 d]|] eqn:S; [|discriminate].

@@ -97,7 +97,7 @@ Proof.
   - destruct H as [q [E H]]. simpl. intros x X. rewrite E in X. injection X as <-. exact H.
   - rewrite H. destruct (changing N (fst f)) eqn:C; simpl.
     + intros q E. rewrite ev_fluent, E. reflexivity.
-    + rewrite static_value by exact C. cbn [initial value_in]. destruct (find (values P) f); [|exact eq_refl].
+    + rewrite static_value by exact C. cbn [initial value_in]. destruct (find (initial_values P) f); [|exact eq_refl].
       intros x X. injection X as <-. rewrite ev_constant. reflexivity.
 Qed.
 Lemma agrees_plus : forall (f : Q -> Q -> Q) c a b r t, (forall x y, f x y == x + c * y) ->

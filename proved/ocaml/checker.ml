@@ -1,0 +1,2996 @@
+
+(** val negb : bool -> bool **)
+
+let negb = function
+| true -> false
+| false -> true
+
+type nat =
+| O
+| S of nat
+
+(** val option_map : ('a1 -> 'a2) -> 'a1 option -> 'a2 option **)
+
+let option_map f = function
+| Some a -> Some (f a)
+| None -> None
+
+(** val fst : ('a1 * 'a2) -> 'a1 **)
+
+let fst = function
+| (x, _) -> x
+
+(** val snd : ('a1 * 'a2) -> 'a2 **)
+
+let snd = function
+| (_, y) -> y
+
+(** val length : 'a1 list -> nat **)
+
+let rec length = function
+| [] -> O
+| _ :: l' -> S (length l')
+
+(** val app : 'a1 list -> 'a1 list -> 'a1 list **)
+
+let rec app l m =
+  match l with
+  | [] -> m
+  | a :: l1 -> a :: (app l1 m)
+
+type comparison =
+| Eq
+| Lt
+| Gt
+
+(** val compOpp : comparison -> comparison **)
+
+let compOpp = function
+| Eq -> Eq
+| Lt -> Gt
+| Gt -> Lt
+
+module Coq__1 = struct
+ (** val add : nat -> nat -> nat **)
+ let rec add n m =
+   match n with
+   | O -> m
+   | S p -> S (add p m)
+end
+include Coq__1
+
+type positive =
+| XI of positive
+| XO of positive
+| XH
+
+type z =
+| Z0
+| Zpos of positive
+| Zneg of positive
+
+(** val eqb : bool -> bool -> bool **)
+
+let eqb b1 b2 =
+  if b1 then b2 else if b2 then false else true
+
+module type EqLtLe =
+ sig
+  type t
+ end
+
+module MakeOrderTac =
+ functor (O:EqLtLe) ->
+ functor (P:sig
+ end) ->
+ struct
+ end
+
+module Nat =
+ struct
+  (** val eqb : nat -> nat -> bool **)
+
+  let rec eqb n m =
+    match n with
+    | O -> (match m with
+            | O -> true
+            | S _ -> false)
+    | S n' -> (match m with
+               | O -> false
+               | S m' -> eqb n' m')
+ end
+
+module Pos =
+ struct
+  type mask =
+  | IsNul
+  | IsPos of positive
+  | IsNeg
+ end
+
+module Coq_Pos =
+ struct
+  (** val succ : positive -> positive **)
+
+  let rec succ = function
+  | XI p -> XO (succ p)
+  | XO p -> XI p
+  | XH -> XO XH
+
+  (** val add : positive -> positive -> positive **)
+
+  let rec add x y =
+    match x with
+    | XI p ->
+      (match y with
+       | XI q0 -> XO (add_carry p q0)
+       | XO q0 -> XI (add p q0)
+       | XH -> XO (succ p))
+    | XO p ->
+      (match y with
+       | XI q0 -> XI (add p q0)
+       | XO q0 -> XO (add p q0)
+       | XH -> XI p)
+    | XH -> (match y with
+             | XI q0 -> XO (succ q0)
+             | XO q0 -> XI q0
+             | XH -> XO XH)
+
+  (** val add_carry : positive -> positive -> positive **)
+
+  and add_carry x y =
+    match x with
+    | XI p ->
+      (match y with
+       | XI q0 -> XI (add_carry p q0)
+       | XO q0 -> XO (add_carry p q0)
+       | XH -> XI (succ p))
+    | XO p ->
+      (match y with
+       | XI q0 -> XO (add_carry p q0)
+       | XO q0 -> XI (add p q0)
+       | XH -> XO (succ p))
+    | XH ->
+      (match y with
+       | XI q0 -> XI (succ q0)
+       | XO q0 -> XO (succ q0)
+       | XH -> XI XH)
+
+  (** val pred_double : positive -> positive **)
+
+  let rec pred_double = function
+  | XI p -> XI (XO p)
+  | XO p -> XI (pred_double p)
+  | XH -> XH
+
+  type mask = Pos.mask =
+  | IsNul
+  | IsPos of positive
+  | IsNeg
+
+  (** val succ_double_mask : mask -> mask **)
+
+  let succ_double_mask = function
+  | IsNul -> IsPos XH
+  | IsPos p -> IsPos (XI p)
+  | IsNeg -> IsNeg
+
+  (** val double_mask : mask -> mask **)
+
+  let double_mask = function
+  | IsPos p -> IsPos (XO p)
+  | x0 -> x0
+
+  (** val double_pred_mask : positive -> mask **)
+
+  let double_pred_mask = function
+  | XI p -> IsPos (XO (XO p))
+  | XO p -> IsPos (XO (pred_double p))
+  | XH -> IsNul
+
+  (** val sub_mask : positive -> positive -> mask **)
+
+  let rec sub_mask x y =
+    match x with
+    | XI p ->
+      (match y with
+       | XI q0 -> double_mask (sub_mask p q0)
+       | XO q0 -> succ_double_mask (sub_mask p q0)
+       | XH -> IsPos (XO p))
+    | XO p ->
+      (match y with
+       | XI q0 -> succ_double_mask (sub_mask_carry p q0)
+       | XO q0 -> double_mask (sub_mask p q0)
+       | XH -> IsPos (pred_double p))
+    | XH -> (match y with
+             | XH -> IsNul
+             | _ -> IsNeg)
+
+  (** val sub_mask_carry : positive -> positive -> mask **)
+
+  and sub_mask_carry x y =
+    match x with
+    | XI p ->
+      (match y with
+       | XI q0 -> succ_double_mask (sub_mask_carry p q0)
+       | XO q0 -> double_mask (sub_mask p q0)
+       | XH -> IsPos (pred_double p))
+    | XO p ->
+      (match y with
+       | XI q0 -> double_mask (sub_mask_carry p q0)
+       | XO q0 -> succ_double_mask (sub_mask_carry p q0)
+       | XH -> double_pred_mask p)
+    | XH -> IsNeg
+
+  (** val sub : positive -> positive -> positive **)
+
+  let sub x y =
+    match sub_mask x y with
+    | IsPos z0 -> z0
+    | _ -> XH
+
+  (** val mul : positive -> positive -> positive **)
+
+  let rec mul x y =
+    match x with
+    | XI p -> add y (XO (mul p y))
+    | XO p -> XO (mul p y)
+    | XH -> y
+
+  (** val size_nat : positive -> nat **)
+
+  let rec size_nat = function
+  | XI p0 -> S (size_nat p0)
+  | XO p0 -> S (size_nat p0)
+  | XH -> S O
+
+  (** val compare_cont : comparison -> positive -> positive -> comparison **)
+
+  let rec compare_cont r x y =
+    match x with
+    | XI p ->
+      (match y with
+       | XI q0 -> compare_cont r p q0
+       | XO q0 -> compare_cont Gt p q0
+       | XH -> Gt)
+    | XO p ->
+      (match y with
+       | XI q0 -> compare_cont Lt p q0
+       | XO q0 -> compare_cont r p q0
+       | XH -> Gt)
+    | XH -> (match y with
+             | XH -> r
+             | _ -> Lt)
+
+  (** val compare : positive -> positive -> comparison **)
+
+  let compare =
+    compare_cont Eq
+
+  (** val eqb : positive -> positive -> bool **)
+
+  let rec eqb p q0 =
+    match p with
+    | XI p0 -> (match q0 with
+                | XI q1 -> eqb p0 q1
+                | _ -> false)
+    | XO p0 -> (match q0 with
+                | XO q1 -> eqb p0 q1
+                | _ -> false)
+    | XH -> (match q0 with
+             | XH -> true
+             | _ -> false)
+
+  (** val ggcdn :
+      nat -> positive -> positive -> positive * (positive * positive) **)
+
+  let rec ggcdn n a b =
+    match n with
+    | O -> (XH, (a, b))
+    | S n0 ->
+      (match a with
+       | XI a' ->
+         (match b with
+          | XI b' ->
+            (match compare a' b' with
+             | Eq -> (a, (XH, XH))
+             | Lt ->
+               let (g, p) = ggcdn n0 (sub b' a') a in
+               let (ba, aa) = p in (g, (aa, (add aa (XO ba))))
+             | Gt ->
+               let (g, p) = ggcdn n0 (sub a' b') b in
+               let (ab, bb) = p in (g, ((add bb (XO ab)), bb)))
+          | XO b0 ->
+            let (g, p) = ggcdn n0 a b0 in
+            let (aa, bb) = p in (g, (aa, (XO bb)))
+          | XH -> (XH, (a, XH)))
+       | XO a0 ->
+         (match b with
+          | XI _ ->
+            let (g, p) = ggcdn n0 a0 b in
+            let (aa, bb) = p in (g, ((XO aa), bb))
+          | XO b0 -> let (g, p) = ggcdn n0 a0 b0 in ((XO g), p)
+          | XH -> (XH, (a, XH)))
+       | XH -> (XH, (XH, b)))
+
+  (** val ggcd : positive -> positive -> positive * (positive * positive) **)
+
+  let ggcd a b =
+    ggcdn (Coq__1.add (size_nat a) (size_nat b)) a b
+
+  (** val iter_op : ('a1 -> 'a1 -> 'a1) -> positive -> 'a1 -> 'a1 **)
+
+  let rec iter_op op p a =
+    match p with
+    | XI p0 -> op a (iter_op op p0 (op a a))
+    | XO p0 -> iter_op op p0 (op a a)
+    | XH -> a
+
+  (** val to_nat : positive -> nat **)
+
+  let to_nat x =
+    iter_op Coq__1.add x (S O)
+
+  (** val of_nat : nat -> positive **)
+
+  let rec of_nat = function
+  | O -> XH
+  | S x -> (match x with
+            | O -> XH
+            | S _ -> succ (of_nat x))
+
+  (** val eq_dec : positive -> positive -> bool **)
+
+  let rec eq_dec p x0 =
+    match p with
+    | XI p0 -> (match x0 with
+                | XI p1 -> eq_dec p0 p1
+                | _ -> false)
+    | XO p0 -> (match x0 with
+                | XO p1 -> eq_dec p0 p1
+                | _ -> false)
+    | XH -> (match x0 with
+             | XH -> true
+             | _ -> false)
+ end
+
+module Z =
+ struct
+  (** val double : z -> z **)
+
+  let double = function
+  | Z0 -> Z0
+  | Zpos p -> Zpos (XO p)
+  | Zneg p -> Zneg (XO p)
+
+  (** val succ_double : z -> z **)
+
+  let succ_double = function
+  | Z0 -> Zpos XH
+  | Zpos p -> Zpos (XI p)
+  | Zneg p -> Zneg (Coq_Pos.pred_double p)
+
+  (** val pred_double : z -> z **)
+
+  let pred_double = function
+  | Z0 -> Zneg XH
+  | Zpos p -> Zpos (Coq_Pos.pred_double p)
+  | Zneg p -> Zneg (XI p)
+
+  (** val pos_sub : positive -> positive -> z **)
+
+  let rec pos_sub x y =
+    match x with
+    | XI p ->
+      (match y with
+       | XI q0 -> double (pos_sub p q0)
+       | XO q0 -> succ_double (pos_sub p q0)
+       | XH -> Zpos (XO p))
+    | XO p ->
+      (match y with
+       | XI q0 -> pred_double (pos_sub p q0)
+       | XO q0 -> double (pos_sub p q0)
+       | XH -> Zpos (Coq_Pos.pred_double p))
+    | XH ->
+      (match y with
+       | XI q0 -> Zneg (XO q0)
+       | XO q0 -> Zneg (Coq_Pos.pred_double q0)
+       | XH -> Z0)
+
+  (** val add : z -> z -> z **)
+
+  let add x y =
+    match x with
+    | Z0 -> y
+    | Zpos x' ->
+      (match y with
+       | Z0 -> x
+       | Zpos y' -> Zpos (Coq_Pos.add x' y')
+       | Zneg y' -> pos_sub x' y')
+    | Zneg x' ->
+      (match y with
+       | Z0 -> x
+       | Zpos y' -> pos_sub y' x'
+       | Zneg y' -> Zneg (Coq_Pos.add x' y'))
+
+  (** val opp : z -> z **)
+
+  let opp = function
+  | Z0 -> Z0
+  | Zpos x0 -> Zneg x0
+  | Zneg x0 -> Zpos x0
+
+  (** val mul : z -> z -> z **)
+
+  let mul x y =
+    match x with
+    | Z0 -> Z0
+    | Zpos x' ->
+      (match y with
+       | Z0 -> Z0
+       | Zpos y' -> Zpos (Coq_Pos.mul x' y')
+       | Zneg y' -> Zneg (Coq_Pos.mul x' y'))
+    | Zneg x' ->
+      (match y with
+       | Z0 -> Z0
+       | Zpos y' -> Zneg (Coq_Pos.mul x' y')
+       | Zneg y' -> Zpos (Coq_Pos.mul x' y'))
+
+  (** val compare : z -> z -> comparison **)
+
+  let compare x y =
+    match x with
+    | Z0 -> (match y with
+             | Z0 -> Eq
+             | Zpos _ -> Lt
+             | Zneg _ -> Gt)
+    | Zpos x' -> (match y with
+                  | Zpos y' -> Coq_Pos.compare x' y'
+                  | _ -> Gt)
+    | Zneg x' ->
+      (match y with
+       | Zneg y' -> compOpp (Coq_Pos.compare x' y')
+       | _ -> Lt)
+
+  (** val sgn : z -> z **)
+
+  let sgn = function
+  | Z0 -> Z0
+  | Zpos _ -> Zpos XH
+  | Zneg _ -> Zneg XH
+
+  (** val leb : z -> z -> bool **)
+
+  let leb x y =
+    match compare x y with
+    | Gt -> false
+    | _ -> true
+
+  (** val ltb : z -> z -> bool **)
+
+  let ltb x y =
+    match compare x y with
+    | Lt -> true
+    | _ -> false
+
+  (** val eqb : z -> z -> bool **)
+
+  let eqb x y =
+    match x with
+    | Z0 -> (match y with
+             | Z0 -> true
+             | _ -> false)
+    | Zpos p -> (match y with
+                 | Zpos q0 -> Coq_Pos.eqb p q0
+                 | _ -> false)
+    | Zneg p -> (match y with
+                 | Zneg q0 -> Coq_Pos.eqb p q0
+                 | _ -> false)
+
+  (** val min : z -> z -> z **)
+
+  let min n m =
+    match compare n m with
+    | Gt -> m
+    | _ -> n
+
+  (** val abs : z -> z **)
+
+  let abs = function
+  | Zneg p -> Zpos p
+  | x -> x
+
+  (** val to_nat : z -> nat **)
+
+  let to_nat = function
+  | Zpos p -> Coq_Pos.to_nat p
+  | _ -> O
+
+  (** val to_pos : z -> positive **)
+
+  let to_pos = function
+  | Zpos p -> p
+  | _ -> XH
+
+  (** val ggcd : z -> z -> z * (z * z) **)
+
+  let ggcd a b =
+    match a with
+    | Z0 -> ((abs b), (Z0, (sgn b)))
+    | Zpos a0 ->
+      (match b with
+       | Z0 -> ((abs a), ((sgn a), Z0))
+       | Zpos b0 ->
+         let (g, p) = Coq_Pos.ggcd a0 b0 in
+         let (aa, bb) = p in ((Zpos g), ((Zpos aa), (Zpos bb)))
+       | Zneg b0 ->
+         let (g, p) = Coq_Pos.ggcd a0 b0 in
+         let (aa, bb) = p in ((Zpos g), ((Zpos aa), (Zneg bb))))
+    | Zneg a0 ->
+      (match b with
+       | Z0 -> ((abs a), ((sgn a), Z0))
+       | Zpos b0 ->
+         let (g, p) = Coq_Pos.ggcd a0 b0 in
+         let (aa, bb) = p in ((Zpos g), ((Zneg aa), (Zpos bb)))
+       | Zneg b0 ->
+         let (g, p) = Coq_Pos.ggcd a0 b0 in
+         let (aa, bb) = p in ((Zpos g), ((Zneg aa), (Zneg bb))))
+
+  (** val eq_dec : z -> z -> bool **)
+
+  let eq_dec x y =
+    match x with
+    | Z0 -> (match y with
+             | Z0 -> true
+             | _ -> false)
+    | Zpos p -> (match y with
+                 | Zpos p0 -> Coq_Pos.eq_dec p p0
+                 | _ -> false)
+    | Zneg p -> (match y with
+                 | Zneg p0 -> Coq_Pos.eq_dec p p0
+                 | _ -> false)
+ end
+
+(** val zeq_bool : z -> z -> bool **)
+
+let zeq_bool x y =
+  match Z.compare x y with
+  | Eq -> true
+  | _ -> false
+
+(** val nth : nat -> 'a1 list -> 'a1 -> 'a1 **)
+
+let rec nth n l default =
+  match n with
+  | O -> (match l with
+          | [] -> default
+          | x :: _ -> x)
+  | S m -> (match l with
+            | [] -> default
+            | _ :: t0 -> nth m t0 default)
+
+(** val nth_error : 'a1 list -> nat -> 'a1 option **)
+
+let rec nth_error l = function
+| O -> (match l with
+        | [] -> None
+        | x :: _ -> Some x)
+| S n0 -> (match l with
+           | [] -> None
+           | _ :: l0 -> nth_error l0 n0)
+
+(** val list_eq_dec : ('a1 -> 'a1 -> bool) -> 'a1 list -> 'a1 list -> bool **)
+
+let rec list_eq_dec eq_dec0 l l' =
+  match l with
+  | [] -> (match l' with
+           | [] -> true
+           | _ :: _ -> false)
+  | y :: l0 ->
+    (match l' with
+     | [] -> false
+     | a :: l1 -> if eq_dec0 y a then list_eq_dec eq_dec0 l0 l1 else false)
+
+(** val map : ('a1 -> 'a2) -> 'a1 list -> 'a2 list **)
+
+let rec map f = function
+| [] -> []
+| a :: t0 -> (f a) :: (map f t0)
+
+(** val flat_map : ('a1 -> 'a2 list) -> 'a1 list -> 'a2 list **)
+
+let rec flat_map f = function
+| [] -> []
+| x :: t0 -> app (f x) (flat_map f t0)
+
+(** val fold_left : ('a1 -> 'a2 -> 'a1) -> 'a2 list -> 'a1 -> 'a1 **)
+
+let rec fold_left f l a0 =
+  match l with
+  | [] -> a0
+  | b :: t0 -> fold_left f t0 (f a0 b)
+
+(** val fold_right : ('a2 -> 'a1 -> 'a1) -> 'a1 -> 'a2 list -> 'a1 **)
+
+let rec fold_right f a0 = function
+| [] -> a0
+| b :: t0 -> f b (fold_right f a0 t0)
+
+(** val existsb : ('a1 -> bool) -> 'a1 list -> bool **)
+
+let rec existsb f = function
+| [] -> false
+| a :: l0 -> (||) (f a) (existsb f l0)
+
+(** val forallb : ('a1 -> bool) -> 'a1 list -> bool **)
+
+let rec forallb f = function
+| [] -> true
+| a :: l0 -> (&&) (f a) (forallb f l0)
+
+(** val filter : ('a1 -> bool) -> 'a1 list -> 'a1 list **)
+
+let rec filter f = function
+| [] -> []
+| x :: l0 -> if f x then x :: (filter f l0) else filter f l0
+
+(** val find : ('a1 -> bool) -> 'a1 list -> 'a1 option **)
+
+let rec find f = function
+| [] -> None
+| x :: tl -> if f x then Some x else find f tl
+
+(** val combine : 'a1 list -> 'a2 list -> ('a1 * 'a2) list **)
+
+let rec combine l l' =
+  match l with
+  | [] -> []
+  | x :: tl ->
+    (match l' with
+     | [] -> []
+     | y :: tl' -> (x, y) :: (combine tl tl'))
+
+(** val seq : nat -> nat -> nat list **)
+
+let rec seq start = function
+| O -> []
+| S len0 -> start :: (seq (S start) len0)
+
+type q = { qnum : z; qden : positive }
+
+(** val inject_Z : z -> q **)
+
+let inject_Z x =
+  { qnum = x; qden = XH }
+
+(** val qeq_bool : q -> q -> bool **)
+
+let qeq_bool x y =
+  zeq_bool (Z.mul x.qnum (Zpos y.qden)) (Z.mul y.qnum (Zpos x.qden))
+
+(** val qle_bool : q -> q -> bool **)
+
+let qle_bool x y =
+  Z.leb (Z.mul x.qnum (Zpos y.qden)) (Z.mul y.qnum (Zpos x.qden))
+
+(** val qplus : q -> q -> q **)
+
+let qplus x y =
+  { qnum = (Z.add (Z.mul x.qnum (Zpos y.qden)) (Z.mul y.qnum (Zpos x.qden)));
+    qden = (Coq_Pos.mul x.qden y.qden) }
+
+(** val qmult : q -> q -> q **)
+
+let qmult x y =
+  { qnum = (Z.mul x.qnum y.qnum); qden = (Coq_Pos.mul x.qden y.qden) }
+
+(** val qopp : q -> q **)
+
+let qopp x =
+  { qnum = (Z.opp x.qnum); qden = x.qden }
+
+(** val qminus : q -> q -> q **)
+
+let qminus x y =
+  qplus x (qopp y)
+
+(** val qinv : q -> q **)
+
+let qinv x =
+  match x.qnum with
+  | Z0 -> { qnum = Z0; qden = XH }
+  | Zpos p -> { qnum = (Zpos x.qden); qden = p }
+  | Zneg p -> { qnum = (Zneg x.qden); qden = p }
+
+(** val qdiv : q -> q -> q **)
+
+let qdiv x y =
+  qmult x (qinv y)
+
+(** val qred : q -> q **)
+
+let qred q0 =
+  let { qnum = q1; qden = q2 } = q0 in
+  let (r1, r2) = snd (Z.ggcd q1 (Zpos q2)) in
+  { qnum = r1; qden = (Z.to_pos r2) }
+
+type 'x compare0 =
+| LT
+| EQ
+| GT
+
+module type OrderedType =
+ sig
+  type t
+
+  val compare : t -> t -> t compare0
+
+  val eq_dec : t -> t -> bool
+ end
+
+module OrderedTypeFacts =
+ functor (O:OrderedType) ->
+ struct
+  module TO =
+   struct
+    type t = O.t
+   end
+
+  module IsTO =
+   struct
+   end
+
+  module OrderTac = MakeOrderTac(TO)(IsTO)
+
+  (** val eq_dec : O.t -> O.t -> bool **)
+
+  let eq_dec =
+    O.eq_dec
+
+  (** val lt_dec : O.t -> O.t -> bool **)
+
+  let lt_dec x y =
+    match O.compare x y with
+    | LT -> true
+    | _ -> false
+
+  (** val eqb : O.t -> O.t -> bool **)
+
+  let eqb x y =
+    if eq_dec x y then true else false
+ end
+
+module KeyOrderedType =
+ functor (O:OrderedType) ->
+ struct
+  module MO = OrderedTypeFacts(O)
+ end
+
+module PositiveOrderedTypeBits =
+ struct
+  type t = positive
+
+  (** val compare : t -> t -> positive compare0 **)
+
+  let rec compare p y =
+    match p with
+    | XI p0 -> (match y with
+                | XI p1 -> compare p0 p1
+                | _ -> GT)
+    | XO p0 -> (match y with
+                | XO p1 -> compare p0 p1
+                | _ -> LT)
+    | XH -> (match y with
+             | XI _ -> LT
+             | XO _ -> GT
+             | XH -> EQ)
+
+  (** val eq_dec : positive -> positive -> bool **)
+
+  let eq_dec x y =
+    match Coq_Pos.compare x y with
+    | Eq -> true
+    | _ -> false
+ end
+
+(** val append : positive -> positive -> positive **)
+
+let rec append i j =
+  match i with
+  | XI ii -> XI (append ii j)
+  | XO ii -> XO (append ii j)
+  | XH -> j
+
+module PositiveMap =
+ struct
+  module E = PositiveOrderedTypeBits
+
+  module ME = KeyOrderedType(E)
+
+  type key = positive
+
+  type 'a tree =
+  | Leaf
+  | Node of 'a tree * 'a option * 'a tree
+
+  type 'a t = 'a tree
+
+  (** val empty : 'a1 t **)
+
+  let empty =
+    Leaf
+
+  (** val is_empty : 'a1 t -> bool **)
+
+  let rec is_empty = function
+  | Leaf -> true
+  | Node (l, o, r) ->
+    (match o with
+     | Some _ -> false
+     | None -> (&&) (is_empty l) (is_empty r))
+
+  (** val find : key -> 'a1 t -> 'a1 option **)
+
+  let rec find i = function
+  | Leaf -> None
+  | Node (l, o, r) ->
+    (match i with
+     | XI ii -> find ii r
+     | XO ii -> find ii l
+     | XH -> o)
+
+  (** val mem : key -> 'a1 t -> bool **)
+
+  let rec mem i = function
+  | Leaf -> false
+  | Node (l, o, r) ->
+    (match i with
+     | XI ii -> mem ii r
+     | XO ii -> mem ii l
+     | XH -> (match o with
+              | Some _ -> true
+              | None -> false))
+
+  (** val add : key -> 'a1 -> 'a1 t -> 'a1 t **)
+
+  let rec add i v = function
+  | Leaf ->
+    (match i with
+     | XI ii -> Node (Leaf, None, (add ii v Leaf))
+     | XO ii -> Node ((add ii v Leaf), None, Leaf)
+     | XH -> Node (Leaf, (Some v), Leaf))
+  | Node (l, o, r) ->
+    (match i with
+     | XI ii -> Node (l, o, (add ii v r))
+     | XO ii -> Node ((add ii v l), o, r)
+     | XH -> Node (l, (Some v), r))
+
+  (** val remove : key -> 'a1 t -> 'a1 t **)
+
+  let rec remove i m =
+    match i with
+    | XI ii ->
+      (match m with
+       | Leaf -> Leaf
+       | Node (l, o, r) ->
+         (match l with
+          | Leaf ->
+            (match o with
+             | Some _ -> Node (l, o, (remove ii r))
+             | None ->
+               (match remove ii r with
+                | Leaf -> Leaf
+                | Node (t0, o0, t1) -> Node (Leaf, None, (Node (t0, o0, t1)))))
+          | Node (_, _, _) -> Node (l, o, (remove ii r))))
+    | XO ii ->
+      (match m with
+       | Leaf -> Leaf
+       | Node (l, o, r) ->
+         (match o with
+          | Some _ -> Node ((remove ii l), o, r)
+          | None ->
+            (match r with
+             | Leaf ->
+               (match remove ii l with
+                | Leaf -> Leaf
+                | Node (t0, o0, t1) -> Node ((Node (t0, o0, t1)), None, Leaf))
+             | Node (_, _, _) -> Node ((remove ii l), o, r))))
+    | XH ->
+      (match m with
+       | Leaf -> Leaf
+       | Node (l, _, r) ->
+         (match l with
+          | Leaf ->
+            (match r with
+             | Leaf -> Leaf
+             | Node (_, _, _) -> Node (l, None, r))
+          | Node (_, _, _) -> Node (l, None, r)))
+
+  (** val xelements : 'a1 t -> key -> (key * 'a1) list **)
+
+  let rec xelements m i =
+    match m with
+    | Leaf -> []
+    | Node (l, o, r) ->
+      (match o with
+       | Some x ->
+         app (xelements l (append i (XO XH))) ((i,
+           x) :: (xelements r (append i (XI XH))))
+       | None ->
+         app (xelements l (append i (XO XH))) (xelements r (append i (XI XH))))
+
+  (** val elements : 'a1 t -> (key * 'a1) list **)
+
+  let elements m =
+    xelements m XH
+
+  (** val cardinal : 'a1 t -> nat **)
+
+  let rec cardinal = function
+  | Leaf -> O
+  | Node (l, o, r) ->
+    (match o with
+     | Some _ -> S (Coq__1.add (cardinal l) (cardinal r))
+     | None -> Coq__1.add (cardinal l) (cardinal r))
+
+  (** val xfind : key -> key -> 'a1 t -> 'a1 option **)
+
+  let rec xfind i j m =
+    match i with
+    | XI ii ->
+      (match j with
+       | XI jj -> xfind ii jj m
+       | XO _ -> None
+       | XH -> find i m)
+    | XO ii ->
+      (match j with
+       | XI _ -> None
+       | XO jj -> xfind ii jj m
+       | XH -> find i m)
+    | XH -> (match j with
+             | XH -> find i m
+             | _ -> None)
+
+  (** val xmapi : (key -> 'a1 -> 'a2) -> 'a1 t -> key -> 'a2 t **)
+
+  let rec xmapi f m i =
+    match m with
+    | Leaf -> Leaf
+    | Node (l, o, r) ->
+      Node ((xmapi f l (append i (XO XH))), (option_map (f i) o),
+        (xmapi f r (append i (XI XH))))
+
+  (** val mapi : (key -> 'a1 -> 'a2) -> 'a1 t -> 'a2 t **)
+
+  let mapi f m =
+    xmapi f m XH
+
+  (** val map : ('a1 -> 'a2) -> 'a1 t -> 'a2 t **)
+
+  let map f m =
+    mapi (fun _ -> f) m
+
+  (** val xmap2_l :
+      ('a1 option -> 'a2 option -> 'a3 option) -> 'a1 t -> 'a3 t **)
+
+  let rec xmap2_l f = function
+  | Leaf -> Leaf
+  | Node (l, o, r) -> Node ((xmap2_l f l), (f o None), (xmap2_l f r))
+
+  (** val xmap2_r :
+      ('a1 option -> 'a2 option -> 'a3 option) -> 'a2 t -> 'a3 t **)
+
+  let rec xmap2_r f = function
+  | Leaf -> Leaf
+  | Node (l, o, r) -> Node ((xmap2_r f l), (f None o), (xmap2_r f r))
+
+  (** val _map2 :
+      ('a1 option -> 'a2 option -> 'a3 option) -> 'a1 t -> 'a2 t -> 'a3 t **)
+
+  let rec _map2 f m1 m2 =
+    match m1 with
+    | Leaf -> xmap2_r f m2
+    | Node (l1, o1, r1) ->
+      (match m2 with
+       | Leaf -> xmap2_l f m1
+       | Node (l2, o2, r2) ->
+         Node ((_map2 f l1 l2), (f o1 o2), (_map2 f r1 r2)))
+
+  (** val map2 :
+      ('a1 option -> 'a2 option -> 'a3 option) -> 'a1 t -> 'a2 t -> 'a3 t **)
+
+  let map2 f =
+    _map2 (fun o1 o2 ->
+      match o1 with
+      | Some _ -> f o1 o2
+      | None -> (match o2 with
+                 | Some _ -> f o1 o2
+                 | None -> None))
+
+  (** val xfoldi :
+      (key -> 'a1 -> 'a2 -> 'a2) -> 'a1 t -> 'a2 -> key -> 'a2 **)
+
+  let rec xfoldi f m v i =
+    match m with
+    | Leaf -> v
+    | Node (l, o, r) ->
+      (match o with
+       | Some x ->
+         xfoldi f r (f i x (xfoldi f l v (append i (XO XH))))
+           (append i (XI XH))
+       | None ->
+         xfoldi f r (xfoldi f l v (append i (XO XH))) (append i (XI XH)))
+
+  (** val fold : (key -> 'a1 -> 'a2 -> 'a2) -> 'a1 t -> 'a2 -> 'a2 **)
+
+  let fold f m i =
+    xfoldi f m i XH
+
+  (** val equal : ('a1 -> 'a1 -> bool) -> 'a1 t -> 'a1 t -> bool **)
+
+  let rec equal cmp m1 m2 =
+    match m1 with
+    | Leaf -> is_empty m2
+    | Node (l1, o1, r1) ->
+      (match m2 with
+       | Leaf -> is_empty m1
+       | Node (l2, o2, r2) ->
+         (&&)
+           ((&&)
+             (match o1 with
+              | Some v1 ->
+                (match o2 with
+                 | Some v2 -> cmp v1 v2
+                 | None -> false)
+              | None -> (match o2 with
+                         | Some _ -> false
+                         | None -> true)) (equal cmp l1 l2)) (equal cmp r1 r2))
+ end
+
+module M = PositiveMap
+
+type key0 = positive
+
+(** val get : z M.t -> key0 -> z **)
+
+let get m k =
+  match M.find k m with
+  | Some x -> x
+  | None -> Z0
+
+type state = { sv : z M.t; sn : z M.t }
+
+(** val val0 : state -> key0 -> z **)
+
+let val0 s =
+  get s.sv
+
+(** val num : state -> key0 -> z **)
+
+let num s =
+  get s.sn
+
+type fact = key0 * z
+
+type literal = fact * bool
+
+type choice = z list
+
+type quantity = { qconst : z; qtables : (nat list * z M.t) list }
+
+type linear = { factors : (key0 * z) list; rest : quantity }
+
+type condition = { facts : fact list; clauses : literal list list;
+                   comparisons : linear list }
+
+type operator = { ident : z; sizes : z list;
+                  excluded : (nat list * z list list) list; pre : condition;
+                  effects : fact list;
+                  conditional : (literal list * fact list) list;
+                  changes : (key0 * linear) list; cost : quantity }
+
+type task = { basic : z; derived : (key0 * z) list; size : z M.t;
+              numbers : key0 list; init : state; operators : operator list;
+              layers : (fact * condition) list list; goal : condition }
+
+(** val row : z list -> choice -> nat list -> z **)
+
+let row sizes0 ch slots =
+  fold_left (fun r i -> Z.add (Z.mul r (nth i sizes0 Z0)) (nth i ch Z0))
+    slots Z0
+
+(** val amount : quantity -> z list -> choice -> z **)
+
+let amount q0 sizes0 ch =
+  fold_left (fun a t0 ->
+    Z.add a
+      (get (snd t0) (Z.to_pos (Z.add (row sizes0 ch (fst t0)) (Zpos XH)))))
+    q0.qtables q0.qconst
+
+(** val value : linear -> state -> z list -> choice -> z **)
+
+let value l s sizes0 ch =
+  fold_left (fun a t0 -> Z.add a (Z.mul (num s (fst t0)) (snd t0))) l.factors
+    (amount l.rest sizes0 ch)
+
+(** val is_fact : state -> fact -> bool **)
+
+let is_fact s f =
+  Z.eqb (val0 s (fst f)) (snd f)
+
+(** val is_literal : state -> literal -> bool **)
+
+let is_literal s l =
+  eqb (is_fact s (fst l)) (snd l)
+
+(** val holds_facts : condition -> state -> bool **)
+
+let holds_facts c s =
+  (&&) (forallb (is_fact s) c.facts)
+    (forallb (existsb (is_literal s)) c.clauses)
+
+(** val holds : condition -> state -> z list -> choice -> bool **)
+
+let holds c s sizes0 ch =
+  (&&) (holds_facts c s)
+    (forallb (fun l -> Z.leb Z0 (value l s sizes0 ch)) c.comparisons)
+
+(** val puts : fact list -> z M.t -> z M.t **)
+
+let puts fs m =
+  fold_left (fun m0 f -> M.add (fst f) (snd f) m0) fs m
+
+(** val basics : task -> key0 list **)
+
+let basics t0 =
+  map Coq_Pos.of_nat (seq (S O) (Z.to_nat t0.basic))
+
+(** val reset : task -> state -> state **)
+
+let reset t0 s =
+  { sv =
+    (puts t0.derived
+      (puts (map (fun v -> (v, (val0 s v))) (basics t0)) M.empty)); sn =
+    (puts (map (fun n -> (n, (num s n))) t0.numbers) M.empty) }
+
+(** val news : (fact * condition) list -> state -> fact list **)
+
+let news rules s =
+  map fst
+    (filter (fun r ->
+      (&&) (negb (is_fact s (fst r))) (holds (snd r) s [] [])) rules)
+
+(** val layer : nat -> (fact * condition) list -> state -> state **)
+
+let rec layer fuel rules s =
+  match fuel with
+  | O -> s
+  | S fuel0 ->
+    (match news rules s with
+     | [] -> s
+     | f :: l -> layer fuel0 rules { sv = (puts (f :: l) s.sv); sn = s.sn })
+
+(** val derive : task -> state -> state **)
+
+let derive t0 s =
+  fold_left (fun s0 rules -> layer (S (length rules)) rules s0) t0.layers
+    (reset t0 s)
+
+(** val fired : state -> (literal list * fact list) -> bool **)
+
+let fired s c =
+  forallb (is_literal s) (fst c)
+
+(** val makes : operator -> state -> fact list **)
+
+let makes o s =
+  app o.effects (flat_map snd (filter (fired s) o.conditional))
+
+(** val apply : operator -> state -> choice -> state **)
+
+let apply o s ch =
+  { sv = (puts (makes o s) s.sv); sn =
+    (puts (map (fun c -> ((fst c), (value (snd c) s o.sizes ch))) o.changes)
+      s.sn) }
+
+type table = { pattern : key0 list; entries : z option M.t }
+
+type label = { at_state : state; paid : z }
+
+type argument = { potentials : table list; needs : (key0 * table) list;
+                  labels : label M.t; count : positive }
+
+(** val upto : nat -> z -> z list **)
+
+let rec upto k x =
+  match k with
+  | O -> []
+  | S k0 -> x :: (upto k0 (Z.add x (Zpos XH)))
+
+(** val range : z -> z list **)
+
+let range n =
+  upto (Z.to_nat n) Z0
+
+(** val combos : z list -> choice list **)
+
+let rec combos = function
+| [] -> [] :: []
+| n :: r -> flat_map (fun x -> map (fun x0 -> x :: x0) (combos r)) (range n)
+
+(** val eq_list : z list -> z list -> bool **)
+
+let eq_list a b =
+  if list_eq_dec Z.eq_dec a b then true else false
+
+(** val admits : operator -> choice -> bool **)
+
+let admits o ch =
+  forallb (fun e ->
+    negb (existsb (eq_list (map (fun i -> nth i ch Z0) (fst e))) (snd e)))
+    o.excluded
+
+(** val choices : operator -> choice list **)
+
+let choices o =
+  filter (admits o) (combos o.sizes)
+
+(** val lookup : key0 -> fact list -> z option **)
+
+let lookup v fs =
+  match find (fun f -> Coq_Pos.eqb (fst f) v) fs with
+  | Some f -> Some (snd f)
+  | None -> None
+
+(** val matching : task -> key0 list -> fact list -> z list list **)
+
+let rec matching t0 pat fs =
+  match pat with
+  | [] -> [] :: []
+  | v :: r ->
+    flat_map (fun x -> map (fun x0 -> x :: x0) (matching t0 r fs))
+      (match lookup v fs with
+       | Some x -> x :: []
+       | None -> range (get t0.size v))
+
+(** val last_put : fact list -> key0 -> z -> z **)
+
+let rec last_put fs v x =
+  match fs with
+  | [] -> x
+  | f :: r -> last_put r v (if Coq_Pos.eqb (fst f) v then snd f else x)
+
+(** val after : key0 list -> z list -> fact list -> z list **)
+
+let rec after pat vals fs =
+  match pat with
+  | [] -> []
+  | v :: p ->
+    (match vals with
+     | [] -> []
+     | x :: r -> (last_put fs v x) :: (after p r fs))
+
+(** val value_in : key0 list -> z list -> key0 -> z option **)
+
+let rec value_in pat vals v =
+  match pat with
+  | [] -> None
+  | w :: p ->
+    (match vals with
+     | [] -> None
+     | x :: r -> if Coq_Pos.eqb w v then Some x else value_in p r v)
+
+(** val truth : key0 list -> z list -> literal -> bool option **)
+
+let truth pat vals l =
+  match value_in pat vals (fst (fst l)) with
+  | Some x -> Some (eqb (Z.eqb x (snd (fst l))) (snd l))
+  | None -> None
+
+(** val targets :
+    key0 list -> z list -> (literal list * fact list) list -> z list list ->
+    z list list **)
+
+let rec targets pat vals cs ts =
+  match cs with
+  | [] -> ts
+  | c :: r ->
+    let tr = map (truth pat vals) (fst c) in
+    if existsb (fun t0 ->
+         match t0 with
+         | Some y -> if y then false else true
+         | None -> false) tr
+    then targets pat vals r ts
+    else let new0 = map (fun t0 -> after pat t0 (snd c)) ts in
+         if forallb (fun t0 -> match t0 with
+                               | Some y -> y
+                               | None -> false) tr
+         then targets pat vals r new0
+         else targets pat vals r (app ts new0)
+
+(** val all_targets : key0 list -> operator -> z list -> z list list **)
+
+let all_targets pat o vals =
+  targets pat vals o.conditional ((after pat vals o.effects) :: [])
+
+(** val memb : key0 -> key0 list -> bool **)
+
+let memb v pat =
+  existsb (Coq_Pos.eqb v) pat
+
+(** val touches : key0 list -> operator -> bool **)
+
+let touches pat o =
+  existsb (fun f -> memb (fst f) pat)
+    (app o.pre.facts (app o.effects (flat_map snd o.conditional)))
+
+(** val index : task -> key0 list -> z list -> z **)
+
+let index t0 pat vals =
+  fold_left (fun r vx -> Z.add (Z.mul r (get t0.size (fst vx))) (snd vx))
+    (combine pat vals) Z0
+
+(** val bound : task -> table -> z list -> z option **)
+
+let bound t0 t1 vals =
+  match M.find (Z.to_pos (Z.add (index t0 t1.pattern vals) (Zpos XH)))
+          t1.entries with
+  | Some b -> b
+  | None -> Some Z0
+
+(** val at_most : z option -> z option -> z -> bool **)
+
+let at_most a b step0 =
+  match b with
+  | Some y -> (match a with
+               | Some x -> Z.leb x (Z.add y step0)
+               | None -> false)
+  | None -> true
+
+(** val minimum : z list -> z option **)
+
+let minimum xs =
+  fold_right (fun x m ->
+    match m with
+    | Some y -> Some (Z.min x y)
+    | None -> Some x) None xs
+
+type prepared = operator * (choice list * z option)
+
+(** val prepare : operator -> prepared **)
+
+let prepare o =
+  (o, ((choices o), (minimum (map (amount o.cost o.sizes) (choices o)))))
+
+(** val pot_op : task -> table -> prepared -> bool **)
+
+let pot_op t0 t1 = function
+| (o, p0) ->
+  let (_, least) = p0 in
+  (match least with
+   | Some least0 ->
+     if touches t1.pattern o
+     then forallb (fun vals ->
+            forallb (fun tgt ->
+              at_most (bound t0 t1 vals) (bound t0 t1 tgt) least0)
+              (all_targets t1.pattern o vals))
+            (matching t0 t1.pattern o.pre.facts)
+     else Z.leb Z0 least0
+   | None -> true)
+
+(** val is_basic : task -> key0 -> bool **)
+
+let is_basic t0 v =
+  Z.leb (Zpos v) t0.basic
+
+(** val check_pot : task -> prepared list -> table -> bool **)
+
+let check_pot t0 ops t1 =
+  (&&)
+    ((&&) (forallb (is_basic t0) t1.pattern)
+      (forallb (fun vals -> at_most (bound t0 t1 vals) (Some Z0) Z0)
+        (matching t0 t1.pattern t0.goal.facts))) (forallb (pot_op t0 t1) ops)
+
+(** val alone : linear -> key0 -> bool **)
+
+let alone l n =
+  match l.factors with
+  | [] -> false
+  | p :: l0 ->
+    let (m, f) = p in
+    (match l0 with
+     | [] -> (&&) (Coq_Pos.eqb m n) (Z.eqb f (Zpos XH))
+     | _ :: _ -> false)
+
+(** val lowers : key0 -> prepared -> z option **)
+
+let lowers n = function
+| (o, p0) ->
+  let (chs, _) = p0 in
+  (match filter (fun c -> Coq_Pos.eqb (fst c) n) o.changes with
+   | [] -> Some Z0
+   | p1 :: l0 ->
+     let (_, l) = p1 in
+     (match l0 with
+      | [] ->
+        if alone l n
+        then (match minimum
+                      (map (fun ch -> Z.opp (amount l.rest o.sizes ch)) chs) with
+              | Some least ->
+                if (&&) (Z.leb Z0 least)
+                     ((||) (Z.eqb least Z0)
+                       (forallb (fun ch ->
+                         existsb (fun c ->
+                           (&&) (alone c n)
+                             (Z.leb (amount c.rest o.sizes ch)
+                               (amount l.rest o.sizes ch))) o.pre.comparisons)
+                         chs))
+                then Some least
+                else None
+              | None -> Some Z0)
+        else None
+      | _ :: _ -> None))
+
+(** val zero : z option -> bool **)
+
+let zero = function
+| Some x -> Z.eqb x Z0
+| None -> false
+
+(** val none : z option -> bool **)
+
+let none = function
+| Some _ -> false
+| None -> true
+
+(** val need_op : task -> table -> key0 -> bool -> prepared -> bool **)
+
+let need_op t0 t1 n allzero p =
+  let o = fst p in
+  if touches t1.pattern o
+  then forallb (fun vals ->
+         forallb (fun tgt ->
+           match lowers n p with
+           | Some least -> at_most (bound t0 t1 vals) (bound t0 t1 tgt) least
+           | None ->
+             (||) (zero (bound t0 t1 vals))
+               ((&&) (none (bound t0 t1 vals)) (none (bound t0 t1 tgt))))
+           (all_targets t1.pattern o vals))
+         (matching t0 t1.pattern o.pre.facts)
+  else (match lowers n p with
+        | Some _ -> true
+        | None -> allzero)
+
+(** val check_need : task -> prepared list -> (key0 * table) -> bool **)
+
+let check_need t0 ops = function
+| (n, t1) ->
+  (&&)
+    ((&&)
+      ((&&) ((&&) (memb n t0.numbers) (forallb (is_basic t0) t1.pattern))
+        (forallb (fun vals ->
+          match bound t0 t1 vals with
+          | Some x -> Z.leb Z0 x
+          | None -> true) (matching t0 t1.pattern [])))
+      (forallb (fun vals ->
+        match bound t0 t1 vals with
+        | Some k ->
+          (||) (Z.leb k Z0)
+            (existsb (fun l ->
+              (&&) (alone l n) (Z.leb k (Z.opp (amount l.rest [] []))))
+              t0.goal.comparisons)
+        | None -> false) (matching t0 t1.pattern t0.goal.facts)))
+    (let allzero =
+       forallb (fun vals ->
+         (||) (zero (bound t0 t1 vals)) (none (bound t0 t1 vals)))
+         (matching t0 t1.pattern [])
+     in
+     forallb (need_op t0 t1 n allzero) ops)
+
+type entry = choice * (z * z list)
+
+(** val profile : operator -> choice -> z list **)
+
+let profile o ch =
+  map (fun l -> amount l.rest o.sizes ch)
+    (app o.pre.comparisons (map snd o.changes))
+
+(** val fits : bool -> z list -> z list -> bool **)
+
+let rec fits mono a b =
+  match a with
+  | [] -> (match b with
+           | [] -> true
+           | _ :: _ -> false)
+  | x :: a0 ->
+    (match b with
+     | [] -> false
+     | y :: b0 ->
+       (&&) (if mono then Z.leb y x else Z.eqb x y) (fits mono a0 b0))
+
+(** val as_good : bool -> entry -> entry -> bool **)
+
+let as_good mono a b =
+  (&&) (Z.leb (fst (snd a)) (fst (snd b)))
+    (fits mono (snd (snd a)) (snd (snd b)))
+
+(** val front : bool -> operator -> choice list **)
+
+let front mono o =
+  let all =
+    map (fun ch -> (ch, ((amount o.cost o.sizes ch), (profile o ch))))
+      (choices o)
+  in
+  let some =
+    fold_left (fun f e ->
+      if existsb (fun x -> as_good mono x e) f
+      then f
+      else e :: (filter (fun x -> negb (as_good mono e x)) f)) all []
+  in
+  if forallb (fun e -> existsb (fun x -> as_good mono x e) some) all
+  then map fst some
+  else choices o
+
+(** val nonneg : linear -> bool **)
+
+let nonneg l =
+  forallb (fun f -> Z.leb Z0 (snd f)) l.factors
+
+(** val more_never_hurts : task -> bool **)
+
+let more_never_hurts t0 =
+  (&&)
+    ((&&)
+      (forallb (fun o ->
+        (&&) (forallb nonneg o.pre.comparisons)
+          (forallb (fun c -> nonneg (snd c)) o.changes)) t0.operators)
+      (forallb nonneg t0.goal.comparisons))
+    (forallb
+      (forallb (fun r ->
+        match (snd r).comparisons with
+        | [] -> true
+        | _ :: _ -> false)) t0.layers)
+
+(** val numbers_fit : bool -> z M.t -> z M.t -> key0 list -> bool **)
+
+let numbers_fit mono a b ns =
+  forallb (fun n ->
+    if mono then Z.leb (get b n) (get a n) else Z.eqb (get a n) (get b n)) ns
+
+(** val pot_cuts : task -> z option -> state -> z -> table -> bool **)
+
+let pot_cuts t0 claim s p t1 =
+  match bound t0 t1 (map (val0 s) t1.pattern) with
+  | Some more ->
+    (match claim with
+     | Some c -> Z.leb c (Z.add p more)
+     | None -> false)
+  | None -> true
+
+(** val need_cuts : task -> state -> (key0 * table) -> bool **)
+
+let need_cuts t0 s nt =
+  match bound t0 (snd nt) (map (val0 s) (snd nt).pattern) with
+  | Some k -> (&&) (Z.ltb Z0 k) (Z.ltb (num s (fst nt)) k)
+  | None -> true
+
+(** val label_covers :
+    task -> bool -> key0 list -> state -> z -> label -> bool **)
+
+let label_covers t0 mono bs s p l =
+  (&&)
+    ((&&) (Z.leb l.paid p)
+      (forallb (fun v -> Z.eqb (val0 l.at_state v) (val0 s v)) bs))
+    (numbers_fit mono l.at_state.sn s.sn t0.numbers)
+
+(** val covered :
+    task -> argument -> z option -> (state -> positive list) -> bool -> key0
+    list -> state -> z -> bool **)
+
+let covered t0 a claim oracle mono bs s p =
+  (||)
+    ((||) (existsb (pot_cuts t0 claim s p) a.potentials)
+      (existsb (need_cuts t0 s) a.needs))
+    (existsb (fun i ->
+      match M.find i a.labels with
+      | Some l -> label_covers t0 mono bs s p l
+      | None -> false) (oracle s))
+
+(** val check_label :
+    task -> argument -> z option -> (state -> positive list) -> bool -> key0
+    list -> (operator * choice list) list -> label -> bool **)
+
+let check_label t0 a claim oracle mono bs ops l =
+  let s = derive t0 l.at_state in
+  (&&)
+    (negb
+      ((&&) (holds t0.goal s [] [])
+        (match claim with
+         | Some c -> Z.ltb l.paid c
+         | None -> true)))
+    (forallb (fun p ->
+      let o = fst p in
+      if holds_facts o.pre s
+      then forallb (fun ch ->
+             if holds o.pre s o.sizes ch
+             then covered t0 a claim oracle mono bs (apply o s ch)
+                    (Z.add l.paid (amount o.cost o.sizes ch))
+             else true) (snd p)
+      else true) ops)
+
+(** val in_range : task -> key0 -> z -> bool **)
+
+let in_range t0 v x =
+  (&&) (Z.leb Z0 x) (Z.ltb x (get t0.size v))
+
+(** val sound_fact : task -> fact -> bool **)
+
+let sound_fact t0 f =
+  (&&) (is_basic t0 (fst f)) (in_range t0 (fst f) (snd f))
+
+(** val distinct : key0 list -> bool **)
+
+let rec distinct = function
+| [] -> true
+| k :: r -> (&&) (negb (memb k r)) (distinct r)
+
+(** val check_task : task -> bool **)
+
+let check_task t0 =
+  (&&)
+    ((&&)
+      ((&&) (forallb (fun v -> in_range t0 v (val0 t0.init v)) (basics t0))
+        (forallb (fun o ->
+          (&&)
+            ((&&) (forallb (sound_fact t0) o.effects)
+              (forallb (fun c -> forallb (sound_fact t0) (snd c))
+                o.conditional)) (distinct (map fst o.changes))) t0.operators))
+      (forallb (forallb (fun r -> negb (is_basic t0 (fst (fst r)))))
+        t0.layers)) (forallb (fun d -> negb (is_basic t0 (fst d))) t0.derived)
+
+(** val check :
+    task -> argument -> z option -> (state -> positive list) -> bool **)
+
+let check t0 a claim oracle =
+  match claim with
+  | Some _ ->
+    let ops = map prepare t0.operators in
+    let mono = more_never_hurts t0 in
+    let bs = basics t0 in
+    (&&)
+      ((&&)
+        ((&&)
+          ((&&) (check_task t0) (forallb (check_pot t0 ops) a.potentials))
+          (forallb (check_need t0 ops) a.needs))
+        (covered t0 a claim oracle mono bs t0.init Z0))
+      (let fronts = map (fun o -> (o, (front mono o))) t0.operators in
+       forallb (fun il ->
+         check_label t0 a claim oracle mono bs fronts (snd il))
+         (M.elements a.labels))
+  | None ->
+    if existsb (fun c -> match c with
+                         | [] -> true
+                         | _ :: _ -> false) t0.goal.clauses
+    then true
+    else let ops = map prepare t0.operators in
+         let mono = more_never_hurts t0 in
+         let bs = basics t0 in
+         (&&)
+           ((&&)
+             ((&&)
+               ((&&) (check_task t0)
+                 (forallb (check_pot t0 ops) a.potentials))
+               (forallb (check_need t0 ops) a.needs))
+             (covered t0 a claim oracle mono bs t0.init Z0))
+           (let fronts = map (fun o -> (o, (front mono o))) t0.operators in
+            forallb (fun il ->
+              check_label t0 a claim oracle mono bs fronts (snd il))
+              (M.elements a.labels))
+
+type key1 = positive
+
+type atom = key1 * key1 list
+
+(** val atom_eqb : atom -> atom -> bool **)
+
+let atom_eqb a b =
+  (&&) (Coq_Pos.eqb (fst a) (fst b))
+    (if list_eq_dec Coq_Pos.eq_dec (snd a) (snd b) then true else false)
+
+(** val assoc : atom -> (atom * 'a1) list -> 'a1 option **)
+
+let rec assoc a = function
+| [] -> None
+| p :: r -> let (b, x) = p in if atom_eqb a b then Some x else assoc a r
+
+type 'x index0 = (atom * 'x) list PositiveMap.t
+
+(** val bucket : atom -> positive **)
+
+let bucket a =
+  fold_left (fun h o ->
+    Coq_Pos.add (XO (XO (XO (XO (XO (XO (XO (XO (XO (XO (XO (XO h))))))))))))
+      o) (snd a) (fst a)
+
+(** val entries0 : 'a1 index0 -> atom -> (atom * 'a1) list **)
+
+let entries0 m a =
+  match PositiveMap.find (bucket a) m with
+  | Some l -> l
+  | None -> []
+
+(** val find0 : 'a1 index0 -> atom -> 'a1 option **)
+
+let find0 m a =
+  assoc a (entries0 m a)
+
+(** val insert : atom -> 'a1 -> 'a1 index0 -> 'a1 index0 **)
+
+let insert a x m =
+  PositiveMap.add (bucket a) ((a, x) :: (entries0 m a)) m
+
+type term =
+| Var of nat
+| Object of key1
+
+type expression =
+| Constant of q
+| Fluent of key1 * term list
+| Duration
+| Plus of expression * expression
+| Minus of expression * expression
+| Times of expression * expression
+| Over of expression * expression
+
+type formula =
+| Truth of bool
+| Atom of key1 * term list
+| Same of term * term
+| Compare of bool * expression * expression
+| Not of formula
+| And of formula * formula
+| Forall of key1 * formula
+
+(** val or0 : formula -> formula -> formula **)
+
+let or0 f g =
+  Not (And ((Not f), (Not g)))
+
+(** val imply : formula -> formula -> formula **)
+
+let imply f g =
+  Not (And (f, (Not g)))
+
+(** val exists : key1 -> formula -> formula **)
+
+let exists type0 f =
+  Not (Forall (type0, (Not f)))
+
+(** val equal0 : expression -> expression -> formula **)
+
+let equal0 a b =
+  And ((Compare (false, a, b)), (Compare (false, b, a)))
+
+type effect =
+| Nothing
+| Put of bool * key1 * term list
+| Change of bool * key1 * term list * expression
+| Both of effect * effect
+| When of formula * effect
+| Each of key1 * effect
+
+type action = { parameters : key1 list; duration : expression option;
+                at_start : formula; start_effect : effect;
+                over_all : formula; at_end : formula; end_effect : effect }
+
+type world = { holds_in : (atom -> bool); value_in0 : (atom -> q option) }
+
+type problem = { objects : (key1 -> key1 list); actions : action list;
+                 initial_atoms : unit index0; initial_values : q index0;
+                 goal_formula : formula; metric : expression; per_time : 
+                 q; per_step : q }
+
+(** val initial : problem -> world **)
+
+let initial p =
+  { holds_in = (fun a ->
+    match find0 p.initial_atoms a with
+    | Some _ -> true
+    | None -> false); value_in0 = (find0 p.initial_values) }
+
+(** val object0 : key1 list -> term -> key1 option **)
+
+let object0 env = function
+| Var i -> nth_error env i
+| Object o -> Some o
+
+(** val ground : key1 list -> term list -> key1 list option **)
+
+let rec ground env = function
+| [] -> Some []
+| t0 :: r ->
+  (match object0 env t0 with
+   | Some o ->
+     (match ground env r with
+      | Some l -> Some (o :: l)
+      | None -> None)
+   | None -> None)
+
+(** val lift : (q -> q -> q) -> q option -> q option -> q option **)
+
+let lift f a b =
+  match a with
+  | Some x -> (match b with
+               | Some y -> Some (f x y)
+               | None -> None)
+  | None -> None
+
+(** val eval : world -> q option -> key1 list -> expression -> q option **)
+
+let rec eval w d env = function
+| Constant q0 -> Some q0
+| Fluent (f, ts) ->
+  (match ground env ts with
+   | Some l -> w.value_in0 (f, l)
+   | None -> None)
+| Duration -> d
+| Plus (a, b) -> lift qplus (eval w d env a) (eval w d env b)
+| Minus (a, b) -> lift qminus (eval w d env a) (eval w d env b)
+| Times (a, b) -> lift qmult (eval w d env a) (eval w d env b)
+| Over (a, b) ->
+  (match eval w d env b with
+   | Some y ->
+     if qeq_bool y { qnum = Z0; qden = XH }
+     then None
+     else lift qdiv (eval w d env a) (Some y)
+   | None -> None)
+
+(** val less : q -> q -> bool **)
+
+let less x y =
+  negb (qle_bool y x)
+
+(** val and3 : bool option -> bool option -> bool option **)
+
+let and3 a b =
+  match a with
+  | Some b0 -> if b0 then b else Some false
+  | None ->
+    (match b with
+     | Some b0 -> if b0 then None else Some false
+     | None -> None)
+
+(** val truth0 :
+    problem -> world -> q option -> key1 list -> formula -> bool option **)
+
+let rec truth0 p w d env = function
+| Truth b -> Some b
+| Atom (p0, ts) ->
+  (match ground env ts with
+   | Some l -> Some (w.holds_in (p0, l))
+   | None -> None)
+| Same (t0, u) ->
+  (match object0 env t0 with
+   | Some a ->
+     (match object0 env u with
+      | Some b -> Some (Coq_Pos.eqb a b)
+      | None -> None)
+   | None -> None)
+| Compare (strict, a, b) ->
+  (match eval w d env a with
+   | Some x ->
+     (match eval w d env b with
+      | Some y -> Some (if strict then less y x else qle_bool y x)
+      | None -> None)
+   | None -> None)
+| Not g -> option_map negb (truth0 p w d env g)
+| And (g, h) -> and3 (truth0 p w d env g) (truth0 p w d env h)
+| Forall (t0, g) ->
+  fold_right (fun o r -> and3 (truth0 p w d (app env (o :: [])) g) r) (Some
+    true) (p.objects t0)
+
+type change =
+| Fact of atom * bool
+| Number of atom * bool * q
+
+(** val both : 'a1 list option -> 'a1 list option -> 'a1 list option **)
+
+let both a b =
+  match a with
+  | Some x -> (match b with
+               | Some y -> Some (app x y)
+               | None -> None)
+  | None -> None
+
+(** val changes0 :
+    problem -> world -> q option -> key1 list -> effect -> change list option **)
+
+let rec changes0 p w d env = function
+| Nothing -> Some []
+| Put (b, p0, ts) ->
+  (match ground env ts with
+   | Some l -> Some ((Fact ((p0, l), b)) :: [])
+   | None -> None)
+| Change (assigns, f, ts, x) ->
+  (match ground env ts with
+   | Some l ->
+     (match eval w d env x with
+      | Some q0 -> Some ((Number ((f, l), assigns, q0)) :: [])
+      | None -> None)
+   | None -> None)
+| Both (a, b) -> both (changes0 p w d env a) (changes0 p w d env b)
+| When (f, a) ->
+  (match truth0 p w d env f with
+   | Some b -> if b then changes0 p w d env a else Some []
+   | None -> None)
+| Each (t0, a) ->
+  fold_right (fun o r -> both (changes0 p w d (app env (o :: [])) a) r) (Some
+    []) (p.objects t0)
+
+(** val puts0 : change list -> atom -> bool -> bool **)
+
+let puts0 cs a b =
+  existsb (fun c ->
+    match c with
+    | Fact (a', b') -> (&&) (atom_eqb a a') (eqb b b')
+    | Number (_, _, _) -> false) cs
+
+(** val on : atom -> change list -> (bool * q) list **)
+
+let on f cs =
+  flat_map (fun c ->
+    match c with
+    | Fact (_, _) -> []
+    | Number (f', b, q0) -> if atom_eqb f f' then (b, q0) :: [] else []) cs
+
+(** val changed_value : q option -> (bool * q) list -> q option **)
+
+let changed_value old l = match l with
+| [] -> old
+| p :: r ->
+  let (b, q0) = p in
+  if b
+  then if forallb (fun c -> (&&) (fst c) (qeq_bool (snd c) q0)) r
+       then Some q0
+       else None
+  else if existsb fst l
+       then None
+       else option_map (fun x ->
+              fold_left (fun s c -> qred (qplus s (snd c))) l x) old
+
+(** val targets0 : change list -> atom list **)
+
+let rec targets0 = function
+| [] -> []
+| c :: r ->
+  (match c with
+   | Fact (_, _) -> targets0 r
+   | Number (f, _, _) -> f :: (targets0 r))
+
+(** val updates :
+    world -> change list -> atom list -> (atom * q) list option **)
+
+let rec updates w cs = function
+| [] -> Some []
+| f :: r ->
+  (match changed_value (w.value_in0 f) (on f cs) with
+   | Some q0 ->
+     (match updates w cs r with
+      | Some l -> Some ((f, q0) :: l)
+      | None -> None)
+   | None -> None)
+
+(** val happening :
+    problem -> world -> q option -> key1 list -> formula -> effect -> world
+    option **)
+
+let happening p w d env f e =
+  match truth0 p w d env f with
+  | Some b ->
+    if b
+    then (match changes0 p w d env e with
+          | Some cs ->
+            (match updates w cs (targets0 cs) with
+             | Some l ->
+               Some { holds_in = (fun a ->
+                 (||) (puts0 cs a true)
+                   ((&&) (negb (puts0 cs a false)) (w.holds_in a)));
+                 value_in0 = (fun a ->
+                 match assoc a l with
+                 | Some q0 -> Some q0
+                 | None -> w.value_in0 a) }
+             | None -> None)
+          | None -> None)
+    else None
+  | None -> None
+
+(** val step :
+    problem -> bool -> world -> action -> key1 list -> (world * q) option **)
+
+let step p zero0 w a env =
+  if negb
+       ((&&) (Nat.eqb (length env) (length a.parameters))
+         (forallb (fun x ->
+           existsb (Coq_Pos.eqb (fst x)) (p.objects (snd x)))
+           (combine env a.parameters)))
+  then None
+  else (match a.duration with
+        | Some e ->
+          (match eval w None env e with
+           | Some d ->
+             if less d { qnum = Z0; qden = XH }
+             then None
+             else if qeq_bool d { qnum = Z0; qden = XH }
+                  then if zero0
+                       then option_map (fun w0 -> (w0, d))
+                              (happening p w (Some d) env (And (a.at_start,
+                                a.at_end)) (Both (a.start_effect,
+                                a.end_effect)))
+                       else None
+                  else (match happening p w (Some d) env a.at_start
+                                a.start_effect with
+                        | Some w1 ->
+                          option_map (fun w0 -> (w0, d))
+                            (happening p w1 (Some d) env (And (a.over_all,
+                              a.at_end)) a.end_effect)
+                        | None -> None)
+           | None -> None)
+        | None ->
+          option_map (fun w0 -> (w0, { qnum = Z0; qden = XH }))
+            (happening p w None env a.at_start a.start_effect))
+
+(** val execute :
+    problem -> bool -> world -> q -> (nat * key1 list) list -> (world * q)
+    option **)
+
+let rec execute p zero0 w spent = function
+| [] ->
+  (match truth0 p w None [] p.goal_formula with
+   | Some b -> if b then Some (w, spent) else None
+   | None -> None)
+| p0 :: r ->
+  let (i, env) = p0 in
+  (match nth_error p.actions i with
+   | Some a ->
+     (match step p zero0 w a env with
+      | Some p1 ->
+        let (w', d) = p1 in
+        execute p zero0 w'
+          (qred (qplus (qplus spent (qmult p.per_time d)) p.per_step)) r
+      | None -> None)
+   | None -> None)
+
+(** val final_metric : problem -> world -> q -> q option **)
+
+let final_metric p w spent =
+  option_map (fun m -> qplus m spent) (eval w None [] p.metric)
+
+type form = (atom * q) list * q
+
+(** val plus_term : atom -> q -> (atom * q) list -> (atom * q) list **)
+
+let rec plus_term f q0 = function
+| [] -> (f, q0) :: []
+| p :: r ->
+  let (g, y) = p in
+  if atom_eqb f g
+  then let s = qred (qplus y q0) in
+       if qeq_bool s { qnum = Z0; qden = XH } then r else (g, s) :: r
+  else (g, y) :: (plus_term f q0 r)
+
+(** val plus_form : form -> q -> form -> form **)
+
+let plus_form a c b =
+  ((fold_left (fun l t0 -> plus_term (fst t0) (qmult c (snd t0)) l) (fst b)
+     (fst a)), (qred (qplus (snd a) (qmult c (snd b)))))
+
+(** val constant : q -> form **)
+
+let constant q0 =
+  ([], q0)
+
+(** val fluent : atom -> form **)
+
+let fluent f =
+  (((f, { qnum = (Zpos XH); qden = XH }) :: []), { qnum = Z0; qden = XH })
+
+type result =
+| Undefined
+| Unknown
+| Is of form
+
+(** val plus_result : result -> q -> result -> result **)
+
+let plus_result a c b =
+  match a with
+  | Undefined -> Undefined
+  | Unknown -> (match b with
+                | Undefined -> Undefined
+                | _ -> Unknown)
+  | Is x -> (match b with
+             | Is y -> Is (plus_form x c y)
+             | x0 -> x0)
+
+type names = { variables : (z * atom) list M.t; fluents : atom M.t;
+               fact_of : (key1 * z) index0; number_of : key1 index0;
+               changing : (key1 -> bool); may_hold : unit index0;
+               scale : positive; cost_scale : positive }
+
+type case_tree =
+| Decided of (nat * choice) option
+| Impossible
+| SplitAtom of atom * case_tree * case_tree
+| SplitForm of form * case_tree * case_tree
+
+(** val mem0 : 'a1 index0 -> atom -> bool **)
+
+let mem0 m a =
+  match find0 m a with
+  | Some _ -> true
+  | None -> false
+
+type knowledge = { literals : (atom * bool) list; bounds : (bool * form) list }
+
+(** val in_variable : names -> knowledge -> key1 -> (z * bool) list **)
+
+let in_variable n k v =
+  flat_map (fun l ->
+    match find0 n.fact_of (fst l) with
+    | Some p ->
+      let (u, x) = p in if Coq_Pos.eqb u v then (x, (snd l)) :: [] else []
+    | None -> []) k.literals
+
+(** val possible : task -> names -> knowledge -> key1 -> z list **)
+
+let possible t0 n k v =
+  let known = in_variable n k v in
+  filter (fun y -> forallb (fun xb -> eqb (Z.eqb y (fst xb)) (snd xb)) known)
+    (match find snd known with
+     | Some p -> let (x, _) = p in x :: []
+     | None -> range (get t0.size v))
+
+(** val fact3 : task -> names -> knowledge -> key1 -> z -> bool option **)
+
+let fact3 t0 n k v x =
+  match M.find v n.variables with
+  | Some _ ->
+    let ys = possible t0 n k v in
+    if forallb (Z.eqb x) ys
+    then Some true
+    else if forallb (fun y -> negb (Z.eqb x y)) ys then Some false else None
+  | None -> None
+
+(** val base_truth :
+    problem -> task -> names -> knowledge -> atom -> bool option **)
+
+let base_truth p t0 n k a =
+  if negb (n.changing (fst a))
+  then Some ((initial p).holds_in a)
+  else (match assoc a k.literals with
+        | Some b -> Some b
+        | None ->
+          if negb (mem0 n.may_hold a)
+          then Some false
+          else (match find0 n.fact_of a with
+                | Some p0 -> let (v, x) = p0 in fact3 t0 n k v x
+                | None -> None))
+
+type symbolic = { new_truths : (atom * bool) list;
+                  new_values : (atom * form) list }
+
+(** val unchanged : symbolic **)
+
+let unchanged =
+  { new_truths = []; new_values = [] }
+
+(** val atom3 :
+    problem -> task -> names -> knowledge -> symbolic -> atom -> bool option **)
+
+let atom3 p t0 n k s a =
+  match assoc a s.new_truths with
+  | Some b -> Some b
+  | None -> base_truth p t0 n k a
+
+(** val value3 : problem -> names -> symbolic -> atom -> result **)
+
+let value3 p n s f =
+  match assoc f s.new_values with
+  | Some g -> Is g
+  | None ->
+    if n.changing (fst f)
+    then Is (fluent f)
+    else (match (initial p).value_in0 f with
+          | Some q0 -> Is (constant q0)
+          | None -> Undefined)
+
+(** val linear_of :
+    problem -> names -> symbolic -> result -> key1 list -> expression ->
+    result **)
+
+let rec linear_of p n s d env = function
+| Constant q0 -> Is (constant q0)
+| Fluent (f, ts) ->
+  (match ground env ts with
+   | Some l -> value3 p n s (f, l)
+   | None -> Undefined)
+| Duration -> d
+| Plus (a, b) ->
+  plus_result (linear_of p n s d env a) { qnum = (Zpos XH); qden = XH }
+    (linear_of p n s d env b)
+| Minus (a, b) ->
+  plus_result (linear_of p n s d env a) { qnum = (Zneg XH); qden = XH }
+    (linear_of p n s d env b)
+| Times (a, b) ->
+  (match linear_of p n s d env a with
+   | Undefined -> Undefined
+   | Unknown ->
+     (match linear_of p n s d env b with
+      | Undefined -> Undefined
+      | _ -> Unknown)
+   | Is x ->
+     let (l, x0) = x in
+     (match l with
+      | [] ->
+        (match linear_of p n s d env b with
+         | Is y -> Is (plus_form (constant { qnum = Z0; qden = XH }) x0 y)
+         | x1 -> x1)
+      | _ :: _ ->
+        (match linear_of p n s d env b with
+         | Is f ->
+           let (l1, y) = f in
+           (match l1 with
+            | [] -> Is (plus_form (constant { qnum = Z0; qden = XH }) y x)
+            | _ :: _ -> Unknown)
+         | x1 -> x1)))
+| Over (a, b) ->
+  (match linear_of p n s d env a with
+   | Undefined -> Undefined
+   | Unknown ->
+     (match linear_of p n s d env b with
+      | Undefined -> Undefined
+      | _ -> Unknown)
+   | Is x ->
+     (match linear_of p n s d env b with
+      | Is f ->
+        let (l, y) = f in
+        (match l with
+         | [] ->
+           if qeq_bool y { qnum = Z0; qden = XH }
+           then Undefined
+           else Is (plus_form (constant { qnum = Z0; qden = XH }) (qinv y) x)
+         | _ :: _ -> Unknown)
+      | x0 -> x0))
+
+(** val implied : knowledge -> bool -> form -> bool **)
+
+let implied k strict f =
+  (||)
+    (existsb (fun b ->
+      let (l, c) = plus_form f { qnum = (Zneg XH); qden = XH } (snd b) in
+      (match l with
+       | [] ->
+         if (&&) strict (negb (fst b))
+         then less { qnum = Z0; qden = XH } c
+         else qle_bool { qnum = Z0; qden = XH } c
+       | _ :: _ -> false)) ((false,
+      (constant { qnum = Z0; qden = XH })) :: k.bounds))
+    (let (l, c) = f in
+     (match l with
+      | [] -> (&&) strict (less { qnum = Z0; qden = XH } c)
+      | _ :: _ -> false))
+
+(** val compare3 : knowledge -> bool -> result -> bool option **)
+
+let compare3 k strict = function
+| Undefined -> Some false
+| Unknown -> None
+| Is f ->
+  if implied k strict f
+  then Some true
+  else if implied k (negb strict)
+            (plus_form (constant { qnum = Z0; qden = XH }) { qnum = (Zneg
+              XH); qden = XH } f)
+       then Some false
+       else None
+
+(** val truth3 :
+    problem -> task -> names -> knowledge -> symbolic -> result -> key1 list
+    -> formula -> bool option **)
+
+let rec truth3 p t0 n k s d env = function
+| Truth b -> Some b
+| Atom (p0, ts) ->
+  (match ground env ts with
+   | Some l -> atom3 p t0 n k s (p0, l)
+   | None -> Some false)
+| Same (t1, u) ->
+  (match object0 env t1 with
+   | Some a ->
+     (match object0 env u with
+      | Some b -> Some (Coq_Pos.eqb a b)
+      | None -> Some false)
+   | None -> Some false)
+| Compare (strict, a, b) ->
+  compare3 k strict (linear_of p n s d env (Minus (a, b)))
+| Not g -> option_map negb (truth3 p t0 n k s d env g)
+| And (g, h) ->
+  (match truth3 p t0 n k s d env g with
+   | Some b ->
+     if b then and3 (Some true) (truth3 p t0 n k s d env h) else Some false
+   | None -> and3 None (truth3 p t0 n k s d env h))
+| Forall (t1, g) ->
+  fold_right (fun o r -> and3 (truth3 p t0 n k s d (app env (o :: [])) g) r)
+    (Some true) (p.objects t1)
+
+type symbolic_change =
+| SFact of atom * bool
+| SNumber of atom * bool * form
+
+(** val changes3 :
+    problem -> task -> names -> knowledge -> symbolic -> result -> key1 list
+    -> effect -> symbolic_change list option **)
+
+let rec changes3 p t0 n k s d env = function
+| Nothing -> Some []
+| Put (b, p0, ts) ->
+  (match ground env ts with
+   | Some l -> Some ((SFact ((p0, l), b)) :: [])
+   | None -> None)
+| Change (assigns, f, ts, x) ->
+  (match ground env ts with
+   | Some l ->
+     (match linear_of p n s d env x with
+      | Is g -> Some ((SNumber ((f, l), assigns, g)) :: [])
+      | _ -> None)
+   | None -> None)
+| Both (a, b) ->
+  both (changes3 p t0 n k s d env a) (changes3 p t0 n k s d env b)
+| When (f, a) ->
+  (match truth3 p t0 n k s d env f with
+   | Some b -> if b then changes3 p t0 n k s d env a else Some []
+   | None -> None)
+| Each (t1, a) ->
+  fold_right (fun o r ->
+    both (changes3 p t0 n k s d (app env (o :: [])) a) r) (Some [])
+    (p.objects t1)
+
+(** val on3 : atom -> symbolic_change list -> (bool * form) list **)
+
+let on3 f cs =
+  flat_map (fun c ->
+    match c with
+    | SFact (_, _) -> []
+    | SNumber (f', b, g) -> if atom_eqb f f' then (b, g) :: [] else []) cs
+
+(** val combine3 : result -> (bool * form) list -> form option **)
+
+let combine3 old l = match l with
+| [] -> None
+| p :: l0 ->
+  let (b, g) = p in
+  if b
+  then (match l0 with
+        | [] -> Some g
+        | _ :: _ -> None)
+  else if existsb fst l
+       then None
+       else (match old with
+             | Is x ->
+               Some
+                 (fold_left (fun s c ->
+                   plus_form s { qnum = (Zpos XH); qden = XH } (snd c)) l x)
+             | _ -> None)
+
+(** val targets3 : symbolic_change list -> atom list **)
+
+let rec targets3 = function
+| [] -> []
+| s :: r ->
+  (match s with
+   | SFact (_, _) -> targets3 r
+   | SNumber (f, _, _) -> f :: (targets3 r))
+
+(** val updates3 :
+    problem -> names -> symbolic -> symbolic_change list -> atom list ->
+    (atom * form) list option **)
+
+let rec updates3 p n s cs = function
+| [] -> Some []
+| f :: r ->
+  (match combine3 (value3 p n s f) (on3 f cs) with
+   | Some g ->
+     (match updates3 p n s cs r with
+      | Some l -> Some ((f, g) :: l)
+      | None -> None)
+   | None -> None)
+
+(** val truths3 : symbolic_change list -> bool -> (atom * bool) list **)
+
+let truths3 cs b =
+  flat_map (fun c ->
+    match c with
+    | SFact (a, b') -> if eqb b b' then (a, b) :: [] else []
+    | SNumber (_, _, _) -> []) cs
+
+type outcome =
+| Never
+| Unclear
+| After of symbolic * q
+
+(** val happening3 :
+    problem -> task -> names -> knowledge -> symbolic -> result -> q -> key1
+    list -> formula -> effect -> outcome **)
+
+let happening3 p t0 n k s d time env f e =
+  match truth3 p t0 n k s d env f with
+  | Some b ->
+    if b
+    then (match changes3 p t0 n k s d env e with
+          | Some cs ->
+            (match updates3 p n s cs (targets3 cs) with
+             | Some l ->
+               After ({ new_truths =
+                 (app (truths3 cs true) (app (truths3 cs false) s.new_truths));
+                 new_values = (app l s.new_values) }, time)
+             | None -> Unclear)
+          | None -> Unclear)
+    else Never
+  | None ->
+    (match changes3 p t0 n k s d env e with
+     | Some cs ->
+       (match updates3 p n s cs (targets3 cs) with
+        | Some l ->
+          After ({ new_truths =
+            (app (truths3 cs true) (app (truths3 cs false) s.new_truths));
+            new_values = (app l s.new_values) }, time)
+        | None -> Unclear)
+     | None -> Unclear)
+
+(** val length3 : problem -> names -> action -> key1 list -> result **)
+
+let length3 p n a env =
+  match a.duration with
+  | Some e -> linear_of p n unchanged Undefined env e
+  | None -> Undefined
+
+(** val step3 :
+    problem -> task -> names -> knowledge -> action -> key1 list -> outcome **)
+
+let step3 p t0 n k a env =
+  match a.duration with
+  | Some _ ->
+    (match length3 p n a env with
+     | Undefined -> Never
+     | Unknown -> Unclear
+     | Is f ->
+       let (l, d) = f in
+       (match l with
+        | [] ->
+          if less d { qnum = Z0; qden = XH }
+          then Never
+          else if qeq_bool d { qnum = Z0; qden = XH }
+               then happening3 p t0 n k unchanged (Is (constant d)) d env
+                      (And (a.at_start, a.at_end)) (Both (a.start_effect,
+                      a.end_effect))
+               else (match happening3 p t0 n k unchanged (Is (constant d)) d
+                             env a.at_start a.start_effect with
+                     | After (s, _) ->
+                       happening3 p t0 n k s (Is (constant d)) d env (And
+                         (a.over_all, a.at_end)) a.end_effect
+                     | x -> x)
+        | _ :: _ -> Unclear))
+  | None ->
+    happening3 p t0 n k unchanged Undefined { qnum = Z0; qden = XH } env
+      a.at_start a.start_effect
+
+(** val conjuncts :
+    problem -> names -> symbolic -> result -> key1 list -> formula ->
+    knowledge **)
+
+let rec conjuncts p n s d env = function
+| Atom (p0, ts) ->
+  (match ground env ts with
+   | Some l ->
+     (match assoc (p0, l) s.new_truths with
+      | Some _ -> { literals = []; bounds = [] }
+      | None ->
+        if n.changing p0
+        then { literals = (((p0, l), true) :: []); bounds = [] }
+        else { literals = []; bounds = [] })
+   | None -> { literals = []; bounds = [] })
+| Compare (strict, a, b) ->
+  (match linear_of p n s d env (Minus (a, b)) with
+   | Is g -> { literals = []; bounds = ((strict, g) :: []) }
+   | _ -> { literals = []; bounds = [] })
+| Not f0 ->
+  (match f0 with
+   | Atom (p0, ts) ->
+     (match ground env ts with
+      | Some l ->
+        (match assoc (p0, l) s.new_truths with
+         | Some _ -> { literals = []; bounds = [] }
+         | None ->
+           if n.changing p0
+           then { literals = (((p0, l), false) :: []); bounds = [] }
+           else { literals = []; bounds = [] })
+      | None -> { literals = []; bounds = [] })
+   | _ -> { literals = []; bounds = [] })
+| And (g, h) ->
+  let a = conjuncts p n s d env g in
+  let b = conjuncts p n s d env h in
+  { literals = (app a.literals b.literals); bounds = (app a.bounds b.bounds) }
+| _ -> { literals = []; bounds = [] }
+
+(** val join : knowledge -> knowledge -> knowledge **)
+
+let join k l =
+  { literals = (app k.literals l.literals); bounds = (app k.bounds l.bounds) }
+
+(** val gathered :
+    problem -> task -> names -> action -> key1 list -> knowledge **)
+
+let gathered p t0 n a env =
+  match a.duration with
+  | Some _ ->
+    (match length3 p n a env with
+     | Is f ->
+       let (l, d) = f in
+       (match l with
+        | [] ->
+          let time = Is (constant d) in
+          let k = conjuncts p n unchanged time env a.at_start in
+          if qeq_bool d { qnum = Z0; qden = XH }
+          then join k (conjuncts p n unchanged time env a.at_end)
+          else (match happening3 p t0 n k unchanged time d env a.at_start
+                        a.start_effect with
+                | After (s, _) ->
+                  join k
+                    (conjuncts p n s time env (And (a.over_all, a.at_end)))
+                | _ -> k)
+        | _ :: _ -> { literals = []; bounds = [] })
+     | _ -> { literals = []; bounds = [] })
+  | None -> conjuncts p n unchanged Undefined env a.at_start
+
+(** val impossible : problem -> task -> names -> knowledge -> bool **)
+
+let impossible p t0 n k =
+  (||)
+    (existsb (fun l ->
+      (||)
+        (match base_truth p t0 n { literals = []; bounds = k.bounds } (fst l) with
+         | Some b -> negb (eqb b (snd l))
+         | None -> false)
+        (match find0 n.fact_of (fst l) with
+         | Some p0 ->
+           let (v, _) = p0 in
+           (match possible t0 n k v with
+            | [] -> true
+            | _ :: _ -> false)
+         | None -> false)) k.literals)
+    (existsb (fun b ->
+      let (l, c) = snd b in
+      (match l with
+       | [] ->
+         if fst b
+         then qle_bool c { qnum = Z0; qden = XH }
+         else less c { qnum = Z0; qden = XH }
+       | _ :: _ -> false)) k.bounds)
+
+(** val scaled : names -> q **)
+
+let scaled n =
+  { qnum = (Zpos n.scale); qden = XH }
+
+(** val factors_of : names -> (key1 * z) list -> form option **)
+
+let rec factors_of n = function
+| [] -> Some (constant { qnum = Z0; qden = XH })
+| p :: r ->
+  let (n0, f) = p in
+  (match M.find n0 n.fluents with
+   | Some a ->
+     (match factors_of n r with
+      | Some g ->
+        Some
+          (plus_form g { qnum = (Zpos XH); qden = XH } (((a,
+            (inject_Z f)) :: []), { qnum = Z0; qden = XH }))
+      | None -> None)
+   | None -> None)
+
+(** val form_of : names -> linear -> z list -> choice -> form option **)
+
+let form_of n l szs ch =
+  match factors_of n l.factors with
+  | Some g ->
+    Some
+      (plus_form g { qnum = (Zpos XH); qden = XH }
+        (constant (qdiv (inject_Z (amount l.rest szs ch)) (scaled n))))
+  | None -> None
+
+(** val required : names -> knowledge -> form -> bool **)
+
+let required n k f =
+  implied k true
+    (plus_form f { qnum = (Zpos XH); qden = XH } (constant (qinv (scaled n))))
+
+(** val literal3 : task -> names -> knowledge -> literal -> bool option **)
+
+let literal3 t0 n k l =
+  option_map (fun b -> eqb b (snd l))
+    (fact3 t0 n k (fst (fst l)) (snd (fst l)))
+
+(** val is_true : bool option -> bool **)
+
+let is_true = function
+| Some b -> b
+| None -> false
+
+(** val is_false : bool option -> bool **)
+
+let is_false = function
+| Some b -> negb b
+| None -> false
+
+(** val condition3 :
+    task -> names -> knowledge -> condition -> z list -> choice -> bool **)
+
+let condition3 t0 n k c szs ch =
+  (&&)
+    ((&&) (forallb (fun f -> is_true (fact3 t0 n k (fst f) (snd f))) c.facts)
+      (forallb (existsb (fun l -> is_true (literal3 t0 n k l))) c.clauses))
+    (forallb (fun l ->
+      match form_of n l szs ch with
+      | Some f -> required n k f
+      | None -> false) c.comparisons)
+
+(** val fired3 :
+    task -> names -> knowledge -> (literal list * fact list) list -> fact
+    list option **)
+
+let rec fired3 t0 n k = function
+| [] -> Some []
+| c :: r ->
+  if existsb (fun l -> is_false (literal3 t0 n k l)) (fst c)
+  then fired3 t0 n k r
+  else if forallb (fun l -> is_true (literal3 t0 n k l)) (fst c)
+       then option_map (app (snd c)) (fired3 t0 n k r)
+       else None
+
+(** val admitted_choice : operator -> choice -> bool **)
+
+let admitted_choice o ch =
+  (&&)
+    ((&&) (Nat.eqb (length ch) (length o.sizes))
+      (forallb (fun xn -> (&&) (Z.leb Z0 (fst xn)) (Z.ltb (fst xn) (snd xn)))
+        (combine ch o.sizes))) (admits o ch)
+
+(** val variable_ok :
+    task -> names -> knowledge -> symbolic -> fact list -> key1 -> bool **)
+
+let variable_ok t0 n k s made v =
+  match M.find v n.variables with
+  | Some vals ->
+    forallb (fun y ->
+      let z0 = last_put made v y in
+      forallb (fun xa ->
+        eqb
+          (match assoc (snd xa) s.new_truths with
+           | Some b -> b
+           | None -> Z.eqb y (fst xa)) (Z.eqb z0 (fst xa))) vals)
+      (possible t0 n k v)
+  | None -> true
+
+(** val is_zero : form -> bool **)
+
+let is_zero = function
+| (l, c) ->
+  (match l with
+   | [] -> qeq_bool c { qnum = Z0; qden = XH }
+   | _ :: _ -> false)
+
+(** val number_ok :
+    names -> symbolic -> (operator * choice) option -> key1 -> bool **)
+
+let number_ok n s o n0 =
+  match M.find n0 n.fluents with
+  | Some f ->
+    let after0 =
+      match assoc f s.new_values with
+      | Some g -> g
+      | None -> fluent f
+    in
+    let made =
+      match o with
+      | Some p ->
+        let (o0, ch) = p in
+        (match find (fun c -> Coq_Pos.eqb (fst c) n0) o0.changes with
+         | Some c -> form_of n (snd c) o0.sizes ch
+         | None -> Some (fluent f))
+      | None -> Some (fluent f)
+    in
+    (match made with
+     | Some g -> is_zero (plus_form after0 { qnum = (Zneg XH); qden = XH } g)
+     | None -> false)
+  | None -> true
+
+(** val growth : problem -> names -> symbolic -> q -> q option **)
+
+let growth p n s time =
+  match plus_result (linear_of p n s Undefined [] p.metric) { qnum = (Zneg
+          XH); qden = XH } (linear_of p n unchanged Undefined [] p.metric) with
+  | Is f ->
+    let (l, c) = f in
+    (match l with
+     | [] -> Some (qplus (qplus c (qmult p.per_time time)) p.per_step)
+     | _ :: _ -> None)
+  | _ -> None
+
+(** val step_cost : (operator * choice) option -> z **)
+
+let step_cost = function
+| Some p -> let (o0, ch) = p in amount o0.cost o0.sizes ch
+| None -> Z0
+
+(** val simulated :
+    problem -> task -> names -> knowledge -> symbolic -> q ->
+    (operator * choice) option -> bool **)
+
+let simulated p t0 n k s time o =
+  match match o with
+        | Some p0 ->
+          let (o0, ch) = p0 in
+          if (&&)
+               ((&&) (admitted_choice o0 ch)
+                 (condition3 t0 n k o0.pre o0.sizes ch))
+               (distinct (map fst o0.changes))
+          then option_map (app o0.effects) (fired3 t0 n k o0.conditional)
+          else None
+        | None -> Some [] with
+  | Some made ->
+    (&&)
+      ((&&)
+        (forallb (variable_ok t0 n k s made)
+          (app (map fst made)
+            (flat_map (fun l ->
+              match find0 n.fact_of (fst l) with
+              | Some f -> (fst f) :: []
+              | None -> []) s.new_truths)))
+        (forallb (number_ok n s o)
+          (app
+            (match o with
+             | Some p0 -> let (o0, _) = p0 in map fst o0.changes
+             | None -> [])
+            (flat_map (fun l ->
+              match find0 n.number_of (fst l) with
+              | Some n0 -> n0 :: []
+              | None -> []) s.new_values))))
+      (match growth p n s time with
+       | Some g ->
+         qle_bool (inject_Z (step_cost o))
+           (qmult g { qnum = (Zpos n.cost_scale); qden = XH })
+       | None -> false)
+  | None -> false
+
+(** val leaf_ok :
+    problem -> task -> names -> knowledge -> action -> key1 list ->
+    (operator * choice) option -> bool **)
+
+let leaf_ok p t0 n k a env o =
+  match step3 p t0 n k a env with
+  | Never -> true
+  | Unclear -> false
+  | After (s, time) ->
+    (&&)
+      (forallb (fun l ->
+        match assoc (fst l) s.new_truths with
+        | Some b -> if b then mem0 n.may_hold (fst l) else true
+        | None -> true) s.new_truths) (simulated p t0 n k s time o)
+
+(** val tree_ok :
+    problem -> task -> names -> (knowledge -> (nat * choice) option -> bool)
+    -> knowledge -> case_tree -> bool **)
+
+let rec tree_ok p t0 n leaf k = function
+| Decided o -> leaf k o
+| Impossible -> impossible p t0 n k
+| SplitAtom (a, t2, u) ->
+  (&&)
+    (tree_ok p t0 n leaf { literals = ((a, true) :: k.literals); bounds =
+      k.bounds } t2)
+    (tree_ok p t0 n leaf { literals = ((a, false) :: k.literals); bounds =
+      k.bounds } u)
+| SplitForm (f, t2, u) ->
+  (&&)
+    (tree_ok p t0 n leaf { literals = k.literals; bounds = ((false,
+      f) :: k.bounds) } t2)
+    (tree_ok p t0 n leaf { literals = k.literals; bounds = ((true,
+      (plus_form (constant { qnum = Z0; qden = XH }) { qnum = (Zneg XH);
+        qden = XH } f)) :: k.bounds) } u)
+
+(** val instance_leaf :
+    problem -> task -> names -> action -> key1 list -> knowledge ->
+    (nat * choice) option -> bool **)
+
+let instance_leaf p t0 n a env k = function
+| Some p0 ->
+  let (i, ch) = p0 in
+  (match nth_error t0.operators i with
+   | Some o0 -> leaf_ok p t0 n k a env (Some (o0, ch))
+   | None -> false)
+| None -> leaf_ok p t0 n k a env None
+
+(** val goal_leaf :
+    problem -> task -> names -> knowledge -> (nat * choice) option -> bool **)
+
+let goal_leaf p t0 n k _ =
+  match truth3 p t0 n k unchanged Undefined [] p.goal_formula with
+  | Some b -> if b then condition3 t0 n k t0.goal [] [] else true
+  | None -> condition3 t0 n k t0.goal [] []
+
+(** val static_false : problem -> names -> key1 list -> formula -> bool **)
+
+let rec static_false p n env = function
+| Atom (p0, ts) ->
+  (&&) (negb (n.changing p0))
+    (match ground env ts with
+     | Some l -> negb ((initial p).holds_in (p0, l))
+     | None -> false)
+| Same (t0, u) ->
+  (match object0 env t0 with
+   | Some a ->
+     (match object0 env u with
+      | Some b -> negb (Coq_Pos.eqb a b)
+      | None -> false)
+   | None -> false)
+| Not f0 ->
+  (match f0 with
+   | Atom (p0, ts) ->
+     (&&) (negb (n.changing p0))
+       (match ground env ts with
+        | Some l -> (initial p).holds_in (p0, l)
+        | None -> false)
+   | Same (t0, u) ->
+     (match object0 env t0 with
+      | Some a ->
+        (match object0 env u with
+         | Some b -> Coq_Pos.eqb a b
+         | None -> false)
+      | None -> false)
+   | _ -> false)
+| And (g, h) -> (||) (static_false p n env g) (static_false p n env h)
+| _ -> false
+
+(** val instances :
+    problem -> (key1 list -> bool) -> key1 list -> key1 list -> key1 list list **)
+
+let rec instances p prune types env =
+  match types with
+  | [] -> env :: []
+  | t0 :: r ->
+    flat_map (fun o ->
+      if prune (app env (o :: []))
+      then []
+      else instances p prune r (app env (o :: []))) (p.objects t0)
+
+(** val pruned : problem -> names -> action -> key1 list -> bool **)
+
+let pruned p n a env =
+  (||) (static_false p n env a.at_start)
+    (match a.duration with
+     | Some _ -> static_false p n env a.at_end
+     | None -> false)
+
+(** val effect_heads : effect -> key1 list **)
+
+let rec effect_heads = function
+| Nothing -> []
+| Put (_, p, _) -> p :: []
+| Change (_, f, _, _) -> f :: []
+| Both (a, b) -> app (effect_heads a) (effect_heads b)
+| When (_, a) -> effect_heads a
+| Each (_, a) -> effect_heads a
+
+(** val action_ok :
+    problem -> task -> names -> (nat -> key1 list -> case_tree) -> nat ->
+    action -> bool **)
+
+let action_ok p t0 n case i a =
+  (&&)
+    (forallb n.changing
+      (app (effect_heads a.start_effect) (effect_heads a.end_effect)))
+    (forallb (fun env ->
+      tree_ok p t0 n (instance_leaf p t0 n a env) (gathered p t0 n a env)
+        (case i env)) (instances p (pruned p n a) a.parameters []))
+
+(** val all_entries : 'a1 index0 -> (atom * 'a1) list **)
+
+let all_entries m =
+  flat_map snd (PositiveMap.elements m)
+
+(** val faithful :
+    problem -> task -> names -> (nat -> key1 list -> case_tree) -> case_tree
+    -> bool **)
+
+let faithful p t0 n case goal_case =
+  (&&)
+    ((&&)
+      ((&&)
+        ((&&)
+          ((&&)
+            (forallb (fun e ->
+              (||) (negb (n.changing (fst (fst e)))) (mem0 n.may_hold (fst e)))
+              (all_entries p.initial_atoms))
+            (forallb (fun vl ->
+              let (v, vals) = vl in
+              (&&) (is_basic t0 v)
+                (forallb (fun xa ->
+                  let (x, a) = xa in
+                  (&&)
+                    (eqb ((initial p).holds_in a) (Z.eqb (val0 t0.init v) x))
+                    (match find0 n.fact_of a with
+                     | Some p0 ->
+                       let (u, y) = p0 in (&&) (Coq_Pos.eqb u v) (Z.eqb y x)
+                     | None -> false)) vals)) (M.elements n.variables)))
+          (forallb (fun e ->
+            let (a, y) = e in
+            let (v, x) = y in
+            (match M.find v n.variables with
+             | Some vals ->
+               existsb (fun xa ->
+                 (&&) (Z.eqb (fst xa) x) (atom_eqb (snd xa) a)) vals
+             | None -> false)) (all_entries n.fact_of)))
+        (forallb (fun nf ->
+          let (n0, f) = nf in
+          (&&)
+            ((&&) ((&&) (memb n0 t0.numbers) (n.changing (fst f)))
+              (match (initial p).value_in0 f with
+               | Some q0 ->
+                 qeq_bool (qmult q0 (scaled n)) (inject_Z (num t0.init n0))
+               | None -> false))
+            (match find0 n.number_of f with
+             | Some m -> Coq_Pos.eqb m n0
+             | None -> false)) (M.elements n.fluents)))
+      (tree_ok p t0 n (goal_leaf p t0 n)
+        (conjuncts p n unchanged Undefined [] p.goal_formula) goal_case))
+    (forallb (fun ia -> action_ok p t0 n case (fst ia) (snd ia))
+      (combine (seq O (length p.actions)) p.actions))
+
+(** val is_linear : problem -> names -> bool **)
+
+let is_linear p n =
+  match linear_of p n unchanged Undefined [] p.metric with
+  | Is _ -> true
+  | _ -> false
+
+(** val check_certificate :
+    problem -> task -> names -> (nat -> key1 list -> case_tree) -> case_tree
+    -> argument -> (state -> positive list) -> (nat * key1 list) list -> q
+    option -> bool **)
+
+let check_certificate p t0 n case goal_case a oracle plan claim =
+  (&&) ((&&) (check_task t0) (faithful p t0 n case goal_case))
+    (match eval (initial p) None [] p.metric with
+     | Some first ->
+       (match claim with
+        | Some m ->
+          (&&)
+            ((&&) (is_linear p n)
+              (match execute p false (initial p) { qnum = Z0; qden = XH } plan with
+               | Some p0 ->
+                 let (w, spent) = p0 in
+                 (match final_metric p w spent with
+                  | Some m' -> qeq_bool m' m
+                  | None -> false)
+               | None -> false))
+            (let cost0 =
+               qred
+                 (qmult (qminus m first) { qnum = (Zpos n.cost_scale); qden =
+                   XH })
+             in
+             (&&) (Coq_Pos.eqb cost0.qden XH)
+               (check t0 a (Some cost0.qnum) oracle))
+        | None -> check t0 a None oracle)
+     | None ->
+       (match claim with
+        | Some _ -> false
+        | None -> check t0 a None oracle))

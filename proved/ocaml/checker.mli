@@ -1,0 +1,925 @@
+
+val negb : bool -> bool
+
+type nat =
+| O
+| S of nat
+
+val option_map : ('a1 -> 'a2) -> 'a1 option -> 'a2 option
+
+val fst : ('a1 * 'a2) -> 'a1
+
+val snd : ('a1 * 'a2) -> 'a2
+
+val length : 'a1 list -> nat
+
+val app : 'a1 list -> 'a1 list -> 'a1 list
+
+type comparison =
+| Eq
+| Lt
+| Gt
+
+val compOpp : comparison -> comparison
+
+val add : nat -> nat -> nat
+
+type positive =
+| XI of positive
+| XO of positive
+| XH
+
+type z =
+| Z0
+| Zpos of positive
+| Zneg of positive
+
+val eqb : bool -> bool -> bool
+
+module type EqLtLe =
+ sig
+  type t
+ end
+
+module MakeOrderTac :
+ functor (O:EqLtLe) ->
+ functor (P:sig
+ end) ->
+ sig
+ end
+
+module Nat :
+ sig
+  val eqb : nat -> nat -> bool
+ end
+
+module Pos :
+ sig
+  type mask =
+  | IsNul
+  | IsPos of positive
+  | IsNeg
+ end
+
+module Coq_Pos :
+ sig
+  val succ : positive -> positive
+
+  val add : positive -> positive -> positive
+
+  val add_carry : positive -> positive -> positive
+
+  val pred_double : positive -> positive
+
+  type mask = Pos.mask =
+  | IsNul
+  | IsPos of positive
+  | IsNeg
+
+  val succ_double_mask : mask -> mask
+
+  val double_mask : mask -> mask
+
+  val double_pred_mask : positive -> mask
+
+  val sub_mask : positive -> positive -> mask
+
+  val sub_mask_carry : positive -> positive -> mask
+
+  val sub : positive -> positive -> positive
+
+  val mul : positive -> positive -> positive
+
+  val size_nat : positive -> nat
+
+  val compare_cont : comparison -> positive -> positive -> comparison
+
+  val compare : positive -> positive -> comparison
+
+  val eqb : positive -> positive -> bool
+
+  val ggcdn : nat -> positive -> positive -> positive * (positive * positive)
+
+  val ggcd : positive -> positive -> positive * (positive * positive)
+
+  val iter_op : ('a1 -> 'a1 -> 'a1) -> positive -> 'a1 -> 'a1
+
+  val to_nat : positive -> nat
+
+  val of_nat : nat -> positive
+
+  val eq_dec : positive -> positive -> bool
+ end
+
+module Z :
+ sig
+  val double : z -> z
+
+  val succ_double : z -> z
+
+  val pred_double : z -> z
+
+  val pos_sub : positive -> positive -> z
+
+  val add : z -> z -> z
+
+  val opp : z -> z
+
+  val mul : z -> z -> z
+
+  val compare : z -> z -> comparison
+
+  val sgn : z -> z
+
+  val leb : z -> z -> bool
+
+  val ltb : z -> z -> bool
+
+  val eqb : z -> z -> bool
+
+  val min : z -> z -> z
+
+  val abs : z -> z
+
+  val to_nat : z -> nat
+
+  val to_pos : z -> positive
+
+  val ggcd : z -> z -> z * (z * z)
+
+  val eq_dec : z -> z -> bool
+ end
+
+val zeq_bool : z -> z -> bool
+
+val nth : nat -> 'a1 list -> 'a1 -> 'a1
+
+val nth_error : 'a1 list -> nat -> 'a1 option
+
+val list_eq_dec : ('a1 -> 'a1 -> bool) -> 'a1 list -> 'a1 list -> bool
+
+val map : ('a1 -> 'a2) -> 'a1 list -> 'a2 list
+
+val flat_map : ('a1 -> 'a2 list) -> 'a1 list -> 'a2 list
+
+val fold_left : ('a1 -> 'a2 -> 'a1) -> 'a2 list -> 'a1 -> 'a1
+
+val fold_right : ('a2 -> 'a1 -> 'a1) -> 'a1 -> 'a2 list -> 'a1
+
+val existsb : ('a1 -> bool) -> 'a1 list -> bool
+
+val forallb : ('a1 -> bool) -> 'a1 list -> bool
+
+val filter : ('a1 -> bool) -> 'a1 list -> 'a1 list
+
+val find : ('a1 -> bool) -> 'a1 list -> 'a1 option
+
+val combine : 'a1 list -> 'a2 list -> ('a1 * 'a2) list
+
+val seq : nat -> nat -> nat list
+
+type q = { qnum : z; qden : positive }
+
+val inject_Z : z -> q
+
+val qeq_bool : q -> q -> bool
+
+val qle_bool : q -> q -> bool
+
+val qplus : q -> q -> q
+
+val qmult : q -> q -> q
+
+val qopp : q -> q
+
+val qminus : q -> q -> q
+
+val qinv : q -> q
+
+val qdiv : q -> q -> q
+
+val qred : q -> q
+
+type 'x compare0 =
+| LT
+| EQ
+| GT
+
+module type OrderedType =
+ sig
+  type t
+
+  val compare : t -> t -> t compare0
+
+  val eq_dec : t -> t -> bool
+ end
+
+module OrderedTypeFacts :
+ functor (O:OrderedType) ->
+ sig
+  module TO :
+   sig
+    type t = O.t
+   end
+
+  module IsTO :
+   sig
+   end
+
+  module OrderTac :
+   sig
+   end
+
+  val eq_dec : O.t -> O.t -> bool
+
+  val lt_dec : O.t -> O.t -> bool
+
+  val eqb : O.t -> O.t -> bool
+ end
+
+module KeyOrderedType :
+ functor (O:OrderedType) ->
+ sig
+  module MO :
+   sig
+    module TO :
+     sig
+      type t = O.t
+     end
+
+    module IsTO :
+     sig
+     end
+
+    module OrderTac :
+     sig
+     end
+
+    val eq_dec : O.t -> O.t -> bool
+
+    val lt_dec : O.t -> O.t -> bool
+
+    val eqb : O.t -> O.t -> bool
+   end
+ end
+
+module PositiveOrderedTypeBits :
+ sig
+  type t = positive
+
+  val compare : t -> t -> positive compare0
+
+  val eq_dec : positive -> positive -> bool
+ end
+
+val append : positive -> positive -> positive
+
+module PositiveMap :
+ sig
+  module E :
+   sig
+    type t = positive
+
+    val compare : t -> t -> positive compare0
+
+    val eq_dec : positive -> positive -> bool
+   end
+
+  module ME :
+   sig
+    module MO :
+     sig
+      module TO :
+       sig
+        type t = positive
+       end
+
+      module IsTO :
+       sig
+       end
+
+      module OrderTac :
+       sig
+       end
+
+      val eq_dec : positive -> positive -> bool
+
+      val lt_dec : positive -> positive -> bool
+
+      val eqb : positive -> positive -> bool
+     end
+   end
+
+  type key = positive
+
+  type 'a tree =
+  | Leaf
+  | Node of 'a tree * 'a option * 'a tree
+
+  type 'a t = 'a tree
+
+  val empty : 'a1 t
+
+  val is_empty : 'a1 t -> bool
+
+  val find : key -> 'a1 t -> 'a1 option
+
+  val mem : key -> 'a1 t -> bool
+
+  val add : key -> 'a1 -> 'a1 t -> 'a1 t
+
+  val remove : key -> 'a1 t -> 'a1 t
+
+  val xelements : 'a1 t -> key -> (key * 'a1) list
+
+  val elements : 'a1 t -> (key * 'a1) list
+
+  val cardinal : 'a1 t -> nat
+
+  val xfind : key -> key -> 'a1 t -> 'a1 option
+
+  val xmapi : (key -> 'a1 -> 'a2) -> 'a1 t -> key -> 'a2 t
+
+  val mapi : (key -> 'a1 -> 'a2) -> 'a1 t -> 'a2 t
+
+  val map : ('a1 -> 'a2) -> 'a1 t -> 'a2 t
+
+  val xmap2_l : ('a1 option -> 'a2 option -> 'a3 option) -> 'a1 t -> 'a3 t
+
+  val xmap2_r : ('a1 option -> 'a2 option -> 'a3 option) -> 'a2 t -> 'a3 t
+
+  val _map2 :
+    ('a1 option -> 'a2 option -> 'a3 option) -> 'a1 t -> 'a2 t -> 'a3 t
+
+  val map2 :
+    ('a1 option -> 'a2 option -> 'a3 option) -> 'a1 t -> 'a2 t -> 'a3 t
+
+  val xfoldi : (key -> 'a1 -> 'a2 -> 'a2) -> 'a1 t -> 'a2 -> key -> 'a2
+
+  val fold : (key -> 'a1 -> 'a2 -> 'a2) -> 'a1 t -> 'a2 -> 'a2
+
+  val equal : ('a1 -> 'a1 -> bool) -> 'a1 t -> 'a1 t -> bool
+ end
+
+module M :
+ sig
+  module E :
+   sig
+    type t = positive
+
+    val compare : t -> t -> positive compare0
+
+    val eq_dec : positive -> positive -> bool
+   end
+
+  module ME :
+   sig
+    module MO :
+     sig
+      module TO :
+       sig
+        type t = positive
+       end
+
+      module IsTO :
+       sig
+       end
+
+      module OrderTac :
+       sig
+       end
+
+      val eq_dec : positive -> positive -> bool
+
+      val lt_dec : positive -> positive -> bool
+
+      val eqb : positive -> positive -> bool
+     end
+   end
+
+  type key = positive
+
+  type 'a tree = 'a PositiveMap.tree =
+  | Leaf
+  | Node of 'a tree * 'a option * 'a tree
+
+  type 'a t = 'a tree
+
+  val empty : 'a1 t
+
+  val is_empty : 'a1 t -> bool
+
+  val find : key -> 'a1 t -> 'a1 option
+
+  val mem : key -> 'a1 t -> bool
+
+  val add : key -> 'a1 -> 'a1 t -> 'a1 t
+
+  val remove : key -> 'a1 t -> 'a1 t
+
+  val xelements : 'a1 t -> key -> (key * 'a1) list
+
+  val elements : 'a1 t -> (key * 'a1) list
+
+  val cardinal : 'a1 t -> nat
+
+  val xfind : key -> key -> 'a1 t -> 'a1 option
+
+  val xmapi : (key -> 'a1 -> 'a2) -> 'a1 t -> key -> 'a2 t
+
+  val mapi : (key -> 'a1 -> 'a2) -> 'a1 t -> 'a2 t
+
+  val map : ('a1 -> 'a2) -> 'a1 t -> 'a2 t
+
+  val xmap2_l : ('a1 option -> 'a2 option -> 'a3 option) -> 'a1 t -> 'a3 t
+
+  val xmap2_r : ('a1 option -> 'a2 option -> 'a3 option) -> 'a2 t -> 'a3 t
+
+  val _map2 :
+    ('a1 option -> 'a2 option -> 'a3 option) -> 'a1 t -> 'a2 t -> 'a3 t
+
+  val map2 :
+    ('a1 option -> 'a2 option -> 'a3 option) -> 'a1 t -> 'a2 t -> 'a3 t
+
+  val xfoldi : (key -> 'a1 -> 'a2 -> 'a2) -> 'a1 t -> 'a2 -> key -> 'a2
+
+  val fold : (key -> 'a1 -> 'a2 -> 'a2) -> 'a1 t -> 'a2 -> 'a2
+
+  val equal : ('a1 -> 'a1 -> bool) -> 'a1 t -> 'a1 t -> bool
+ end
+
+type key0 = positive
+
+val get : z M.t -> key0 -> z
+
+type state = { sv : z M.t; sn : z M.t }
+
+val val0 : state -> key0 -> z
+
+val num : state -> key0 -> z
+
+type fact = key0 * z
+
+type literal = fact * bool
+
+type choice = z list
+
+type quantity = { qconst : z; qtables : (nat list * z M.t) list }
+
+type linear = { factors : (key0 * z) list; rest : quantity }
+
+type condition = { facts : fact list; clauses : literal list list;
+                   comparisons : linear list }
+
+type operator = { ident : z; sizes : z list;
+                  excluded : (nat list * z list list) list; pre : condition;
+                  effects : fact list;
+                  conditional : (literal list * fact list) list;
+                  changes : (key0 * linear) list; cost : quantity }
+
+type task = { basic : z; derived : (key0 * z) list; size : z M.t;
+              numbers : key0 list; init : state; operators : operator list;
+              layers : (fact * condition) list list; goal : condition }
+
+val row : z list -> choice -> nat list -> z
+
+val amount : quantity -> z list -> choice -> z
+
+val value : linear -> state -> z list -> choice -> z
+
+val is_fact : state -> fact -> bool
+
+val is_literal : state -> literal -> bool
+
+val holds_facts : condition -> state -> bool
+
+val holds : condition -> state -> z list -> choice -> bool
+
+val puts : fact list -> z M.t -> z M.t
+
+val basics : task -> key0 list
+
+val reset : task -> state -> state
+
+val news : (fact * condition) list -> state -> fact list
+
+val layer : nat -> (fact * condition) list -> state -> state
+
+val derive : task -> state -> state
+
+val fired : state -> (literal list * fact list) -> bool
+
+val makes : operator -> state -> fact list
+
+val apply : operator -> state -> choice -> state
+
+type table = { pattern : key0 list; entries : z option M.t }
+
+type label = { at_state : state; paid : z }
+
+type argument = { potentials : table list; needs : (key0 * table) list;
+                  labels : label M.t; count : positive }
+
+val upto : nat -> z -> z list
+
+val range : z -> z list
+
+val combos : z list -> choice list
+
+val eq_list : z list -> z list -> bool
+
+val admits : operator -> choice -> bool
+
+val choices : operator -> choice list
+
+val lookup : key0 -> fact list -> z option
+
+val matching : task -> key0 list -> fact list -> z list list
+
+val last_put : fact list -> key0 -> z -> z
+
+val after : key0 list -> z list -> fact list -> z list
+
+val value_in : key0 list -> z list -> key0 -> z option
+
+val truth : key0 list -> z list -> literal -> bool option
+
+val targets :
+  key0 list -> z list -> (literal list * fact list) list -> z list list -> z
+  list list
+
+val all_targets : key0 list -> operator -> z list -> z list list
+
+val memb : key0 -> key0 list -> bool
+
+val touches : key0 list -> operator -> bool
+
+val index : task -> key0 list -> z list -> z
+
+val bound : task -> table -> z list -> z option
+
+val at_most : z option -> z option -> z -> bool
+
+val minimum : z list -> z option
+
+type prepared = operator * (choice list * z option)
+
+val prepare : operator -> prepared
+
+val pot_op : task -> table -> prepared -> bool
+
+val is_basic : task -> key0 -> bool
+
+val check_pot : task -> prepared list -> table -> bool
+
+val alone : linear -> key0 -> bool
+
+val lowers : key0 -> prepared -> z option
+
+val zero : z option -> bool
+
+val none : z option -> bool
+
+val need_op : task -> table -> key0 -> bool -> prepared -> bool
+
+val check_need : task -> prepared list -> (key0 * table) -> bool
+
+type entry = choice * (z * z list)
+
+val profile : operator -> choice -> z list
+
+val fits : bool -> z list -> z list -> bool
+
+val as_good : bool -> entry -> entry -> bool
+
+val front : bool -> operator -> choice list
+
+val nonneg : linear -> bool
+
+val more_never_hurts : task -> bool
+
+val numbers_fit : bool -> z M.t -> z M.t -> key0 list -> bool
+
+val pot_cuts : task -> z option -> state -> z -> table -> bool
+
+val need_cuts : task -> state -> (key0 * table) -> bool
+
+val label_covers : task -> bool -> key0 list -> state -> z -> label -> bool
+
+val covered :
+  task -> argument -> z option -> (state -> positive list) -> bool -> key0
+  list -> state -> z -> bool
+
+val check_label :
+  task -> argument -> z option -> (state -> positive list) -> bool -> key0
+  list -> (operator * choice list) list -> label -> bool
+
+val in_range : task -> key0 -> z -> bool
+
+val sound_fact : task -> fact -> bool
+
+val distinct : key0 list -> bool
+
+val check_task : task -> bool
+
+val check : task -> argument -> z option -> (state -> positive list) -> bool
+
+type key1 = positive
+
+type atom = key1 * key1 list
+
+val atom_eqb : atom -> atom -> bool
+
+val assoc : atom -> (atom * 'a1) list -> 'a1 option
+
+type 'x index0 = (atom * 'x) list PositiveMap.t
+
+val bucket : atom -> positive
+
+val entries0 : 'a1 index0 -> atom -> (atom * 'a1) list
+
+val find0 : 'a1 index0 -> atom -> 'a1 option
+
+val insert : atom -> 'a1 -> 'a1 index0 -> 'a1 index0
+
+type term =
+| Var of nat
+| Object of key1
+
+type expression =
+| Constant of q
+| Fluent of key1 * term list
+| Duration
+| Plus of expression * expression
+| Minus of expression * expression
+| Times of expression * expression
+| Over of expression * expression
+
+type formula =
+| Truth of bool
+| Atom of key1 * term list
+| Same of term * term
+| Compare of bool * expression * expression
+| Not of formula
+| And of formula * formula
+| Forall of key1 * formula
+
+val or0 : formula -> formula -> formula
+
+val imply : formula -> formula -> formula
+
+val exists : key1 -> formula -> formula
+
+val equal0 : expression -> expression -> formula
+
+type effect =
+| Nothing
+| Put of bool * key1 * term list
+| Change of bool * key1 * term list * expression
+| Both of effect * effect
+| When of formula * effect
+| Each of key1 * effect
+
+type action = { parameters : key1 list; duration : expression option;
+                at_start : formula; start_effect : effect;
+                over_all : formula; at_end : formula; end_effect : effect }
+
+type world = { holds_in : (atom -> bool); value_in0 : (atom -> q option) }
+
+type problem = { objects : (key1 -> key1 list); actions : action list;
+                 initial_atoms : unit index0; initial_values : q index0;
+                 goal_formula : formula; metric : expression; per_time : 
+                 q; per_step : q }
+
+val initial : problem -> world
+
+val object0 : key1 list -> term -> key1 option
+
+val ground : key1 list -> term list -> key1 list option
+
+val lift : (q -> q -> q) -> q option -> q option -> q option
+
+val eval : world -> q option -> key1 list -> expression -> q option
+
+val less : q -> q -> bool
+
+val and3 : bool option -> bool option -> bool option
+
+val truth0 :
+  problem -> world -> q option -> key1 list -> formula -> bool option
+
+type change =
+| Fact of atom * bool
+| Number of atom * bool * q
+
+val both : 'a1 list option -> 'a1 list option -> 'a1 list option
+
+val changes0 :
+  problem -> world -> q option -> key1 list -> effect -> change list option
+
+val puts0 : change list -> atom -> bool -> bool
+
+val on : atom -> change list -> (bool * q) list
+
+val changed_value : q option -> (bool * q) list -> q option
+
+val targets0 : change list -> atom list
+
+val updates : world -> change list -> atom list -> (atom * q) list option
+
+val happening :
+  problem -> world -> q option -> key1 list -> formula -> effect -> world
+  option
+
+val step :
+  problem -> bool -> world -> action -> key1 list -> (world * q) option
+
+val execute :
+  problem -> bool -> world -> q -> (nat * key1 list) list -> (world * q)
+  option
+
+val final_metric : problem -> world -> q -> q option
+
+type form = (atom * q) list * q
+
+val plus_term : atom -> q -> (atom * q) list -> (atom * q) list
+
+val plus_form : form -> q -> form -> form
+
+val constant : q -> form
+
+val fluent : atom -> form
+
+type result =
+| Undefined
+| Unknown
+| Is of form
+
+val plus_result : result -> q -> result -> result
+
+type names = { variables : (z * atom) list M.t; fluents : atom M.t;
+               fact_of : (key1 * z) index0; number_of : key1 index0;
+               changing : (key1 -> bool); may_hold : unit index0;
+               scale : positive; cost_scale : positive }
+
+type case_tree =
+| Decided of (nat * choice) option
+| Impossible
+| SplitAtom of atom * case_tree * case_tree
+| SplitForm of form * case_tree * case_tree
+
+val mem0 : 'a1 index0 -> atom -> bool
+
+type knowledge = { literals : (atom * bool) list; bounds : (bool * form) list }
+
+val in_variable : names -> knowledge -> key1 -> (z * bool) list
+
+val possible : task -> names -> knowledge -> key1 -> z list
+
+val fact3 : task -> names -> knowledge -> key1 -> z -> bool option
+
+val base_truth : problem -> task -> names -> knowledge -> atom -> bool option
+
+type symbolic = { new_truths : (atom * bool) list;
+                  new_values : (atom * form) list }
+
+val unchanged : symbolic
+
+val atom3 :
+  problem -> task -> names -> knowledge -> symbolic -> atom -> bool option
+
+val value3 : problem -> names -> symbolic -> atom -> result
+
+val linear_of :
+  problem -> names -> symbolic -> result -> key1 list -> expression -> result
+
+val implied : knowledge -> bool -> form -> bool
+
+val compare3 : knowledge -> bool -> result -> bool option
+
+val truth3 :
+  problem -> task -> names -> knowledge -> symbolic -> result -> key1 list ->
+  formula -> bool option
+
+type symbolic_change =
+| SFact of atom * bool
+| SNumber of atom * bool * form
+
+val changes3 :
+  problem -> task -> names -> knowledge -> symbolic -> result -> key1 list ->
+  effect -> symbolic_change list option
+
+val on3 : atom -> symbolic_change list -> (bool * form) list
+
+val combine3 : result -> (bool * form) list -> form option
+
+val targets3 : symbolic_change list -> atom list
+
+val updates3 :
+  problem -> names -> symbolic -> symbolic_change list -> atom list ->
+  (atom * form) list option
+
+val truths3 : symbolic_change list -> bool -> (atom * bool) list
+
+type outcome =
+| Never
+| Unclear
+| After of symbolic * q
+
+val happening3 :
+  problem -> task -> names -> knowledge -> symbolic -> result -> q -> key1
+  list -> formula -> effect -> outcome
+
+val length3 : problem -> names -> action -> key1 list -> result
+
+val step3 :
+  problem -> task -> names -> knowledge -> action -> key1 list -> outcome
+
+val conjuncts :
+  problem -> names -> symbolic -> result -> key1 list -> formula -> knowledge
+
+val join : knowledge -> knowledge -> knowledge
+
+val gathered : problem -> task -> names -> action -> key1 list -> knowledge
+
+val impossible : problem -> task -> names -> knowledge -> bool
+
+val scaled : names -> q
+
+val factors_of : names -> (key1 * z) list -> form option
+
+val form_of : names -> linear -> z list -> choice -> form option
+
+val required : names -> knowledge -> form -> bool
+
+val literal3 : task -> names -> knowledge -> literal -> bool option
+
+val is_true : bool option -> bool
+
+val is_false : bool option -> bool
+
+val condition3 :
+  task -> names -> knowledge -> condition -> z list -> choice -> bool
+
+val fired3 :
+  task -> names -> knowledge -> (literal list * fact list) list -> fact list
+  option
+
+val admitted_choice : operator -> choice -> bool
+
+val variable_ok :
+  task -> names -> knowledge -> symbolic -> fact list -> key1 -> bool
+
+val is_zero : form -> bool
+
+val number_ok :
+  names -> symbolic -> (operator * choice) option -> key1 -> bool
+
+val growth : problem -> names -> symbolic -> q -> q option
+
+val step_cost : (operator * choice) option -> z
+
+val simulated :
+  problem -> task -> names -> knowledge -> symbolic -> q ->
+  (operator * choice) option -> bool
+
+val leaf_ok :
+  problem -> task -> names -> knowledge -> action -> key1 list ->
+  (operator * choice) option -> bool
+
+val tree_ok :
+  problem -> task -> names -> (knowledge -> (nat * choice) option -> bool) ->
+  knowledge -> case_tree -> bool
+
+val instance_leaf :
+  problem -> task -> names -> action -> key1 list -> knowledge ->
+  (nat * choice) option -> bool
+
+val goal_leaf :
+  problem -> task -> names -> knowledge -> (nat * choice) option -> bool
+
+val static_false : problem -> names -> key1 list -> formula -> bool
+
+val instances :
+  problem -> (key1 list -> bool) -> key1 list -> key1 list -> key1 list list
+
+val pruned : problem -> names -> action -> key1 list -> bool
+
+val effect_heads : effect -> key1 list
+
+val action_ok :
+  problem -> task -> names -> (nat -> key1 list -> case_tree) -> nat ->
+  action -> bool
+
+val all_entries : 'a1 index0 -> (atom * 'a1) list
+
+val faithful :
+  problem -> task -> names -> (nat -> key1 list -> case_tree) -> case_tree ->
+  bool
+
+val is_linear : problem -> names -> bool
+
+val check_certificate :
+  problem -> task -> names -> (nat -> key1 list -> case_tree) -> case_tree ->
+  argument -> (state -> positive list) -> (nat * key1 list) list -> q option
+  -> bool

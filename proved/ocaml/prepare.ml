@@ -1,0 +1,301 @@
+(* Turns a certificate of format 3 into the evidence that check.ml reads, and finds the case trees. Not believed: a mistake in this file makes
+   the checker reject, and cannot make it accept a false claim. *)
+module C = Checker
+module R = Reader
+
+(* JSON *)
+
+type json = Number of string | String of string | Bool of bool | Null | Array of json list | Object of (string * json) list
+
+let json text =
+  let position = ref 0 in
+  let fail what = R.reject "JSON: %s is expected at byte %d" what !position in
+  let peek () = if !position < String.length text then text.[!position] else '\000' in
+  let rec skip () = match peek () with ' ' | '\n' | '\t' | '\r' -> incr position; skip () | _ -> () in
+  let expect c = skip (); if peek () = c then incr position else fail (String.make 1 c) in
+  let accept c = skip (); if peek () = c then (incr position; true) else false in
+  let constant word value =
+    if !position + String.length word <= String.length text && String.sub text !position (String.length word) = word
+    then (position := !position + String.length word; value) else fail word in
+  let string () =
+    expect '"';
+    let buffer = Buffer.create 16 in
+    let rec characters () = match peek () with
+      | '"' -> incr position
+      | '\000' -> fail "the end of a string"
+      | '\\' -> incr position; Buffer.add_char buffer (peek ()); incr position; characters ()
+      | c -> Buffer.add_char buffer c; incr position; characters () in
+    characters (); Buffer.contents buffer in
+  let items close read =
+    if accept close then [] else
+      let rec more () = let item = read () in if accept ',' then item :: more () else (expect close; [item]) in
+      more () in
+  let rec value () =
+    skip ();
+    match peek () with
+    | '{' -> incr position; Object (items '}' (fun () -> skip (); let name = string () in expect ':'; name, value ()))
+    | '[' -> incr position; Array (items ']' value)
+    | '"' -> String (string ())
+    | 't' -> constant "true" (Bool true)
+    | 'f' -> constant "false" (Bool false)
+    | 'n' -> constant "null" Null
+    | '-' | '0' .. '9' ->
+      let start = !position in
+      while (match peek () with '-' | '+' | '.' | 'e' | 'E' | '0' .. '9' -> true | _ -> false) do incr position done;
+      Number (String.sub text start (!position - start))
+    | _ -> fail "a value" in
+  value ()
+
+let array = function Array items -> items | _ -> R.reject "JSON: an array is expected"
+let string = function String text -> text | _ -> R.reject "JSON: a string is expected"
+let number = function Number text -> text | _ -> R.reject "JSON: a number is expected"
+let int item = match int_of_string_opt (number item) with Some n -> n | None -> R.reject "JSON: a position is expected"
+let optional object_ name = match object_ with
+  | Object fields -> List.assoc_opt name fields
+  | _ -> R.reject "JSON: an object is expected"
+let field object_ name = match optional object_ name with Some item -> item | None -> R.reject "JSON: no field %s" name
+let items object_ name = match optional object_ name with Some item -> array item | None -> []
+let nth list i = match List.nth_opt list i with Some item -> item | None -> R.reject "JSON: no position %d" i
+
+(* Text of the evidence *)
+
+let list write items = "(" ^ String.concat " " (List.map write items) ^ ")"
+let pair write_first write_second item = match array item with
+  | [first; second] -> "(" ^ write_first first ^ " " ^ write_second second ^ ")"
+  | _ -> R.reject "JSON: a pair is expected"
+let numbers item = list number (array item)
+let fact = pair number number
+let literal = pair fact (function Bool holds -> string_of_bool holds | _ -> R.reject "JSON: true or false is expected")
+let quantity tables item =
+  let table item = match array item with
+    | [slots; i] -> "(" ^ numbers slots ^ " " ^ numbers (nth tables (int i)) ^ ")"
+    | _ -> R.reject "JSON: a table is expected" in
+  "(" ^ number (field item "constant") ^ " " ^ list table (items item "tables") ^ ")"
+let linear tables item = "(" ^ list (pair number number) (items item "factors") ^ " " ^ quantity tables (field item "quantity") ^ ")"
+let condition tables item =
+  Printf.sprintf "(%s %s %s)" (list fact (items item "facts"))
+    (list (fun clause -> list literal (array clause)) (items item "clauses"))
+    (list (linear tables) (items item "comparisons"))
+
+let task_text task =
+  let variables = array (field task "variables") and tables = array (field task "tables") in
+  let sizes = List.map (fun values -> List.length (array values)) variables in
+  let basic = int (field task "basic") in
+  let derived = List.filteri (fun i _ -> i >= basic) (List.mapi (fun i size -> Printf.sprintf "(%d %d)" i (size - 1)) sizes) in
+  let exclusion item = "(" ^ numbers (field item "slots") ^ " " ^ list numbers (items item "combinations") ^ ")" in
+  let operator item =
+    let designs = array (nth (array (field task "uses")) (int (field item "uses"))) in
+    let sizes = list (fun use -> match array use with
+      | [_; suitable] -> string_of_int (List.length (array suitable))
+      | _ -> R.reject "JSON: a slot is expected") designs in
+    let conditional item = "(" ^ list literal (items item "condition") ^ " " ^ list fact (items item "effects") ^ ")" in
+    Printf.sprintf "(%s %s %s %s %s %s %s)\n" sizes
+      (list exclusion (array (nth (array (field task "exclusions")) (int (field item "exclusions")))))
+      (condition tables (field item "condition")) (list fact (items item "effects")) (list conditional (items item "conditional"))
+      (list (pair number (linear tables)) (items item "changes")) (quantity tables (field item "cost")) in
+  let layer item = list (pair fact (condition tables)) (items item "rules") in
+  Printf.sprintf "(task %d %s %s %s %s\n%s\n%s %s)\n" basic (list Fun.id derived) (list string_of_int sizes)
+    (numbers (field task "values")) (numbers (field task "numbers")) (list operator (array (field task "operators")))
+    (list layer (array (field task "axioms"))) (condition tables (field task "goal"))
+
+let argument_text argument =
+  let bounds item = list (function Null -> "infinite" | item -> number item) (array (field item "values")) in
+  let potential item = Printf.sprintf "(%s %s)\n" (numbers (field item "pattern")) (bounds item) in
+  let need item = Printf.sprintf "(%s %s %s)\n" (number (field item "number")) (numbers (field item "pattern")) (bounds item) in
+  let label item = match array item with
+    | [values; amounts; paid] -> Printf.sprintf "(%s %s %s)\n" (numbers values) (numbers amounts) (number paid)
+    | _ -> R.reject "JSON: a label is expected" in
+  Printf.sprintf "(argument %s %s %s)\n" (list potential (items argument "potentials")) (list need (items argument "needs"))
+    (list label (items argument "labels"))
+
+(* Names of keys, without the word that says what the key is for. *)
+let names_of_keys () =
+  let names = Hashtbl.create 1000 in
+  Hashtbl.iter (fun name key ->
+    let space = String.index name ' ' in
+    Hashtbl.replace names key (String.sub name 0 space, String.sub name (space + 1) (String.length name - space - 1))) R.keys;
+  names
+
+let names_text problem task witness =
+  let names = names_of_keys () in
+  let heads = List.concat_map (fun action -> C.effect_heads action.C.start_effect @ C.effect_heads action.C.end_effect) problem.C.actions in
+  let heads what = List.sort_uniq compare (List.filter_map (fun key ->
+      let kind, name = Hashtbl.find names key in if kind = what then Some name else None) heads) in
+  let basic = int (field task "basic") in
+  let variable i values =
+    let last = List.length (array values) - 1 in
+    let atoms = List.mapi (fun x atom -> x, string atom) (array values) in
+    Printf.sprintf "(%d %s)\n" i (list (fun (x, atom) -> Printf.sprintf "(%d %s)" x atom) (List.filter (fun (x, _) -> x < last) atoms)) in
+  let variables = List.filteri (fun i _ -> i < basic) (List.mapi variable (array (field task "variables"))) in
+  let fluents = List.mapi (fun i fluent -> Printf.sprintf "(%d %s)" i (string fluent)) (array (field task "fluents")) in
+  Printf.sprintf "(names %s %s %s %s %s %s %s)\n" (list Fun.id variables) (list Fun.id fluents)
+    (list Fun.id (heads "predicate")) (list Fun.id (heads "function")) (list string (items witness "atoms"))
+    (number (field task "number_scale")) (number (field (field task "objective") "scale"))
+
+let integer_text number =
+  let rec decimal = function    (* digits, the least first *)
+    | C.XH -> [1]
+    | C.XO p -> double 0 (decimal p)
+    | C.XI p -> double 1 (decimal p)
+  and double carry = function
+    | [] -> if carry = 0 then [] else [carry]
+    | digit :: others -> let n = 2 * digit + carry in (n mod 10) :: double (n / 10) others in
+  let text p = String.concat "" (List.rev_map string_of_int (decimal p)) in
+  match number with C.Z0 -> "0" | C.Zpos p -> text p | C.Zneg p -> "-" ^ text p
+let fraction_text q = integer_text q.C.qnum ^ "/" ^ integer_text (C.Zpos q.C.qden)
+
+let tree_text names tree =
+  let name key = snd (Hashtbl.find names key) in
+  let atom (head, arguments) = list name (head :: arguments) in
+  let rec nat = function C.O -> 0 | C.S n -> 1 + nat n in
+  let rec text = function
+    | C.Decided None -> "(nothing)"
+    | C.Decided (Some (i, choice)) -> Printf.sprintf "(operator %d %s)" (nat i) (list integer_text choice)
+    | C.Impossible -> "(impossible)"
+    | C.SplitAtom (a, yes, no) -> Printf.sprintf "(atom %s %s %s)" (atom a) (text yes) (text no)
+    | C.SplitForm ((terms, constant), yes, no) ->
+      Printf.sprintf "(form %s %s %s %s)" (list (fun (fluent, q) -> Printf.sprintf "(%s %s)" (atom fluent) (fraction_text q)) terms)
+        (fraction_text constant) (text yes) (text no) in
+  text tree
+
+(* Case trees *)
+
+type split = Atom of C.atom | Form of C.form
+
+(* Atoms and linear forms on which a formula or an effect depends. *)
+let splits_of problem names duration =
+  let rec formula env = function
+    | C.Truth _ | C.Same _ -> []
+    | C.Atom (p, terms) -> (match C.ground env terms with Some arguments when names.C.changing p -> [Atom (p, arguments)] | _ -> [])
+    | C.Compare (_, a, b) -> (match C.linear_of problem names C.unchanged duration env (C.Minus (a, b)) with
+        | C.Is ((_ :: _, _) as form) -> [Form form]
+        | _ -> [])
+    | C.Not f -> formula env f
+    | C.And (f, g) -> formula env f @ formula env g
+    | C.Forall (kind, f) -> List.concat_map (fun o -> formula (env @ [o]) f) (problem.C.objects kind) in
+  let rec effect env = function
+    | C.Nothing | C.Put _ | C.Change _ -> []
+    | C.Both (a, b) -> effect env a @ effect env b
+    | C.When (f, a) -> formula env f @ effect env a
+    | C.Each (kind, a) -> List.concat_map (fun o -> effect (env @ [o]) a) (problem.C.objects kind) in
+  formula, effect
+
+(* Atoms that the values of a ground condition stand for. *)
+let splits_of_condition names condition =
+  let atom (v, x) = match C.M.find v names.C.variables with
+    | Some atoms -> (match List.assoc_opt x atoms with Some atom -> [Atom atom] | None -> List.map (fun (_, atom) -> Atom atom) atoms)
+    | None -> [] in
+  List.concat_map atom (condition.C.facts @ List.map fst (List.concat condition.C.clauses))
+
+exception No_tree
+
+let max_splits = 14
+
+(* A tree whose leaves [leaf] accepts: tries the candidates, and splits on what is not known. *)
+let search problem task names leaf candidates splits knowledge =
+  let rec tree depth (knowledge : C.knowledge) =
+    match List.find_opt (leaf knowledge) candidates with
+    | Some candidate -> C.Decided candidate
+    | None when C.impossible problem task names knowledge -> C.Impossible
+    | None when depth = max_splits -> raise No_tree
+    | None ->
+      let negated form = C.plus_form (C.constant R.zero) { C.qnum = C.Zneg C.XH; qden = C.XH } form in
+      let is_open = function
+        | Atom atom -> C.base_truth problem task names knowledge atom = None
+        | Form form -> not (C.implied knowledge false form) && not (C.implied knowledge true (negated form)) in
+      match List.find_opt is_open splits with
+      | None -> raise No_tree
+      | Some (Atom atom) ->
+        let known holds = tree (depth + 1) { knowledge with C.literals = (atom, holds) :: knowledge.C.literals } in
+        C.SplitAtom (atom, known true, known false)
+      | Some (Form form) ->
+        let known strict form = tree (depth + 1) { knowledge with C.bounds = (strict, form) :: knowledge.C.bounds } in
+        C.SplitForm (form, known false form, known true (negated form)) in
+  tree 0 knowledge
+
+(* Operators of an action with their arguments: an object, or the objects that may fill a slot. *)
+let operators_by_action task =
+  let objects = Array.of_list (List.map string (array (field task "objects"))) in
+  let slots = List.map (fun slot -> List.map (fun i -> objects.(int i)) (array slot)) (array (field task "slots")) in
+  let designs = List.map (fun uses -> List.map (fun use -> match array use with
+      | [slot; suitable] -> List.map (fun i -> nth (nth slots (int slot)) (int i)) (array suitable)
+      | _ -> R.reject "JSON: a slot is expected") (array uses)) (array (field task "uses")) in
+  let schemas = List.map string (array (field task "schemas")) in
+  let by_action = Hashtbl.create 100 in
+  List.iteri (fun i operator ->
+    let uses = nth designs (int (field operator "uses")) in
+    let arguments = List.map (fun argument -> match optional argument "object", optional argument "slot" with
+        | Some o, _ -> `Object (objects.(int o))
+        | _, Some slot -> `Slot (int slot)
+        | _ -> R.reject "JSON: an argument is expected") (array (field operator "arguments")) in
+    match List.nth_opt schemas (int (field operator "schema")) with
+    | Some name -> Hashtbl.add by_action name (i, arguments, uses)
+    | None -> R.reject "not covered: waiting") (array (field task "operators"));
+  by_action
+
+(* The choice for which an operator is the instance with these arguments. *)
+let choice_for arguments uses instance =
+  let rec position i name = function [] -> None | other :: others -> if other = name then Some i else position (i + 1) name others in
+  let choices = Array.make (List.length uses) None in
+  let matches argument name = match argument with
+    | `Object other -> other = name
+    | `Slot slot -> choices.(slot) <- position 0 name (List.nth uses slot); choices.(slot) <> None in
+  if List.length arguments = List.length instance && List.for_all2 matches arguments instance
+  then Some (List.map (fun choice -> R.integer (Option.value ~default:0 choice)) (Array.to_list choices)) else None
+
+let claim_text manifest = match field manifest "claim" with
+  | String "unsolvable" -> "unsolvable"
+  | claim -> string (field (field claim "optimal") "metric")
+
+let prepare directory =
+  let read name =
+    let channel = open_in_bin (Filename.concat directory name) in
+    Fun.protect ~finally:(fun () -> close_in channel) (fun () -> really_input_string channel (in_channel_length channel)) in
+  let problem = R.problem (read "domain.pddl") (read "problem.pddl") in
+  let task = json (read "task.json") in
+  let first_part =
+    "(claim " ^ claim_text (json (read "manifest.json")) ^ ")\n" ^ task_text task ^ argument_text (json (read "argument.json"))
+    ^ names_text problem.R.task task (json (read "witness.json")) in
+  let evidence = Evidence.read problem.R.action_names (first_part ^ "(goal-case (nothing)) (cases)") in
+  let ground_task = evidence.Evidence.ground_task and names = evidence.Evidence.names and problem_ = problem.R.task in
+  let keys = names_of_keys () in
+  let search = search problem_ ground_task names in
+  let formula_splits, _ = splits_of problem_ names C.Undefined in
+  let goal_case =
+    try search (C.goal_leaf problem_ ground_task names) [None]
+        (formula_splits [] problem_.C.goal_formula @ splits_of_condition names ground_task.C.goal)
+        (C.conjuncts problem_ names C.unchanged C.Undefined [] problem_.C.goal_formula)
+    with No_tree -> R.reject "no case tree is found for the goal" in
+  print_string first_part;
+  Printf.printf "(goal-case %s)\n(cases" (tree_text keys goal_case);
+  let by_action = operators_by_action task in
+  List.iter2 (fun name action ->
+    let instances = C.instances problem_ (C.pruned problem_ names action) action.C.parameters [] in
+    List.iter (fun env ->
+      let objects = List.map (fun key -> snd (Hashtbl.find keys key)) env in
+      let candidates = List.filter_map (fun (i, arguments, uses) ->
+          Option.map (fun choice -> Some (R.nat i, choice)) (choice_for arguments uses objects)) (Hashtbl.find_all by_action name) in
+      let formula, effect = splits_of problem_ names (C.length3 problem_ names action env) in
+      let operator_splits = List.concat_map (fun candidate ->
+          match candidate with
+          | Some (i, _) -> (match C.nth_error ground_task.C.operators i with
+              | Some operator ->
+                splits_of_condition names operator.C.pre
+                @ List.concat_map (fun (literals, _) ->
+                    splits_of_condition names { C.facts = List.map fst literals; clauses = []; comparisons = [] }) operator.C.conditional
+              | None -> [])
+          | None -> []) candidates in
+      let splits = formula env action.C.at_start @ formula env action.C.over_all @ formula env action.C.at_end
+                   @ effect env action.C.start_effect @ effect env action.C.end_effect @ operator_splits in
+      match search (C.instance_leaf problem_ ground_task names action env) (candidates @ [None]) splits
+              (C.gathered problem_ ground_task names action env) with
+      | C.Decided None -> ()
+      | tree -> Printf.printf "\n((%s) %s)" (String.concat " " (name :: objects)) (tree_text keys tree)
+      | exception No_tree -> R.reject "no case tree is found for (%s)" (String.concat " " (name :: objects))) instances)
+    problem.R.action_names problem_.C.actions;
+  print_string ")\n"
+
+let () =
+  match Sys.argv with
+  | [| _; directory |] -> (try prepare directory with R.Rejected message -> prerr_endline ("rejected: " ^ message); exit 3)
+  | _ -> prerr_endline "usage: prepare CERTIFICATE > EVIDENCE"; exit 2
