@@ -1,0 +1,136 @@
+(* Changes evidence at random and offers it for false statements: none may be accepted. As a control, the same evidence is offered for the
+   true statement. Prints the seed, and a mutant that was accepted wrongly. *)
+module C = Checker
+module R = Reader
+
+let rec text = function
+  | R.Word word -> word
+  | R.List items -> "(" ^ String.concat " " (List.map text items) ^ ")"
+
+let random_item items = List.nth items (Random.int (List.length items))
+let rec subexpressions item = item :: (match item with R.List items -> List.concat_map subexpressions items | R.Word _ -> [])
+
+(* Applies a change at one random place below a list. *)
+let rec at_random_place change item = match item with
+  | R.List (_ :: _ as items) when Random.int 6 > 0 ->
+    let place = Random.int (List.length items) in
+    R.List (List.mapi (fun i item -> if i = place then at_random_place change item else item) items)
+  | item -> change item
+
+let shifted delta word = match int_of_string_opt word with Some n -> string_of_int (n + delta) | None -> word
+let rec shift_all delta = function
+  | R.Word word -> R.Word (shifted delta word)
+  | R.List items -> R.List (List.map (shift_all delta) items)
+
+let is_integer word = int_of_string_opt word <> None
+let is_integer_item = function R.Word word -> is_integer word | R.List _ -> false
+
+(* Replaces the integer at one random place, by a near one or by another of the section. *)
+let mutate_integer integers item =
+  let target = Random.int (List.length integers) and place = ref (-1) in
+  let rec change = function
+    | R.Word word when is_integer word ->
+      incr place;
+      if !place <> target then R.Word word
+      else if Random.int 4 = 0 then random_item integers
+      else R.Word (shifted (random_item [-100; -10; -2; -1; 1; 2; 10; 100]) word)
+    | R.Word word -> R.Word word
+    | R.List items -> R.List (List.map change items) in
+  change item
+
+let mutate_structure other_places item = match item, Random.int 5 with
+  | R.List (_ :: items), 0 -> R.List items
+  | R.List (first :: items), 1 -> R.List (first :: first :: items)
+  | R.List items, 2 -> R.List (List.rev items)
+  | R.List _, 3 -> shift_all (random_item [-10; -1; 1; 10; 100; 204]) item
+  | _ -> random_item other_places
+
+let mutate_section section =
+  let places = subexpressions section in
+  match List.filter is_integer_item places, section with
+  | (_ :: _ as integers), _ when Random.int 3 > 0 -> mutate_integer integers section
+  | _, R.List (name :: parts) ->
+    (match at_random_place (mutate_structure places) (R.List parts) with
+     | R.List parts -> R.List (name :: parts)
+     | R.Word _ -> section)
+  | _, (R.Word _ | R.List []) -> section
+
+let mutate sections =
+  let rec repeat n sections =
+    if n = 0 then sections else
+      let place = 1 + Random.int (List.length sections - 1) in          (* section 0 is the claim *)
+      repeat (n - 1) (List.mapi (fun i section -> if i = place then mutate_section section else section) sections) in
+  repeat (1 + Random.int 3) sections
+
+type statement = { name : string; problem : C.problem; plan : (C.nat * C.positive list) list; claim : C.q option }
+
+let holds statement (evidence : Evidence.t) =
+  C.check_certificate statement.problem evidence.ground_task evidence.names evidence.case evidence.goal_case evidence.argument
+    evidence.labels_at statement.plan statement.claim
+
+(* The metric of a plan, if it can be executed. *)
+let metric problem plan = match C.execute problem false (C.initial problem) R.zero plan with
+  | Some (world, spent) -> C.final_metric problem world spent
+  | None -> None
+
+(* Plans that begin with one or two more steps; not all of them can be executed to the end. *)
+let longer_plans problem plan =
+  let steps = List.concat (List.mapi (fun i action ->
+      List.map (fun env -> i, action, env) (C.instances problem (fun _ -> false) action.C.parameters [])) problem.C.actions) in
+  let successors world = List.filter_map (fun (i, action, env) ->
+      Option.map (fun (world, _) -> (R.nat i, env), world) (C.step problem false world action env)) steps in
+  let extend (prefix, world) = List.map (fun (step, world) -> prefix @ [step], world) (successors world) in
+  let once = extend ([], C.initial problem) in
+  List.map (fun (prefix, _) -> prefix @ plan) (once @ List.concat_map extend once)
+
+(* False statements: a longer plan with a greater metric is optimal; there is no plan; and the original claim where one more action
+   reaches the goal for nothing. *)
+let false_statements problem plan best =
+  let worse = List.find_map (fun plan -> match metric problem plan with
+      | Some value when not (C.qle_bool value best) -> Some { name = "a worse plan"; problem; plan; claim = Some value }
+      | _ -> None) (longer_plans problem plan) in
+  let rec goal_effect = function
+    | C.Atom (p, terms) -> Some (C.Put (true, p, terms))
+    | C.And (f, g) -> (match goal_effect f, goal_effect g with Some a, Some b -> Some (C.Both (a, b)) | _ -> None)
+    | _ -> None in
+  let shortcut = match goal_effect problem.C.goal_formula with
+    | Some effect when not (C.qle_bool best R.zero) ->
+      let truth = C.Truth true in
+      let action = { C.parameters = []; duration = None; at_start = truth; start_effect = effect; over_all = truth; at_end = truth;
+                     end_effect = C.Nothing } in
+      [{ name = "a shortcut to the goal"; problem = { problem with C.actions = problem.C.actions @ [action] }; plan; claim = Some best }]
+    | _ -> [] in
+  Option.to_list worse @ [{ name = "no plan"; problem; plan = []; claim = None }] @ shortcut
+
+let read_file path =
+  let channel = open_in_bin path in
+  Fun.protect ~finally:(fun () -> close_in channel) (fun () -> really_input_string channel (in_channel_length channel))
+
+let () =
+  let directory = Sys.argv.(1) and count = int_of_string Sys.argv.(3) and seed = int_of_string Sys.argv.(4) in
+  Random.init seed;
+  let read name = read_file (Filename.concat directory name) in
+  let problem = R.problem (read "domain.pddl") (read "problem.pddl") in
+  let plan = R.plan problem (read "plan.txt") in
+  let evidence_text = read_file Sys.argv.(2) in
+  let names = problem.R.action_names @ ["shortcut"] in
+  let original = Evidence.read names evidence_text in
+  let best = match original.claim with Some value -> value | None -> failwith "the certificate has no plan" in
+  let true_statement = { name = "the true statement"; problem = problem.R.task; plan; claim = original.claim } in
+  if not (holds true_statement original) then failwith "the certificate itself is not accepted";
+  let false_statements = false_statements problem.R.task plan best in
+  let sections = R.expressions evidence_text in
+  let unreadable = ref 0 and true_accepted = ref 0 and true_rejected = ref 0 in
+  for _ = 1 to count do
+    let mutant = String.concat "\n" (List.map text (mutate sections)) in
+    match Evidence.read names mutant with
+    | exception (R.Rejected _ | Failure _ | Invalid_argument _ | Not_found) -> incr unreadable
+    | evidence ->
+      if holds true_statement evidence then incr true_accepted else incr true_rejected;
+      List.iter (fun statement ->
+        if holds statement evidence then begin
+          Printf.printf "accepted for a false statement (%s), seed %d:\n%s\n" statement.name seed mutant; exit 1
+        end) false_statements
+  done;
+  Printf.printf "seed %d: %d mutants, %d of them unreadable; %d accepted and %d not accepted for the true statement; none of them accepted for %s\n"
+    seed count !unreadable !true_accepted !true_rejected (String.concat ", " (List.map (fun s -> s.name) false_statements))
