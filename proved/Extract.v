@@ -1,8 +1,9 @@
-(* Extracts the checker to ocaml/checker.ml, with Coq's own integers: no arithmetic library is linked. *)
+(* Extracts the checker to ocaml/checker.ml, with Coq's own integers: no arithmetic library is
+   linked. *)
 From Coq Require Import Extraction ExtrOcamlBasic ZArith QArith.
 From Proved Require Import Task Check Lifted Faithful.
 Extraction Language OCaml.
 Set Warnings "-extraction-opaque-accessed".
 Extraction "ocaml/checker.ml" check_certificate
-  (* for the readers *) insert basics M.elements val Or Imply Exists Equal M.empty M.add Z.add Z.mul Qred
+  (* for the readers *) add_atom basics M.elements var_value Or Imply Exists Equal M.empty M.add Z.add Z.mul Qred
   (* for the program that writes case trees *) instances pruned gathered instance_leaf goal_leaf conjuncts impossible base_truth implied linear_of.

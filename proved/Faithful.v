@@ -1,5 +1,6 @@
-(* Compares a ground task with PDDL: every instance of an action is simulated by an operator that requires no more, has the same
-   effects, and costs no more. Instances are evaluated symbolically; case trees, which need no trust, name the operators. *)
+(* Compares a ground task with PDDL: every instance of an action is simulated by an operator that
+   requires no more, has the same effects, and costs no more. Instances are evaluated symbolically;
+   case trees, which need no trust, name the operators. *)
 From Coq Require Import ZArith QArith List Bool FMapPositive.
 From Proved Require Import Task Check Lifted.
 Import ListNotations.
@@ -23,22 +24,22 @@ Definition plus_result (a : result) (c : Q) (b : result) : result :=
   | Is x, Is y => Is (plus_form x c y) | _, _ => Unknown
   end.
 
-(* What a task and its names say; none of it is trusted. *)
+(* Relation between a task and PDDL; need not be believed. *)
 Record names := Names {
-  variables : M.t (list (Z * atom));             (* atoms of the values of a variable *)
-  fluents : M.t atom;                            (* fluents of the numbers *)
-  fact_of : index (key * Z); number_of : index key;
-  changing : key -> bool;                        (* predicates and functions that actions change *)
-  may_hold : index unit;                         (* atoms of changing predicates that may hold in some state *)
-  scale : positive;                              (* a number of the task is the value of its fluent times this *)
+  variables : M.t (list (Z * atom));               (* values of a variable, with their atoms *)
+  fluents : M.t atom;                              (* fluent of each number *)
+  fact_of : atom_map (key * Z); number_of : atom_map key;
+  changing : key -> bool;                          (* predicates and functions that actions change *)
+  may_hold : atom_map unit;                        (* atoms of changing predicates that may hold in some state *)
+  scale : positive;                                (* number = fluent times scale *)
   cost_scale : positive }.
 Inductive case_tree :=
-  | Decided (o : option (nat * choice))             (* an operator with a choice, or none *)
+  | Decided (o : option (nat * choice))             (* simulated by an operator with a choice, or by no operator *)
   | Impossible
-  | SplitAtom (a : atom) (t u : case_tree)            (* it holds, it does not hold *)
-  | SplitForm (f : form) (t u : case_tree).           (* it is at least 0, it is less *)
+  | SplitAtom (a : atom) (t u : case_tree)            (* the atom holds; it does not hold *)
+  | SplitForm (f : form) (t u : case_tree).           (* the form is at least 0; it is negative *)
 
-Definition mem {X} (m : index X) (a : atom) : bool := match find m a with Some _ => true | None => false end.
+Definition mem {X} (m : atom_map X) (a : atom) : bool := match find_atom m a with Some _ => true | None => false end.
 
 Section Faithful.
 Variables (P : problem) (T : task) (N : names).
@@ -46,13 +47,13 @@ Variables (P : problem) (T : task) (N : names).
 (* Knowledge of the state before a step. *)
 Record knowledge := Knowledge { literals : list (atom * bool); bounds : list (bool * form) }. (* form > 0 if strict, else >= 0 *)
 Definition in_variable (k : knowledge) (v : key) : list (Z * bool) :=
-  flat_map (fun l => match find (fact_of N) (fst l) with
+  flat_map (fun l => match find_atom (fact_of N) (fst l) with
                      | Some (u, x) => if Pos.eqb u v then [(x, snd l)] else [] | None => [] end) (literals k).
 (* The values that a variable may have. *)
 Definition possible (k : knowledge) (v : key) : list Z :=
   let known := in_variable k v in
   filter (fun y => forallb (fun xb => Bool.eqb (Z.eqb y (fst xb)) (snd xb)) known)
-         (match List.find snd known with Some (x, _) => [x] | None => range (get (size T) v) end).
+         (match List.find snd known with Some (x, _) => [x] | None => range (get (domain_size T) v) end).
 Definition fact3 (k : knowledge) (v : key) (x : Z) : option bool :=
   match M.find v (variables N) with
   | None => None
@@ -64,7 +65,7 @@ Definition base_truth (k : knowledge) (a : atom) : option bool :=
   else match assoc a (literals k) with
        | Some b => Some b
        | None => if negb (mem (may_hold N) a) then Some false
-                 else match find (fact_of N) a with Some (v, x) => fact3 k v x | None => None end
+                 else match find_atom (fact_of N) a with Some (v, x) => fact3 k v x | None => None end
        end.
 (* A state in terms of the one before the step: atoms and fluents that have changed. *)
 Record symbolic := Symbolic { new_truths : list (atom * bool); new_values : list (atom * form) }.
@@ -111,7 +112,7 @@ Fixpoint truth3 (k : knowledge) (s : symbolic) (d : result) (env : list key) (f 
   match f with
   | Truth b => Some b
   | Atom p ts => match ground env ts with Some l => atom3 k s (p, l) | None => Some false end
-  | Same t u => match object env t, object env u with Some a, Some b => Some (Pos.eqb a b) | _, _ => Some false end
+  | Same t u => match object_of env t, object_of env u with Some a, Some b => Some (Pos.eqb a b) | _, _ => Some false end
   | Compare strict a b => compare3 k strict (linear_of s d env (Minus a b))
   | Not g => option_map negb (truth3 k s d env g)
   | And g h => match truth3 k s d env g with
@@ -212,7 +213,7 @@ Definition gathered (a : action) (env : list key) : knowledge :=
   end.
 Definition impossible (k : knowledge) : bool :=
   existsb (fun l => match base_truth (Knowledge [] (bounds k)) (fst l) with Some b => negb (Bool.eqb b (snd l)) | None => false end
-                    || match find (fact_of N) (fst l) with
+                    || match find_atom (fact_of N) (fst l) with
                        | Some (v, _) => match possible k v with [] => true | _ => false end
                        | None => false end) (literals k)
   || existsb (fun b : bool * form => match snd b with ([], c) => if fst b then Qle_bool c 0 else less c 0 | _ => false end) (bounds k).
@@ -227,7 +228,7 @@ Fixpoint factors_of (l : list (key * Z)) : option form :=
   end.
 Definition form_of (l : linear) (szs : list Z) (ch : choice) : option form :=
   match factors_of (factors l) with
-  | Some g => Some (plus_form g 1 (constant (inject_Z (amount (rest l) szs ch) / scaled)))
+  | Some g => Some (plus_form g 1 (constant (inject_Z (amount (offset l) szs ch) / scaled)))
   | None => None
   end.
 (* The form times the scale is an integer, so more than -1 is enough. *)
@@ -238,7 +239,7 @@ Definition literal3 (k : knowledge) (l : literal) : option bool :=
 Definition is_true (r : option bool) : bool := match r with Some b => b | None => false end.
 Definition is_false (r : option bool) : bool := match r with Some b => negb b | None => false end.
 Definition condition3 (k : knowledge) (c : condition) (szs : list Z) (ch : choice) : bool :=
-  forallb (fun f => is_true (fact3 k (fst f) (snd f))) (Task.facts c) &&
+  forallb (fun f => is_true (fact3 k (fst f) (snd f))) (facts c) &&
   forallb (existsb (fun l => is_true (literal3 k l))) (clauses c) &&
   forallb (fun l => match form_of l szs ch with Some f => required k f | None => false end) (comparisons c).
 Fixpoint fired3 (k : knowledge) (cs : list (list literal * list fact)) : option (list fact) :=
@@ -249,9 +250,10 @@ Fixpoint fired3 (k : knowledge) (cs : list (list literal * list fact)) : option 
               else None
   end.
 Definition admitted_choice (o : operator) (ch : choice) : bool :=
-  Nat.eqb (length ch) (length (sizes o)) &&
-  forallb (fun xn : Z * Z => Z.leb 0 (fst xn) && Z.ltb (fst xn) (snd xn)) (combine ch (sizes o)) && admits o ch.
-(* What a variable becomes, for each value that it may have. *)
+  Nat.eqb (length ch) (length (slot_sizes o)) &&
+  forallb (fun xn : Z * Z => Z.leb 0 (fst xn) && Z.ltb (fst xn) (snd xn)) (combine ch (slot_sizes o)) && admits o ch.
+(* The value of a variable after the step agrees with its atoms, for each possible value before the
+   step. *)
 Definition variable_ok (k : knowledge) (s : symbolic) (made : list fact) (v : key) : bool :=
   match M.find v (variables N) with
   | None => true
@@ -266,8 +268,8 @@ Definition number_ok (s : symbolic) (o : option (operator * choice)) (n : key) :
   | Some f =>
       let after := match assoc f (new_values s) with Some g => g | None => fluent f end in
       let made := match o with
-                  | Some (o, ch) => match List.find (fun c => Pos.eqb (fst c) n) (Task.changes o) with
-                                    | Some c => form_of (snd c) (sizes o) ch | None => Some (fluent f) end
+                  | Some (o, ch) => match List.find (fun c => Pos.eqb (fst c) n) (number_effects o) with
+                                    | Some c => form_of (snd c) (slot_sizes o) ch | None => Some (fluent f) end
                   | None => Some (fluent f) end in
       match made with Some g => is_zero (plus_form after (-1 # 1) g) | None => false end
   end.
@@ -277,19 +279,19 @@ Definition growth (s : symbolic) (time : Q) : option Q :=
   | _ => None
   end.
 Definition step_cost (o : option (operator * choice)) : Z :=
-  match o with Some (o, ch) => amount (cost o) (sizes o) ch | None => 0 end.
+  match o with Some (o, ch) => amount (cost o) (slot_sizes o) ch | None => 0 end.
 Definition simulated (k : knowledge) (s : symbolic) (time : Q) (o : option (operator * choice)) : bool :=
   match match o with
-        | Some (o, ch) => if admitted_choice o ch && condition3 k (pre o) (sizes o) ch && distinct (map fst (Task.changes o))
-                          then option_map (app (Task.effects o)) (fired3 k (conditional o)) else None
+        | Some (o, ch) => if admitted_choice o ch && condition3 k (precondition o) (slot_sizes o) ch && distinct (map fst (number_effects o))
+                          then option_map (app (effects o)) (fired3 k (conditional o)) else None
         | None => Some [] end with
   | None => false
   | Some made =>
       forallb (variable_ok k s made)
-        (map fst made ++ flat_map (fun l => match find (fact_of N) (fst l) with Some f => [fst f] | None => [] end) (new_truths s)) &&
+        (map fst made ++ flat_map (fun l => match find_atom (fact_of N) (fst l) with Some f => [fst f] | None => [] end) (new_truths s)) &&
       forallb (number_ok s o)
-        (match o with Some (o, _) => map fst (Task.changes o) | None => [] end
-         ++ flat_map (fun l => match find (number_of N) (fst l) with Some n => [n] | None => [] end) (new_values s)) &&
+        (match o with Some (o, _) => map fst (number_effects o) | None => [] end
+         ++ flat_map (fun l => match find_atom (number_of N) (fst l) with Some n => [n] | None => [] end) (new_values s)) &&
       match growth s time with
       | Some g => Qle_bool (inject_Z (step_cost o)) (g * (Zpos (cost_scale N) # 1))
       | None => false
@@ -320,14 +322,15 @@ Definition instance_leaf (a : action) (env : list key) (k : knowledge) (o : opti
 Definition goal_leaf (k : knowledge) (_ : option (nat * choice)) : bool :=
   match truth3 k unchanged Undefined [] (goal_formula P) with Some false => true | _ => condition3 k (goal T) [] [] end.
 
-(* Instances for which the conditions on what never changes may hold: parameters are bound one after another. *)
+(* Instances for which the conditions on what never changes may hold: parameters are bound one after
+   another. *)
 Fixpoint static_false (env : list key) (f : formula) : bool :=
   match f with
   | And g h => static_false env g || static_false env h
   | Atom p ts => negb (changing N p) && match ground env ts with Some l => negb (holds_in (initial P) (p, l)) | None => false end
   | Not (Atom p ts) => negb (changing N p) && match ground env ts with Some l => holds_in (initial P) (p, l) | None => false end
-  | Same t u => match object env t, object env u with Some a, Some b => negb (Pos.eqb a b) | _, _ => false end
-  | Not (Same t u) => match object env t, object env u with Some a, Some b => Pos.eqb a b | _, _ => false end
+  | Same t u => match object_of env t, object_of env u with Some a, Some b => negb (Pos.eqb a b) | _, _ => false end
+  | Not (Same t u) => match object_of env t, object_of env u with Some a, Some b => Pos.eqb a b | _, _ => false end
   | _ => false
   end.
 Fixpoint instances (prune : list key -> bool) (types : list key) (env : list key) : list (list key) :=
@@ -346,19 +349,19 @@ Variables (case : nat -> list key -> case_tree) (goal_case : case_tree).
 Definition action_ok (i : nat) (a : action) : bool :=
   forallb (changing N) (effect_heads (start_effect a) ++ effect_heads (end_effect a)) &&
   forallb (fun env => tree_ok (instance_leaf a env) (gathered a env) (case i env)) (instances (pruned a) (parameters a) []).
-Definition all_entries {X} (m : index X) : list (atom * X) := flat_map snd (PositiveMap.elements m).
+Definition all_entries {X} (m : atom_map X) : list (atom * X) := flat_map snd (PositiveMap.elements m).
 Definition same_atom (r : option atom) (a : atom) : bool := match r with Some b => atom_eqb b a | None => false end.
 Definition faithful : bool :=
   forallb (fun e => negb (changing N (fst (fst e))) || mem (may_hold N) (fst e)) (all_entries (initial_atoms P)) &&
   forallb (fun vl => let '(v, vals) := vl in is_basic T v &&
-     forallb (fun xa => let '(x, a) := xa in Bool.eqb (holds_in (initial P) a) (Z.eqb (val (init T) v) x) &&
-       match find (fact_of N) a with Some (u, y) => Pos.eqb u v && Z.eqb y x | None => false end) vals) (M.elements (variables N)) &&
+     forallb (fun xa => let '(x, a) := xa in Bool.eqb (holds_in (initial P) a) (Z.eqb (var_value (init T) v) x) &&
+       match find_atom (fact_of N) a with Some (u, y) => Pos.eqb u v && Z.eqb y x | None => false end) vals) (M.elements (variables N)) &&
   forallb (fun e => let '(a, (v, x)) := e in
      match M.find v (variables N) with Some vals => existsb (fun xa => Z.eqb (fst xa) x && atom_eqb (snd xa) a) vals | None => false end)
      (all_entries (fact_of N)) &&
-  forallb (fun nf => let '(n, f) := nf in memb n (numbers T) && changing N (fst f) &&
-     match value_in (initial P) f with Some q => Qeq_bool (q * scaled) (inject_Z (num (init T) n)) | None => false end &&
-     match find (number_of N) f with Some m => Pos.eqb m n | None => false end) (M.elements (fluents N)) &&
+  forallb (fun nf => let '(n, f) := nf in mem_key n (numbers T) && changing N (fst f) &&
+     match value_in (initial P) f with Some q => Qeq_bool (q * scaled) (inject_Z (num_value (init T) n)) | None => false end &&
+     match find_atom (number_of N) f with Some m => Pos.eqb m n | None => false end) (M.elements (fluents N)) &&
   tree_ok goal_leaf (conjuncts unchanged Undefined [] (goal_formula P)) goal_case &&
   forallb (fun ia => action_ok (fst ia) (snd ia)) (combine (seq 0 (length (actions P))) (actions P)).
 End Faithful.

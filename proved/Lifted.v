@@ -1,6 +1,7 @@
-(* Semantics of PDDL actions executed one after another: the formal counterpart of pddl/src/validate/definition.md
-   for tasks without derived predicates, timed initial literals and chosen durations. This file, the statement of
-   the theorem [optimal], and the readers are all that has to be believed. *)
+(* Semantics of PDDL actions executed one after another: the formal counterpart of
+   pddl/src/validate/definition.md for tasks without derived predicates, timed initial literals and
+   chosen durations. This file, the statement of the theorem [optimal], and the readers are all that
+   has to be believed. *)
 From Coq Require Import ZArith QArith List Bool FMapPositive.
 Import ListNotations.
 
@@ -12,16 +13,17 @@ Fixpoint assoc {X} (a : atom) (l : list (atom * X)) : option X :=
   match l with [] => None | (b, x) :: r => if atom_eqb a b then Some x else assoc a r end.
 
 (* Finite maps from atoms: buckets in a search tree. Collisions of [bucket] cost time only. *)
-Definition index X := PositiveMap.t (list (atom * X)).
+Definition atom_map X := PositiveMap.t (list (atom * X)).
 Definition bucket (a : atom) : positive :=
   fold_left (fun h o => Pos.add (xO (xO (xO (xO (xO (xO (xO (xO (xO (xO (xO (xO h)))))))))))) o) (snd a) (fst a).
-Definition entries {X} (m : index X) (a : atom) : list (atom * X) :=
+Definition bucket_entries {X} (m : atom_map X) (a : atom) : list (atom * X) :=
   match PositiveMap.find (bucket a) m with Some l => l | None => [] end.
-Definition find {X} (m : index X) (a : atom) : option X := assoc a (entries m a).
-Definition insert {X} (a : atom) (x : X) (m : index X) : index X :=
-  PositiveMap.add (bucket a) ((a, x) :: entries m a) m.
+Definition find_atom {X} (m : atom_map X) (a : atom) : option X := assoc a (bucket_entries m a).
+Definition add_atom {X} (a : atom) (x : X) (m : atom_map X) : atom_map X :=
+  PositiveMap.add (bucket a) ((a, x) :: bucket_entries m a) m.
 
-(* Syntax. [Var i] is the variable at position i: parameters first, then variables of enclosing quantifiers. *)
+(* Syntax. [Var i] is the variable at position i: parameters first, then variables of enclosing
+   quantifiers. *)
 Inductive term := Var (i : nat) | Object (o : key).
 Inductive expression :=
   | Constant (q : Q) | Fluent (f : key) (ts : list term) | Duration
@@ -39,26 +41,26 @@ Inductive effect :=
   | Change (assigns : bool) (f : key) (ts : list term) (e : expression) (* assigns or increases *)
   | Both (a b : effect) | When (f : formula) (a : effect) | Each (type : key) (a : effect).
 Record action := Action {
-  parameters : list key;                         (* types *)
-  duration : option expression;                  (* none: instantaneous; only the part at start is used *)
+  parameters : list key;                           (* types *)
+  duration : option expression;                    (* none: instantaneous; only the part at start is used *)
   at_start : formula; start_effect : effect; over_all : formula; at_end : formula; end_effect : effect }.
 Record world := World { holds_in : atom -> bool; value_in : atom -> option Q }.
 Record problem := Problem {
-  objects : key -> list key;                     (* the objects of a type *)
+  objects : key -> list key;                       (* the objects of a type *)
   actions : list action;
-  initial_atoms : index unit; initial_values : index Q;
+  initial_atoms : atom_map unit; initial_values : atom_map Q;
   goal_formula : formula;
-  metric : expression;                           (* to be minimized, with *)
+  metric : expression;                             (* to be minimized, with *)
   per_time : Q; per_step : Q }.                  (* weights of the total time and of the number of steps *)
 Definition initial (P : problem) : world :=
-  World (fun a => match find (initial_atoms P) a with Some _ => true | None => false end) (find (initial_values P)).
+  World (fun a => match find_atom (initial_atoms P) a with Some _ => true | None => false end) (find_atom (initial_values P)).
 
 (* Terms, expressions, conditions. [None] is undefined. *)
-Definition object (env : list key) (t : term) : option key := match t with Var i => nth_error env i | Object o => Some o end.
+Definition object_of (env : list key) (t : term) : option key := match t with Var i => nth_error env i | Object o => Some o end.
 Fixpoint ground (env : list key) (ts : list term) : option (list key) :=
   match ts with
   | [] => Some []
-  | t :: r => match object env t, ground env r with Some o, Some l => Some (o :: l) | _, _ => None end
+  | t :: r => match object_of env t, ground env r with Some o, Some l => Some (o :: l) | _, _ => None end
   end.
 Definition lift (f : Q -> Q -> Q) (a b : option Q) : option Q :=
   match a, b with Some x, Some y => Some (f x y) | _, _ => None end.
@@ -86,7 +88,7 @@ Fixpoint truth (w : world) (d : option Q) (env : list key) (f : formula) : optio
   match f with
   | Truth b => Some b
   | Atom p ts => match ground env ts with Some l => Some (holds_in w (p, l)) | None => None end
-  | Same t u => match object env t, object env u with Some a, Some b => Some (Pos.eqb a b) | _, _ => None end
+  | Same t u => match object_of env t, object_of env u with Some a, Some b => Some (Pos.eqb a b) | _, _ => None end
   | Compare strict a b => match eval w d env a, eval w d env b with
                           | Some x, Some y => Some (if strict then less y x else Qle_bool y x) | _, _ => None end
   | Not g => option_map negb (truth w d env g)
@@ -110,7 +112,7 @@ Fixpoint changes (w : world) (d : option Q) (env : list key) (e : effect) : opti
   | Each t a => fold_right (fun o r => both (changes w d (env ++ [o]) a) r) (Some []) (objects P t)
   end.
 (* Of an atom that is both added and deleted, the addition counts. *)
-Definition puts (cs : list change) (a : atom) (b : bool) : bool :=
+Definition sets_atom (cs : list change) (a : atom) (b : bool) : bool :=
   existsb (fun c => match c with Fact a' b' => atom_eqb a a' && Bool.eqb b b' | _ => false end) cs.
 (* Several changes of one number: increases together, or assignments of one value. *)
 Definition on (f : atom) (cs : list change) : list (bool * Q) :=
@@ -122,8 +124,8 @@ Definition changed_value (old : option Q) (l : list (bool * Q)) : option Q :=
   | (false, _) :: _ => if existsb fst l then None
                        else option_map (fun x => fold_left (fun s c => Qred (s + snd c)) l x) old
   end.
-Fixpoint targets (cs : list change) : list atom :=
-  match cs with [] => [] | Number f _ _ :: r => f :: targets r | Fact _ _ :: r => targets r end.
+Fixpoint changed_fluents (cs : list change) : list atom :=
+  match cs with [] => [] | Number f _ _ :: r => f :: changed_fluents r | Fact _ _ :: r => changed_fluents r end.
 Fixpoint updates (w : world) (cs : list change) (fs : list atom) : option (list (atom * Q)) :=
   match fs with
   | [] => Some []
@@ -134,16 +136,17 @@ Fixpoint updates (w : world) (cs : list change) (fs : list atom) : option (list 
 Definition happening (w : world) (d : option Q) (env : list key) (f : formula) (e : effect) : option world :=
   match truth w d env f, changes w d env e with
   | Some true, Some cs =>
-      match updates w cs (targets cs) with
-      | Some l => Some (World (fun a => puts cs a true || (negb (puts cs a false) && holds_in w a))
+      match updates w cs (changed_fluents cs) with
+      | Some l => Some (World (fun a => sets_atom cs a true || (negb (sets_atom cs a false) && holds_in w a))
                               (fun a => match assoc a l with Some q => Some q | None => value_in w a end))
       | None => None
       end
   | _, _ => None
   end.
-(* One step: the state after it and its duration. With duration 0, start and end are one happening. The definition forbids
-   that start and end interfere then; [zero] says whether such steps are allowed at all. *)
-Definition step (zero : bool) (w : world) (a : action) (env : list key) : option (world * Q) :=
+(* One step: the state after it and its duration. With duration 0, start and end are one happening.
+   The definition forbids that start and end interfere then; [zero] says whether such steps are
+   allowed at all. *)
+Definition step (is_zero_bound : bool) (w : world) (a : action) (env : list key) : option (world * Q) :=
   if negb (Nat.eqb (length env) (length (parameters a)) &&
            forallb (fun x => existsb (Pos.eqb (fst x)) (objects P (snd x))) (combine env (parameters a)))
   then None else
@@ -155,7 +158,7 @@ Definition step (zero : bool) (w : world) (a : action) (env : list key) : option
       | Some d =>
           if less d 0 then None
           else if Qeq_bool d 0 then
-            if zero then option_map (fun w => (w, d))
+            if is_zero_bound then option_map (fun w => (w, d))
               (happening w (Some d) env (And (at_start a) (at_end a)) (Both (start_effect a) (end_effect a)))
             else None
           else match happening w (Some d) env (at_start a) (start_effect a) with
@@ -165,15 +168,16 @@ Definition step (zero : bool) (w : world) (a : action) (env : list key) : option
                end
       end
   end.
-(* A plan names actions by their positions. The goal state in which it ends, with what its steps add to the metric. *)
-Fixpoint execute (zero : bool) (w : world) (spent : Q) (plan : list (nat * list key)) : option (world * Q) :=
+(* A plan names actions by their positions. The goal state in which it ends, with what its steps add
+   to the metric. *)
+Fixpoint execute (is_zero_bound : bool) (w : world) (spent : Q) (plan : list (nat * list key)) : option (world * Q) :=
   match plan with
   | [] => match truth w None [] (goal_formula P) with Some true => Some (w, spent) | _ => None end
   | (i, env) :: r =>
       match nth_error (actions P) i with
       | None => None
-      | Some a => match step zero w a env with
-                  | Some (w', d) => execute zero w' (Qred (spent + per_time P * d + per_step P)) r
+      | Some a => match step is_zero_bound w a env with
+                  | Some (w', d) => execute is_zero_bound w' (Qred (spent + per_time P * d + per_step P)) r
                   | None => None
                   end
       end
@@ -181,8 +185,8 @@ Fixpoint execute (zero : bool) (w : world) (spent : Q) (plan : list (nat * list 
 End Conditions.
 Definition final_metric (P : problem) (w : world) (spent : Q) : option Q :=
   option_map (fun m => m + spent) (eval w None [] (metric P)).
-(* The claim of a certificate: [Some m], an optimal plan has metric m; [None], there is no plan. The plan of the certificate
-   has no step of duration 0; the other plans may have some. *)
+(* The claim of a certificate: [Some m], an optimal plan has metric m; [None], there is no plan. The
+   plan of the certificate has no step of duration 0; the other plans may have some. *)
 Definition is_optimal (P : problem) (plan : list (nat * list key)) (claim : option Q) : Prop :=
   match claim with
   | Some m =>

@@ -1,11 +1,13 @@
-(* Theorem [optimal]: if [check_certificate] accepts, then the plan of the certificate is executable with the claimed metric,
-   and no plan has a smaller metric; or, without a claimed metric, there is no plan. *)
+(* Theorem [optimal]: if [check_certificate] accepts, then the plan of the certificate is executable
+   with the claimed metric, and no plan has a smaller metric; or, without a claimed metric, there is
+   no plan. *)
 From Coq Require Import ZArith QArith List Bool Lia Lqa Setoid.
 From Proved Require Import Task Check Sound Lifted Faithful Symbolic Simulation.
 Import ListNotations.
 Open Scope Q_scope.
 
-(* What the checker accepts is true. Nothing is assumed of the ground task [T], the names [N], the case trees, the argument [A] and the oracle. *)
+(* What the checker accepts is true. Nothing is assumed of the ground task [T], the names [N], the
+   case trees, the argument [A] and the oracle. *)
 Theorem optimal : forall P T N case goal_case A oracle plan claim,
   check_certificate P T N case goal_case A oracle plan claim = true -> is_optimal P plan claim.
 Proof.

@@ -1,19 +1,21 @@
+(* Lemmas for theorem [sound]: potentials and needs are admissible, and a state that is no worse has
+   successors that are no worse. *)
 From Coq Require Import ZArith List Bool FMapPositive Lia.
 From Proved Require Import Task Check.
 Import ListNotations.
 Open Scope Z_scope.
 
-(* ---------- maps and lists ---------- *)
+(* Maps and lists *)
 Lemma get_add : forall m k x j, get (M.add k x m) j = if Pos.eqb k j then x else get m j.
 Proof.
   intros. unfold get. destruct (Pos.eqb_spec k j).
   - subst. rewrite M.gss. reflexivity.
   - rewrite M.gso by congruence. reflexivity.
 Qed.
-Lemma get_puts : forall fs m v, get (puts fs m) v = last_put fs v (get m v).
+Lemma get_puts : forall fs m v, get (put_all fs m) v = last_put fs v (get m v).
 Proof.
   induction fs as [|f fs IH]; intros; simpl; [reflexivity|].
-  unfold puts in *. simpl. rewrite IH, get_add. reflexivity.
+  unfold put_all in *. simpl. rewrite IH, get_add. reflexivity.
 Qed.
 Lemma last_put_app : forall a b v x, last_put (a ++ b) v x = last_put b v (last_put a v x).
 Proof. induction a; intros; simpl; auto. Qed.
@@ -32,25 +34,25 @@ Proof.
   - destruct (IH v x) as [H|H]; [left; exact H|right; right; exact H].
 Qed.
 Lemma last_put_copy : forall (g : key -> Z) ks v x,
-  last_put (map (fun k => (k, g k)) ks) v x = if memb v ks then g v else x.
+  last_put (map (fun k => (k, g k)) ks) v x = if mem_key v ks then g v else x.
 Proof.
   intros g. induction ks as [|k ks IH]; intros v x; simpl; [reflexivity|].
-  rewrite IH. unfold memb. simpl. rewrite (Pos.eqb_sym v k).
+  rewrite IH. unfold mem_key. simpl. rewrite (Pos.eqb_sym v k).
   destruct (Pos.eqb_spec k v); simpl; [subst; destruct (existsb _ _); reflexivity|reflexivity].
 Qed.
-Lemma memb_In : forall v ks, memb v ks = true <-> In v ks.
+Lemma memb_In : forall v ks, mem_key v ks = true <-> In v ks.
 Proof.
-  intros. unfold memb. rewrite existsb_exists. split.
+  intros. unfold mem_key. rewrite existsb_exists. split.
   - intros [x [H e]]. apply Pos.eqb_eq in e. subst. exact H.
   - intros H. exists v. split; [exact H|apply Pos.eqb_refl].
 Qed.
-Lemma upto_In : forall k a x, a <= x < a + Z.of_nat k -> In x (upto k a).
+Lemma upto_In : forall k a x, a <= x < a + Z.of_nat k -> In x (count_up k a).
 Proof.
   induction k; intros a x H; [lia|]. simpl. destruct (Z.eq_dec a x); [left; assumption|right; apply IHk; lia].
 Qed.
 Lemma range_In : forall x n, 0 <= x < n -> In x (range n).
 Proof. intros. unfold range. apply upto_In. lia. Qed.
-Lemma combos_In : forall ns ch, Forall2 (fun x n => 0 <= x < n) ch ns -> In ch (combos ns).
+Lemma combos_In : forall ns ch, Forall2 (fun x n => 0 <= x < n) ch ns -> In ch (combinations ns).
 Proof.
   intros ns ch H. induction H; simpl; [left; reflexivity|].
   apply in_flat_map. exists x. split; [apply range_In; assumption|apply in_map; assumption].
@@ -61,7 +63,7 @@ Proof.
   unfold admits. apply forallb_forall. intros [slots bad] H. simpl.
   apply negb_true_iff. destruct (existsb _ bad) eqn:E; [|reflexivity].
   exfalso. apply existsb_exists in E. destruct E as [b [B e]].
-  unfold eq_list in e. destruct (list_eq_dec _ _ _); [|discriminate].
+  unfold equal_lists in e. destruct (list_eq_dec _ _ _); [|discriminate].
   apply (H2 slots bad H). subst. exact B.
 Qed.
 Lemma minimum_le : forall xs x, In x xs -> exists m, minimum xs = Some m /\ m <= x.
@@ -77,7 +79,7 @@ Section Soundness.
 Variable T : task.
 Notation bas v := (is_basic T v = true).
 
-(* ---------- derived variables ---------- *)
+(* Derived variables *)
 Hypothesis heads_derived :
   forallb (forallb (fun r : fact * condition => negb (is_basic T (fst (fst r))))) (layers T) = true.
 Hypothesis derived_derived : forallb (fun d : key * Z => negb (is_basic T (fst d))) (derived T) = true.
@@ -88,61 +90,61 @@ Proof.
   unfold basics. apply in_map_iff. exists (Pos.to_nat v). split; [apply Pos2Nat.id|].
   apply in_seq. lia.
 Qed.
-Lemma reset_val : forall s v, bas v -> val (reset T s) v = val s v.
+Lemma reset_val : forall s v, bas v -> var_value (reset_derived T s) v = var_value s v.
 Proof.
-  intros s v H. unfold reset, val at 1. simpl. rewrite get_puts.
+  intros s v H. unfold reset_derived, var_value at 1. simpl. rewrite get_puts.
   rewrite last_put_none.
-  - rewrite get_puts, (last_put_copy (val s)).
-    assert (I : memb v (basics T) = true) by (apply memb_In, basics_In, H).
+  - rewrite get_puts, (last_put_copy (var_value s)).
+    assert (I : mem_key v (basics T) = true) by (apply memb_In, basics_In, H).
     rewrite I. reflexivity.
   - intros f F e. rewrite forallb_forall in derived_derived. apply derived_derived in F.
     rewrite e, H in F. discriminate.
 Qed.
-Lemma reset_num : forall s n, num (reset T s) n = if memb n (numbers T) then num s n else 0.
+Lemma reset_num : forall s n, num_value (reset_derived T s) n = if mem_key n (numbers T) then num_value s n else 0.
 Proof.
-  intros. unfold reset, num at 1. simpl. rewrite get_puts, (last_put_copy (num s)). unfold get.
+  intros. unfold reset_derived, num_value at 1. simpl. rewrite get_puts, (last_put_copy (num_value s)). unfold get.
   rewrite M.gempty. reflexivity.
 Qed.
-Lemma layer_num : forall fuel rules s n, num (layer fuel rules s) n = num s n.
+Lemma layer_num : forall fuel rules s n, num_value (evaluate_layer fuel rules s) n = num_value s n.
 Proof.
-  induction fuel; intros; simpl; [reflexivity|]. destruct (news rules s); [reflexivity|].
+  induction fuel; intros; simpl; [reflexivity|]. destruct (new_facts rules s); [reflexivity|].
   rewrite IHfuel. reflexivity.
 Qed.
 Lemma layer_val : forall rules, forallb (fun r : fact * condition => negb (is_basic T (fst (fst r)))) rules = true ->
-  forall fuel s v, bas v -> val (layer fuel rules s) v = val s v.
+  forall fuel s v, bas v -> var_value (evaluate_layer fuel rules s) v = var_value s v.
 Proof.
-  intros rules R. induction fuel; intros s v B; cbn [layer]; [reflexivity|].
-  destruct (news rules s) as [|f fs] eqn:N; [reflexivity|]. rewrite IHfuel by exact B.
-  unfold val. cbn [sv]. rewrite get_puts. apply last_put_none.
-  intros g G e. rewrite <- N in G. unfold news in G. apply in_map_iff in G.
+  intros rules R. induction fuel; intros s v B; cbn [evaluate_layer]; [reflexivity|].
+  destruct (new_facts rules s) as [|f fs] eqn:N; [reflexivity|]. rewrite IHfuel by exact B.
+  unfold var_value. cbn [var_values]. rewrite get_puts. apply last_put_none.
+  intros g G e. rewrite <- N in G. unfold new_facts in G. apply in_map_iff in G.
   destruct G as [r [E G]]. apply filter_In in G. destruct G as [G _].
   rewrite forallb_forall in R. apply R in G. rewrite E, e, B in G. discriminate.
 Qed.
-Lemma derive_val : forall s v, bas v -> val (derive T s) v = val s v.
+Lemma derive_val : forall s v, bas v -> var_value (derive T s) v = var_value s v.
 Proof.
-  intros s v B. unfold derive. rewrite <- (reset_val s v B). generalize (reset T s) as t.
+  intros s v B. unfold derive. rewrite <- (reset_val s v B). generalize (reset_derived T s) as t.
   revert heads_derived. generalize (layers T) as ls.
   induction ls as [|l ls IH]; intros H t; cbn [fold_left]; [reflexivity|].
   simpl in H. apply andb_true_iff in H. destruct H as [H1 H2].
   rewrite IH by exact H2. apply layer_val; assumption.
 Qed.
-Lemma derive_num : forall s n, num (derive T s) n = if memb n (numbers T) then num s n else 0.
+Lemma derive_num : forall s n, num_value (derive T s) n = if mem_key n (numbers T) then num_value s n else 0.
 Proof.
-  intros s n. unfold derive. rewrite <- reset_num. generalize (reset T s) as t. generalize (layers T) as ls.
+  intros s n. unfold derive. rewrite <- reset_num. generalize (reset_derived T s) as t. generalize (layers T) as ls.
   induction ls as [|l ls IH]; intros t; cbn [fold_left]; [reflexivity|]. rewrite IH. apply layer_num.
 Qed.
 
-(* ---------- a state that is no worse ---------- *)
+(* Dominance: a state that is no worse than another *)
 Definition rel (mono : bool) (a b : Z) : Prop := if mono then b <= a else a = b.
 Definition same (mono : bool) (s t : state) : Prop :=
-  (forall v, val s v = val t v) /\ forall n, rel mono (num s n) (num t n).
+  (forall v, var_value s v = var_value t v) /\ forall n, rel mono (num_value s n) (num_value t n).
 Definition no_worse (mono : bool) (s t : state) : Prop :=
-  (forall v, bas v -> val s v = val t v) /\ forall n, In n (numbers T) -> rel mono (num s n) (num t n).
+  (forall v, bas v -> var_value s v = var_value t v) /\ forall n, In n (numbers T) -> rel mono (num_value s n) (num_value t n).
 
 Lemma rel_refl : forall m a, rel m a a.
 Proof. intros [] a; simpl; lia. Qed.
 Lemma value_rel2 : forall m l s t sz ch ch', (m = true -> nonneg l = true) -> same m s t ->
-  rel m (amount (rest l) sz ch) (amount (rest l) sz ch') -> rel m (value l s sz ch) (value l t sz ch').
+  rel m (amount (offset l) sz ch) (amount (offset l) sz ch') -> rel m (value l s sz ch) (value l t sz ch').
 Proof.
   intros m [fs r] s t sz ch ch' P [_ H]. unfold value. simpl.
   assert (P' : m = true -> forallb (fun f : key * Z => 0 <=? snd f) fs = true) by (intro e; apply (P e)).
@@ -172,11 +174,11 @@ Proof.
   - apply forallb_ext. intro. apply existsb_ext. intro. eapply is_literal_same, H.
 Qed.
 Definition no_dearer (m : bool) (o : operator) (ch ch' : choice) : Prop :=
-  amount (cost o) (sizes o) ch <= amount (cost o) (sizes o) ch' /\
-  forall l, In l (comparisons (pre o) ++ map snd (changes o)) ->
-    rel m (amount (rest l) (sizes o) ch) (amount (rest l) (sizes o) ch').
+  amount (cost o) (slot_sizes o) ch <= amount (cost o) (slot_sizes o) ch' /\
+  forall l, In l (comparisons (precondition o) ++ map snd (number_effects o)) ->
+    rel m (amount (offset l) (slot_sizes o) ch) (amount (offset l) (slot_sizes o) ch').
 Lemma holds_mono2 : forall m c s t sz ch ch', (m = true -> forallb nonneg (comparisons c) = true) -> same m s t ->
-  (forall l, In l (comparisons c) -> rel m (amount (rest l) sz ch) (amount (rest l) sz ch')) ->
+  (forall l, In l (comparisons c) -> rel m (amount (offset l) sz ch) (amount (offset l) sz ch')) ->
   holds c t sz ch' = true -> holds c s sz ch = true.
 Proof.
   intros m c s t sz ch ch' P H D. unfold holds. rewrite (holds_facts_same _ c _ _ H).
@@ -198,9 +200,9 @@ Proof.
   - apply forallb_ext. intro l. f_equal. apply (value_rel false); [discriminate|exact H].
 Qed.
 Lemma news_same : forall m rules s t,
-  (m = true -> forall r, In r rules -> comparisons (snd r) = []) -> same m s t -> news rules s = news rules t.
+  (m = true -> forall r, In r rules -> comparisons (snd r) = []) -> same m s t -> new_facts rules s = new_facts rules t.
 Proof.
-  intros m rules s t P H. unfold news. f_equal.
+  intros m rules s t P H. unfold new_facts. f_equal.
   assert (Q : forall r, In r rules -> negb (is_fact s (fst r)) && holds (snd r) s [] []
                                   = negb (is_fact t (fst r)) && holds (snd r) t [] []).
   { intros r I. erewrite is_fact_same by eassumption. f_equal. eapply holds_same; [|exact H]. auto. }
@@ -208,135 +210,135 @@ Proof.
   rewrite Q by (left; reflexivity). rewrite IH by (intros; apply Q; right; assumption). reflexivity.
 Qed.
 Lemma layer_same : forall m rules, (m = true -> forall r, In r rules -> comparisons (snd r) = []) ->
-  forall fuel s t, same m s t -> same m (layer fuel rules s) (layer fuel rules t).
+  forall fuel s t, same m s t -> same m (evaluate_layer fuel rules s) (evaluate_layer fuel rules t).
 Proof.
-  intros m rules P. induction fuel; intros s t H; cbn [layer]; [exact H|].
-  rewrite (news_same m rules s t P H). destruct (news rules t) as [|f fs]; [exact H|].
+  intros m rules P. induction fuel; intros s t H; cbn [evaluate_layer]; [exact H|].
+  rewrite (news_same m rules s t P H). destruct (new_facts rules t) as [|f fs]; [exact H|].
   apply IHfuel. destruct H as [H1 H2]. split; [|exact H2].
-  intro v. unfold val. cbn [sv]. rewrite !get_puts. f_equal. apply H1.
+  intro v. unfold var_value. cbn [var_values]. rewrite !get_puts. f_equal. apply H1.
 Qed.
 Lemma derive_same : forall m, (m = true -> forall ls, In ls (layers T) -> forall r, In r ls -> comparisons (snd r) = []) ->
   forall s t, no_worse m s t -> same m (derive T s) (derive T t).
 Proof.
   intros m P s t [H1 H2]. unfold derive.
-  assert (R : same m (reset T s) (reset T t)).
+  assert (R : same m (reset_derived T s) (reset_derived T t)).
   { split.
-    - intro v. unfold reset, val at 1 3. cbn [sv]. rewrite !get_puts. f_equal.
-      rewrite (last_put_copy (val s)), (last_put_copy (val t)).
-      destruct (memb v (basics T)) eqn:E; [|reflexivity].
+    - intro v. unfold reset_derived, var_value at 1 3. cbn [var_values]. rewrite !get_puts. f_equal.
+      rewrite (last_put_copy (var_value s)), (last_put_copy (var_value t)).
+      destruct (mem_key v (basics T)) eqn:E; [|reflexivity].
       apply H1. apply memb_In in E. unfold basics in E. apply in_map_iff in E.
       destruct E as [i [E I]]. apply in_seq in I. unfold is_basic. apply Z.leb_le. subst v.
       rewrite <- (Nat2Pos.id i) in I by lia. lia.
-    - intro n. rewrite !reset_num. destruct (memb n (numbers T)) eqn:E; [|apply rel_refl].
+    - intro n. rewrite !reset_num. destruct (mem_key n (numbers T)) eqn:E; [|apply rel_refl].
       apply H2. apply memb_In, E. }
-  revert R. generalize (reset T s) as a. generalize (reset T t) as b. revert P. generalize (layers T) as ls.
+  revert R. generalize (reset_derived T s) as a. generalize (reset_derived T t) as b. revert P. generalize (layers T) as ls.
   induction ls as [|l ls IH]; intros P b a R; cbn [fold_left]; [exact R|].
   apply IH; [intros e l' L; apply P; [exact e|right; exact L]|].
   apply layer_same; [|exact R]. intros e r. apply P; [exact e|left; reflexivity].
 Qed.
 
-Lemma makes_same : forall m o s t, same m s t -> makes o s = makes o t.
+Lemma makes_same : forall m o s t, same m s t -> made_facts o s = made_facts o t.
 Proof.
-  intros m o s t H. unfold makes. f_equal. f_equal.
+  intros m o s t H. unfold made_facts. f_equal. f_equal.
   induction (conditional o) as [|c cs IH]; simpl; [reflexivity|].
-  replace (fired s c) with (fired t c); [rewrite IH; reflexivity|].
-  unfold fired. apply forallb_ext. intro. symmetry. eapply is_literal_same, H.
+  replace (fires s c) with (fires t c); [rewrite IH; reflexivity|].
+  unfold fires. apply forallb_ext. intro. symmetry. eapply is_literal_same, H.
 Qed.
-Lemma puts_rel : forall m o s t ch ch', (m = true -> forallb (fun c => nonneg (snd c)) (changes o) = true) -> same m s t ->
-  (forall l, In l (map snd (changes o)) -> rel m (amount (rest l) (sizes o) ch) (amount (rest l) (sizes o) ch')) ->
-  forall n, rel m (num (apply o s ch) n) (num (apply o t ch') n).
+Lemma puts_rel : forall m o s t ch ch', (m = true -> forallb (fun c => nonneg (snd c)) (number_effects o) = true) -> same m s t ->
+  (forall l, In l (map snd (number_effects o)) -> rel m (amount (offset l) (slot_sizes o) ch) (amount (offset l) (slot_sizes o) ch')) ->
+  forall n, rel m (num_value (apply o s ch) n) (num_value (apply o t ch') n).
 Proof.
-  intros m o s t ch ch' P H D n. unfold apply, num. cbn [sn]. rewrite !get_puts.
-  destruct H as [H1 H2]. assert (Q : rel m (get (sn s) n) (get (sn t) n)) by apply H2.
+  intros m o s t ch ch' P H D n. unfold apply, num_value. cbn [num_values]. rewrite !get_puts.
+  destruct H as [H1 H2]. assert (Q : rel m (get (num_values s) n) (get (num_values t) n)) by apply H2.
   assert (R : same m s t) by (split; assumption). clear H1 H2.
-  revert P D Q. generalize (get (sn s) n) as a. generalize (get (sn t) n) as b.
-  induction (changes o) as [|c cs IH]; intros b a P D Q; simpl; [exact Q|].
+  revert P D Q. generalize (get (num_values s) n) as a. generalize (get (num_values t) n) as b.
+  induction (number_effects o) as [|c cs IH]; intros b a P D Q; simpl; [exact Q|].
   apply IH.
   - intro e. specialize (P e). simpl in P. apply andb_true_iff in P. apply P.
   - intros l L. apply D. right. exact L.
   - destruct (Pos.eqb (fst c) n); [|exact Q]. apply value_rel2; [|exact R|apply D; left; reflexivity].
     intro e. specialize (P e). simpl in P. apply andb_true_iff in P. apply P.
 Qed.
-Lemma apply_no_worse : forall m o s t ch ch', (m = true -> forallb (fun c => nonneg (snd c)) (changes o) = true) ->
+Lemma apply_no_worse : forall m o s t ch ch', (m = true -> forallb (fun c => nonneg (snd c)) (number_effects o) = true) ->
   same m s t -> no_dearer m o ch ch' -> no_worse m (apply o s ch) (apply o t ch').
 Proof.
   intros m o s t ch ch' P H D. split.
-  - intros v _. unfold apply, val. cbn [sv]. rewrite !get_puts, (makes_same _ _ _ _ H).
+  - intros v _. unfold apply, var_value. cbn [var_values]. rewrite !get_puts, (makes_same _ _ _ _ H).
     f_equal. apply H.
   - intros n _. apply puts_rel; [assumption|assumption|]. intros l L. apply D. apply in_or_app. right. exact L.
 Qed.
 
-(* ---------- tables ---------- *)
-Definition shape (s : state) (pat : list key) : list Z := map (val s) pat.
-Lemma after_map : forall pat g fs, after pat (map g pat) fs = map (fun v => last_put fs v (g v)) pat.
+(* Patterns and tables *)
+Definition shape (s : state) (pat : list key) : list Z := map (var_value s) pat.
+Lemma after_map : forall pat g fs, pattern_after pat (map g pat) fs = map (fun v => last_put fs v (g v)) pat.
 Proof. induction pat; intros; simpl; [reflexivity|]. rewrite IHpat. reflexivity. Qed.
-Lemma value_in_map : forall pat g v, value_in pat (map g pat) v = if memb v pat then Some (g v) else None.
+Lemma value_in_map : forall pat g v, pattern_value pat (map g pat) v = if mem_key v pat then Some (g v) else None.
 Proof.
   induction pat as [|w pat IH]; intros g v; simpl; [reflexivity|].
-  unfold memb. simpl. rewrite (Pos.eqb_sym v w). destruct (Pos.eqb_spec w v); simpl; [subst; reflexivity|apply IH].
+  unfold mem_key. simpl. rewrite (Pos.eqb_sym v w). destruct (Pos.eqb_spec w v); simpl; [subst; reflexivity|apply IH].
 Qed.
-Lemma truth_ok : forall pat s l b, truth pat (shape s pat) l = Some b -> is_literal s l = b.
+Lemma truth_ok : forall pat s l b, pattern_truth pat (shape s pat) l = Some b -> is_literal s l = b.
 Proof.
-  intros pat s l b. unfold truth, shape. rewrite value_in_map.
-  destruct (memb _ pat); [|discriminate]. intro e. injection e as e. exact e.
+  intros pat s l b. unfold pattern_truth, shape. rewrite value_in_map.
+  destruct (mem_key _ pat); [|discriminate]. intro e. injection e as e. exact e.
 Qed.
 Lemma fired_false : forall pat s c,
-  existsb (fun t => match t with Some false => true | _ => false end) (map (truth pat (shape s pat)) (fst c)) = true ->
-  fired s c = false.
+  existsb (fun t => match t with Some false => true | _ => false end) (map (pattern_truth pat (shape s pat)) (fst c)) = true ->
+  fires s c = false.
 Proof.
-  intros pat s c H. unfold fired. apply existsb_exists in H. destruct H as [t [I E]].
+  intros pat s c H. unfold fires. apply existsb_exists in H. destruct H as [t [I E]].
   apply in_map_iff in I. destruct I as [l [L I]]. destruct t as [[]|]; try discriminate.
   apply truth_ok in L. destruct (forallb (is_literal s) (fst c)) eqn:F; [|reflexivity].
   rewrite forallb_forall in F. rewrite (F l I) in L. discriminate.
 Qed.
 Lemma fired_true : forall pat s c,
-  forallb (fun t => match t with Some true => true | _ => false end) (map (truth pat (shape s pat)) (fst c)) = true ->
-  fired s c = true.
+  forallb (fun t => match t with Some true => true | _ => false end) (map (pattern_truth pat (shape s pat)) (fst c)) = true ->
+  fires s c = true.
 Proof.
-  intros pat s c H. unfold fired. rewrite forallb_forall in H |- *. intros l I.
-  specialize (H (truth pat (shape s pat) l) (in_map _ _ _ I)).
-  destruct (truth pat (shape s pat) l) as [[]|] eqn:E; try discriminate. apply truth_ok in E. exact E.
+  intros pat s c H. unfold fires. rewrite forallb_forall in H |- *. intros l I.
+  specialize (H (pattern_truth pat (shape s pat) l) (in_map _ _ _ I)).
+  destruct (pattern_truth pat (shape s pat) l) as [[]|] eqn:E; try discriminate. apply truth_ok in E. exact E.
 Qed.
 Lemma targets_ok : forall pat s cs ts g, In (map g pat) ts ->
-  In (map (fun v => last_put (flat_map snd (filter (fired s) cs)) v (g v)) pat) (targets pat (shape s pat) cs ts).
+  In (map (fun v => last_put (flat_map snd (filter (fires s) cs)) v (g v)) pat) (reached_patterns pat (shape s pat) cs ts).
 Proof.
   intros pat s. induction cs as [|c cs IH]; intros ts g H; simpl; [exact H|].
   destruct (existsb _ _) eqn:E.
   { rewrite (fired_false _ _ _ E). apply IH, H. }
-  assert (N : In (map (fun v => last_put (snd c) v (g v)) pat) (map (fun t => after pat t (snd c)) ts)).
-  { rewrite <- after_map. apply (in_map (fun t => after pat t (snd c))). exact H. }
+  assert (N : In (map (fun v => last_put (snd c) v (g v)) pat) (map (fun t => pattern_after pat t (snd c)) ts)).
+  { rewrite <- after_map. apply (in_map (fun t => pattern_after pat t (snd c))). exact H. }
   match goal with |- context [if forallb ?a ?b then _ else _] => destruct (forallb a b) eqn:F end.
   - rewrite (fired_true _ _ _ F). simpl.
     apply (IH _ _) in N. erewrite map_ext; [exact N|]. intro v. simpl. apply last_put_app.
-  - destruct (fired s c); simpl.
-    + assert (N' : In (map (fun v => last_put (snd c) v (g v)) pat) (ts ++ map (fun t => after pat t (snd c)) ts))
+  - destruct (fires s c); simpl.
+    + assert (N' : In (map (fun v => last_put (snd c) v (g v)) pat) (ts ++ map (fun t => pattern_after pat t (snd c)) ts))
         by (apply in_or_app; right; exact N).
       apply (IH _ _) in N'. erewrite map_ext; [exact N'|]. intro v. simpl. apply last_put_app.
     + apply IH. apply in_or_app. left. exact H.
 Qed.
-Lemma all_targets_ok : forall pat o s ch, In (shape (apply o s ch) pat) (all_targets pat o (shape s pat)).
+Lemma all_targets_ok : forall pat o s ch, In (shape (apply o s ch) pat) (successor_patterns pat o (shape s pat)).
 Proof.
-  intros. unfold all_targets.
-  pose proof (targets_ok pat s (conditional o) [after pat (shape s pat) (effects o)]
-                (fun v => last_put (effects o) v (val s v))) as H.
+  intros. unfold successor_patterns.
+  pose proof (targets_ok pat s (conditional o) [pattern_after pat (shape s pat) (effects o)]
+                (fun v => last_put (effects o) v (var_value s v))) as H.
   unfold shape in *. erewrite map_ext; [apply H; left; apply after_map|].
-  intro v. unfold apply, val, makes. cbn [sv]. rewrite get_puts, last_put_app. reflexivity.
+  intro v. unfold apply, var_value, made_facts. cbn [var_values]. rewrite get_puts, last_put_app. reflexivity.
 Qed.
-Lemma untouched : forall pat o s ch, touches pat o = false -> shape (apply o s ch) pat = shape s pat.
+Lemma untouched : forall pat o s ch, mentions pat o = false -> shape (apply o s ch) pat = shape s pat.
 Proof.
   intros pat o s ch H. unfold shape. apply map_ext_in. intros v I.
-  unfold apply, val. cbn [sv]. rewrite get_puts. apply last_put_none.
-  intros f F e. assert (Q : touches pat o = true); [|congruence].
-  unfold touches. apply existsb_exists. exists f. split.
-  - unfold makes in F. apply in_app_or in F. apply in_or_app. right. apply in_or_app.
+  unfold apply, var_value. cbn [var_values]. rewrite get_puts. apply last_put_none.
+  intros f F e. assert (Q : mentions pat o = true); [|congruence].
+  unfold mentions. apply existsb_exists. exists f. split.
+  - unfold made_facts in F. apply in_app_or in F. apply in_or_app. right. apply in_or_app.
     destruct F as [F|F]; [left; exact F|right]. apply in_flat_map in F. destruct F as [c [C F]].
     apply filter_In in C. apply in_flat_map. exists c. tauto.
   - apply memb_In. rewrite e. exact I.
 Qed.
-Definition wf (s : state) : Prop := forall v, bas v -> 0 <= val s v < get (size T) v.
-Lemma lookup_ok : forall v fs x, lookup v fs = Some x -> In (v, x) fs.
+Definition wf (s : state) : Prop := forall v, bas v -> 0 <= var_value s v < get (domain_size T) v.
+Lemma lookup_ok : forall v fs x, fact_value v fs = Some x -> In (v, x) fs.
 Proof.
-  intros v fs x H. unfold lookup in H.
+  intros v fs x H. unfold fact_value in H.
   match type of H with match ?e with _ => _ end = _ => destruct e as [[w y]|] eqn:F end; [|discriminate].
   apply find_some in F. destruct F as [F E]. apply Pos.eqb_eq in E. simpl in *. injection H as ->. subst. exact F.
 Qed.
@@ -344,8 +346,8 @@ Lemma matching_ok : forall s pat fs, wf s -> forallb (is_basic T) pat = true -> 
   In (shape s pat) (matching T pat fs).
 Proof.
   intros s pat fs W B F. induction pat as [|v pat IH]; simpl; [left; reflexivity|].
-  simpl in B. apply andb_true_iff in B. destruct B as [B1 B2]. apply in_flat_map. exists (val s v). split.
-  - destruct (lookup v fs) as [x|] eqn:L; [|apply range_In, W, B1].
+  simpl in B. apply andb_true_iff in B. destruct B as [B1 B2]. apply in_flat_map. exists (var_value s v). split.
+  - destruct (fact_value v fs) as [x|] eqn:L; [|apply range_In, W, B1].
     apply lookup_ok in L. rewrite forallb_forall in F. specialize (F _ L). unfold is_fact in F. simpl in F.
     apply Z.eqb_eq in F. left. symmetry. exact F.
   - apply in_map, IH, B2.
@@ -358,7 +360,7 @@ Qed.
 Lemma wf_derive : forall s, wf s -> wf (derive T s).
 Proof. intros s W v B. rewrite derive_val by exact B. apply W, B. Qed.
 
-(* ---------- the task ---------- *)
+(* Well-formed states *)
 Hypothesis task_ok : check_task T = true.
 Lemma wf_init : wf (init T).
 Proof.
@@ -367,54 +369,54 @@ Proof.
 Qed.
 Lemma wf_apply : forall o s ch, In o (operators T) -> wf s -> wf (apply o s ch).
 Proof.
-  intros o s ch I W v B. unfold apply, val. cbn [sv]. rewrite get_puts.
-  destruct (last_put_in (makes o s) v (get (sv s) v)) as [E|E]; [rewrite E; apply W, B|].
+  intros o s ch I W v B. unfold apply, var_value. cbn [var_values]. rewrite get_puts.
+  destruct (last_put_in (made_facts o s) v (get (var_values s) v)) as [E|E]; [rewrite E; apply W, B|].
   set (x := last_put _ _ _) in *.
   unfold check_task in task_ok. rewrite !andb_true_iff in task_ok. destruct task_ok as [[[_ H] _] _].
   rewrite forallb_forall in H. specialize (H o I). rewrite !andb_true_iff in H. destruct H as [[H1 H2] _].
-  assert (S : sound_fact T (v, x) = true).
-  { unfold makes in E. apply in_app_or in E. destruct E as [E|E].
+  assert (S : is_well_formed T (v, x) = true).
+  { unfold made_facts in E. apply in_app_or in E. destruct E as [E|E].
     - rewrite forallb_forall in H1. apply H1, E.
     - apply in_flat_map in E. destruct E as [c [C E]]. apply filter_In in C. destruct C as [C _].
       rewrite forallb_forall in H2. specialize (H2 c C). rewrite forallb_forall in H2. apply H2, E. }
-  unfold sound_fact, in_range in S. simpl in S. lia.
+  unfold is_well_formed, in_range in S. simpl in S. lia.
 Qed.
 Lemma holds_facts_of : forall c s sz ch, holds c s sz ch = true -> forallb (is_fact s) (facts c) = true.
 Proof. intros c s sz ch H. unfold holds, holds_facts in H. rewrite !andb_true_iff in H. tauto. Qed.
 
 (* A potential is a lower bound on the cost of every plan. *)
-Lemma potential_ok : forall t, check_pot T (map prepare (operators T)) t = true ->
-  forall s steps c, plan T s steps c -> wf s -> exists k, bound T t (shape s (pattern t)) = Some k /\ k <= c.
+Lemma potential_ok : forall t, check_potential T (map prepare (operators T)) t = true ->
+  forall s steps c, plan T s steps c -> wf s -> exists k, table_bound T t (shape s (pattern t)) = Some k /\ k <= c.
 Proof.
-  intros t H. unfold check_pot in H. rewrite !andb_true_iff in H. destruct H as [[B G] O].
+  intros t H. unfold check_potential in H. rewrite !andb_true_iff in H. destruct H as [[B G] O].
   intros s steps c P. induction P as [s HG|s o ch steps c Io Ad Ho P IH]; intro W.
   - rewrite forallb_forall in G. specialize (G (shape s (pattern t))).
     assert (M : In (shape s (pattern t)) (matching T (pattern t) (facts (goal T)))).
     { rewrite <- shape_derive by exact B. apply matching_ok; [apply wf_derive, W|exact B|].
       eapply holds_facts_of, HG. }
-    specialize (G M). unfold at_most in G. destruct (bound T t _) as [k|]; [|discriminate].
+    specialize (G M). unfold at_most in G. destruct (table_bound T t _) as [k|]; [|discriminate].
     exists k. split; [reflexivity|lia].
   - destruct (IH (wf_apply _ _ _ Io (wf_derive _ W))) as [k [K L]]. clear IH P.
-    rewrite forallb_forall in O. specialize (O (prepare o) (in_map _ _ _ Io)). unfold pot_op, prepare in O.
-    destruct (minimum_le _ _ (in_map (amount (cost o) (sizes o)) _ _ (choices_In o ch Ad))) as [least [E Le]].
-    rewrite E in O. destruct (touches (pattern t) o) eqn:U.
+    rewrite forallb_forall in O. specialize (O (prepare o) (in_map _ _ _ Io)). unfold potential_ok_for, prepare in O.
+    destruct (minimum_le _ _ (in_map (amount (cost o) (slot_sizes o)) _ _ (choices_In o ch Ad))) as [least [E Le]].
+    rewrite E in O. destruct (mentions (pattern t) o) eqn:U.
     + rewrite forallb_forall in O. specialize (O (shape s (pattern t))).
-      assert (M : In (shape s (pattern t)) (matching T (pattern t) (facts (pre o)))).
+      assert (M : In (shape s (pattern t)) (matching T (pattern t) (facts (precondition o)))).
       { rewrite <- shape_derive by exact B. apply matching_ok; [apply wf_derive, W|exact B|].
         eapply holds_facts_of, Ho. }
       specialize (O M). rewrite forallb_forall in O.
       specialize (O (shape (apply o (derive T s) ch) (pattern t))).
       rewrite <- (shape_derive s _ B) in O at 1. specialize (O (all_targets_ok _ _ _ _)).
-      rewrite K in O. unfold at_most in O. destruct (bound T t (shape s (pattern t))) as [b|]; [|discriminate].
+      rewrite K in O. unfold at_most in O. destruct (table_bound T t (shape s (pattern t))) as [b|]; [|discriminate].
       exists b. split; [reflexivity|lia].
     + rewrite untouched in K by exact U. rewrite shape_derive in K by exact B.
       exists k. split; [exact K|lia].
 Qed.
 
-(* ---------- needs ---------- *)
-Lemma alone_value : forall l n s sz ch, alone l n = true -> value l s sz ch = num s n + amount (rest l) sz ch.
+(* Needs *)
+Lemma alone_value : forall l n s sz ch, is_number l n = true -> value l s sz ch = num_value s n + amount (offset l) sz ch.
 Proof.
-  intros [fs r] n s sz ch H. unfold alone in H. unfold value. simpl in *.
+  intros [fs r] n s sz ch H. unfold is_number in H. unfold value. simpl in *.
   destruct fs as [|[m f] [|]]; try discriminate. apply andb_true_iff in H. destruct H as [H1 H2].
   apply Pos.eqb_eq in H1. apply Z.eqb_eq in H2. subst. simpl. lia.
 Qed.
@@ -429,29 +431,29 @@ Proof.
   match goal with |- match ?e with _ => _ end = _ => destruct e as [|c r] eqn:F end; [reflexivity|].
   exfalso. assert (I : In c (filter (fun c => Pos.eqb (fst c) n) cs)) by (rewrite F; left; reflexivity).
   apply filter_In in I. destruct I as [I E]. apply Pos.eqb_eq in E.
-  apply negb_true_iff in D1. assert (Q : memb n (map fst cs) = true); [|congruence].
+  apply negb_true_iff in D1. assert (Q : mem_key n (map fst cs) = true); [|congruence].
   apply memb_In. rewrite <- E. apply in_map, I.
 Qed.
-(* What [lowers] says of a step. *)
+(* [least_use] bounds the consumption of a step. *)
 Lemma lowers_ok : forall n o s ch least, In o (operators T) -> In n (numbers T) -> admitted o ch ->
-  holds (pre o) (derive T s) (sizes o) ch = true -> lowers n (prepare o) = Some least ->
-  num (apply o (derive T s) ch) n + least <= num s n /\ 0 <= least /\ (0 < least -> 0 <= num (apply o (derive T s) ch) n).
+  holds (precondition o) (derive T s) (slot_sizes o) ch = true -> least_use n (prepare o) = Some least ->
+  num_value (apply o (derive T s) ch) n + least <= num_value s n /\ 0 <= least /\ (0 < least -> 0 <= num_value (apply o (derive T s) ch) n).
 Proof.
   intros n o s ch least Io In_ Ad Ho L.
-  assert (D : distinct (map fst (changes o)) = true).
+  assert (D : distinct (map fst (number_effects o)) = true).
   { unfold check_task in task_ok. rewrite !andb_true_iff in task_ok. destruct task_ok as [[[_ H] _] _].
     rewrite forallb_forall in H. specialize (H o Io). rewrite !andb_true_iff in H. tauto. }
-  assert (V : num (derive T s) n = num s n).
+  assert (V : num_value (derive T s) n = num_value s n).
   { rewrite derive_num. apply memb_In in In_. rewrite In_. reflexivity. }
-  pose proof (changed (fun l => value l (derive T s) (sizes o) ch) (changes o) n (get (sn (derive T s)) n) D) as CH.
-  cbv beta in CH. unfold apply, num at 1 3. cbn [sn]. rewrite get_puts, CH. clear CH.
-  change (get (sn (derive T s)) n) with (num (derive T s) n). rewrite V.
-  unfold lowers, prepare in L.
-  match goal with |- context [match ?e with [] => num s n | _ => _ end] => destruct e as [|[m l] r] eqn:F end.
+  pose proof (changed (fun l => value l (derive T s) (slot_sizes o) ch) (number_effects o) n (get (num_values (derive T s)) n) D) as CH.
+  cbv beta in CH. unfold apply, num_value at 1 3. cbn [num_values]. rewrite get_puts, CH. clear CH.
+  change (get (num_values (derive T s)) n) with (num_value (derive T s) n). rewrite V.
+  unfold least_use, prepare in L.
+  match goal with |- context [match ?e with [] => num_value s n | _ => _ end] => destruct e as [|[m l] r] eqn:F end.
   { injection L as <-. lia. }
-  destruct r; [|discriminate]. destruct (alone l n) eqn:E; [|discriminate]. cbn [snd].
+  destruct r; [|discriminate]. destruct (is_number l n) eqn:E; [|discriminate]. cbn [snd].
   rewrite (alone_value _ _ _ _ _ E), V.
-  destruct (minimum_le _ _ (in_map (fun ch => - amount (rest l) (sizes o) ch) _ _ (choices_In o ch Ad))) as [m' [E' Le]].
+  destruct (minimum_le _ _ (in_map (fun ch => - amount (offset l) (slot_sizes o) ch) _ _ (choices_In o ch Ad))) as [m' [E' Le]].
   rewrite E' in L. destruct (_ && _) eqn:C; [|discriminate]. injection L as <-.
   apply andb_true_iff in C. destruct C as [C1 C2]. apply Z.leb_le in C1.
   split; [lia|]. split; [exact C1|]. intro Pos. apply orb_true_iff in C2. destruct C2 as [C2|C2]; [lia|].
@@ -462,11 +464,11 @@ Proof.
 Qed.
 Lemma need_ok : forall n t, check_need T (map prepare (operators T)) (n, t) = true ->
   forall s steps c, plan T s steps c -> wf s ->
-  exists k, bound T t (shape s (pattern t)) = Some k /\ 0 <= k /\ (0 < k -> k <= num s n).
+  exists k, table_bound T t (shape s (pattern t)) = Some k /\ 0 <= k /\ (0 < k -> k <= num_value s n).
 Proof.
   intros n t H. unfold check_need in H. rewrite !andb_true_iff in H. destruct H as [[[[N B] Z0] G] O].
   apply memb_In in N.
-  assert (NN : forall s, wf s -> forall k, bound T t (shape s (pattern t)) = Some k -> 0 <= k).
+  assert (NN : forall s, wf s -> forall k, table_bound T t (shape s (pattern t)) = Some k -> 0 <= k).
   { intros s W k E. rewrite forallb_forall in Z0. specialize (Z0 (shape s (pattern t))).
     rewrite E in Z0. apply Z.leb_le. apply Z0. apply matching_ok; [exact W|exact B|reflexivity]. }
   intros s steps c P. induction P as [s HG|s o ch steps c Io Ad Ho P IH]; intro W.
@@ -474,7 +476,7 @@ Proof.
     assert (M : In (shape s (pattern t)) (matching T (pattern t) (facts (goal T)))).
     { rewrite <- shape_derive by exact B. apply matching_ok; [apply wf_derive, W|exact B|].
       eapply holds_facts_of, HG. }
-    specialize (G M). destruct (bound T t (shape s (pattern t))) as [k|] eqn:E; [|discriminate].
+    specialize (G M). destruct (table_bound T t (shape s (pattern t))) as [k|] eqn:E; [|discriminate].
     exists k. split; [reflexivity|]. split; [exact (NN s W _ E)|]. intro K.
     apply orb_true_iff in G. destruct G as [G|G]; [lia|].
     apply existsb_exists in G. destruct G as [l [Il El]]. apply andb_true_iff in El. destruct El as [E1 E2].
@@ -483,32 +485,32 @@ Proof.
     apply memb_In in N. rewrite N in HG. lia.
   - pose proof (wf_apply o (derive T s) ch Io (wf_derive _ W)) as W'.
     destruct (IH W') as [k' [K' [P' L']]]. clear IH P.
-    rewrite forallb_forall in O. specialize (O (prepare o) (in_map _ _ _ Io)). unfold need_op in O. cbn [fst prepare] in O.
-    assert (Q : match lowers n (prepare o) with
-                | Some least => at_most (bound T t (shape s (pattern t))) (Some k') least = true
-                | None => exists x, bound T t (shape s (pattern t)) = Some x /\ x = 0
+    rewrite forallb_forall in O. specialize (O (prepare o) (in_map _ _ _ Io)). unfold need_ok_for in O. cbn [fst prepare] in O.
+    assert (Q : match least_use n (prepare o) with
+                | Some least => at_most (table_bound T t (shape s (pattern t))) (Some k') least = true
+                | None => exists x, table_bound T t (shape s (pattern t)) = Some x /\ x = 0
                 end).
-    { destruct (touches (pattern t) o) eqn:U.
+    { destruct (mentions (pattern t) o) eqn:U.
       - rewrite forallb_forall in O. specialize (O (shape s (pattern t))).
-        assert (M : In (shape s (pattern t)) (matching T (pattern t) (facts (pre o)))).
+        assert (M : In (shape s (pattern t)) (matching T (pattern t) (facts (precondition o)))).
         { rewrite <- shape_derive by exact B. apply matching_ok; [apply wf_derive, W|exact B|].
           eapply holds_facts_of, Ho. }
         specialize (O M). rewrite forallb_forall in O.
         specialize (O (shape (apply o (derive T s) ch) (pattern t))).
         rewrite <- (shape_derive s _ B) in O at 1. specialize (O (all_targets_ok _ _ _ _)).
-        rewrite K' in O. change (o, (choices o, minimum (map (amount (cost o) (sizes o)) (choices o)))) with (prepare o) in O.
-        destruct (lowers n (prepare o)); [exact O|]. unfold none, zero in O.
-        destruct (bound T t (shape s (pattern t))) as [x|]; simpl in O; [|discriminate].
+        rewrite K' in O. change (o, (choices o, minimum (map (amount (cost o) (slot_sizes o)) (choices o)))) with (prepare o) in O.
+        destruct (least_use n (prepare o)); [exact O|]. unfold is_infinite, is_zero_bound in O.
+        destruct (table_bound T t (shape s (pattern t))) as [x|]; simpl in O; [|discriminate].
         exists x. split; [reflexivity|]. rewrite orb_false_r in O. lia.
       - rewrite untouched in K' by exact U. rewrite shape_derive in K' by exact B.
-        change (o, (choices o, minimum (map (amount (cost o) (sizes o)) (choices o)))) with (prepare o) in O.
-        destruct (lowers n (prepare o)) as [least|] eqn:L.
+        change (o, (choices o, minimum (map (amount (cost o) (slot_sizes o)) (choices o)))) with (prepare o) in O.
+        destruct (least_use n (prepare o)) as [least|] eqn:L.
         + rewrite K'. simpl. destruct (lowers_ok n o s ch least Io N Ad Ho L). lia.
         + exists k'. split; [exact K'|]. rewrite forallb_forall in O. specialize (O (shape s (pattern t))).
           rewrite K' in O. simpl in O. rewrite orb_false_r in O. apply Z.eqb_eq, O.
           apply matching_ok; [exact W|exact B|reflexivity]. }
-    destruct (lowers n (prepare o)) as [least|] eqn:L.
-    + unfold at_most in Q. destruct (bound T t (shape s (pattern t))) as [k|] eqn:E; [|discriminate].
+    destruct (least_use n (prepare o)) as [least|] eqn:L.
+    + unfold at_most in Q. destruct (table_bound T t (shape s (pattern t))) as [k|] eqn:E; [|discriminate].
       exists k. split; [reflexivity|]. split; [exact (NN s W _ E)|]. intro Kp.
       destruct (lowers_ok n o s ch least Io N Ad Ho L) as [L1 [L2 L3]].
       apply Z.leb_le in Q.
@@ -519,7 +521,7 @@ Proof.
 Qed.
 End Soundness.
 
-(* ---------- the theorem ---------- *)
+(* Coverage by labels *)
 Lemma fits_ok : forall m (f g : linear -> Z) ls, fits m (map f ls) (map g ls) = true ->
   forall l, In l ls -> rel m (f l) (g l).
 Proof.
@@ -527,15 +529,15 @@ Proof.
   apply andb_true_iff in H. destruct H as [H1 H2]. destruct I as [I|I]; [subst|apply IH; assumption].
   destruct m; simpl; lia.
 Qed.
-Lemma front_ok : forall m o ch, admitted o ch -> exists ch', In ch' (front m o) /\ no_dearer m o ch' ch.
+Lemma front_ok : forall m o ch, admitted o ch -> exists ch', In ch' (undominated_choices m o) /\ no_dearer m o ch' ch.
 Proof.
-  intros m o ch Ad. apply choices_In in Ad. unfold front.
+  intros m o ch Ad. apply choices_In in Ad. unfold undominated_choices.
   match goal with |- context [if forallb ?a ?b then _ else _] => destruct (forallb a b) eqn:F end.
-  - set (e := fun ch => (ch, (amount (cost o) (sizes o) ch, profile o ch))) in *.
-    assert (H0 : forall l, (forall x : entry, In x l -> snd x = snd (e (fst x))) ->
-                 forall all, (forall x : entry, In x all -> snd x = snd (e (fst x))) ->
-                 forall x : entry, In x (fold_left (fun f e => if existsb (fun x => as_good m x e) f then f
-                                    else e :: filter (fun x => negb (as_good m e x)) f) all l) -> snd x = snd (e (fst x))).
+  - set (e := fun ch => (ch, (amount (cost o) (slot_sizes o) ch, profile o ch))) in *.
+    assert (H0 : forall l, (forall x : choice_profile, In x l -> snd x = snd (e (fst x))) ->
+                 forall all, (forall x : choice_profile, In x all -> snd x = snd (e (fst x))) ->
+                 forall x : choice_profile, In x (fold_left (fun f e => if existsb (fun x => dominates m x e) f then f
+                                    else e :: filter (fun x => negb (dominates m e x)) f) all l) -> snd x = snd (e (fst x))).
     { intros l Hl all. revert l Hl. induction all as [|y all IH]; intros l Hl Ha x I; simpl in I; [apply Hl, I|].
       revert I. apply IH; [|intros z Z; apply Ha; right; exact Z].
       intros z Iz. destruct (existsb _ l); [apply Hl, Iz|].
@@ -544,7 +546,7 @@ Proof.
     apply existsb_exists in F. destruct F as [x [Ix G]].
     exists (fst x). split; [apply in_map, Ix|].
     apply H0 in Ix; [|intros ? []|intros z Iz; apply in_map_iff in Iz; destruct Iz as [c [E _]]; subst z; reflexivity].
-    unfold as_good in G. rewrite Ix in G. apply andb_true_iff in G. destruct G as [G1 G2]. simpl in G1, G2.
-    split; [lia|]. apply (fits_ok m (fun l => amount (rest l) (sizes o) (fst x)) (fun l => amount (rest l) (sizes o) ch)). exact G2.
+    unfold dominates in G. rewrite Ix in G. apply andb_true_iff in G. destruct G as [G1 G2]. simpl in G1, G2.
+    split; [lia|]. apply (fits_ok m (fun l => amount (offset l) (slot_sizes o) (fst x)) (fun l => amount (offset l) (slot_sizes o) ch)). exact G2.
   - exists ch. split; [exact Ad|]. split; [lia|]. intros. apply rel_refl.
 Qed.

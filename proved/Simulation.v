@@ -10,8 +10,8 @@ Hypothesis task_ok : check_task T = true.
 Hypothesis ok : faithful P T N case goal_case = true.
 
 Record Rel (w : world) (s : state) : Prop := {
-  r_var : forall v vals x a, M.find v (variables N) = Some vals -> In (x, a) vals -> holds_in w a = Z.eqb (val s v) x;
-  r_num : forall n f, M.find n (fluents N) = Some f -> exists q, value_in w f = Some q /\ q * scaled N == inject_Z (num s n);
+  r_var : forall v vals x a, M.find v (variables N) = Some vals -> In (x, a) vals -> holds_in w a = Z.eqb (var_value s v) x;
+  r_num : forall n f, M.find n (fluents N) = Some f -> exists q, value_in w f = Some q /\ q * scaled N == inject_Z (num_value s n);
   r_fact : forall p os, changing N p = false -> holds_in w (p, os) = holds_in (initial P) (p, os);
   r_value : forall f, changing N (fst f) = false -> value_in w f = value_in (initial P) f;
   r_may : forall a, changing N (fst a) = true -> holds_in w a = true -> mem (may_hold N) a = true;
@@ -20,27 +20,27 @@ Record Rel (w : world) (s : state) : Prop := {
 Lemma parts :
   (forall a, changing N (fst a) = true -> holds_in (initial P) a = true -> mem (may_hold N) a = true) /\
   (forall v vals, M.find v (variables N) = Some vals -> is_basic T v = true /\
-     forall x a, In (x, a) vals -> holds_in (initial P) a = Z.eqb (val (init T) v) x /\ find (fact_of N) a = Some (v, x)) /\
-  (forall a v x, find (fact_of N) a = Some (v, x) -> exists vals, M.find v (variables N) = Some vals /\ In (x, a) vals) /\
-  (forall n f, M.find n (fluents N) = Some f -> memb n (numbers T) = true /\ changing N (fst f) = true /\
-     find (number_of N) f = Some n /\ exists q, value_in (initial P) f = Some q /\ q * scaled N == inject_Z (num (init T) n)) /\
+     forall x a, In (x, a) vals -> holds_in (initial P) a = Z.eqb (var_value (init T) v) x /\ find_atom (fact_of N) a = Some (v, x)) /\
+  (forall a v x, find_atom (fact_of N) a = Some (v, x) -> exists vals, M.find v (variables N) = Some vals /\ In (x, a) vals) /\
+  (forall n f, M.find n (fluents N) = Some f -> mem_key n (numbers T) = true /\ changing N (fst f) = true /\
+     find_atom (number_of N) f = Some n /\ exists q, value_in (initial P) f = Some q /\ q * scaled N == inject_Z (num_value (init T) n)) /\
   tree_ok P T N (goal_leaf P T N) (conjuncts P N unchanged Undefined [] (goal_formula P)) goal_case = true /\
   (forall i a, nth_error (actions P) i = Some a -> action_ok P T N case i a = true).
 Proof.
   unfold faithful in ok. rewrite !andb_true_iff in ok. destruct ok as [[[[[H1 H2] H3] H4] H5] H6].
   rewrite forallb_forall in H1, H2, H3, H4, H6. split; [|split; [|split; [|split; [|split]]]].
-  - intros a C H. simpl in H. destruct (find (initial_atoms P) a) as [u|] eqn:F; [|discriminate]. apply find_entries in F.
+  - intros a C H. simpl in H. destruct (find_atom (initial_atoms P) a) as [u|] eqn:F; [|discriminate]. apply find_entries in F.
     specialize (H1 _ F). cbn [fst] in H1. rewrite C in H1. exact H1.
   - intros v vals F. apply M.elements_correct in F. specialize (H2 _ F). cbn beta iota in H2. apply andb_true_iff in H2. destruct H2 as [B H2].
     split; [exact B|]. intros x a I. rewrite forallb_forall in H2. specialize (H2 _ I). cbn beta iota in H2. apply andb_true_iff in H2.
-    destruct H2 as [E H2]. apply eqb_prop in E. split; [exact E|]. destruct (find (fact_of N) a) as [[u y]|]; [|discriminate].
+    destruct H2 as [E H2]. apply eqb_prop in E. split; [exact E|]. destruct (find_atom (fact_of N) a) as [[u y]|]; [|discriminate].
     apply andb_true_iff in H2. destruct H2 as [E1 E2]. apply Pos.eqb_eq in E1. apply Z.eqb_eq in E2. subst. reflexivity.
   - intros a v x F. apply find_entries in F. specialize (H3 _ F). cbn beta iota in H3. destruct (M.find v (variables N)) as [vals|]; [|discriminate].
     exists vals. split; [reflexivity|]. apply existsb_exists in H3. destruct H3 as [[y b] [I E]]. apply andb_true_iff in E. destruct E as [E1 E2].
     cbn [fst snd] in *. apply Z.eqb_eq in E1. apply atom_eqb_eq in E2. subst. exact I.
   - intros n f F. apply M.elements_correct in F. specialize (H4 _ F). cbn beta iota in H4. rewrite !andb_true_iff in H4. destruct H4 as [[[A B] C] D].
     split; [exact A|]. split; [exact B|]. split.
-    + destruct (find (number_of N) f) as [m|]; [|discriminate]. apply Pos.eqb_eq in D. subst. reflexivity.
+    + destruct (find_atom (number_of N) f) as [m|]; [|discriminate]. apply Pos.eqb_eq in D. subst. reflexivity.
     + destruct (value_in (initial P) f) as [q|]; [|discriminate]. apply Qeq_bool_iff in C. exists q. split; [reflexivity|exact C].
   - exact H5.
   - intros i a Hn. apply (H6 (i, a)). clear -Hn.
@@ -55,22 +55,22 @@ Section State.
 Variables (w : world) (s : state).
 Hypothesis R : Rel w s.
 Notation ds := (derive T s).
-Lemma d_val : forall v vals, M.find v (variables N) = Some vals -> val ds v = val s v.
+Lemma d_val : forall v vals, M.find v (variables N) = Some vals -> var_value ds v = var_value s v.
 Proof. intros v vals F. apply derive_val; [apply heads|apply deriveds|]; auto. destruct parts as [_ [A _]]. apply (A _ _ F). Qed.
-Lemma d_num : forall n f, M.find n (fluents N) = Some f -> num ds n = num s n.
+Lemma d_num : forall n f, M.find n (fluents N) = Some f -> num_value ds n = num_value s n.
 Proof. intros n f F. rewrite derive_num. destruct parts as [_ [_ [_ [A _]]]]. rewrite (proj1 (A _ _ F)). reflexivity. Qed.
 
 Section Known.
 Variable k : knowledge.
 Hypothesis K : Knows w k.
-Lemma in_variable_ok : forall v x b, In (x, b) (in_variable N k v) -> Z.eqb (val s v) x = b.
+Lemma in_variable_ok : forall v x b, In (x, b) (in_variable N k v) -> Z.eqb (var_value s v) x = b.
 Proof.
   intros v x b I. unfold in_variable in I. apply in_flat_map in I. destruct I as [[a c] [I J]]. cbn [fst snd] in J.
-  destruct (find (fact_of N) a) as [[u y]|] eqn:F; [|destruct J]. destruct (Pos.eqb_spec u v); [|destruct J]. destruct J as [J|[]].
+  destruct (find_atom (fact_of N) a) as [[u y]|] eqn:F; [|destruct J]. destruct (Pos.eqb_spec u v); [|destruct J]. destruct J as [J|[]].
   injection J as -> ->. subst u. destruct parts as [_ [_ [A _]]]. destruct (A _ _ _ F) as [vals [F1 F2]].
   rewrite <- (r_var _ _ R _ _ _ _ F1 F2). apply K, I.
 Qed.
-Lemma possible_ok : forall v vals, M.find v (variables N) = Some vals -> In (val s v) (possible T N k v).
+Lemma possible_ok : forall v vals, M.find v (variables N) = Some vals -> In (var_value s v) (possible T N k v).
 Proof.
   intros v vals F. unfold possible. apply filter_In. split.
   - destruct (List.find snd (in_variable N k v)) as [[x b]|] eqn:E.
@@ -78,7 +78,7 @@ Proof.
     + apply range_In, (r_wf _ _ R). destruct parts as [_ [A _]]. apply (A _ _ F).
   - apply forallb_forall. intros [x b] I. apply in_variable_ok in I. cbn [fst snd]. rewrite I. apply eqb_reflx.
 Qed.
-Lemma fact3_ok : forall v x b, fact3 T N k v x = Some b -> (exists vals, M.find v (variables N) = Some vals) /\ Z.eqb (val s v) x = b.
+Lemma fact3_ok : forall v x b, fact3 T N k v x = Some b -> (exists vals, M.find v (variables N) = Some vals) /\ Z.eqb (var_value s v) x = b.
 Proof.
   intros v x b H. unfold fact3 in H. destruct (M.find v (variables N)) as [vals|] eqn:F; [|discriminate]. split; [exists vals; reflexivity|].
   pose proof (possible_ok _ _ F) as I. cbv zeta in H. destruct (forallb (Z.eqb x) (possible T N k v)) eqn:A.
@@ -93,7 +93,7 @@ Proof.
   destruct (assoc a (literals k)) as [c|] eqn:E.
   { apply assoc_In in E. rewrite (proj1 K _ _ E). congruence. }
   destruct (mem (may_hold N) a) eqn:M; cbn [negb] in H.
-  - destruct (find (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. apply fact3_ok in H. destruct H as [_ H].
+  - destruct (find_atom (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. apply fact3_ok in H. destruct H as [_ H].
     destruct parts as [_ [_ [A _]]]. destruct (A _ _ _ F) as [vals [F1 F2]]. rewrite (r_var _ _ R _ _ _ _ F1 F2). exact H.
   - injection H as <-. destruct (holds_in w a) eqn:E2; [|reflexivity]. rewrite (r_may _ _ R a C E2) in M. discriminate.
 Qed.
@@ -108,24 +108,24 @@ Proof.
       { destruct (changing N (fst a)) eqn:C; unfold base_truth in E; rewrite C in E; cbn [negb literals assoc] in E.
         2: { destruct a as [p os]. rewrite (r_fact _ _ R) by exact C. congruence. }
         destruct (mem (may_hold N) a) eqn:M; cbn [negb] in E.
-        - destruct (find (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. unfold fact3 in E. cbv zeta in E.
+        - destruct (find_atom (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. unfold fact3 in E. cbv zeta in E.
           destruct parts as [_ [_ [A _]]]. destruct (A _ _ _ F) as [vals [F1 F2]]. rewrite F1 in E. rewrite (r_var _ _ R _ _ _ _ F1 F2).
-          assert (In_ : In (val s v) (possible T N (Knowledge [] (bounds k)) v)).
+          assert (In_ : In (var_value s v) (possible T N (Knowledge [] (bounds k)) v)).
           { unfold possible. apply filter_In. split; [|reflexivity]. simpl. apply range_In, (r_wf _ _ R). destruct parts as [_ [B _]]. apply (B _ _ F1). }
           destruct (forallb (Z.eqb x) _) eqn:Y1.
           + injection E as <-. rewrite forallb_forall in Y1. rewrite Z.eqb_sym. apply Y1, In_.
           + destruct (forallb (fun y => negb (Z.eqb x y)) _) eqn:Y; [|discriminate]. injection E as <-. rewrite forallb_forall in Y. specialize (Y _ In_). apply negb_true_iff in Y. rewrite Z.eqb_sym. exact Y.
         - injection E as <-. destruct (holds_in w a) eqn:E2; [|reflexivity]. rewrite (r_may _ _ R a C E2) in M. discriminate. }
       rewrite (proj1 K _ _ I) in E'. subst c. rewrite eqb_reflx in H. discriminate.
-    + destruct (find (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. destruct parts as [_ [_ [A _]]]. destruct (A _ _ _ F) as [vals [F1 _]].
+    + destruct (find_atom (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. destruct parts as [_ [_ [A _]]]. destruct (A _ _ _ F) as [vals [F1 _]].
       pose proof (possible_ok _ _ F1) as Q. destruct (possible T N k v); [destruct Q|discriminate].
   - apply existsb_exists in H. destruct H as [[st f] [I H]]. cbn [fst snd] in H. pose proof (proj2 K _ _ I) as B.
     destruct f as [[|] c]; [|discriminate]. destruct st; rewrite ev_empty in B; [apply Qle_bool_iff in H|apply less_spec in H]; lra.
 Qed.
 
-(* ---------- operators ---------- *)
+(* Operators *)
 Lemma factors_ok : forall l g, factors_of N l = Some g -> forall a : Z, ev w g * scaled N + inject_Z a
-  == inject_Z (fold_left (fun a t => (a + num ds (fst t) * snd t)%Z) l a).
+  == inject_Z (fold_left (fun a t => (a + num_value ds (fst t) * snd t)%Z) l a).
 Proof.
   induction l as [|[n f] l IH]; intros g H a; cbn [factors_of fold_left] in *.
   - injection H as <-. rewrite ev_constant. ring.
@@ -162,28 +162,28 @@ Proof.
     destruct (literal3 T N k l) as [[]|] eqn:F; try discriminate. apply literal3_ok, F.
   - intros l I. specialize (H3 _ I). destruct (form_of N l szs ch) as [g|] eqn:F; [|discriminate]. apply Z.leb_le. eapply required_ok; eassumption.
 Qed.
-Lemma fired3_ok : forall cs l, fired3 T N k cs = Some l -> l = flat_map snd (filter (fired ds) cs).
+Lemma fired3_ok : forall cs l, fired3 T N k cs = Some l -> l = flat_map snd (filter (fires ds) cs).
 Proof.
   induction cs as [|c cs IH]; intros l H; cbn [fired3 filter] in *; [injection H as <-; reflexivity|].
   destruct (existsb _ (fst c)) eqn:E.
-  - replace (fired ds c) with false; [apply IH, H|]. symmetry. unfold fired. apply existsb_exists in E. destruct E as [x [I E]].
+  - replace (fires ds c) with false; [apply IH, H|]. symmetry. unfold fires. apply existsb_exists in E. destruct E as [x [I E]].
     destruct (literal3 T N k x) as [[]|] eqn:F; try discriminate. apply literal3_ok in F. destruct (forallb _ _) eqn:A; [|reflexivity].
     rewrite forallb_forall in A. rewrite (A _ I) in F. discriminate.
   - destruct (forallb _ (fst c)) eqn:A; [|discriminate]. destruct (fired3 T N k cs) as [r|]; [|discriminate]. injection H as <-.
-    replace (fired ds c) with true; [simpl; f_equal; apply IH; reflexivity|]. symmetry. unfold fired. apply forallb_forall. intros x I.
+    replace (fires ds c) with true; [simpl; f_equal; apply IH; reflexivity|]. symmetry. unfold fires. apply forallb_forall. intros x I.
     rewrite forallb_forall in A. specialize (A _ I). destruct (literal3 T N k x) as [[]|] eqn:F; try discriminate. apply literal3_ok, F.
 Qed.
 
 Lemma admitted_ok : forall o ch, admitted_choice o ch = true -> admitted o ch.
 Proof.
   intros o ch H. unfold admitted_choice in H. rewrite !andb_true_iff in H. destruct H as [[H1 H2] H3]. split.
-  - apply Nat.eqb_eq in H1. revert H1 H2. generalize (sizes o) as ns. clear. induction ch as [|x ch IH]; intros [|n ns] L F; try discriminate; constructor.
+  - apply Nat.eqb_eq in H1. revert H1 H2. generalize (slot_sizes o) as ns. clear. induction ch as [|x ch IH]; intros [|n ns] L F; try discriminate; constructor.
     + simpl in F. rewrite !andb_true_iff in F. destruct F as [F _]. lia.
     + simpl in F. rewrite !andb_true_iff in F. destruct F as [_ F]. apply IH; [simpl in L; lia|exact F].
   - intros slots bad I J. unfold admits in H3. rewrite forallb_forall in H3. specialize (H3 _ I). simpl in H3.
-    apply negb_true_iff in H3. assert (E : existsb (eq_list (map (fun i => nth i ch 0%Z) slots)) bad = true); [|congruence].
+    apply negb_true_iff in H3. assert (E : existsb (equal_lists (map (fun i => nth i ch 0%Z) slots)) bad = true); [|congruence].
     apply existsb_exists. exists (map (fun i => nth i ch 0%Z) slots). split; [exact J|].
-    unfold eq_list. destruct (list_eq_dec _ _ _); [reflexivity|congruence].
+    unfold equal_lists. destruct (list_eq_dec _ _ _); [reflexivity|congruence].
 Qed.
 Lemma find_filter : forall X (f : X -> bool) l, List.find f l = match filter f l with [] => None | c :: _ => Some c end.
 Proof. intros X f. induction l as [|x l IH]; simpl; [reflexivity|]. destruct (f x); [reflexivity|exact IH]. Qed.
@@ -196,26 +196,26 @@ Lemma simulated_ok : forall sy time o w', Describes w w' sy ->
   forallb (fun l => match assoc (fst l) (new_truths sy) with Some true => mem (may_hold N) (fst l) | _ => true end) (new_truths sy) = true ->
   match o with Some (o, _) => In o (operators T) | None => True end ->
   simulated P T N k sy time o = true ->
-  Rel w' (after_of o) /\ match o with Some (o, ch) => admitted o ch /\ holds (pre o) ds (sizes o) ch = true | None => True end /\
+  Rel w' (after_of o) /\ match o with Some (o, ch) => admitted o ch /\ holds (precondition o) ds (slot_sizes o) ch = true | None => True end /\
   exists g, growth P N sy time = Some g /\ inject_Z (step_cost o) <= g * (Zpos (cost_scale N) # 1).
 Proof.
   intros sy time o w' D Sf Sv May Io H. unfold simulated in H.
   match type of H with match ?e with None => _ | Some _ => _ end = _ => destruct e as [made|] eqn:E end; [|discriminate].
   rewrite !andb_true_iff in H. destruct H as [[H1 H2] H3]. rewrite forallb_forall in H1, H2.
-  assert (Pre : match o with Some (o, ch) => admitted o ch /\ holds (pre o) ds (sizes o) ch = true /\ distinct (map fst (Task.changes o)) = true /\ made = makes o ds
+  assert (Pre : match o with Some (o, ch) => admitted o ch /\ holds (precondition o) ds (slot_sizes o) ch = true /\ distinct (map fst (number_effects o)) = true /\ made = made_facts o ds
                 | None => made = [] end).
-  { destruct o as [[o ch]|]; [|congruence]. destruct (admitted_choice o ch && condition3 T N k (pre o) (sizes o) ch && distinct (map fst (Task.changes o))) eqn:A; [|discriminate].
+  { destruct o as [[o ch]|]; [|congruence]. destruct (admitted_choice o ch && condition3 T N k (precondition o) (slot_sizes o) ch && distinct (map fst (number_effects o))) eqn:A; [|discriminate].
     rewrite !andb_true_iff in A. destruct A as [[A1 A2] A3]. split; [apply admitted_ok, A1|]. split; [apply condition3_ok, A2|]. split; [exact A3|].
-    destruct (fired3 T N k (conditional o)) as [l|] eqn:F; [|discriminate]. apply fired3_ok in F. simpl in E. injection E as <-. unfold makes. congruence. }
-  assert (Val : forall v vals, M.find v (variables N) = Some vals -> val (after_of o) v = last_put made v (val s v)).
+    destruct (fired3 T N k (conditional o)) as [l|] eqn:F; [|discriminate]. apply fired3_ok in F. simpl in E. injection E as <-. unfold made_facts. congruence. }
+  assert (Val : forall v vals, M.find v (variables N) = Some vals -> var_value (after_of o) v = last_put made v (var_value s v)).
   { intros v vals F. destruct o as [[o ch]|].
-    - destruct Pre as [_ [_ [_ ->]]]. unfold after_of, apply, val at 1. cbn [sv]. rewrite get_puts. change (get (sv ds) v) with (val ds v). rewrite (d_val _ _ F). reflexivity.
+    - destruct Pre as [_ [_ [_ ->]]]. unfold after_of, apply, var_value at 1. cbn [var_values]. rewrite get_puts. change (get (var_values ds) v) with (var_value ds v). rewrite (d_val _ _ F). reflexivity.
     - rewrite Pre. reflexivity. }
   split; [|split].
   - split.
     + intros v vals x a F I. rewrite (d_fact _ _ _ D).
-      assert (Q : variable_ok T N k sy made v = true \/ (last_put made v (val s v) = val s v /\ assoc a (new_truths sy) = None)).
-      { destruct (in_dec Pos.eq_dec v (map fst made ++ flat_map (fun l => match find (fact_of N) (fst l) with Some f => [fst f] | None => [] end) (new_truths sy))) as [J|J].
+      assert (Q : variable_ok T N k sy made v = true \/ (last_put made v (var_value s v) = var_value s v /\ assoc a (new_truths sy) = None)).
+      { destruct (in_dec Pos.eq_dec v (map fst made ++ flat_map (fun l => match find_atom (fact_of N) (fst l) with Some f => [fst f] | None => [] end) (new_truths sy))) as [J|J].
         - left. apply H1, J.
         - right. split.
           + apply last_put_none. intros f If e. apply J, in_or_app. left. apply in_map_iff. exists f. split; assumption.
@@ -231,26 +231,26 @@ Proof.
       { destruct (assoc f (new_values sy)) as [g|]; [exact V|]. exists q0. rewrite V, ev_fluent, E0. split; reflexivity. }
       destruct X as [q [X1 X2]]. exists q. split; [exact X1|]. rewrite X2.
       assert (Q : number_ok N sy o n = true \/ (match assoc f (new_values sy) with Some g => g | None => fluent f end = fluent f /\
-                    match o with Some (o, _) => List.find (fun c => Pos.eqb (fst c) n) (Task.changes o) = None | None => True end)).
-      { destruct (in_dec Pos.eq_dec n (match o with Some (o, _) => map fst (Task.changes o) | None => [] end
-           ++ flat_map (fun l => match find (number_of N) (fst l) with Some n => [n] | None => [] end) (new_values sy))) as [J|J].
+                    match o with Some (o, _) => List.find (fun c => Pos.eqb (fst c) n) (number_effects o) = None | None => True end)).
+      { destruct (in_dec Pos.eq_dec n (match o with Some (o, _) => map fst (number_effects o) | None => [] end
+           ++ flat_map (fun l => match find_atom (number_of N) (fst l) with Some n => [n] | None => [] end) (new_values sy))) as [J|J].
         - left. apply H2, J.
         - right. split.
           + destruct (assoc f (new_values sy)) as [g|] eqn:A; [|reflexivity]. exfalso. apply J, in_or_app. right. apply in_flat_map.
             exists (f, g). split; [apply assoc_In, A|]. cbn [fst]. destruct parts as [_ [_ [_ [B _]]]]. destruct (B _ _ F) as [_ [_ [B' _]]]. rewrite B'. left. reflexivity.
           + destruct o as [[o ch]|]; [|exact I]. destruct (List.find _ _) as [c|] eqn:A; [|reflexivity]. exfalso. apply find_some in A. destruct A as [A1 A2].
             apply Pos.eqb_eq in A2. apply J, in_or_app. left. rewrite <- A2. apply in_map, A1. }
-      assert (Y : match o with Some (o, ch) => match List.find (fun c => Pos.eqb (fst c) n) (Task.changes o) with
-                     | Some c => num (after_of (Some (o, ch))) n = value (snd c) ds (sizes o) ch | None => num (after_of (Some (o, ch))) n = num s n end
-                  | None => num (after_of o) n = num s n end).
+      assert (Y : match o with Some (o, ch) => match List.find (fun c => Pos.eqb (fst c) n) (number_effects o) with
+                     | Some c => num_value (after_of (Some (o, ch))) n = value (snd c) ds (slot_sizes o) ch | None => num_value (after_of (Some (o, ch))) n = num_value s n end
+                  | None => num_value (after_of o) n = num_value s n end).
       { destruct o as [[o ch]|]; [|reflexivity]. destruct Pre as [_ [_ [Di _]]].
-        pose proof (changed (fun l => value l ds (sizes o) ch) (Task.changes o) n (get (sn ds) n) Di) as CH. cbv beta in CH.
-        rewrite find_filter. unfold after_of, apply, num at 1 2. cbn [sn]. rewrite get_puts, CH. change (get (sn ds) n) with (num ds n).
+        pose proof (changed (fun l => value l ds (slot_sizes o) ch) (number_effects o) n (get (num_values ds) n) Di) as CH. cbv beta in CH.
+        rewrite find_filter. unfold after_of, apply, num_value at 1 2. cbn [num_values]. rewrite get_puts, CH. change (get (num_values ds) n) with (num_value ds n).
         destruct (filter _ _); [apply (d_num _ _ F)|reflexivity]. }
       destruct Q as [Q|[Q1 Q2]].
       * unfold number_ok in Q. rewrite F in Q. cbv zeta in Q. destruct o as [[o ch]|].
-        -- destruct (List.find (fun c : positive * linear => Pos.eqb (fst c) n) (Task.changes o)) as [c|].
-           ++ destruct (form_of N (snd c) (sizes o) ch) as [g|] eqn:G; [|discriminate]. apply is_zero_ok in Q. rewrite ev_plus_form in Q.
+        -- destruct (List.find (fun c : positive * linear => Pos.eqb (fst c) n) (number_effects o)) as [c|].
+           ++ destruct (form_of N (snd c) (slot_sizes o) ch) as [g|] eqn:G; [|discriminate]. apply is_zero_ok in Q. rewrite ev_plus_form in Q.
               apply form_of_ok in G. rewrite Y, <- G. setoid_replace (ev w g) with (ev w (match assoc f (new_values sy) with Some g => g | None => fluent f end)) by lra. reflexivity.
            ++ apply is_zero_ok in Q. rewrite ev_plus_form, (ev_fluent w f), E0 in Q. cbn [default] in Q. rewrite Y, <- Q0.
               setoid_replace q0 with (ev w (match assoc f (new_values sy) with Some g => g | None => fluent f end)) by lra. reflexivity.
@@ -267,7 +267,7 @@ Proof.
 Qed.
 End Known.
 
-(* ---------- conditions that hold are known ---------- *)
+(* Knowledge from conditions that hold *)
 Lemma knows_join : forall a b, Knows w a -> Knows w b -> Knows w (join a b).
 Proof.
   intros a b [A1 A2] [B1 B2]. split; simpl; intros ? ? I; apply in_app_or in I; destruct I; auto; [apply A2|apply B2]; assumption.
@@ -329,14 +329,14 @@ Proof.
 Qed.
 End State.
 
-(* ---------- instances ---------- *)
+(* Instances *)
 Lemma ground_prefix : forall e more ts l, ground e ts = Some l -> ground (e ++ more) ts = Some l.
 Proof.
   intros e more. induction ts as [|t ts IH]; intros l H; simpl in *; [exact H|].
-  destruct (object e t) as [o|] eqn:O; [|discriminate]. destruct (ground e ts) as [l'|]; [|discriminate]. rewrite (IH _ eq_refl).
-  replace (object (e ++ more) t) with (Some o); [exact H|]. destruct t; simpl in *; [|congruence]. rewrite nth_error_app1; [congruence|]. apply nth_error_Some. congruence.
+  destruct (object_of e t) as [o|] eqn:O; [|discriminate]. destruct (ground e ts) as [l'|]; [|discriminate]. rewrite (IH _ eq_refl).
+  replace (object_of (e ++ more) t) with (Some o); [exact H|]. destruct t; simpl in *; [|congruence]. rewrite nth_error_app1; [congruence|]. apply nth_error_Some. congruence.
 Qed.
-Lemma object_prefix : forall e more t o, object e t = Some o -> object (e ++ more) t = Some o.
+Lemma object_prefix : forall e more t o, object_of e t = Some o -> object_of (e ++ more) t = Some o.
 Proof. intros e more t o H. destruct t; simpl in *; [|exact H]. rewrite nth_error_app1; [exact H|]. apply nth_error_Some. congruence. Qed.
 Definition same_statics (w : world) := forall p os, changing N p = false -> holds_in w (p, os) = holds_in (initial P) (p, os).
 Lemma static_false_ok : forall w d e more f, same_statics w -> static_false P N e f = true -> truth P w d (e ++ more) f <> Some true.
@@ -344,17 +344,17 @@ Proof.
   intros w d e more f S. induction f; intro H; cbn [static_false truth] in *; try discriminate.
   - apply andb_true_iff in H. destruct H as [C H]. apply negb_true_iff in C. destruct (ground e ts) as [l|] eqn:G; [|discriminate].
     rewrite (ground_prefix _ _ _ _ G), S by exact C. apply negb_true_iff in H. rewrite H. discriminate.
-  - destruct (object e t) as [a|] eqn:A; [|discriminate]. destruct (object e u) as [b|] eqn:B; [|discriminate].
+  - destruct (object_of e t) as [a|] eqn:A; [|discriminate]. destruct (object_of e u) as [b|] eqn:B; [|discriminate].
     rewrite (object_prefix _ _ _ _ A), (object_prefix _ _ _ _ B). apply negb_true_iff in H. rewrite H. discriminate.
   - destruct f; try discriminate; cbn [truth] in *.
     + apply andb_true_iff in H. destruct H as [C H]. apply negb_true_iff in C. destruct (ground e ts) as [l|] eqn:G; [|discriminate].
       rewrite (ground_prefix _ _ _ _ G), S by exact C. rewrite H. discriminate.
-    + destruct (object e t) as [a|] eqn:A; [|discriminate]. destruct (object e u) as [b|] eqn:B; [|discriminate].
+    + destruct (object_of e t) as [a|] eqn:A; [|discriminate]. destruct (object_of e u) as [b|] eqn:B; [|discriminate].
       rewrite (object_prefix _ _ _ _ A), (object_prefix _ _ _ _ B), H. discriminate.
   - apply orb_true_iff in H. destruct H as [H|H]; [specialize (IHf1 H)|specialize (IHf2 H)];
       destruct (truth P w d (e ++ more) f1) as [[]|], (truth P w d (e ++ more) f2) as [[]|]; simpl; congruence.
 Qed.
-(* Changes concern the predicates and functions of the effect. *)
+(* Every change has a predicate or function among the heads of its effect. *)
 Definition head (c : change) : key := match c with Fact a _ => fst a | Number a _ _ => fst a end.
 Lemma changes_heads : forall w d e env cs c, changes P w d env e = Some cs -> In c cs -> In (head c) (effect_heads e).
 Proof.
@@ -375,7 +375,7 @@ Proof.
   destruct (changed_value _ _); [|discriminate]. destruct (updates w cs fs) as [l'|]; [|discriminate]. injection H as <-. simpl in A.
   destruct (atom_eqb f h) eqn:E; [left; symmetry; apply atom_eqb_eq, E|right; eapply IH; [reflexivity|exact A]].
 Qed.
-Lemma targets_In : forall cs f, In f (targets cs) -> exists b q, In (Number f b q) cs.
+Lemma targets_In : forall cs f, In f (changed_fluents cs) -> exists b q, In (Number f b q) cs.
 Proof.
   induction cs as [|c cs IH]; intros f I; [destruct I|]. destruct c; simpl in I.
   - destruct (IH _ I) as [b [q J]]. exists b, q. right. exact J.
@@ -386,11 +386,11 @@ Definition keeps_statics (w w' : world) := (forall p os, changing N p = false ->
 Lemma happening_statics : forall w d env f e w', forallb (changing N) (effect_heads e) = true -> happening P w d env f e = Some w' -> keeps_statics w w'.
 Proof.
   intros w d env f e w' C H. rewrite forallb_forall in C. unfold happening in H. destruct (truth P w d env f) as [[]|]; try discriminate.
-  destruct (changes P w d env e) as [cs|] eqn:E; [|discriminate]. destruct (updates w cs (targets cs)) as [l|] eqn:U; [|discriminate]. injection H as <-.
+  destruct (changes P w d env e) as [cs|] eqn:E; [|discriminate]. destruct (updates w cs (changed_fluents cs)) as [l|] eqn:U; [|discriminate]. injection H as <-.
   assert (X : forall c, In c cs -> changing N (head c) = true) by (intros c I; apply C; eapply changes_heads; eassumption).
   split; simpl.
-  - intros p os S. assert (Y : forall b, puts cs (p, os) b = false).
-    { intro b. destruct (puts cs (p, os) b) eqn:Z; [|reflexivity]. unfold puts in Z. apply existsb_exists in Z. destruct Z as [[a b'|] [I Z]]; [|discriminate].
+  - intros p os S. assert (Y : forall b, sets_atom cs (p, os) b = false).
+    { intro b. destruct (sets_atom cs (p, os) b) eqn:Z; [|reflexivity]. unfold sets_atom in Z. apply existsb_exists in Z. destruct Z as [[a b'|] [I Z]]; [|discriminate].
       apply andb_true_iff in Z. destruct Z as [Z _]. apply atom_eqb_eq in Z. subst a. specialize (X _ I). simpl in X. congruence. }
     rewrite !Y. reflexivity.
   - intros g S. destruct (assoc g l) as [q|] eqn:A; [|reflexivity]. exfalso. apply (updates_targets _ _ _ _ _ _ U) in A. apply targets_In in A.
@@ -432,7 +432,7 @@ Proof.
     apply (IH _ more); [rewrite <- app_assoc; exact E|exact Pr|simpl in L; lia|exact F2].
 Qed.
 
-(* ---------- the metric ---------- *)
+(* Metric *)
 Definition measure (w : world) : Q := match linear_of P N unchanged Undefined [] (metric P) with Is f => ev w f | _ => 0 end.
 Lemma measure_changes : forall w w' s sy e f g, Rel w s -> (forall f, changing N (fst f) = false -> value_in w' f = value_in w f) -> Describes w w' sy ->
   linear_of P N unchanged Undefined [] e = Is f -> linear_of P N sy Undefined [] e = Is g -> ev w' f == ev w g.
@@ -493,7 +493,7 @@ Proof.
       apply (instances_ok _ env _ [] env); auto. apply Nat.eqb_eq, N1. }
     specialize (B I).
     assert (Go : exists o sy t, match o with Some (o, _) => In o (operators T) | None => True end /\ Rel w1 (after_of s o) /\
-       match o with Some (o, ch) => admitted o ch /\ holds (pre o) (derive T s) (sizes o) ch = true | None => True end /\ Describes w w1 sy /\ t == d /\
+       match o with Some (o, ch) => admitted o ch /\ holds (precondition o) (derive T s) (slot_sizes o) ch = true | None => True end /\ Describes w w1 sy /\ t == d /\
        exists g, growth P N sy t = Some g /\ inject_Z (step_cost o) <= g * (Zpos (cost_scale N) # 1)).
     { eapply (tree_cases w s R); [|eapply gathered_ok; eassumption|exact B]. intros k o K L.
       assert (L' : exists o, match o with Some (o, _) => In o (operators T) | None => True end /\ leaf_ok P T N k a env o = true).
@@ -518,7 +518,7 @@ Proof.
         ((measure w1 - measure w + per_time P * d + per_step P) * k + (measure w' + spent' - measure w1 - (spent + per_time P * d + per_step P)) * k) by ring.
       lra. }
     destruct o as [[o ch]|].
-    + exists ((o, ch) :: ps), (amount (cost o) (sizes o) ch + c)%Z. split; [destruct Ad; constructor; assumption|split; [exact Sum|exact End]].
+    + exists ((o, ch) :: ps), (amount (cost o) (slot_sizes o) ch + c)%Z. split; [destruct Ad; constructor; assumption|split; [exact Sum|exact End]].
     + exists ps, c. split; [exact Pl|split; [exact Sum|exact End]].
 Qed.
 End Simulation.

@@ -1,3 +1,5 @@
+(* Theorem [sound]: an accepted argument bounds the cost of every plan of the ground task, by
+   induction over the plan. *)
 From Coq Require Import ZArith List Bool FMapPositive Lia.
 From Proved Require Import Task Check Proof.
 Import ListNotations.
@@ -5,7 +7,7 @@ Open Scope Z_scope.
 
 Section Main.
 Variables (T : task) (A : argument) (claim : option Z) (oracle : state -> list positive).
-Notation mono := (more_never_hurts T).
+Notation mono := (is_monotone T).
 
 Definition reached (total : Z) : Prop := match claim with Some c => c <= total | None => False end.
 
@@ -15,15 +17,15 @@ Proof. unfold check_task in task_ok. rewrite !andb_true_iff in task_ok. tauto. Q
 Lemma deriveds : forallb (fun d : key * Z => negb (is_basic T (fst d))) (derived T) = true.
 Proof. unfold check_task in task_ok. rewrite !andb_true_iff in task_ok. tauto. Qed.
 
-Hypothesis pots_ok : forallb (check_pot T (map prepare (operators T))) (potentials A) = true.
+Hypothesis pots_ok : forallb (check_potential T (map prepare (operators T))) (potentials A) = true.
 Hypothesis needs_ok : forallb (check_need T (map prepare (operators T))) (needs A) = true.
 Hypothesis labels_ok : forallb (fun il => check_label T A claim oracle mono (basics T)
-    (map (fun o => (o, front mono o)) (operators T)) (snd il)) (M.elements (labels A)) = true.
+    (map (fun o => (o, undominated_choices mono o)) (operators T)) (snd il)) (M.elements (labels A)) = true.
 
 Definition Covered (s : state) (p : Z) : Prop :=
-  (exists t, In t (potentials A) /\ pot_cuts T claim s p t = true) \/
-  (exists nt, In nt (needs A) /\ need_cuts T s nt = true) \/
-  (exists i l, M.find i (labels A) = Some l /\ paid l <= p /\ no_worse T mono (at_state l) s).
+  (exists t, In t (potentials A) /\ potential_prunes T claim s p t = true) \/
+  (exists nt, In nt (needs A) /\ need_prunes T s nt = true) \/
+  (exists i l, M.find i (labels A) = Some l /\ path_cost l <= p /\ no_worse T mono (label_state l) s).
 
 Lemma covered_Covered : forall s p, covered T A claim oracle mono (basics T) s p = true -> Covered s p.
 Proof.
@@ -35,8 +37,8 @@ Proof.
     unfold label_covers in E. rewrite !andb_true_iff in E. destruct E as [[E1 E2] E3].
     split; [exact F|]. split; [lia|]. split.
     + intros v B. rewrite forallb_forall in E2. specialize (E2 v (basics_In T v B)). lia.
-    + intros n N. unfold numbers_fit in E3. rewrite forallb_forall in E3. specialize (E3 n N).
-      unfold num, rel. destruct mono; lia.
+    + intros n N. unfold numbers_cover in E3. rewrite forallb_forall in E3. specialize (E3 n N).
+      unfold num_value, rel. destruct mono; lia.
 Qed.
 
 Lemma rel_trans : forall m a b c, rel m a b -> rel m b c -> rel m a c.
@@ -44,34 +46,34 @@ Proof. intros [] a b c; unfold rel; lia. Qed.
 Lemma Covered_worse : forall s t p q, Covered s p -> no_worse T mono s t -> p <= q -> Covered t q.
 Proof.
   intros s t p q H [V N] L.
-  assert (Sh : forall pat, forallb (is_basic T) pat = true -> map (val t) pat = map (val s) pat).
+  assert (Sh : forall pat, forallb (is_basic T) pat = true -> map (var_value t) pat = map (var_value s) pat).
   { intros pat B. apply map_ext_in. intros v I. symmetry. apply V. rewrite forallb_forall in B. apply B, I. }
   destruct H as [[x [I E]]|[[[n x] [I E]]|[i [l [F [P W]]]]]].
-  - left. exists x. split; [exact I|]. unfold pot_cuts in *.
+  - left. exists x. split; [exact I|]. unfold potential_prunes in *.
     rewrite Sh.
-    + destruct (bound T x _); [|reflexivity]. destruct claim; [lia|exact E].
-    + rewrite forallb_forall in pots_ok. specialize (pots_ok x I). unfold check_pot in pots_ok.
+    + destruct (table_bound T x _); [|reflexivity]. destruct claim; [lia|exact E].
+    + rewrite forallb_forall in pots_ok. specialize (pots_ok x I). unfold check_potential in pots_ok.
       rewrite !andb_true_iff in pots_ok. tauto.
   - right. left. exists (n, x). split; [exact I|].
     rewrite forallb_forall in needs_ok. specialize (needs_ok _ I). unfold check_need in needs_ok.
     rewrite !andb_true_iff in needs_ok. destruct needs_ok as [[[[Nn B] _] _] _].
     apply memb_In in Nn. specialize (N n Nn).
-    unfold need_cuts in *. cbn [fst snd] in *. rewrite Sh by exact B.
-    destruct (bound T x _); [|reflexivity]. unfold rel in N. destruct mono; lia.
+    unfold need_prunes in *. cbn [fst snd] in *. rewrite Sh by exact B.
+    destruct (table_bound T x _); [|reflexivity]. unfold rel in N. destruct mono; lia.
   - right. right. exists i, l. split; [exact F|]. split; [lia|]. destruct W as [W1 W2]. split.
     + intros v B. rewrite W1 by exact B. apply V, B.
     + intros n I. eapply rel_trans; [apply W2, I|apply N, I].
 Qed.
 
 Lemma mono_op : forall o, In o (operators T) -> mono = true ->
-  forallb nonneg (comparisons (pre o)) = true /\ forallb (fun c => nonneg (snd c)) (changes o) = true.
+  forallb nonneg (comparisons (precondition o)) = true /\ forallb (fun c => nonneg (snd c)) (number_effects o) = true.
 Proof.
-  intros o I M. unfold more_never_hurts in M. rewrite !andb_true_iff in M. destruct M as [[M _] _].
+  intros o I M. unfold is_monotone in M. rewrite !andb_true_iff in M. destruct M as [[M _] _].
   rewrite forallb_forall in M. specialize (M o I). apply andb_true_iff in M. exact M.
 Qed.
 Lemma mono_rules : mono = true -> forall ls, In ls (layers T) -> forall r, In r ls -> comparisons (snd r) = [].
 Proof.
-  intros M ls I r R. unfold more_never_hurts in M. rewrite !andb_true_iff in M. destruct M as [_ M].
+  intros M ls I r R. unfold is_monotone in M. rewrite !andb_true_iff in M. destruct M as [_ M].
   rewrite forallb_forall in M. specialize (M ls I). rewrite forallb_forall in M. specialize (M r R).
   destruct (comparisons (snd r)); [reflexivity|discriminate].
 Qed.
@@ -83,29 +85,29 @@ Proof.
   all: destruct C as [[x [I E]]|[[[n x] [I E]]|[i [l [F [L Nw]]]]]].
   1,4: (pose proof (proj1 (forallb_forall _ _) pots_ok x I) as PO;
         destruct (potential_ok T heads deriveds task_ok x PO _ _ _ Q W) as [k [K Le]];
-        unfold pot_cuts, shape in *; rewrite K in E; unfold reached; destruct claim; [lia|discriminate]).
+        unfold potential_prunes, shape in *; rewrite K in E; unfold reached; destruct claim; [lia|discriminate]).
   1,3: (pose proof (proj1 (forallb_forall _ _) needs_ok _ I) as NO;
         destruct (need_ok T heads deriveds task_ok n x NO _ _ _ Q W) as [k [K [K0 Le]]];
-        unfold need_cuts, shape in *; cbn [fst snd] in *; rewrite K in E; exfalso; lia).
+        unfold need_prunes, shape in *; cbn [fst snd] in *; rewrite K in E; exfalso; lia).
   all: pose proof (derive_same T mono mono_rules _ _ Nw) as Sa;
        pose proof (proj1 (forallb_forall _ _) labels_ok _ (M.elements_correct _ _ F)) as LO; cbn [snd] in LO;
        unfold check_label in LO; apply andb_true_iff in LO; destruct LO as [G O].
   - apply negb_true_iff in G.
-    assert (Hl : holds (goal T) (derive T (at_state l)) [] [] = true).
-    { eapply holds_mono; [|exact Sa|exact HG]. intro M. unfold more_never_hurts in M.
+    assert (Hl : holds (goal T) (derive T (label_state l)) [] [] = true).
+    { eapply holds_mono; [|exact Sa|exact HG]. intro M. unfold is_monotone in M.
       rewrite !andb_true_iff in M. tauto. }
     rewrite Hl in G. simpl in G. unfold reached. destruct claim; [lia|discriminate].
   - destruct (front_ok mono o ch Ad) as [ch' [If Nd]].
-    rewrite forallb_forall in O. specialize (O (o, front mono o) (in_map (fun o => (o, front mono o)) _ _ Io)). cbn [fst snd] in O.
-    assert (Hl : holds (pre o) (derive T (at_state l)) (sizes o) ch' = true).
+    rewrite forallb_forall in O. specialize (O (o, undominated_choices mono o) (in_map (fun o => (o, undominated_choices mono o)) _ _ Io)). cbn [fst snd] in O.
+    assert (Hl : holds (precondition o) (derive T (label_state l)) (slot_sizes o) ch' = true).
     { eapply holds_mono2; [|exact Sa| |exact Ho].
       - intro M. apply (mono_op o Io M).
       - intros lin Il. apply Nd. apply in_or_app. left. exact Il. }
-    assert (Hf : holds_facts (pre o) (derive T (at_state l)) = true).
+    assert (Hf : holds_facts (precondition o) (derive T (label_state l)) = true).
     { unfold holds in Hl. apply andb_true_iff in Hl. tauto. }
     rewrite Hf in O. rewrite forallb_forall in O. specialize (O ch' If). rewrite Hl in O.
     apply covered_Covered in O.
-    replace (p + (amount (cost o) (sizes o) ch + c)) with ((p + amount (cost o) (sizes o) ch) + c) by lia.
+    replace (p + (amount (cost o) (slot_sizes o) ch + c)) with ((p + amount (cost o) (slot_sizes o) ch) + c) by lia.
     apply IH; [apply wf_apply, wf_derive; auto using heads, deriveds|].
     eapply Covered_worse; [exact O| |].
     + apply apply_no_worse; [|exact Sa|exact Nd]. intro M. apply (mono_op o Io M).
@@ -113,9 +115,10 @@ Proof.
 Qed.
 End Main.
 
-(* If the checker says yes, every plan of the task costs at least the claim, and there is none if the claim is that there is none. *)
+(* Every plan of an accepted task costs at least the claimed bound; without a bound, there is no
+   plan. *)
 Theorem sound : forall T A claim oracle, check T A claim oracle = true ->
-  forall steps c, plan T (init T) steps c -> match claim with Some bound => bound <= c | None => False end.
+  forall steps c, plan T (init T) steps c -> match claim with Some table_bound => table_bound <= c | None => False end.
 Proof.
   intros T A claim oracle H steps c P. unfold check in H.
   destruct claim as [b|].
@@ -133,4 +136,3 @@ Proof.
   2: change (reached None (0 + c)).
   all: eapply cover_bounds; eauto; [apply wf_init; auto|eapply covered_Covered; eauto].
 Qed.
-Print Assumptions sound.

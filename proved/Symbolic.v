@@ -19,9 +19,9 @@ Proof.
 Qed.
 Lemma assoc_app : forall X a (l m : list (atom * X)), assoc a (l ++ m) = match assoc a l with Some x => Some x | None => assoc a m end.
 Proof. induction l as [|[b y] l IH]; simpl; intros; [reflexivity|]. destruct (atom_eqb a b); auto. Qed.
-Lemma find_entries : forall X (m : index X) a x, find m a = Some x -> In (a, x) (all_entries m).
+Lemma find_entries : forall X (m : atom_map X) a x, find_atom m a = Some x -> In (a, x) (all_entries m).
 Proof.
-  intros X m a x H. unfold find, Lifted.entries in H. destruct (PositiveMap.find (bucket a) m) as [l|] eqn:F; [|discriminate].
+  intros X m a x H. unfold find_atom, bucket_entries in H. destruct (PositiveMap.find (bucket a) m) as [l|] eqn:F; [|discriminate].
   apply PositiveMap.elements_correct in F. unfold all_entries. apply in_flat_map. exists (bucket a, l). split; [exact F|]. apply assoc_In, H.
 Qed.
 Lemma less_spec : forall x y, less x y = true <-> x < y.
@@ -35,7 +35,7 @@ Proof. intros. unfold less. rewrite negb_false_iff. apply Qle_bool_iff. Qed.
 Lemma le_false : forall x y, Qle_bool x y = false <-> y < x.
 Proof. intros. pose proof (less_spec y x) as H. unfold less in H. rewrite negb_true_iff in H. exact H. Qed.
 
-(* ---------- linear forms ---------- *)
+(* Linear forms *)
 Definition default (o : option Q) : Q := match o with Some q => q | None => 0 end.
 Definition ev (w : world) (f : form) : Q := fold_right (fun t s => default (value_in w (fst t)) * snd t + s) (snd f) (fst f).
 Lemma ev_shift : forall w l c, ev w (l, c) == ev w (l, 0) + c.
@@ -67,7 +67,7 @@ Proof. intros. unfold ev. simpl. ring. Qed.
 Lemma ev_empty : forall w q, ev w ([], q) == q.
 Proof. intros. reflexivity. Qed.
 
-(* A symbolic state describes a state in terms of another one. *)
+(* A symbolic state describes a world relative to an earlier world [w0]. *)
 Record Describes (w0 w : world) (s : symbolic) : Prop := {
   d_fact : forall a, holds_in w a = match assoc a (new_truths s) with Some b => b | None => holds_in w0 a end;
   d_value : forall f, match assoc f (new_values s) with
@@ -97,7 +97,7 @@ Proof.
   - destruct H as [q [E H]]. simpl. intros x X. rewrite E in X. injection X as <-. exact H.
   - rewrite H. destruct (changing N (fst f)) eqn:C; simpl.
     + intros q E. rewrite ev_fluent, E. reflexivity.
-    + rewrite static_value by exact C. cbn [initial value_in]. destruct (find (initial_values P) f); [|exact eq_refl].
+    + rewrite static_value by exact C. cbn [initial value_in]. destruct (find_atom (initial_values P) f); [|exact eq_refl].
       intros x X. injection X as <-. rewrite ev_constant. reflexivity.
 Qed.
 Lemma agrees_plus : forall (f : Q -> Q -> Q) c a b r t, (forall x y, f x y == x + c * y) ->
@@ -147,7 +147,7 @@ Proof.
   intros w s d r D R. induction f; intros env v H; cbn [truth3 truth] in *.
   - injection H as <-. destruct b; discriminate.
   - destruct (ground env ts); [|discriminate]. apply (atom3_ok w) in H; [|exact D]. rewrite H. destruct v; discriminate.
-  - destruct (object env t); [|discriminate]. destruct (object env u); [|discriminate]. injection H as <-. destruct (Pos.eqb _ _); discriminate.
+  - destruct (object_of env t); [|discriminate]. destruct (object_of env u); [|discriminate]. injection H as <-. destruct (Pos.eqb _ _); discriminate.
   - pose proof (linear_ok w s d r D R env (Minus a b)) as G. cbn [eval] in G. unfold compare3 in H.
     destruct (eval w d env a) as [x|]; [|discriminate]. destruct (eval w d env b) as [y|]; [|discriminate]. cbn [lift] in G.
     destruct (linear_of P N s r env (Minus a b)) as [| |g]; unfold agrees in G; cbn [agrees compare3] in *; try discriminate.
@@ -173,7 +173,7 @@ Proof.
       try destruct x; try destruct y; simpl in *; try discriminate; injection H as <-; destruct t as [[]|], u as [[]|]; simpl in *; congruence.
 Qed.
 
-(* ---------- effects ---------- *)
+(* Effects *)
 Definition matches (c : change) (s : symbolic_change) : Prop :=
   match c, s with
   | Fact a b, SFact a' b' => a = a' /\ b = b'
@@ -204,7 +204,7 @@ Proof.
     + injection H as <-. injection K as <-. constructor.
     + eapply both_ok; [| |exact H|exact K]; [intros; eapply IHe; eassumption|exact IH].
 Qed.
-Lemma targets_same : forall cs ss, Forall2 matches cs ss -> targets cs = targets3 ss.
+Lemma targets_same : forall cs ss, Forall2 matches cs ss -> changed_fluents cs = targets3 ss.
 Proof. induction 1 as [|c s cs ss M F IH]; [reflexivity|]. destruct c, s; simpl in *; try contradiction; [exact IH|]. destruct M as [-> _]. f_equal. exact IH. Qed.
 Lemma on_same : forall f cs ss, Forall2 matches cs ss -> Forall2 (fun a b => fst a = fst b /\ snd a == ev w0 (snd b)) (on f cs) (on3 f ss).
 Proof.
@@ -240,9 +240,9 @@ Proof.
     simpl. destruct (atom_eqb f h); [|apply IH; reflexivity]. exists q. split; [reflexivity|].
     eapply changed_ok; [apply on_same, F|apply value3_ok, D|exact E1|exact E2].
 Qed.
-Lemma truths_ok : forall a b cs ss, Forall2 matches cs ss -> assoc a (truths3 ss b) = if puts cs a b then Some b else None.
+Lemma truths_ok : forall a b cs ss, Forall2 matches cs ss -> assoc a (truths3 ss b) = if sets_atom cs a b then Some b else None.
 Proof.
-  intros a b. induction 1 as [|c s cs ss M F IH]; [reflexivity|]. unfold puts, truths3 in *. cbn [flat_map existsb].
+  intros a b. induction 1 as [|c s cs ss M F IH]; [reflexivity|]. unfold sets_atom, truths3 in *. cbn [flat_map existsb].
   destruct c as [x y|], s as [x' y'|]; simpl in M; try contradiction; cbn [orb app].
   - destruct M as [<- <-]. destruct (Bool.eqb b y); simpl; [rewrite andb_true_r; destruct (atom_eqb a x); [reflexivity|exact IH]|].
     rewrite andb_false_r. exact IH.
@@ -252,14 +252,14 @@ Lemma happening3_ok : forall w s d r t env f e w', Describes w0 w s -> agrees w0
   match happening3 P T N k s r t env f e with Never => False | Unclear => True | After s' t' => t' = t /\ Describes w0 w' s' end.
 Proof.
   intros w s d r t env f e w' D R H. unfold happening in H. destruct (truth P w d env f) as [[]|] eqn:E; try discriminate.
-  destruct (changes P w d env e) as [cs|] eqn:C; [|discriminate]. destruct (updates w cs (targets cs)) as [l|] eqn:U; [|discriminate].
+  destruct (changes P w d env e) as [cs|] eqn:C; [|discriminate]. destruct (updates w cs (changed_fluents cs)) as [l|] eqn:U; [|discriminate].
   injection H as <-. unfold happening3. destruct (truth3 P T N k s r env f) as [[]|] eqn:E3.
   2: { apply (truth3_ok w s d r D R) in E3. apply E3. exact E. }
   all: destruct (changes3 P T N k s r env e) as [ss|] eqn:C3; [|exact I];
     pose proof (changes3_ok w s d r D R e env cs ss C C3) as F; rewrite (targets_same _ _ F) in U;
     destruct (updates3 P N s ss (targets3 ss)) as [m|] eqn:U3; [|exact I]; split; [reflexivity|]; split; cbn [holds_in value_in new_truths new_values].
-  1,3: intro a; rewrite !assoc_app, !(truths_ok _ _ _ _ F), (d_fact _ _ _ D); destruct (puts cs a true); [reflexivity|];
-       destruct (puts cs a false); [reflexivity|]; reflexivity.
+  1,3: intro a; rewrite !assoc_app, !(truths_ok _ _ _ _ F), (d_fact _ _ _ D); destruct (sets_atom cs a true); [reflexivity|];
+       destruct (sets_atom cs a false); [reflexivity|]; reflexivity.
   all: intro g; rewrite assoc_app; pose proof (updates_ok w s cs ss D F _ l m U U3 g) as Q; destruct (assoc g m);
        [destruct Q as [q [Q1 Q2]]; exists q; rewrite Q1; split; [reflexivity|exact Q2]|rewrite Q; apply (d_value _ _ _ D)].
 Qed.

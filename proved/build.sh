@@ -1,6 +1,6 @@
 #!/bin/sh
 # Compiles every proof, fails if a theorem rests on an assumption, extracts the checker to ocaml/checker.ml, and builds the programs
-# ocaml/check, ocaml/prepare and ocaml/mutants. Needs Debian's coq, libcoq-stdlib, ocaml-nox and ocaml-findlib.
+# check, prepare, mutants and differential in ocaml/. Needs Debian's coq, libcoq-stdlib, ocaml-nox and ocaml-findlib.
 set -e
 cd "$(dirname "$0")"
 for file in Task Check Proof Sound Derived Lifted Faithful Symbolic Simulation Optimal Extract; do coqc -Q . Proved "$file.v" >/dev/null; done
@@ -10,4 +10,7 @@ for theorem in Sound.sound Derived.layer_closed Optimal.optimal; do
   echo "$theorem: closed under the global context"
 done
 cd ocaml
-for program in check prepare mutants; do ocamlfind ocamlopt checker.mli checker.ml reader.ml evidence.ml "$program.ml" -o "$program"; done
+ocamlfind ocamlopt -c checker.mli checker.ml reader.ml evidence.ml
+for program in check prepare mutants differential; do
+  ocamlfind ocamlopt checker.cmx reader.cmx evidence.cmx "$program.ml" -o "$program"
+done

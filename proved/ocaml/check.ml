@@ -1,4 +1,5 @@
-(* Checks a certificate with the function that theorem [optimal] is about. Believed. Exit statuses: 0 proved, 30 not proved, 3 rejected. *)
+(* Checks a certificate with the function that theorem [optimal] is about. Believed. Exit statuses:
+   0 proved, 30 not proved, 3 rejected. *)
 let read_file path =
   let channel = open_in_bin path in
   Fun.protect ~finally:(fun () -> close_in channel) (fun () -> really_input_string channel (in_channel_length channel))

@@ -1058,17 +1058,17 @@ let get m k =
   | Some x -> x
   | None -> Z0
 
-type state = { sv : z M.t; sn : z M.t }
+type state = { var_values : z M.t; num_values : z M.t }
 
-(** val val0 : state -> key0 -> z **)
+(** val var_value : state -> key0 -> z **)
 
-let val0 s =
-  get s.sv
+let var_value s =
+  get s.var_values
 
-(** val num : state -> key0 -> z **)
+(** val num_value : state -> key0 -> z **)
 
-let num s =
-  get s.sn
+let num_value s =
+  get s.num_values
 
 type fact = key0 * z
 
@@ -1076,47 +1076,49 @@ type literal = fact * bool
 
 type choice = z list
 
-type quantity = { qconst : z; qtables : (nat list * z M.t) list }
+type quantity = { base : z; tables : (nat list * z M.t) list }
 
-type linear = { factors : (key0 * z) list; rest : quantity }
+type linear = { factors : (key0 * z) list; offset : quantity }
 
 type condition = { facts : fact list; clauses : literal list list;
                    comparisons : linear list }
 
-type operator = { ident : z; sizes : z list;
-                  excluded : (nat list * z list list) list; pre : condition;
-                  effects : fact list;
+type operator = { slot_sizes : z list;
+                  excluded : (nat list * z list list) list;
+                  precondition : condition; effects : fact list;
                   conditional : (literal list * fact list) list;
-                  changes : (key0 * linear) list; cost : quantity }
+                  number_effects : (key0 * linear) list; cost : quantity }
 
-type task = { basic : z; derived : (key0 * z) list; size : z M.t;
-              numbers : key0 list; init : state; operators : operator list;
+type task = { basic_count : z; derived : (key0 * z) list;
+              domain_size : z M.t; numbers : key0 list; init : state;
+              operators : operator list;
               layers : (fact * condition) list list; goal : condition }
 
-(** val row : z list -> choice -> nat list -> z **)
+(** val table_row : z list -> choice -> nat list -> z **)
 
-let row sizes0 ch slots =
-  fold_left (fun r i -> Z.add (Z.mul r (nth i sizes0 Z0)) (nth i ch Z0))
+let table_row slot_sizes0 ch slots =
+  fold_left (fun r i -> Z.add (Z.mul r (nth i slot_sizes0 Z0)) (nth i ch Z0))
     slots Z0
 
 (** val amount : quantity -> z list -> choice -> z **)
 
-let amount q0 sizes0 ch =
+let amount q0 slot_sizes0 ch =
   fold_left (fun a t0 ->
     Z.add a
-      (get (snd t0) (Z.to_pos (Z.add (row sizes0 ch (fst t0)) (Zpos XH)))))
-    q0.qtables q0.qconst
+      (get (snd t0)
+        (Z.to_pos (Z.add (table_row slot_sizes0 ch (fst t0)) (Zpos XH)))))
+    q0.tables q0.base
 
 (** val value : linear -> state -> z list -> choice -> z **)
 
-let value l s sizes0 ch =
-  fold_left (fun a t0 -> Z.add a (Z.mul (num s (fst t0)) (snd t0))) l.factors
-    (amount l.rest sizes0 ch)
+let value l s slot_sizes0 ch =
+  fold_left (fun a t0 -> Z.add a (Z.mul (num_value s (fst t0)) (snd t0)))
+    l.factors (amount l.offset slot_sizes0 ch)
 
 (** val is_fact : state -> fact -> bool **)
 
 let is_fact s f =
-  Z.eqb (val0 s (fst f)) (snd f)
+  Z.eqb (var_value s (fst f)) (snd f)
 
 (** val is_literal : state -> literal -> bool **)
 
@@ -1131,113 +1133,118 @@ let holds_facts c s =
 
 (** val holds : condition -> state -> z list -> choice -> bool **)
 
-let holds c s sizes0 ch =
+let holds c s slot_sizes0 ch =
   (&&) (holds_facts c s)
-    (forallb (fun l -> Z.leb Z0 (value l s sizes0 ch)) c.comparisons)
+    (forallb (fun l -> Z.leb Z0 (value l s slot_sizes0 ch)) c.comparisons)
 
-(** val puts : fact list -> z M.t -> z M.t **)
+(** val put_all : fact list -> z M.t -> z M.t **)
 
-let puts fs m =
+let put_all fs m =
   fold_left (fun m0 f -> M.add (fst f) (snd f) m0) fs m
 
 (** val basics : task -> key0 list **)
 
 let basics t0 =
-  map Coq_Pos.of_nat (seq (S O) (Z.to_nat t0.basic))
+  map Coq_Pos.of_nat (seq (S O) (Z.to_nat t0.basic_count))
 
-(** val reset : task -> state -> state **)
+(** val reset_derived : task -> state -> state **)
 
-let reset t0 s =
-  { sv =
-    (puts t0.derived
-      (puts (map (fun v -> (v, (val0 s v))) (basics t0)) M.empty)); sn =
-    (puts (map (fun n -> (n, (num s n))) t0.numbers) M.empty) }
+let reset_derived t0 s =
+  { var_values =
+    (put_all t0.derived
+      (put_all (map (fun v -> (v, (var_value s v))) (basics t0)) M.empty));
+    num_values =
+    (put_all (map (fun n -> (n, (num_value s n))) t0.numbers) M.empty) }
 
-(** val news : (fact * condition) list -> state -> fact list **)
+(** val new_facts : (fact * condition) list -> state -> fact list **)
 
-let news rules s =
+let new_facts rules s =
   map fst
     (filter (fun r ->
       (&&) (negb (is_fact s (fst r))) (holds (snd r) s [] [])) rules)
 
-(** val layer : nat -> (fact * condition) list -> state -> state **)
+(** val evaluate_layer : nat -> (fact * condition) list -> state -> state **)
 
-let rec layer fuel rules s =
+let rec evaluate_layer fuel rules s =
   match fuel with
   | O -> s
   | S fuel0 ->
-    (match news rules s with
+    (match new_facts rules s with
      | [] -> s
-     | f :: l -> layer fuel0 rules { sv = (puts (f :: l) s.sv); sn = s.sn })
+     | f :: l ->
+       evaluate_layer fuel0 rules { var_values =
+         (put_all (f :: l) s.var_values); num_values = s.num_values })
 
 (** val derive : task -> state -> state **)
 
 let derive t0 s =
-  fold_left (fun s0 rules -> layer (S (length rules)) rules s0) t0.layers
-    (reset t0 s)
+  fold_left (fun s0 rules -> evaluate_layer (S (length rules)) rules s0)
+    t0.layers (reset_derived t0 s)
 
-(** val fired : state -> (literal list * fact list) -> bool **)
+(** val fires : state -> (literal list * fact list) -> bool **)
 
-let fired s c =
+let fires s c =
   forallb (is_literal s) (fst c)
 
-(** val makes : operator -> state -> fact list **)
+(** val made_facts : operator -> state -> fact list **)
 
-let makes o s =
-  app o.effects (flat_map snd (filter (fired s) o.conditional))
+let made_facts o s =
+  app o.effects (flat_map snd (filter (fires s) o.conditional))
 
 (** val apply : operator -> state -> choice -> state **)
 
 let apply o s ch =
-  { sv = (puts (makes o s) s.sv); sn =
-    (puts (map (fun c -> ((fst c), (value (snd c) s o.sizes ch))) o.changes)
-      s.sn) }
+  { var_values = (put_all (made_facts o s) s.var_values); num_values =
+    (put_all
+      (map (fun c -> ((fst c), (value (snd c) s o.slot_sizes ch)))
+        o.number_effects) s.num_values) }
 
-type table = { pattern : key0 list; entries : z option M.t }
+type table = { pattern : key0 list; table_values : z option M.t }
 
-type label = { at_state : state; paid : z }
+type label = { label_state : state; path_cost : z }
 
 type argument = { potentials : table list; needs : (key0 * table) list;
-                  labels : label M.t; count : positive }
+                  labels : label M.t }
 
-(** val upto : nat -> z -> z list **)
+(** val count_up : nat -> z -> z list **)
 
-let rec upto k x =
+let rec count_up k x =
   match k with
   | O -> []
-  | S k0 -> x :: (upto k0 (Z.add x (Zpos XH)))
+  | S k0 -> x :: (count_up k0 (Z.add x (Zpos XH)))
 
 (** val range : z -> z list **)
 
 let range n =
-  upto (Z.to_nat n) Z0
+  count_up (Z.to_nat n) Z0
 
-(** val combos : z list -> choice list **)
+(** val combinations : z list -> choice list **)
 
-let rec combos = function
+let rec combinations = function
 | [] -> [] :: []
-| n :: r -> flat_map (fun x -> map (fun x0 -> x :: x0) (combos r)) (range n)
+| n :: r ->
+  flat_map (fun x -> map (fun x0 -> x :: x0) (combinations r)) (range n)
 
-(** val eq_list : z list -> z list -> bool **)
+(** val equal_lists : z list -> z list -> bool **)
 
-let eq_list a b =
+let equal_lists a b =
   if list_eq_dec Z.eq_dec a b then true else false
 
 (** val admits : operator -> choice -> bool **)
 
 let admits o ch =
   forallb (fun e ->
-    negb (existsb (eq_list (map (fun i -> nth i ch Z0) (fst e))) (snd e)))
+    negb (existsb (equal_lists (map (fun i -> nth i ch Z0) (fst e))) (snd e)))
     o.excluded
 
 (** val choices : operator -> choice list **)
 
 let choices o =
-  filter (admits o) (combos o.sizes)
+  filter (admits o) (combinations o.slot_sizes)
 
-(** val lookup : key0 -> fact list -> z option **)
+(** val fact_value : key0 -> fact list -> z option **)
 
-let lookup v fs =
+let fact_value v fs =
   match find (fun f -> Coq_Pos.eqb (fst f) v) fs with
   | Some f -> Some (snd f)
   | None -> None
@@ -1249,9 +1256,9 @@ let rec matching t0 pat fs =
   | [] -> [] :: []
   | v :: r ->
     flat_map (fun x -> map (fun x0 -> x :: x0) (matching t0 r fs))
-      (match lookup v fs with
+      (match fact_value v fs with
        | Some x -> x :: []
-       | None -> range (get t0.size v))
+       | None -> range (get t0.domain_size v))
 
 (** val last_put : fact list -> key0 -> z -> z **)
 
@@ -1260,81 +1267,84 @@ let rec last_put fs v x =
   | [] -> x
   | f :: r -> last_put r v (if Coq_Pos.eqb (fst f) v then snd f else x)
 
-(** val after : key0 list -> z list -> fact list -> z list **)
+(** val pattern_after : key0 list -> z list -> fact list -> z list **)
 
-let rec after pat vals fs =
+let rec pattern_after pat vals fs =
   match pat with
   | [] -> []
   | v :: p ->
     (match vals with
      | [] -> []
-     | x :: r -> (last_put fs v x) :: (after p r fs))
+     | x :: r -> (last_put fs v x) :: (pattern_after p r fs))
 
-(** val value_in : key0 list -> z list -> key0 -> z option **)
+(** val pattern_value : key0 list -> z list -> key0 -> z option **)
 
-let rec value_in pat vals v =
+let rec pattern_value pat vals v =
   match pat with
   | [] -> None
   | w :: p ->
     (match vals with
      | [] -> None
-     | x :: r -> if Coq_Pos.eqb w v then Some x else value_in p r v)
+     | x :: r -> if Coq_Pos.eqb w v then Some x else pattern_value p r v)
 
-(** val truth : key0 list -> z list -> literal -> bool option **)
+(** val pattern_truth : key0 list -> z list -> literal -> bool option **)
 
-let truth pat vals l =
-  match value_in pat vals (fst (fst l)) with
+let pattern_truth pat vals l =
+  match pattern_value pat vals (fst (fst l)) with
   | Some x -> Some (eqb (Z.eqb x (snd (fst l))) (snd l))
   | None -> None
 
-(** val targets :
+(** val reached_patterns :
     key0 list -> z list -> (literal list * fact list) list -> z list list ->
     z list list **)
 
-let rec targets pat vals cs ts =
+let rec reached_patterns pat vals cs ts =
   match cs with
   | [] -> ts
   | c :: r ->
-    let tr = map (truth pat vals) (fst c) in
+    let tr = map (pattern_truth pat vals) (fst c) in
     if existsb (fun t0 ->
          match t0 with
          | Some y -> if y then false else true
          | None -> false) tr
-    then targets pat vals r ts
-    else let new0 = map (fun t0 -> after pat t0 (snd c)) ts in
+    then reached_patterns pat vals r ts
+    else let new0 = map (fun t0 -> pattern_after pat t0 (snd c)) ts in
          if forallb (fun t0 -> match t0 with
                                | Some y -> y
                                | None -> false) tr
-         then targets pat vals r new0
-         else targets pat vals r (app ts new0)
+         then reached_patterns pat vals r new0
+         else reached_patterns pat vals r (app ts new0)
 
-(** val all_targets : key0 list -> operator -> z list -> z list list **)
+(** val successor_patterns :
+    key0 list -> operator -> z list -> z list list **)
 
-let all_targets pat o vals =
-  targets pat vals o.conditional ((after pat vals o.effects) :: [])
+let successor_patterns pat o vals =
+  reached_patterns pat vals o.conditional
+    ((pattern_after pat vals o.effects) :: [])
 
-(** val memb : key0 -> key0 list -> bool **)
+(** val mem_key : key0 -> key0 list -> bool **)
 
-let memb v pat =
+let mem_key v pat =
   existsb (Coq_Pos.eqb v) pat
 
-(** val touches : key0 list -> operator -> bool **)
+(** val mentions : key0 list -> operator -> bool **)
 
-let touches pat o =
-  existsb (fun f -> memb (fst f) pat)
-    (app o.pre.facts (app o.effects (flat_map snd o.conditional)))
+let mentions pat o =
+  existsb (fun f -> mem_key (fst f) pat)
+    (app o.precondition.facts (app o.effects (flat_map snd o.conditional)))
 
-(** val index : task -> key0 list -> z list -> z **)
+(** val table_index : task -> key0 list -> z list -> z **)
 
-let index t0 pat vals =
-  fold_left (fun r vx -> Z.add (Z.mul r (get t0.size (fst vx))) (snd vx))
+let table_index t0 pat vals =
+  fold_left (fun r vx ->
+    Z.add (Z.mul r (get t0.domain_size (fst vx))) (snd vx))
     (combine pat vals) Z0
 
-(** val bound : task -> table -> z list -> z option **)
+(** val table_bound : task -> table -> z list -> z option **)
 
-let bound t0 t1 vals =
-  match M.find (Z.to_pos (Z.add (index t0 t1.pattern vals) (Zpos XH)))
-          t1.entries with
+let table_bound t0 t1 vals =
+  match M.find (Z.to_pos (Z.add (table_index t0 t1.pattern vals) (Zpos XH)))
+          t1.table_values with
   | Some b -> b
   | None -> Some Z0
 
@@ -1360,40 +1370,41 @@ type prepared = operator * (choice list * z option)
 (** val prepare : operator -> prepared **)
 
 let prepare o =
-  (o, ((choices o), (minimum (map (amount o.cost o.sizes) (choices o)))))
+  (o, ((choices o), (minimum (map (amount o.cost o.slot_sizes) (choices o)))))
 
-(** val pot_op : task -> table -> prepared -> bool **)
+(** val potential_ok_for : task -> table -> prepared -> bool **)
 
-let pot_op t0 t1 = function
+let potential_ok_for t0 t1 = function
 | (o, p0) ->
   let (_, least) = p0 in
   (match least with
    | Some least0 ->
-     if touches t1.pattern o
+     if mentions t1.pattern o
      then forallb (fun vals ->
             forallb (fun tgt ->
-              at_most (bound t0 t1 vals) (bound t0 t1 tgt) least0)
-              (all_targets t1.pattern o vals))
-            (matching t0 t1.pattern o.pre.facts)
+              at_most (table_bound t0 t1 vals) (table_bound t0 t1 tgt) least0)
+              (successor_patterns t1.pattern o vals))
+            (matching t0 t1.pattern o.precondition.facts)
      else Z.leb Z0 least0
    | None -> true)
 
 (** val is_basic : task -> key0 -> bool **)
 
 let is_basic t0 v =
-  Z.leb (Zpos v) t0.basic
+  Z.leb (Zpos v) t0.basic_count
 
-(** val check_pot : task -> prepared list -> table -> bool **)
+(** val check_potential : task -> prepared list -> table -> bool **)
 
-let check_pot t0 ops t1 =
+let check_potential t0 ops t1 =
   (&&)
     ((&&) (forallb (is_basic t0) t1.pattern)
-      (forallb (fun vals -> at_most (bound t0 t1 vals) (Some Z0) Z0)
-        (matching t0 t1.pattern t0.goal.facts))) (forallb (pot_op t0 t1) ops)
+      (forallb (fun vals -> at_most (table_bound t0 t1 vals) (Some Z0) Z0)
+        (matching t0 t1.pattern t0.goal.facts)))
+    (forallb (potential_ok_for t0 t1) ops)
 
-(** val alone : linear -> key0 -> bool **)
+(** val is_number : linear -> key0 -> bool **)
 
-let alone l n =
+let is_number l n =
   match l.factors with
   | [] -> false
   | p :: l0 ->
@@ -1402,62 +1413,65 @@ let alone l n =
      | [] -> (&&) (Coq_Pos.eqb m n) (Z.eqb f (Zpos XH))
      | _ :: _ -> false)
 
-(** val lowers : key0 -> prepared -> z option **)
+(** val least_use : key0 -> prepared -> z option **)
 
-let lowers n = function
+let least_use n = function
 | (o, p0) ->
   let (chs, _) = p0 in
-  (match filter (fun c -> Coq_Pos.eqb (fst c) n) o.changes with
+  (match filter (fun c -> Coq_Pos.eqb (fst c) n) o.number_effects with
    | [] -> Some Z0
    | p1 :: l0 ->
      let (_, l) = p1 in
      (match l0 with
       | [] ->
-        if alone l n
+        if is_number l n
         then (match minimum
-                      (map (fun ch -> Z.opp (amount l.rest o.sizes ch)) chs) with
+                      (map (fun ch ->
+                        Z.opp (amount l.offset o.slot_sizes ch)) chs) with
               | Some least ->
                 if (&&) (Z.leb Z0 least)
                      ((||) (Z.eqb least Z0)
                        (forallb (fun ch ->
                          existsb (fun c ->
-                           (&&) (alone c n)
-                             (Z.leb (amount c.rest o.sizes ch)
-                               (amount l.rest o.sizes ch))) o.pre.comparisons)
-                         chs))
+                           (&&) (is_number c n)
+                             (Z.leb (amount c.offset o.slot_sizes ch)
+                               (amount l.offset o.slot_sizes ch)))
+                           o.precondition.comparisons) chs))
                 then Some least
                 else None
               | None -> Some Z0)
         else None
       | _ :: _ -> None))
 
-(** val zero : z option -> bool **)
+(** val is_zero_bound : z option -> bool **)
 
-let zero = function
+let is_zero_bound = function
 | Some x -> Z.eqb x Z0
 | None -> false
 
-(** val none : z option -> bool **)
+(** val is_infinite : z option -> bool **)
 
-let none = function
+let is_infinite = function
 | Some _ -> false
 | None -> true
 
-(** val need_op : task -> table -> key0 -> bool -> prepared -> bool **)
+(** val need_ok_for : task -> table -> key0 -> bool -> prepared -> bool **)
 
-let need_op t0 t1 n allzero p =
+let need_ok_for t0 t1 n allzero p =
   let o = fst p in
-  if touches t1.pattern o
+  if mentions t1.pattern o
   then forallb (fun vals ->
          forallb (fun tgt ->
-           match lowers n p with
-           | Some least -> at_most (bound t0 t1 vals) (bound t0 t1 tgt) least
+           match least_use n p with
+           | Some least ->
+             at_most (table_bound t0 t1 vals) (table_bound t0 t1 tgt) least
            | None ->
-             (||) (zero (bound t0 t1 vals))
-               ((&&) (none (bound t0 t1 vals)) (none (bound t0 t1 tgt))))
-           (all_targets t1.pattern o vals))
-         (matching t0 t1.pattern o.pre.facts)
-  else (match lowers n p with
+             (||) (is_zero_bound (table_bound t0 t1 vals))
+               ((&&) (is_infinite (table_bound t0 t1 vals))
+                 (is_infinite (table_bound t0 t1 tgt))))
+           (successor_patterns t1.pattern o vals))
+         (matching t0 t1.pattern o.precondition.facts)
+  else (match least_use n p with
         | Some _ -> true
         | None -> allzero)
 
@@ -1467,33 +1481,33 @@ let check_need t0 ops = function
 | (n, t1) ->
   (&&)
     ((&&)
-      ((&&) ((&&) (memb n t0.numbers) (forallb (is_basic t0) t1.pattern))
+      ((&&) ((&&) (mem_key n t0.numbers) (forallb (is_basic t0) t1.pattern))
         (forallb (fun vals ->
-          match bound t0 t1 vals with
+          match table_bound t0 t1 vals with
           | Some x -> Z.leb Z0 x
           | None -> true) (matching t0 t1.pattern [])))
       (forallb (fun vals ->
-        match bound t0 t1 vals with
+        match table_bound t0 t1 vals with
         | Some k ->
           (||) (Z.leb k Z0)
             (existsb (fun l ->
-              (&&) (alone l n) (Z.leb k (Z.opp (amount l.rest [] []))))
+              (&&) (is_number l n) (Z.leb k (Z.opp (amount l.offset [] []))))
               t0.goal.comparisons)
         | None -> false) (matching t0 t1.pattern t0.goal.facts)))
     (let allzero =
        forallb (fun vals ->
-         (||) (zero (bound t0 t1 vals)) (none (bound t0 t1 vals)))
-         (matching t0 t1.pattern [])
+         (||) (is_zero_bound (table_bound t0 t1 vals))
+           (is_infinite (table_bound t0 t1 vals))) (matching t0 t1.pattern [])
      in
-     forallb (need_op t0 t1 n allzero) ops)
+     forallb (need_ok_for t0 t1 n allzero) ops)
 
-type entry = choice * (z * z list)
+type choice_profile = choice * (z * z list)
 
 (** val profile : operator -> choice -> z list **)
 
 let profile o ch =
-  map (fun l -> amount l.rest o.sizes ch)
-    (app o.pre.comparisons (map snd o.changes))
+  map (fun l -> amount l.offset o.slot_sizes ch)
+    (app o.precondition.comparisons (map snd o.number_effects))
 
 (** val fits : bool -> z list -> z list -> bool **)
 
@@ -1508,27 +1522,27 @@ let rec fits mono a b =
      | y :: b0 ->
        (&&) (if mono then Z.leb y x else Z.eqb x y) (fits mono a0 b0))
 
-(** val as_good : bool -> entry -> entry -> bool **)
+(** val dominates : bool -> choice_profile -> choice_profile -> bool **)
 
-let as_good mono a b =
+let dominates mono a b =
   (&&) (Z.leb (fst (snd a)) (fst (snd b)))
     (fits mono (snd (snd a)) (snd (snd b)))
 
-(** val front : bool -> operator -> choice list **)
+(** val undominated_choices : bool -> operator -> choice list **)
 
-let front mono o =
+let undominated_choices mono o =
   let all =
-    map (fun ch -> (ch, ((amount o.cost o.sizes ch), (profile o ch))))
+    map (fun ch -> (ch, ((amount o.cost o.slot_sizes ch), (profile o ch))))
       (choices o)
   in
-  let some =
+  let kept =
     fold_left (fun f e ->
-      if existsb (fun x -> as_good mono x e) f
+      if existsb (fun x -> dominates mono x e) f
       then f
-      else e :: (filter (fun x -> negb (as_good mono e x)) f)) all []
+      else e :: (filter (fun x -> negb (dominates mono e x)) f)) all []
   in
-  if forallb (fun e -> existsb (fun x -> as_good mono x e) some) all
-  then map fst some
+  if forallb (fun e -> existsb (fun x -> dominates mono x e) kept) all
+  then map fst kept
   else choices o
 
 (** val nonneg : linear -> bool **)
@@ -1536,14 +1550,14 @@ let front mono o =
 let nonneg l =
   forallb (fun f -> Z.leb Z0 (snd f)) l.factors
 
-(** val more_never_hurts : task -> bool **)
+(** val is_monotone : task -> bool **)
 
-let more_never_hurts t0 =
+let is_monotone t0 =
   (&&)
     ((&&)
       (forallb (fun o ->
-        (&&) (forallb nonneg o.pre.comparisons)
-          (forallb (fun c -> nonneg (snd c)) o.changes)) t0.operators)
+        (&&) (forallb nonneg o.precondition.comparisons)
+          (forallb (fun c -> nonneg (snd c)) o.number_effects)) t0.operators)
       (forallb nonneg t0.goal.comparisons))
     (forallb
       (forallb (fun r ->
@@ -1551,27 +1565,27 @@ let more_never_hurts t0 =
         | [] -> true
         | _ :: _ -> false)) t0.layers)
 
-(** val numbers_fit : bool -> z M.t -> z M.t -> key0 list -> bool **)
+(** val numbers_cover : bool -> z M.t -> z M.t -> key0 list -> bool **)
 
-let numbers_fit mono a b ns =
+let numbers_cover mono a b ns =
   forallb (fun n ->
     if mono then Z.leb (get b n) (get a n) else Z.eqb (get a n) (get b n)) ns
 
-(** val pot_cuts : task -> z option -> state -> z -> table -> bool **)
+(** val potential_prunes : task -> z option -> state -> z -> table -> bool **)
 
-let pot_cuts t0 claim s p t1 =
-  match bound t0 t1 (map (val0 s) t1.pattern) with
+let potential_prunes t0 claim s p t1 =
+  match table_bound t0 t1 (map (var_value s) t1.pattern) with
   | Some more ->
     (match claim with
      | Some c -> Z.leb c (Z.add p more)
      | None -> false)
   | None -> true
 
-(** val need_cuts : task -> state -> (key0 * table) -> bool **)
+(** val need_prunes : task -> state -> (key0 * table) -> bool **)
 
-let need_cuts t0 s nt =
-  match bound t0 (snd nt) (map (val0 s) (snd nt).pattern) with
-  | Some k -> (&&) (Z.ltb Z0 k) (Z.ltb (num s (fst nt)) k)
+let need_prunes t0 s nt =
+  match table_bound t0 (snd nt) (map (var_value s) (snd nt).pattern) with
+  | Some k -> (&&) (Z.ltb Z0 k) (Z.ltb (num_value s (fst nt)) k)
   | None -> true
 
 (** val label_covers :
@@ -1579,9 +1593,10 @@ let need_cuts t0 s nt =
 
 let label_covers t0 mono bs s p l =
   (&&)
-    ((&&) (Z.leb l.paid p)
-      (forallb (fun v -> Z.eqb (val0 l.at_state v) (val0 s v)) bs))
-    (numbers_fit mono l.at_state.sn s.sn t0.numbers)
+    ((&&) (Z.leb l.path_cost p)
+      (forallb (fun v -> Z.eqb (var_value l.label_state v) (var_value s v))
+        bs))
+    (numbers_cover mono l.label_state.num_values s.num_values t0.numbers)
 
 (** val covered :
     task -> argument -> z option -> (state -> positive list) -> bool -> key0
@@ -1589,8 +1604,8 @@ let label_covers t0 mono bs s p l =
 
 let covered t0 a claim oracle mono bs s p =
   (||)
-    ((||) (existsb (pot_cuts t0 claim s p) a.potentials)
-      (existsb (need_cuts t0 s) a.needs))
+    ((||) (existsb (potential_prunes t0 claim s p) a.potentials)
+      (existsb (need_prunes t0 s) a.needs))
     (existsb (fun i ->
       match M.find i a.labels with
       | Some l -> label_covers t0 mono bs s p l
@@ -1601,50 +1616,52 @@ let covered t0 a claim oracle mono bs s p =
     list -> (operator * choice list) list -> label -> bool **)
 
 let check_label t0 a claim oracle mono bs ops l =
-  let s = derive t0 l.at_state in
+  let s = derive t0 l.label_state in
   (&&)
     (negb
       ((&&) (holds t0.goal s [] [])
         (match claim with
-         | Some c -> Z.ltb l.paid c
+         | Some c -> Z.ltb l.path_cost c
          | None -> true)))
     (forallb (fun p ->
       let o = fst p in
-      if holds_facts o.pre s
+      if holds_facts o.precondition s
       then forallb (fun ch ->
-             if holds o.pre s o.sizes ch
+             if holds o.precondition s o.slot_sizes ch
              then covered t0 a claim oracle mono bs (apply o s ch)
-                    (Z.add l.paid (amount o.cost o.sizes ch))
+                    (Z.add l.path_cost (amount o.cost o.slot_sizes ch))
              else true) (snd p)
       else true) ops)
 
 (** val in_range : task -> key0 -> z -> bool **)
 
 let in_range t0 v x =
-  (&&) (Z.leb Z0 x) (Z.ltb x (get t0.size v))
+  (&&) (Z.leb Z0 x) (Z.ltb x (get t0.domain_size v))
 
-(** val sound_fact : task -> fact -> bool **)
+(** val is_well_formed : task -> fact -> bool **)
 
-let sound_fact t0 f =
+let is_well_formed t0 f =
   (&&) (is_basic t0 (fst f)) (in_range t0 (fst f) (snd f))
 
 (** val distinct : key0 list -> bool **)
 
 let rec distinct = function
 | [] -> true
-| k :: r -> (&&) (negb (memb k r)) (distinct r)
+| k :: r -> (&&) (negb (mem_key k r)) (distinct r)
 
 (** val check_task : task -> bool **)
 
 let check_task t0 =
   (&&)
     ((&&)
-      ((&&) (forallb (fun v -> in_range t0 v (val0 t0.init v)) (basics t0))
+      ((&&)
+        (forallb (fun v -> in_range t0 v (var_value t0.init v)) (basics t0))
         (forallb (fun o ->
           (&&)
-            ((&&) (forallb (sound_fact t0) o.effects)
-              (forallb (fun c -> forallb (sound_fact t0) (snd c))
-                o.conditional)) (distinct (map fst o.changes))) t0.operators))
+            ((&&) (forallb (is_well_formed t0) o.effects)
+              (forallb (fun c -> forallb (is_well_formed t0) (snd c))
+                o.conditional)) (distinct (map fst o.number_effects)))
+          t0.operators))
       (forallb (forallb (fun r -> negb (is_basic t0 (fst (fst r)))))
         t0.layers)) (forallb (fun d -> negb (is_basic t0 (fst d))) t0.derived)
 
@@ -1655,15 +1672,18 @@ let check t0 a claim oracle =
   match claim with
   | Some _ ->
     let ops = map prepare t0.operators in
-    let mono = more_never_hurts t0 in
+    let mono = is_monotone t0 in
     let bs = basics t0 in
     (&&)
       ((&&)
         ((&&)
-          ((&&) (check_task t0) (forallb (check_pot t0 ops) a.potentials))
+          ((&&) (check_task t0)
+            (forallb (check_potential t0 ops) a.potentials))
           (forallb (check_need t0 ops) a.needs))
         (covered t0 a claim oracle mono bs t0.init Z0))
-      (let fronts = map (fun o -> (o, (front mono o))) t0.operators in
+      (let fronts =
+         map (fun o -> (o, (undominated_choices mono o))) t0.operators
+       in
        forallb (fun il ->
          check_label t0 a claim oracle mono bs fronts (snd il))
          (M.elements a.labels))
@@ -1673,16 +1693,18 @@ let check t0 a claim oracle =
                          | _ :: _ -> false) t0.goal.clauses
     then true
     else let ops = map prepare t0.operators in
-         let mono = more_never_hurts t0 in
+         let mono = is_monotone t0 in
          let bs = basics t0 in
          (&&)
            ((&&)
              ((&&)
                ((&&) (check_task t0)
-                 (forallb (check_pot t0 ops) a.potentials))
+                 (forallb (check_potential t0 ops) a.potentials))
                (forallb (check_need t0 ops) a.needs))
              (covered t0 a claim oracle mono bs t0.init Z0))
-           (let fronts = map (fun o -> (o, (front mono o))) t0.operators in
+           (let fronts =
+              map (fun o -> (o, (undominated_choices mono o))) t0.operators
+            in
             forallb (fun il ->
               check_label t0 a claim oracle mono bs fronts (snd il))
               (M.elements a.labels))
@@ -1703,7 +1725,7 @@ let rec assoc a = function
 | [] -> None
 | p :: r -> let (b, x) = p in if atom_eqb a b then Some x else assoc a r
 
-type 'x index0 = (atom * 'x) list PositiveMap.t
+type 'x atom_map = (atom * 'x) list PositiveMap.t
 
 (** val bucket : atom -> positive **)
 
@@ -1712,22 +1734,22 @@ let bucket a =
     Coq_Pos.add (XO (XO (XO (XO (XO (XO (XO (XO (XO (XO (XO (XO h))))))))))))
       o) (snd a) (fst a)
 
-(** val entries0 : 'a1 index0 -> atom -> (atom * 'a1) list **)
+(** val bucket_entries : 'a1 atom_map -> atom -> (atom * 'a1) list **)
 
-let entries0 m a =
+let bucket_entries m a =
   match PositiveMap.find (bucket a) m with
   | Some l -> l
   | None -> []
 
-(** val find0 : 'a1 index0 -> atom -> 'a1 option **)
+(** val find_atom : 'a1 atom_map -> atom -> 'a1 option **)
 
-let find0 m a =
-  assoc a (entries0 m a)
+let find_atom m a =
+  assoc a (bucket_entries m a)
 
-(** val insert : atom -> 'a1 -> 'a1 index0 -> 'a1 index0 **)
+(** val add_atom : atom -> 'a1 -> 'a1 atom_map -> 'a1 atom_map **)
 
-let insert a x m =
-  PositiveMap.add (bucket a) ((a, x) :: (entries0 m a)) m
+let add_atom a x m =
+  PositiveMap.add (bucket a) ((a, x) :: (bucket_entries m a)) m
 
 type term =
 | Var of nat
@@ -1783,10 +1805,10 @@ type action = { parameters : key1 list; duration : expression option;
                 at_start : formula; start_effect : effect;
                 over_all : formula; at_end : formula; end_effect : effect }
 
-type world = { holds_in : (atom -> bool); value_in0 : (atom -> q option) }
+type world = { holds_in : (atom -> bool); value_in : (atom -> q option) }
 
 type problem = { objects : (key1 -> key1 list); actions : action list;
-                 initial_atoms : unit index0; initial_values : q index0;
+                 initial_atoms : unit atom_map; initial_values : q atom_map;
                  goal_formula : formula; metric : expression; per_time : 
                  q; per_step : q }
 
@@ -1794,13 +1816,13 @@ type problem = { objects : (key1 -> key1 list); actions : action list;
 
 let initial p =
   { holds_in = (fun a ->
-    match find0 p.initial_atoms a with
+    match find_atom p.initial_atoms a with
     | Some _ -> true
-    | None -> false); value_in0 = (find0 p.initial_values) }
+    | None -> false); value_in = (find_atom p.initial_values) }
 
-(** val object0 : key1 list -> term -> key1 option **)
+(** val object_of : key1 list -> term -> key1 option **)
 
-let object0 env = function
+let object_of env = function
 | Var i -> nth_error env i
 | Object o -> Some o
 
@@ -1809,7 +1831,7 @@ let object0 env = function
 let rec ground env = function
 | [] -> Some []
 | t0 :: r ->
-  (match object0 env t0 with
+  (match object_of env t0 with
    | Some o ->
      (match ground env r with
       | Some l -> Some (o :: l)
@@ -1831,7 +1853,7 @@ let rec eval w d env = function
 | Constant q0 -> Some q0
 | Fluent (f, ts) ->
   (match ground env ts with
-   | Some l -> w.value_in0 (f, l)
+   | Some l -> w.value_in (f, l)
    | None -> None)
 | Duration -> d
 | Plus (a, b) -> lift qplus (eval w d env a) (eval w d env b)
@@ -1860,19 +1882,19 @@ let and3 a b =
      | Some b0 -> if b0 then None else Some false
      | None -> None)
 
-(** val truth0 :
+(** val truth :
     problem -> world -> q option -> key1 list -> formula -> bool option **)
 
-let rec truth0 p w d env = function
+let rec truth p w d env = function
 | Truth b -> Some b
 | Atom (p0, ts) ->
   (match ground env ts with
    | Some l -> Some (w.holds_in (p0, l))
    | None -> None)
 | Same (t0, u) ->
-  (match object0 env t0 with
+  (match object_of env t0 with
    | Some a ->
-     (match object0 env u with
+     (match object_of env u with
       | Some b -> Some (Coq_Pos.eqb a b)
       | None -> None)
    | None -> None)
@@ -1883,10 +1905,10 @@ let rec truth0 p w d env = function
       | Some y -> Some (if strict then less y x else qle_bool y x)
       | None -> None)
    | None -> None)
-| Not g -> option_map negb (truth0 p w d env g)
-| And (g, h) -> and3 (truth0 p w d env g) (truth0 p w d env h)
+| Not g -> option_map negb (truth p w d env g)
+| And (g, h) -> and3 (truth p w d env g) (truth p w d env h)
 | Forall (t0, g) ->
-  fold_right (fun o r -> and3 (truth0 p w d (app env (o :: [])) g) r) (Some
+  fold_right (fun o r -> and3 (truth p w d (app env (o :: [])) g) r) (Some
     true) (p.objects t0)
 
 type change =
@@ -1902,10 +1924,10 @@ let both a b =
                | None -> None)
   | None -> None
 
-(** val changes0 :
+(** val changes :
     problem -> world -> q option -> key1 list -> effect -> change list option **)
 
-let rec changes0 p w d env = function
+let rec changes p w d env = function
 | Nothing -> Some []
 | Put (b, p0, ts) ->
   (match ground env ts with
@@ -1918,18 +1940,18 @@ let rec changes0 p w d env = function
       | Some q0 -> Some ((Number ((f, l), assigns, q0)) :: [])
       | None -> None)
    | None -> None)
-| Both (a, b) -> both (changes0 p w d env a) (changes0 p w d env b)
+| Both (a, b) -> both (changes p w d env a) (changes p w d env b)
 | When (f, a) ->
-  (match truth0 p w d env f with
-   | Some b -> if b then changes0 p w d env a else Some []
+  (match truth p w d env f with
+   | Some b -> if b then changes p w d env a else Some []
    | None -> None)
 | Each (t0, a) ->
-  fold_right (fun o r -> both (changes0 p w d (app env (o :: [])) a) r) (Some
+  fold_right (fun o r -> both (changes p w d (app env (o :: [])) a) r) (Some
     []) (p.objects t0)
 
-(** val puts0 : change list -> atom -> bool -> bool **)
+(** val sets_atom : change list -> atom -> bool -> bool **)
 
-let puts0 cs a b =
+let sets_atom cs a b =
   existsb (fun c ->
     match c with
     | Fact (a', b') -> (&&) (atom_eqb a a') (eqb b b')
@@ -1958,14 +1980,14 @@ let changed_value old l = match l with
        else option_map (fun x ->
               fold_left (fun s c -> qred (qplus s (snd c))) l x) old
 
-(** val targets0 : change list -> atom list **)
+(** val changed_fluents : change list -> atom list **)
 
-let rec targets0 = function
+let rec changed_fluents = function
 | [] -> []
 | c :: r ->
   (match c with
-   | Fact (_, _) -> targets0 r
-   | Number (f, _, _) -> f :: (targets0 r))
+   | Fact (_, _) -> changed_fluents r
+   | Number (f, _, _) -> f :: (changed_fluents r))
 
 (** val updates :
     world -> change list -> atom list -> (atom * q) list option **)
@@ -1973,7 +1995,7 @@ let rec targets0 = function
 let rec updates w cs = function
 | [] -> Some []
 | f :: r ->
-  (match changed_value (w.value_in0 f) (on f cs) with
+  (match changed_value (w.value_in f) (on f cs) with
    | Some q0 ->
      (match updates w cs r with
       | Some l -> Some ((f, q0) :: l)
@@ -1985,20 +2007,20 @@ let rec updates w cs = function
     option **)
 
 let happening p w d env f e =
-  match truth0 p w d env f with
+  match truth p w d env f with
   | Some b ->
     if b
-    then (match changes0 p w d env e with
+    then (match changes p w d env e with
           | Some cs ->
-            (match updates w cs (targets0 cs) with
+            (match updates w cs (changed_fluents cs) with
              | Some l ->
                Some { holds_in = (fun a ->
-                 (||) (puts0 cs a true)
-                   ((&&) (negb (puts0 cs a false)) (w.holds_in a)));
-                 value_in0 = (fun a ->
+                 (||) (sets_atom cs a true)
+                   ((&&) (negb (sets_atom cs a false)) (w.holds_in a)));
+                 value_in = (fun a ->
                  match assoc a l with
                  | Some q0 -> Some q0
-                 | None -> w.value_in0 a) }
+                 | None -> w.value_in a) }
              | None -> None)
           | None -> None)
     else None
@@ -2007,7 +2029,7 @@ let happening p w d env f e =
 (** val step :
     problem -> bool -> world -> action -> key1 list -> (world * q) option **)
 
-let step p zero0 w a env =
+let step p is_zero_bound0 w a env =
   if negb
        ((&&) (Nat.eqb (length env) (length a.parameters))
          (forallb (fun x ->
@@ -2021,7 +2043,7 @@ let step p zero0 w a env =
              if less d { qnum = Z0; qden = XH }
              then None
              else if qeq_bool d { qnum = Z0; qden = XH }
-                  then if zero0
+                  then if is_zero_bound0
                        then option_map (fun w0 -> (w0, d))
                               (happening p w (Some d) env (And (a.at_start,
                                 a.at_end)) (Both (a.start_effect,
@@ -2043,19 +2065,19 @@ let step p zero0 w a env =
     problem -> bool -> world -> q -> (nat * key1 list) list -> (world * q)
     option **)
 
-let rec execute p zero0 w spent = function
+let rec execute p is_zero_bound0 w spent = function
 | [] ->
-  (match truth0 p w None [] p.goal_formula with
+  (match truth p w None [] p.goal_formula with
    | Some b -> if b then Some (w, spent) else None
    | None -> None)
 | p0 :: r ->
   let (i, env) = p0 in
   (match nth_error p.actions i with
    | Some a ->
-     (match step p zero0 w a env with
+     (match step p is_zero_bound0 w a env with
       | Some p1 ->
         let (w', d) = p1 in
-        execute p zero0 w'
+        execute p is_zero_bound0 w'
           (qred (qplus (qplus spent (qmult p.per_time d)) p.per_step)) r
       | None -> None)
    | None -> None)
@@ -2112,8 +2134,8 @@ let plus_result a c b =
              | x0 -> x0)
 
 type names = { variables : (z * atom) list M.t; fluents : atom M.t;
-               fact_of : (key1 * z) index0; number_of : key1 index0;
-               changing : (key1 -> bool); may_hold : unit index0;
+               fact_of : (key1 * z) atom_map; number_of : key1 atom_map;
+               changing : (key1 -> bool); may_hold : unit atom_map;
                scale : positive; cost_scale : positive }
 
 type case_tree =
@@ -2122,10 +2144,10 @@ type case_tree =
 | SplitAtom of atom * case_tree * case_tree
 | SplitForm of form * case_tree * case_tree
 
-(** val mem0 : 'a1 index0 -> atom -> bool **)
+(** val mem0 : 'a1 atom_map -> atom -> bool **)
 
 let mem0 m a =
-  match find0 m a with
+  match find_atom m a with
   | Some _ -> true
   | None -> false
 
@@ -2135,7 +2157,7 @@ type knowledge = { literals : (atom * bool) list; bounds : (bool * form) list }
 
 let in_variable n k v =
   flat_map (fun l ->
-    match find0 n.fact_of (fst l) with
+    match find_atom n.fact_of (fst l) with
     | Some p ->
       let (u, x) = p in if Coq_Pos.eqb u v then (x, (snd l)) :: [] else []
     | None -> []) k.literals
@@ -2147,7 +2169,7 @@ let possible t0 n k v =
   filter (fun y -> forallb (fun xb -> eqb (Z.eqb y (fst xb)) (snd xb)) known)
     (match find snd known with
      | Some p -> let (x, _) = p in x :: []
-     | None -> range (get t0.size v))
+     | None -> range (get t0.domain_size v))
 
 (** val fact3 : task -> names -> knowledge -> key1 -> z -> bool option **)
 
@@ -2171,7 +2193,7 @@ let base_truth p t0 n k a =
         | None ->
           if negb (mem0 n.may_hold a)
           then Some false
-          else (match find0 n.fact_of a with
+          else (match find_atom n.fact_of a with
                 | Some p0 -> let (v, x) = p0 in fact3 t0 n k v x
                 | None -> None))
 
@@ -2199,7 +2221,7 @@ let value3 p n s f =
   | None ->
     if n.changing (fst f)
     then Is (fluent f)
-    else (match (initial p).value_in0 f with
+    else (match (initial p).value_in f with
           | Some q0 -> Is (constant q0)
           | None -> Undefined)
 
@@ -2304,9 +2326,9 @@ let rec truth3 p t0 n k s d env = function
    | Some l -> atom3 p t0 n k s (p0, l)
    | None -> Some false)
 | Same (t1, u) ->
-  (match object0 env t1 with
+  (match object_of env t1 with
    | Some a ->
-     (match object0 env u with
+     (match object_of env u with
       | Some b -> Some (Coq_Pos.eqb a b)
       | None -> Some false)
    | None -> Some false)
@@ -2560,7 +2582,7 @@ let impossible p t0 n k =
         (match base_truth p t0 n { literals = []; bounds = k.bounds } (fst l) with
          | Some b -> negb (eqb b (snd l))
          | None -> false)
-        (match find0 n.fact_of (fst l) with
+        (match find_atom n.fact_of (fst l) with
          | Some p0 ->
            let (v, _) = p0 in
            (match possible t0 n k v with
@@ -2604,7 +2626,7 @@ let form_of n l szs ch =
   | Some g ->
     Some
       (plus_form g { qnum = (Zpos XH); qden = XH }
-        (constant (qdiv (inject_Z (amount l.rest szs ch)) (scaled n))))
+        (constant (qdiv (inject_Z (amount l.offset szs ch)) (scaled n))))
   | None -> None
 
 (** val required : names -> knowledge -> form -> bool **)
@@ -2660,9 +2682,9 @@ let rec fired3 t0 n k = function
 
 let admitted_choice o ch =
   (&&)
-    ((&&) (Nat.eqb (length ch) (length o.sizes))
+    ((&&) (Nat.eqb (length ch) (length o.slot_sizes))
       (forallb (fun xn -> (&&) (Z.leb Z0 (fst xn)) (Z.ltb (fst xn) (snd xn)))
-        (combine ch o.sizes))) (admits o ch)
+        (combine ch o.slot_sizes))) (admits o ch)
 
 (** val variable_ok :
     task -> names -> knowledge -> symbolic -> fact list -> key1 -> bool **)
@@ -2694,22 +2716,21 @@ let is_zero = function
 let number_ok n s o n0 =
   match M.find n0 n.fluents with
   | Some f ->
-    let after0 =
-      match assoc f s.new_values with
-      | Some g -> g
-      | None -> fluent f
+    let after = match assoc f s.new_values with
+                | Some g -> g
+                | None -> fluent f
     in
     let made =
       match o with
       | Some p ->
         let (o0, ch) = p in
-        (match find (fun c -> Coq_Pos.eqb (fst c) n0) o0.changes with
-         | Some c -> form_of n (snd c) o0.sizes ch
+        (match find (fun c -> Coq_Pos.eqb (fst c) n0) o0.number_effects with
+         | Some c -> form_of n (snd c) o0.slot_sizes ch
          | None -> Some (fluent f))
       | None -> Some (fluent f)
     in
     (match made with
-     | Some g -> is_zero (plus_form after0 { qnum = (Zneg XH); qden = XH } g)
+     | Some g -> is_zero (plus_form after { qnum = (Zneg XH); qden = XH } g)
      | None -> false)
   | None -> true
 
@@ -2728,7 +2749,7 @@ let growth p n s time =
 (** val step_cost : (operator * choice) option -> z **)
 
 let step_cost = function
-| Some p -> let (o0, ch) = p in amount o0.cost o0.sizes ch
+| Some p -> let (o0, ch) = p in amount o0.cost o0.slot_sizes ch
 | None -> Z0
 
 (** val simulated :
@@ -2741,8 +2762,8 @@ let simulated p t0 n k s time o =
           let (o0, ch) = p0 in
           if (&&)
                ((&&) (admitted_choice o0 ch)
-                 (condition3 t0 n k o0.pre o0.sizes ch))
-               (distinct (map fst o0.changes))
+                 (condition3 t0 n k o0.precondition o0.slot_sizes ch))
+               (distinct (map fst o0.number_effects))
           then option_map (app o0.effects) (fired3 t0 n k o0.conditional)
           else None
         | None -> Some [] with
@@ -2752,16 +2773,16 @@ let simulated p t0 n k s time o =
         (forallb (variable_ok t0 n k s made)
           (app (map fst made)
             (flat_map (fun l ->
-              match find0 n.fact_of (fst l) with
+              match find_atom n.fact_of (fst l) with
               | Some f -> (fst f) :: []
               | None -> []) s.new_truths)))
         (forallb (number_ok n s o)
           (app
             (match o with
-             | Some p0 -> let (o0, _) = p0 in map fst o0.changes
+             | Some p0 -> let (o0, _) = p0 in map fst o0.number_effects
              | None -> [])
             (flat_map (fun l ->
-              match find0 n.number_of (fst l) with
+              match find_atom n.number_of (fst l) with
               | Some n0 -> n0 :: []
               | None -> []) s.new_values))))
       (match growth p n s time with
@@ -2836,9 +2857,9 @@ let rec static_false p n env = function
      | Some l -> negb ((initial p).holds_in (p0, l))
      | None -> false)
 | Same (t0, u) ->
-  (match object0 env t0 with
+  (match object_of env t0 with
    | Some a ->
-     (match object0 env u with
+     (match object_of env u with
       | Some b -> negb (Coq_Pos.eqb a b)
       | None -> false)
    | None -> false)
@@ -2850,9 +2871,9 @@ let rec static_false p n env = function
         | Some l -> (initial p).holds_in (p0, l)
         | None -> false)
    | Same (t0, u) ->
-     (match object0 env t0 with
+     (match object_of env t0 with
       | Some a ->
-        (match object0 env u with
+        (match object_of env u with
          | Some b -> Coq_Pos.eqb a b
          | None -> false)
       | None -> false)
@@ -2902,7 +2923,7 @@ let action_ok p t0 n case i a =
       tree_ok p t0 n (instance_leaf p t0 n a env) (gathered p t0 n a env)
         (case i env)) (instances p (pruned p n a) a.parameters []))
 
-(** val all_entries : 'a1 index0 -> (atom * 'a1) list **)
+(** val all_entries : 'a1 atom_map -> (atom * 'a1) list **)
 
 let all_entries m =
   flat_map snd (PositiveMap.elements m)
@@ -2926,8 +2947,9 @@ let faithful p t0 n case goal_case =
                 (forallb (fun xa ->
                   let (x, a) = xa in
                   (&&)
-                    (eqb ((initial p).holds_in a) (Z.eqb (val0 t0.init v) x))
-                    (match find0 n.fact_of a with
+                    (eqb ((initial p).holds_in a)
+                      (Z.eqb (var_value t0.init v) x))
+                    (match find_atom n.fact_of a with
                      | Some p0 ->
                        let (u, y) = p0 in (&&) (Coq_Pos.eqb u v) (Z.eqb y x)
                      | None -> false)) vals)) (M.elements n.variables)))
@@ -2942,12 +2964,13 @@ let faithful p t0 n case goal_case =
         (forallb (fun nf ->
           let (n0, f) = nf in
           (&&)
-            ((&&) ((&&) (memb n0 t0.numbers) (n.changing (fst f)))
-              (match (initial p).value_in0 f with
+            ((&&) ((&&) (mem_key n0 t0.numbers) (n.changing (fst f)))
+              (match (initial p).value_in f with
                | Some q0 ->
-                 qeq_bool (qmult q0 (scaled n)) (inject_Z (num t0.init n0))
+                 qeq_bool (qmult q0 (scaled n))
+                   (inject_Z (num_value t0.init n0))
                | None -> false))
-            (match find0 n.number_of f with
+            (match find_atom n.number_of f with
              | Some m -> Coq_Pos.eqb m n0
              | None -> false)) (M.elements n.fluents)))
       (tree_ok p t0 n (goal_leaf p t0 n)

@@ -452,11 +452,11 @@ type key0 = positive
 
 val get : z M.t -> key0 -> z
 
-type state = { sv : z M.t; sn : z M.t }
+type state = { var_values : z M.t; num_values : z M.t }
 
-val val0 : state -> key0 -> z
+val var_value : state -> key0 -> z
 
-val num : state -> key0 -> z
+val num_value : state -> key0 -> z
 
 type fact = key0 * z
 
@@ -464,24 +464,25 @@ type literal = fact * bool
 
 type choice = z list
 
-type quantity = { qconst : z; qtables : (nat list * z M.t) list }
+type quantity = { base : z; tables : (nat list * z M.t) list }
 
-type linear = { factors : (key0 * z) list; rest : quantity }
+type linear = { factors : (key0 * z) list; offset : quantity }
 
 type condition = { facts : fact list; clauses : literal list list;
                    comparisons : linear list }
 
-type operator = { ident : z; sizes : z list;
-                  excluded : (nat list * z list list) list; pre : condition;
-                  effects : fact list;
+type operator = { slot_sizes : z list;
+                  excluded : (nat list * z list list) list;
+                  precondition : condition; effects : fact list;
                   conditional : (literal list * fact list) list;
-                  changes : (key0 * linear) list; cost : quantity }
+                  number_effects : (key0 * linear) list; cost : quantity }
 
-type task = { basic : z; derived : (key0 * z) list; size : z M.t;
-              numbers : key0 list; init : state; operators : operator list;
+type task = { basic_count : z; derived : (key0 * z) list;
+              domain_size : z M.t; numbers : key0 list; init : state;
+              operators : operator list;
               layers : (fact * condition) list list; goal : condition }
 
-val row : z list -> choice -> nat list -> z
+val table_row : z list -> choice -> nat list -> z
 
 val amount : quantity -> z list -> choice -> z
 
@@ -495,68 +496,68 @@ val holds_facts : condition -> state -> bool
 
 val holds : condition -> state -> z list -> choice -> bool
 
-val puts : fact list -> z M.t -> z M.t
+val put_all : fact list -> z M.t -> z M.t
 
 val basics : task -> key0 list
 
-val reset : task -> state -> state
+val reset_derived : task -> state -> state
 
-val news : (fact * condition) list -> state -> fact list
+val new_facts : (fact * condition) list -> state -> fact list
 
-val layer : nat -> (fact * condition) list -> state -> state
+val evaluate_layer : nat -> (fact * condition) list -> state -> state
 
 val derive : task -> state -> state
 
-val fired : state -> (literal list * fact list) -> bool
+val fires : state -> (literal list * fact list) -> bool
 
-val makes : operator -> state -> fact list
+val made_facts : operator -> state -> fact list
 
 val apply : operator -> state -> choice -> state
 
-type table = { pattern : key0 list; entries : z option M.t }
+type table = { pattern : key0 list; table_values : z option M.t }
 
-type label = { at_state : state; paid : z }
+type label = { label_state : state; path_cost : z }
 
 type argument = { potentials : table list; needs : (key0 * table) list;
-                  labels : label M.t; count : positive }
+                  labels : label M.t }
 
-val upto : nat -> z -> z list
+val count_up : nat -> z -> z list
 
 val range : z -> z list
 
-val combos : z list -> choice list
+val combinations : z list -> choice list
 
-val eq_list : z list -> z list -> bool
+val equal_lists : z list -> z list -> bool
 
 val admits : operator -> choice -> bool
 
 val choices : operator -> choice list
 
-val lookup : key0 -> fact list -> z option
+val fact_value : key0 -> fact list -> z option
 
 val matching : task -> key0 list -> fact list -> z list list
 
 val last_put : fact list -> key0 -> z -> z
 
-val after : key0 list -> z list -> fact list -> z list
+val pattern_after : key0 list -> z list -> fact list -> z list
 
-val value_in : key0 list -> z list -> key0 -> z option
+val pattern_value : key0 list -> z list -> key0 -> z option
 
-val truth : key0 list -> z list -> literal -> bool option
+val pattern_truth : key0 list -> z list -> literal -> bool option
 
-val targets :
+val reached_patterns :
   key0 list -> z list -> (literal list * fact list) list -> z list list -> z
   list list
 
-val all_targets : key0 list -> operator -> z list -> z list list
+val successor_patterns : key0 list -> operator -> z list -> z list list
 
-val memb : key0 -> key0 list -> bool
+val mem_key : key0 -> key0 list -> bool
 
-val touches : key0 list -> operator -> bool
+val mentions : key0 list -> operator -> bool
 
-val index : task -> key0 list -> z list -> z
+val table_index : task -> key0 list -> z list -> z
 
-val bound : task -> table -> z list -> z option
+val table_bound : task -> table -> z list -> z option
 
 val at_most : z option -> z option -> z -> bool
 
@@ -566,43 +567,43 @@ type prepared = operator * (choice list * z option)
 
 val prepare : operator -> prepared
 
-val pot_op : task -> table -> prepared -> bool
+val potential_ok_for : task -> table -> prepared -> bool
 
 val is_basic : task -> key0 -> bool
 
-val check_pot : task -> prepared list -> table -> bool
+val check_potential : task -> prepared list -> table -> bool
 
-val alone : linear -> key0 -> bool
+val is_number : linear -> key0 -> bool
 
-val lowers : key0 -> prepared -> z option
+val least_use : key0 -> prepared -> z option
 
-val zero : z option -> bool
+val is_zero_bound : z option -> bool
 
-val none : z option -> bool
+val is_infinite : z option -> bool
 
-val need_op : task -> table -> key0 -> bool -> prepared -> bool
+val need_ok_for : task -> table -> key0 -> bool -> prepared -> bool
 
 val check_need : task -> prepared list -> (key0 * table) -> bool
 
-type entry = choice * (z * z list)
+type choice_profile = choice * (z * z list)
 
 val profile : operator -> choice -> z list
 
 val fits : bool -> z list -> z list -> bool
 
-val as_good : bool -> entry -> entry -> bool
+val dominates : bool -> choice_profile -> choice_profile -> bool
 
-val front : bool -> operator -> choice list
+val undominated_choices : bool -> operator -> choice list
 
 val nonneg : linear -> bool
 
-val more_never_hurts : task -> bool
+val is_monotone : task -> bool
 
-val numbers_fit : bool -> z M.t -> z M.t -> key0 list -> bool
+val numbers_cover : bool -> z M.t -> z M.t -> key0 list -> bool
 
-val pot_cuts : task -> z option -> state -> z -> table -> bool
+val potential_prunes : task -> z option -> state -> z -> table -> bool
 
-val need_cuts : task -> state -> (key0 * table) -> bool
+val need_prunes : task -> state -> (key0 * table) -> bool
 
 val label_covers : task -> bool -> key0 list -> state -> z -> label -> bool
 
@@ -616,7 +617,7 @@ val check_label :
 
 val in_range : task -> key0 -> z -> bool
 
-val sound_fact : task -> fact -> bool
+val is_well_formed : task -> fact -> bool
 
 val distinct : key0 list -> bool
 
@@ -632,15 +633,15 @@ val atom_eqb : atom -> atom -> bool
 
 val assoc : atom -> (atom * 'a1) list -> 'a1 option
 
-type 'x index0 = (atom * 'x) list PositiveMap.t
+type 'x atom_map = (atom * 'x) list PositiveMap.t
 
 val bucket : atom -> positive
 
-val entries0 : 'a1 index0 -> atom -> (atom * 'a1) list
+val bucket_entries : 'a1 atom_map -> atom -> (atom * 'a1) list
 
-val find0 : 'a1 index0 -> atom -> 'a1 option
+val find_atom : 'a1 atom_map -> atom -> 'a1 option
 
-val insert : atom -> 'a1 -> 'a1 index0 -> 'a1 index0
+val add_atom : atom -> 'a1 -> 'a1 atom_map -> 'a1 atom_map
 
 type term =
 | Var of nat
@@ -684,16 +685,16 @@ type action = { parameters : key1 list; duration : expression option;
                 at_start : formula; start_effect : effect;
                 over_all : formula; at_end : formula; end_effect : effect }
 
-type world = { holds_in : (atom -> bool); value_in0 : (atom -> q option) }
+type world = { holds_in : (atom -> bool); value_in : (atom -> q option) }
 
 type problem = { objects : (key1 -> key1 list); actions : action list;
-                 initial_atoms : unit index0; initial_values : q index0;
+                 initial_atoms : unit atom_map; initial_values : q atom_map;
                  goal_formula : formula; metric : expression; per_time : 
                  q; per_step : q }
 
 val initial : problem -> world
 
-val object0 : key1 list -> term -> key1 option
+val object_of : key1 list -> term -> key1 option
 
 val ground : key1 list -> term list -> key1 list option
 
@@ -705,7 +706,7 @@ val less : q -> q -> bool
 
 val and3 : bool option -> bool option -> bool option
 
-val truth0 :
+val truth :
   problem -> world -> q option -> key1 list -> formula -> bool option
 
 type change =
@@ -714,16 +715,16 @@ type change =
 
 val both : 'a1 list option -> 'a1 list option -> 'a1 list option
 
-val changes0 :
+val changes :
   problem -> world -> q option -> key1 list -> effect -> change list option
 
-val puts0 : change list -> atom -> bool -> bool
+val sets_atom : change list -> atom -> bool -> bool
 
 val on : atom -> change list -> (bool * q) list
 
 val changed_value : q option -> (bool * q) list -> q option
 
-val targets0 : change list -> atom list
+val changed_fluents : change list -> atom list
 
 val updates : world -> change list -> atom list -> (atom * q) list option
 
@@ -758,8 +759,8 @@ type result =
 val plus_result : result -> q -> result -> result
 
 type names = { variables : (z * atom) list M.t; fluents : atom M.t;
-               fact_of : (key1 * z) index0; number_of : key1 index0;
-               changing : (key1 -> bool); may_hold : unit index0;
+               fact_of : (key1 * z) atom_map; number_of : key1 atom_map;
+               changing : (key1 -> bool); may_hold : unit atom_map;
                scale : positive; cost_scale : positive }
 
 type case_tree =
@@ -768,7 +769,7 @@ type case_tree =
 | SplitAtom of atom * case_tree * case_tree
 | SplitForm of form * case_tree * case_tree
 
-val mem0 : 'a1 index0 -> atom -> bool
+val mem0 : 'a1 atom_map -> atom -> bool
 
 type knowledge = { literals : (atom * bool) list; bounds : (bool * form) list }
 
@@ -911,7 +912,7 @@ val action_ok :
   problem -> task -> names -> (nat -> key1 list -> case_tree) -> nat ->
   action -> bool
 
-val all_entries : 'a1 index0 -> (atom * 'a1) list
+val all_entries : 'a1 atom_map -> (atom * 'a1) list
 
 val faithful :
   problem -> task -> names -> (nat -> key1 list -> case_tree) -> case_tree ->

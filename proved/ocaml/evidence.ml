@@ -1,5 +1,6 @@
-(* Reads the evidence that prepare.ml writes: claim, ground task, names, argument and case trees. Nothing in it is believed: the theorem
-   holds for any evidence. Required of this file is only that it returns immutable values and prints nothing. *)
+(* Reads the evidence that prepare.ml writes: claim, ground task, names, argument and case trees.
+   Nothing in it is believed: the theorem holds for any evidence. Required of this file is only that
+   it returns immutable values and prints nothing. *)
 module C = Checker
 open Reader
 
@@ -23,26 +24,26 @@ let fact = pair position whole
 let literal = pair fact (fun item -> word item = "true")
 let quantity = function
   | List [constant; tables] ->
-    { C.qconst = whole constant; qtables = list (pair (list (fun item -> nat (small item))) (map whole)) tables }
+    { C.base = whole constant; tables = list (pair (list (fun item -> nat (small item))) (map whole)) tables }
   | _ -> reject "a quantity is expected"
-let linear item = let factors, rest = pair (list (pair position whole)) quantity item in { C.factors; rest }
+let linear item = let factors, offset = pair (list (pair position whole)) quantity item in { C.factors; offset }
 let ground_condition = function
   | List [facts; clauses; comparisons] ->
     { C.facts = list fact facts; clauses = list (list literal) clauses; comparisons = list linear comparisons }
   | _ -> reject "a condition is expected"
 let operator = function
   | List [sizes; excluded; pre; effects; conditional; changes; cost] ->
-    { C.ident = C.Z0; sizes = list whole sizes;
+    { C.slot_sizes = list whole sizes;
       excluded = list (pair (list (fun item -> nat (small item))) (list (list whole))) excluded;
-      pre = ground_condition pre; effects = list fact effects; conditional = list (pair (list literal) (list fact)) conditional;
-      changes = list (pair position linear) changes; cost = quantity cost }
+      precondition = ground_condition pre; effects = list fact effects; conditional = list (pair (list literal) (list fact)) conditional;
+      number_effects = list (pair position linear) changes; cost = quantity cost }
   | _ -> reject "an operator is expected"
 let ground_task = function
   | [basic; derived; sizes; values; numbers; operators; layers; goal] ->
     let numbers = list whole numbers in
-    { C.basic = whole basic; derived = list fact derived; size = map whole sizes;
+    { C.basic_count = whole basic; derived = list fact derived; domain_size = map whole sizes;
       numbers = List.mapi (fun i _ -> positive (i + 1)) numbers;
-      init = { C.sv = map whole values; sn = map_of_list numbers };
+      init = { C.var_values = map whole values; num_values = map_of_list numbers };
       operators = list operator operators; layers = list (list (pair fact ground_condition)) layers;
       goal = ground_condition goal }
   | _ -> reject "a task is expected"
@@ -50,15 +51,15 @@ let ground_task = function
 (* Argument: a bound is an integer, or infinite. *)
 
 let table pattern entries =
-  { C.pattern = list position pattern; entries = map (fun item -> if item = Word "infinite" then None else Some (whole item)) entries }
+  { C.pattern = list position pattern; table_values = map (fun item -> if item = Word "infinite" then None else Some (whole item)) entries }
 let label = function
-  | List [values; numbers; paid] -> { C.at_state = { C.sv = map whole values; sn = map whole numbers }; paid = whole paid }
+  | List [values; numbers; path_cost] -> { C.label_state = { C.var_values = map whole values; num_values = map whole numbers }; path_cost = whole path_cost }
   | _ -> reject "a label is expected"
 let argument = function
   | [potentials; needs; labels] ->
     { C.potentials = list (function List [pattern; entries] -> table pattern entries | _ -> reject "a potential is expected") potentials;
       needs = list (function List [n; pattern; entries] -> position n, table pattern entries | _ -> reject "a need is expected") needs;
-      labels = map label labels; count = C.XH }
+      labels = map label labels }
   | _ -> reject "an argument is expected"
 
 (* Names *)
@@ -75,11 +76,11 @@ let names = function
                                                            @ list (fun item -> function_key (word item)) functions) in
     { C.variables = set (fun map (v, atoms) -> C.M.add v atoms map) variables;
       fluents = set (fun map (n, fluent) -> C.M.add n fluent map) fluents;
-      fact_of = set (fun map (v, (x, atom)) -> C.insert atom (v, x) map)
+      fact_of = set (fun map (v, (x, atom)) -> C.add_atom atom (v, x) map)
           (List.concat_map (fun (v, atoms) -> List.map (fun value -> v, value) atoms) variables);
-      number_of = set (fun map (n, fluent) -> C.insert fluent n map) fluents;
+      number_of = set (fun map (n, fluent) -> C.add_atom fluent n map) fluents;
       changing = (fun key -> C.M.find key changing <> None);
-      may_hold = set (fun map atom -> C.insert atom () map) (list atom may_hold);
+      may_hold = set (fun map atom -> C.add_atom atom () map) (list atom may_hold);
       scale = C.Z.to_pos (whole scale); cost_scale = C.Z.to_pos (whole cost_scale) }
   | _ -> reject "names are expected"
 
@@ -109,9 +110,9 @@ let read action_names text =
   let metric = word (only "claim") in
   let ground_task = ground_task (section "task") and argument = argument (section "argument") in
   let basics = C.basics ground_task in
-  let values state = List.map (C.val0 state) basics in
+  let values state = List.map (C.var_value state) basics in
   let labels = List.fold_left (fun map (i, label) ->
-      Values.update (values label.C.at_state) (fun others -> Some (i :: Option.value ~default:[] others)) map)
+      Values.update (values label.C.label_state) (fun others -> Some (i :: Option.value ~default:[] others)) map)
       Values.empty (C.M.elements argument.C.labels) in
   let cases = List.fold_left (fun map item ->
       let (name, arguments), tree = pair (function

@@ -1,5 +1,6 @@
-(* Changes evidence at random and offers it for false statements: none may be accepted. As a control, the same evidence is offered for the
-   true statement. Prints the seed, and a mutant that was accepted wrongly. *)
+(* Changes evidence at random and offers it for false statements: none may be accepted. As a
+   control, the same evidence is offered for the true statement. Prints the seed, and a mutant that
+   was accepted wrongly. *)
 module C = Checker
 module R = Reader
 
@@ -83,8 +84,8 @@ let longer_plans problem plan =
   let once = extend ([], C.initial problem) in
   List.map (fun (prefix, _) -> prefix @ plan) (once @ List.concat_map extend once)
 
-(* False statements: a longer plan with a greater metric is optimal; there is no plan; and the original claim where one more action
-   reaches the goal for nothing. *)
+(* False statements: a longer plan with a greater metric is optimal; there is no plan; and the
+   original claim where one more action reaches the goal for nothing. *)
 let false_statements problem plan best =
   let worse = List.find_map (fun plan -> match metric problem plan with
       | Some value when not (C.qle_bool value best) -> Some { name = "a worse plan"; problem; plan; claim = Some value }

@@ -1,5 +1,6 @@
-(* Turns a certificate of format 3 into the evidence that check.ml reads, and finds the case trees. Not believed: a mistake in this file makes
-   the checker reject, and cannot make it accept a false claim. *)
+(* Turns a certificate of format 3 into the evidence that check.ml reads, and finds the case trees.
+   Not believed: a mistake in this file makes the checker reject, and cannot make it accept a false
+   claim. *)
 module C = Checker
 module R = Reader
 
@@ -280,7 +281,7 @@ let prepare directory =
           match candidate with
           | Some (i, _) -> (match C.nth_error ground_task.C.operators i with
               | Some operator ->
-                splits_of_condition names operator.C.pre
+                splits_of_condition names operator.C.precondition
                 @ List.concat_map (fun (literals, _) ->
                     splits_of_condition names { C.facts = List.map fst literals; clauses = []; comparisons = [] }) operator.C.conditional
               | None -> [])

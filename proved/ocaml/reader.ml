@@ -1,5 +1,5 @@
-(* Reads PDDL files and a plan as values of Lifted.v. This file is believed: it decides which problem the theorem is about.
-   Constructs without a meaning in Lifted.v are rejected by name. *)
+(* Reads PDDL files and a plan as values of Lifted.v. This file is believed: it decides which
+   problem the theorem is about. Constructs without a meaning in Lifted.v are rejected by name. *)
 module C = Checker
 
 exception Rejected of string
@@ -107,11 +107,11 @@ let distinct what names =
 type problem = { task : C.problem; action_names : string list; object_names : string list }
 
 let problem domain_text problem_text =
-  let sections text = match expressions text with
-    | [List (Word "define" :: List [_; _] :: sections)] ->
+  let sections kind text = match expressions text with
+    | [List (Word "define" :: List [Word other; Word _] :: sections)] when other = kind ->
       List.map (function List (Word name :: items) -> name, items | _ -> reject "a section is expected") sections
-    | _ -> reject "(define ...) is expected" in
-  let domain = sections domain_text and problem = sections problem_text in
+    | _ -> reject "(define (%s NAME) ...) is expected" kind in
+  let domain = sections "domain" domain_text and problem = sections "problem" problem_text in
   let check_names allowed = List.iter (fun (name, _) -> if not (List.mem name allowed) then reject "not covered: %s" name) in
   check_names [":requirements"; ":types"; ":constants"; ":predicates"; ":functions"; ":action"; ":durative-action"] domain;
   check_names [":domain"; ":requirements"; ":objects"; ":init"; ":goal"; ":metric"] problem;
@@ -294,16 +294,17 @@ let problem domain_text problem_text =
   let set_value name arguments value =
     applied "function" functions name arguments;
     let fluent = function_key name, ground arguments in
-    if C.find0 !initial_values fluent <> None then reject "two initial values: %s" name;
-    initial_values := C.insert fluent value !initial_values in
+    if C.find_atom !initial_values fluent <> None then reject "two initial values: %s" name;
+    initial_values := C.add_atom fluent value !initial_values in
   List.iter (function
     | List [Word "="; List (Word name :: arguments); Word value] -> set_value name arguments (decimal value)
     | List [Word "at"; Word time; List _] when is_number time -> reject "not covered: timed initial literals"
+    | List (Word "not" :: _) -> reject "not covered: negated initial atoms"
     | List (Word name :: arguments) ->
       applied "predicate" predicates name arguments;
-      initial_atoms := C.insert (predicate_key name, ground arguments) () !initial_atoms
+      initial_atoms := C.add_atom (predicate_key name, ground arguments) () !initial_atoms
     | _ -> reject "not covered in :init") (section problem ":init");
-  if List.mem_assoc "total-cost" functions && C.find0 !initial_values (function_key "total-cost", []) = None then
+  if List.mem_assoc "total-cost" functions && C.find_atom !initial_values (function_key "total-cost", []) = None then
     set_value "total-cost" [] zero;
 
   (* Goal and metric: an expression over functions, and the weight of the total time *)
@@ -327,7 +328,8 @@ let problem domain_text problem_text =
              goal_formula; metric; per_time; per_step };
     action_names = List.map fst actions; object_names = List.map fst objects }
 
-(* A plan: one step after another; start times and durations, as in 0.0: (go a b) [2.5], are not read. *)
+(* A plan: one step after another; start times and durations, as in 0.0: (go a b) [2.5], are not
+   read. *)
 let plan problem text =
   let step = function
     | List (Word name :: arguments) ->
