@@ -12,7 +12,7 @@ Variable rules : list (fact * condition).
 (* All rules of a derived variable assign the same value. *)
 Hypothesis one_value : forall r q, In r rules -> In q rules -> fst (fst r) = fst (fst q) -> snd (fst r) = snd (fst q).
 Definition true_heads (s : state) : nat := length (filter (fun r => is_fact s (fst r)) rules).
-Lemma news_in : forall s f, In f (new_facts rules s) -> (exists r, In r rules /\ fst r = f) /\ is_fact s f = false.
+Lemma new_facts_in : forall s f, In f (new_facts rules s) -> (exists r, In r rules /\ fst r = f) /\ is_fact s f = false.
 Proof.
   intros s f I. unfold new_facts in I. apply in_map_iff in I. destruct I as [r [E I]]. apply filter_In in I. destruct I as [I C].
   apply andb_true_iff in C. destruct C as [C _]. apply negb_true_iff in C. subst f. split; [exists r; tauto|exact C].
@@ -32,15 +32,15 @@ Proof.
         destruct (last_put_in fs (fst (fst r)) (snd (fst r))) as [L|L]; [exact L|].
         destruct (Q _ (or_intror L)) as [q [Iq Eq]].
         assert (V : snd (fst q) = snd (fst r)) by (apply one_value; auto; rewrite Eq; reflexivity). rewrite Eq in V. exact V. }
-    specialize (G (new_facts rules s) (get (var_values s) (fst (fst r))) H (fun f If => proj1 (news_in s f If))).
-    destruct (news_in s _ H) as [_ F]. unfold is_fact, var_value in F. apply Z.eqb_neq in F. congruence.
-  - destruct (news_in s _ E) as [[q [Iq Eq]] _].
+    specialize (G (new_facts rules s) (get (var_values s) (fst (fst r))) H (fun f If => proj1 (new_facts_in s f If))).
+    destruct (new_facts_in s _ H) as [_ F]. unfold is_fact, var_value in F. apply Z.eqb_neq in F. congruence.
+  - destruct (new_facts_in s _ E) as [[q [Iq Eq]] _].
     assert (V : snd (fst q) = snd (fst r)) by (apply one_value; auto; rewrite Eq; reflexivity). rewrite Eq in V. exact V.
 Qed.
-Lemma more : forall s, new_facts rules s <> [] -> (true_heads s < true_heads (State (put_all (new_facts rules s) (var_values s)) (num_values s)))%nat.
+Lemma more_true_heads : forall s, new_facts rules s <> [] -> (true_heads s < true_heads (State (put_all (new_facts rules s) (var_values s)) (num_values s)))%nat.
 Proof.
   intros s N. destruct (new_facts rules s) as [|f fs] eqn:E; [congruence|]. rewrite <- E.
-  destruct (news_in s f) as [[r0 [I0 E0]] F0]; [rewrite E; left; reflexivity|].
+  destruct (new_facts_in s f) as [[r0 [I0 E0]] F0]; [rewrite E; left; reflexivity|].
   unfold true_heads.
   assert (G : forall l, incl l rules ->
     (length (filter (fun r => is_fact s (fst r)) l) <= length (filter (fun r => is_fact (State (put_all (new_facts rules s) (var_values s)) (num_values s)) (fst r)) l))%nat /\
@@ -63,7 +63,7 @@ Proof.
   { induction fuel; intros s H; cbn [evaluate_layer].
     - exfalso. unfold true_heads in H. pose proof (filter_shorter _ (fun r => is_fact s (fst r)) rules). lia.
     - destruct (new_facts rules s) as [|f fs] eqn:E; [exact E|]. rewrite <- E. apply IHfuel.
-      assert (Ne : new_facts rules s <> []) by (rewrite E; discriminate). pose proof (more s Ne) as M. lia. }
+      assert (Ne : new_facts rules s <> []) by (rewrite E; discriminate). pose proof (more_true_heads s Ne) as M. lia. }
   intro s. apply G. lia.
 Qed.
 End Closed.

@@ -54,7 +54,7 @@ Definition possible (k : knowledge) (v : key) : list Z :=
   let known := in_variable k v in
   filter (fun y => forallb (fun xb => Bool.eqb (Z.eqb y (fst xb)) (snd xb)) known)
          (match List.find snd known with Some (x, _) => [x] | None => range (get (domain_size T) v) end).
-Definition fact3 (k : knowledge) (v : key) (x : Z) : option bool :=
+Definition known_fact (k : knowledge) (v : key) (x : Z) : option bool :=
   match M.find v (variables N) with
   | None => None
   | Some _ => let ys := possible k v in
@@ -65,32 +65,32 @@ Definition base_truth (k : knowledge) (a : atom) : option bool :=
   else match assoc a (literals k) with
        | Some b => Some b
        | None => if negb (mem (may_hold N) a) then Some false
-                 else match find_atom (fact_of N) a with Some (v, x) => fact3 k v x | None => None end
+                 else match find_atom (fact_of N) a with Some (v, x) => known_fact k v x | None => None end
        end.
 (* A state in terms of the one before the step: atoms and fluents that have changed. *)
 Record symbolic := Symbolic { new_truths : list (atom * bool); new_values : list (atom * form) }.
 Definition unchanged := Symbolic [] [].
-Definition atom3 (k : knowledge) (s : symbolic) (a : atom) : option bool :=
+Definition symbolic_atom (k : knowledge) (s : symbolic) (a : atom) : option bool :=
   match assoc a (new_truths s) with Some b => Some b | None => base_truth k a end.
-Definition value3 (s : symbolic) (f : atom) : result :=
+Definition symbolic_value (s : symbolic) (f : atom) : result :=
   match assoc f (new_values s) with
   | Some g => Is g
   | None => if changing N (fst f) then Is (fluent f)
             else match value_in (initial P) f with Some q => Is (constant q) | None => Undefined end
   end.
-Fixpoint linear_of (s : symbolic) (d : result) (env : list key) (e : expression) : result :=
+Fixpoint symbolic_expression (s : symbolic) (d : result) (env : list key) (e : expression) : result :=
   match e with
   | Constant q => Is (constant q)
-  | Fluent f ts => match ground env ts with Some l => value3 s (f, l) | None => Undefined end
+  | Fluent f ts => match ground env ts with Some l => symbolic_value s (f, l) | None => Undefined end
   | Duration => d
-  | Plus a b => plus_result (linear_of s d env a) 1 (linear_of s d env b)
-  | Minus a b => plus_result (linear_of s d env a) (-1 # 1) (linear_of s d env b)
-  | Times a b => match linear_of s d env a, linear_of s d env b with
+  | Plus a b => plus_result (symbolic_expression s d env a) 1 (symbolic_expression s d env b)
+  | Minus a b => plus_result (symbolic_expression s d env a) (-1 # 1) (symbolic_expression s d env b)
+  | Times a b => match symbolic_expression s d env a, symbolic_expression s d env b with
                  | Undefined, _ => Undefined | _, Undefined => Undefined
                  | Is ([], x), Is y => Is (plus_form (constant 0) x y)
                  | Is x, Is ([], y) => Is (plus_form (constant 0) y x)
                  | _, _ => Unknown end
-  | Over a b => match linear_of s d env a, linear_of s d env b with
+  | Over a b => match symbolic_expression s d env a, symbolic_expression s d env b with
                 | Undefined, _ => Undefined | _, Undefined => Undefined
                 | Is x, Is ([], y) => if Qeq_bool y 0 then Undefined else Is (plus_form (constant 0) (/ y) x)
                 | _, _ => Unknown end
@@ -100,7 +100,7 @@ Definition implied (k : knowledge) (strict : bool) (f : form) : bool :=
                     | ([], c) => if strict && negb (fst b) then less 0 c else Qle_bool 0 c
                     | _ => false end) ((false, constant 0) :: bounds k)
   || match f with ([], c) => strict && less 0 c | _ => false end.
-Definition compare3 (k : knowledge) (strict : bool) (r : result) : option bool :=
+Definition symbolic_comparison (k : knowledge) (strict : bool) (r : result) : option bool :=
   match r with
   | Undefined => Some false
   | Unknown => None
@@ -108,73 +108,73 @@ Definition compare3 (k : knowledge) (strict : bool) (r : result) : option bool :
             else if implied k (negb strict) (plus_form (constant 0) (-1 # 1) f) then Some false else None
   end.
 (* [Some b] means that the condition does not have the other truth value; it may be undefined. *)
-Fixpoint truth3 (k : knowledge) (s : symbolic) (d : result) (env : list key) (f : formula) : option bool :=
+Fixpoint symbolic_truth (k : knowledge) (s : symbolic) (d : result) (env : list key) (f : formula) : option bool :=
   match f with
   | Truth b => Some b
-  | Atom p ts => match ground env ts with Some l => atom3 k s (p, l) | None => Some false end
+  | Atom p ts => match ground env ts with Some l => symbolic_atom k s (p, l) | None => Some false end
   | Same t u => match object_of env t, object_of env u with Some a, Some b => Some (Pos.eqb a b) | _, _ => Some false end
-  | Compare strict a b => compare3 k strict (linear_of s d env (Minus a b))
-  | Not g => option_map negb (truth3 k s d env g)
-  | And g h => match truth3 k s d env g with
+  | Compare strict a b => symbolic_comparison k strict (symbolic_expression s d env (Minus a b))
+  | Not g => option_map negb (symbolic_truth k s d env g)
+  | And g h => match symbolic_truth k s d env g with
                | Some false => Some false
-               | x => and3 x (truth3 k s d env h) end
-  | Forall t g => fold_right (fun o r => and3 (truth3 k s d (env ++ [o]) g) r) (Some true) (objects P t)
+               | x => and_kleene x (symbolic_truth k s d env h) end
+  | Forall t g => fold_right (fun o r => and_kleene (symbolic_truth k s d (env ++ [o]) g) r) (Some true) (objects P t)
   end.
 Inductive symbolic_change := SFact (a : atom) (holds : bool) | SNumber (a : atom) (assigns : bool) (f : form).
-Fixpoint changes3 (k : knowledge) (s : symbolic) (d : result) (env : list key) (e : effect) : option (list symbolic_change) :=
+Fixpoint symbolic_changes (k : knowledge) (s : symbolic) (d : result) (env : list key) (e : effect) : option (list symbolic_change) :=
   match e with
   | Nothing => Some []
   | Put b p ts => match ground env ts with Some l => Some [SFact (p, l) b] | None => None end
-  | Change assigns f ts x => match ground env ts, linear_of s d env x with
+  | Change assigns f ts x => match ground env ts, symbolic_expression s d env x with
                              | Some l, Is g => Some [SNumber (f, l) assigns g] | _, _ => None end
-  | Both a b => both (changes3 k s d env a) (changes3 k s d env b)
-  | When f a => match truth3 k s d env f with
-                | Some true => changes3 k s d env a | Some false => Some [] | None => None end
-  | Each t a => fold_right (fun o r => both (changes3 k s d (env ++ [o]) a) r) (Some []) (objects P t)
+  | Both a b => both (symbolic_changes k s d env a) (symbolic_changes k s d env b)
+  | When f a => match symbolic_truth k s d env f with
+                | Some true => symbolic_changes k s d env a | Some false => Some [] | None => None end
+  | Each t a => fold_right (fun o r => both (symbolic_changes k s d (env ++ [o]) a) r) (Some []) (objects P t)
   end.
-Definition on3 (f : atom) (cs : list symbolic_change) : list (bool * form) :=
+Definition symbolic_changes_of (f : atom) (cs : list symbolic_change) : list (bool * form) :=
   flat_map (fun c => match c with SNumber f' b g => if atom_eqb f f' then [(b, g)] else [] | _ => [] end) cs.
-Definition combine3 (old : result) (l : list (bool * form)) : option form :=
+Definition symbolic_new_value (old : result) (l : list (bool * form)) : option form :=
   match l with
   | [(true, g)] => Some g
   | (false, _) :: _ => match existsb fst l, old with
                        | false, Is x => Some (fold_left (fun s c => plus_form s 1 (snd c)) l x) | _, _ => None end
   | _ => None
   end.
-Fixpoint targets3 (cs : list symbolic_change) : list atom :=
-  match cs with [] => [] | SNumber f _ _ :: r => f :: targets3 r | SFact _ _ :: r => targets3 r end.
-Fixpoint updates3 (s : symbolic) (cs : list symbolic_change) (fs : list atom) : option (list (atom * form)) :=
+Fixpoint symbolic_changed_fluents (cs : list symbolic_change) : list atom :=
+  match cs with [] => [] | SNumber f _ _ :: r => f :: symbolic_changed_fluents r | SFact _ _ :: r => symbolic_changed_fluents r end.
+Fixpoint symbolic_updates (s : symbolic) (cs : list symbolic_change) (fs : list atom) : option (list (atom * form)) :=
   match fs with
   | [] => Some []
-  | f :: r => match combine3 (value3 s f) (on3 f cs), updates3 s cs r with
+  | f :: r => match symbolic_new_value (symbolic_value s f) (symbolic_changes_of f cs), symbolic_updates s cs r with
               | Some g, Some l => Some ((f, g) :: l) | _, _ => None end
   end.
-Definition truths3 (cs : list symbolic_change) (b : bool) : list (atom * bool) :=
+Definition atoms_set_to (cs : list symbolic_change) (b : bool) : list (atom * bool) :=
   flat_map (fun c => match c with SFact a b' => if Bool.eqb b b' then [(a, b)] else [] | _ => [] end) cs.
 Inductive outcome := Never | Unclear | After (s : symbolic) (time : Q).
-Definition happening3 (k : knowledge) (s : symbolic) (d : result) (time : Q) (env : list key) (f : formula) (e : effect) : outcome :=
-  match truth3 k s d env f with
+Definition symbolic_happening (k : knowledge) (s : symbolic) (d : result) (time : Q) (env : list key) (f : formula) (e : effect) : outcome :=
+  match symbolic_truth k s d env f with
   | Some false => Never
-  | _ => match changes3 k s d env e with
+  | _ => match symbolic_changes k s d env e with
          | None => Unclear
-         | Some cs => match updates3 s cs (targets3 cs) with
+         | Some cs => match symbolic_updates s cs (symbolic_changed_fluents cs) with
                       | None => Unclear
-                      | Some l => After (Symbolic (truths3 cs true ++ truths3 cs false ++ new_truths s) (l ++ new_values s)) time
+                      | Some l => After (Symbolic (atoms_set_to cs true ++ atoms_set_to cs false ++ new_truths s) (l ++ new_values s)) time
                       end
          end
   end.
-Definition length3 (a : action) (env : list key) : result :=
-  match duration a with Some e => linear_of unchanged Undefined env e | None => Undefined end.
-Definition step3 (k : knowledge) (a : action) (env : list key) : outcome :=
-  match duration a, length3 a env with
-  | None, _ => happening3 k unchanged Undefined 0 env (at_start a) (start_effect a)
+Definition symbolic_duration (a : action) (env : list key) : result :=
+  match duration a with Some e => symbolic_expression unchanged Undefined env e | None => Undefined end.
+Definition symbolic_step (k : knowledge) (a : action) (env : list key) : outcome :=
+  match duration a, symbolic_duration a env with
+  | None, _ => symbolic_happening k unchanged Undefined 0 env (at_start a) (start_effect a)
   | Some _, Undefined => Never
   | Some _, Is ([], d) =>
       if less d 0 then Never
       else if Qeq_bool d 0 then
-        happening3 k unchanged (Is (constant d)) d env (And (at_start a) (at_end a)) (Both (start_effect a) (end_effect a))
-      else match happening3 k unchanged (Is (constant d)) d env (at_start a) (start_effect a) with
-           | After s _ => happening3 k s (Is (constant d)) d env (And (over_all a) (at_end a)) (end_effect a)
+        symbolic_happening k unchanged (Is (constant d)) d env (And (at_start a) (at_end a)) (Both (start_effect a) (end_effect a))
+      else match symbolic_happening k unchanged (Is (constant d)) d env (at_start a) (start_effect a) with
+           | After s _ => symbolic_happening k s (Is (constant d)) d env (And (over_all a) (at_end a)) (end_effect a)
            | r => r
            end
   | Some _, _ => Unclear
@@ -194,18 +194,18 @@ Fixpoint conjuncts (s : symbolic) (d : result) (env : list key) (f : formula) : 
                              | None => if changing N p then Knowledge [((p, l), false)] [] else Knowledge [] []
                              | Some _ => Knowledge [] [] end
                  | None => Knowledge [] [] end
-  | Compare strict a b => match linear_of s d env (Minus a b) with Is g => Knowledge [] [(strict, g)] | _ => Knowledge [] [] end
+  | Compare strict a b => match symbolic_expression s d env (Minus a b) with Is g => Knowledge [] [(strict, g)] | _ => Knowledge [] [] end
   | _ => Knowledge [] []
   end.
 Definition join (k l : knowledge) := Knowledge (literals k ++ literals l) (bounds k ++ bounds l).
 Definition gathered (a : action) (env : list key) : knowledge :=
-  match duration a, length3 a env with
+  match duration a, symbolic_duration a env with
   | None, _ => conjuncts unchanged Undefined env (at_start a)
   | Some _, Is ([], d) =>
       let time := Is (constant d) in
       let k := conjuncts unchanged time env (at_start a) in
       if Qeq_bool d 0 then join k (conjuncts unchanged time env (at_end a))
-      else match happening3 k unchanged time d env (at_start a) (start_effect a) with
+      else match symbolic_happening k unchanged time d env (at_start a) (start_effect a) with
            | After s _ => join k (conjuncts s time env (And (over_all a) (at_end a)))
            | _ => k
            end
@@ -234,19 +234,19 @@ Definition form_of (l : linear) (szs : list Z) (ch : choice) : option form :=
 (* The form times the scale is an integer, so more than -1 is enough. *)
 Definition required (k : knowledge) (f : form) : bool :=
   implied k true (plus_form f 1 (constant (/ scaled))).
-Definition literal3 (k : knowledge) (l : literal) : option bool :=
-  option_map (fun b => Bool.eqb b (snd l)) (fact3 k (fst (fst l)) (snd (fst l))).
+Definition known_literal (k : knowledge) (l : literal) : option bool :=
+  option_map (fun b => Bool.eqb b (snd l)) (known_fact k (fst (fst l)) (snd (fst l))).
 Definition is_true (r : option bool) : bool := match r with Some b => b | None => false end.
 Definition is_false (r : option bool) : bool := match r with Some b => negb b | None => false end.
-Definition condition3 (k : knowledge) (c : condition) (szs : list Z) (ch : choice) : bool :=
-  forallb (fun f => is_true (fact3 k (fst f) (snd f))) (facts c) &&
-  forallb (existsb (fun l => is_true (literal3 k l))) (clauses c) &&
+Definition known_condition (k : knowledge) (c : condition) (szs : list Z) (ch : choice) : bool :=
+  forallb (fun f => is_true (known_fact k (fst f) (snd f))) (facts c) &&
+  forallb (existsb (fun l => is_true (known_literal k l))) (clauses c) &&
   forallb (fun l => match form_of l szs ch with Some f => required k f | None => false end) (comparisons c).
-Fixpoint fired3 (k : knowledge) (cs : list (list literal * list fact)) : option (list fact) :=
+Fixpoint known_effects (k : knowledge) (cs : list (list literal * list fact)) : option (list fact) :=
   match cs with
   | [] => Some []
-  | c :: r => if existsb (fun l => is_false (literal3 k l)) (fst c) then fired3 k r
-              else if forallb (fun l => is_true (literal3 k l)) (fst c) then option_map (app (snd c)) (fired3 k r)
+  | c :: r => if existsb (fun l => is_false (known_literal k l)) (fst c) then known_effects k r
+              else if forallb (fun l => is_true (known_literal k l)) (fst c) then option_map (app (snd c)) (known_effects k r)
               else None
   end.
 Definition admitted_choice (o : operator) (ch : choice) : bool :=
@@ -274,7 +274,7 @@ Definition number_ok (s : symbolic) (o : option (operator * choice)) (n : key) :
       match made with Some g => is_zero (plus_form after (-1 # 1) g) | None => false end
   end.
 Definition growth (s : symbolic) (time : Q) : option Q :=
-  match plus_result (linear_of s Undefined [] (metric P)) (-1 # 1) (linear_of unchanged Undefined [] (metric P)) with
+  match plus_result (symbolic_expression s Undefined [] (metric P)) (-1 # 1) (symbolic_expression unchanged Undefined [] (metric P)) with
   | Is ([], c) => Some (c + per_time P * time + per_step P)
   | _ => None
   end.
@@ -282,8 +282,8 @@ Definition step_cost (o : option (operator * choice)) : Z :=
   match o with Some (o, ch) => amount (cost o) (slot_sizes o) ch | None => 0 end.
 Definition simulated (k : knowledge) (s : symbolic) (time : Q) (o : option (operator * choice)) : bool :=
   match match o with
-        | Some (o, ch) => if admitted_choice o ch && condition3 k (precondition o) (slot_sizes o) ch && distinct (map fst (number_effects o))
-                          then option_map (app (effects o)) (fired3 k (conditional o)) else None
+        | Some (o, ch) => if admitted_choice o ch && known_condition k (precondition o) (slot_sizes o) ch && distinct (map fst (number_effects o))
+                          then option_map (app (effects o)) (known_effects k (conditional o)) else None
         | None => Some [] end with
   | None => false
   | Some made =>
@@ -298,7 +298,7 @@ Definition simulated (k : knowledge) (s : symbolic) (time : Q) (o : option (oper
       end
   end.
 Definition leaf_ok (k : knowledge) (a : action) (env : list key) (o : option (operator * choice)) : bool :=
-  match step3 k a env with
+  match symbolic_step k a env with
   | Never => true
   | Unclear => false
   | After s time =>
@@ -320,7 +320,7 @@ Definition instance_leaf (a : action) (env : list key) (k : knowledge) (o : opti
   | Some (i, ch) => match nth_error (operators T) i with Some o => leaf_ok k a env (Some (o, ch)) | None => false end
   end.
 Definition goal_leaf (k : knowledge) (_ : option (nat * choice)) : bool :=
-  match truth3 k unchanged Undefined [] (goal_formula P) with Some false => true | _ => condition3 k (goal T) [] [] end.
+  match symbolic_truth k unchanged Undefined [] (goal_formula P) with Some false => true | _ => known_condition k (goal T) [] [] end.
 
 (* Instances for which the conditions on what never changes may hold: parameters are bound one after
    another. *)
@@ -367,7 +367,7 @@ Definition faithful : bool :=
 End Faithful.
 
 Definition is_linear (P : problem) (N : names) : bool :=
-  match linear_of P N unchanged Undefined [] (metric P) with Is _ => true | _ => false end.
+  match symbolic_expression P N unchanged Undefined [] (metric P) with Is _ => true | _ => false end.
 
 (* The whole check: the plan, the comparison and the argument. *)
 Definition check_certificate (P : problem) (T : task) (N : names) (case : nat -> list key -> case_tree) (goal_case : case_tree)

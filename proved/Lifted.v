@@ -77,7 +77,7 @@ Fixpoint eval (w : world) (d : option Q) (env : list key) (e : expression) : opt
                 | None => None end
   end.
 Definition less (x y : Q) : bool := negb (Qle_bool y x).
-Definition and3 (a b : option bool) : option bool :=          (* undefined only where the truth depends on it *)
+Definition and_kleene (a b : option bool) : option bool :=          (* undefined only where the truth depends on it *)
   match a, b with
   | Some false, _ => Some false | _, Some false => Some false
   | Some true, Some true => Some true | _, _ => None
@@ -92,8 +92,8 @@ Fixpoint truth (w : world) (d : option Q) (env : list key) (f : formula) : optio
   | Compare strict a b => match eval w d env a, eval w d env b with
                           | Some x, Some y => Some (if strict then less y x else Qle_bool y x) | _, _ => None end
   | Not g => option_map negb (truth w d env g)
-  | And g h => and3 (truth w d env g) (truth w d env h)
-  | Forall t g => fold_right (fun o r => and3 (truth w d (env ++ [o]) g) r) (Some true) (objects P t)
+  | And g h => and_kleene (truth w d env g) (truth w d env h)
+  | Forall t g => fold_right (fun o r => and_kleene (truth w d (env ++ [o]) g) r) (Some true) (objects P t)
   end.
 
 (* The changes that an effect makes; undefined if it needs an undefined value. *)
@@ -115,7 +115,7 @@ Fixpoint changes (w : world) (d : option Q) (env : list key) (e : effect) : opti
 Definition sets_atom (cs : list change) (a : atom) (b : bool) : bool :=
   existsb (fun c => match c with Fact a' b' => atom_eqb a a' && Bool.eqb b b' | _ => false end) cs.
 (* Several changes of one number: increases together, or assignments of one value. *)
-Definition on (f : atom) (cs : list change) : list (bool * Q) :=
+Definition changes_of (f : atom) (cs : list change) : list (bool * Q) :=
   flat_map (fun c => match c with Number f' b q => if atom_eqb f f' then [(b, q)] else [] | _ => [] end) cs.
 Definition changed_value (old : option Q) (l : list (bool * Q)) : option Q :=
   match l with
@@ -129,7 +129,7 @@ Fixpoint changed_fluents (cs : list change) : list atom :=
 Fixpoint updates (w : world) (cs : list change) (fs : list atom) : option (list (atom * Q)) :=
   match fs with
   | [] => Some []
-  | f :: r => match changed_value (value_in w f) (on f cs), updates w cs r with
+  | f :: r => match changed_value (value_in w f) (changes_of f cs), updates w cs r with
               | Some q, Some l => Some ((f, q) :: l) | _, _ => None end
   end.
 (* One happening: everything is evaluated in the state before it. *)

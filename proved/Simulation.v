@@ -78,9 +78,9 @@ Proof.
     + apply range_In, (r_wf _ _ R). destruct parts as [_ [A _]]. apply (A _ _ F).
   - apply forallb_forall. intros [x b] I. apply in_variable_ok in I. cbn [fst snd]. rewrite I. apply eqb_reflx.
 Qed.
-Lemma fact3_ok : forall v x b, fact3 T N k v x = Some b -> (exists vals, M.find v (variables N) = Some vals) /\ Z.eqb (var_value s v) x = b.
+Lemma known_fact_ok : forall v x b, known_fact T N k v x = Some b -> (exists vals, M.find v (variables N) = Some vals) /\ Z.eqb (var_value s v) x = b.
 Proof.
-  intros v x b H. unfold fact3 in H. destruct (M.find v (variables N)) as [vals|] eqn:F; [|discriminate]. split; [exists vals; reflexivity|].
+  intros v x b H. unfold known_fact in H. destruct (M.find v (variables N)) as [vals|] eqn:F; [|discriminate]. split; [exists vals; reflexivity|].
   pose proof (possible_ok _ _ F) as I. cbv zeta in H. destruct (forallb (Z.eqb x) (possible T N k v)) eqn:A.
   - injection H as <-. rewrite forallb_forall in A. specialize (A _ I). rewrite Z.eqb_sym. exact A.
   - destruct (forallb (fun y => negb (Z.eqb x y)) (possible T N k v)) eqn:B; [|discriminate]. injection H as <-. rewrite forallb_forall in B. specialize (B _ I).
@@ -93,7 +93,7 @@ Proof.
   destruct (assoc a (literals k)) as [c|] eqn:E.
   { apply assoc_In in E. rewrite (proj1 K _ _ E). congruence. }
   destruct (mem (may_hold N) a) eqn:M; cbn [negb] in H.
-  - destruct (find_atom (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. apply fact3_ok in H. destruct H as [_ H].
+  - destruct (find_atom (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. apply known_fact_ok in H. destruct H as [_ H].
     destruct parts as [_ [_ [A _]]]. destruct (A _ _ _ F) as [vals [F1 F2]]. rewrite (r_var _ _ R _ _ _ _ F1 F2). exact H.
   - injection H as <-. destruct (holds_in w a) eqn:E2; [|reflexivity]. rewrite (r_may _ _ R a C E2) in M. discriminate.
 Qed.
@@ -108,7 +108,7 @@ Proof.
       { destruct (changing N (fst a)) eqn:C; unfold base_truth in E; rewrite C in E; cbn [negb literals assoc] in E.
         2: { destruct a as [p os]. rewrite (r_fact _ _ R) by exact C. congruence. }
         destruct (mem (may_hold N) a) eqn:M; cbn [negb] in E.
-        - destruct (find_atom (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. unfold fact3 in E. cbv zeta in E.
+        - destruct (find_atom (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. unfold known_fact in E. cbv zeta in E.
           destruct parts as [_ [_ [A _]]]. destruct (A _ _ _ F) as [vals [F1 F2]]. rewrite F1 in E. rewrite (r_var _ _ R _ _ _ _ F1 F2).
           assert (In_ : In (var_value s v) (possible T N (Knowledge [] (bounds k)) v)).
           { unfold possible. apply filter_In. split; [|reflexivity]. simpl. apply range_In, (r_wf _ _ R). destruct parts as [_ [B _]]. apply (B _ _ F1). }
@@ -147,31 +147,31 @@ Proof.
   setoid_replace ((ev w g + 1 * / scaled N) * scaled N) with (ev w g * scaled N + 1) in B by (field; lra).
   rewrite F in B. change 1 with (inject_Z 1) in B. rewrite <- inject_Z_plus in B. change 0 with (inject_Z 0) in B. rewrite <- Zlt_Qlt in B. lia.
 Qed.
-Lemma literal3_ok : forall l b, literal3 T N k l = Some b -> is_literal ds l = b.
+Lemma known_literal_ok : forall l b, known_literal T N k l = Some b -> is_literal ds l = b.
 Proof.
-  intros [[v x] t] b H. unfold literal3 in H. cbn [fst snd] in H. destruct (fact3 T N k v x) as [c|] eqn:F; [|discriminate]. injection H as <-.
-  apply fact3_ok in F. destruct F as [[vals F] E]. unfold is_literal, is_fact. cbn [fst snd]. rewrite (d_val _ _ F), E. reflexivity.
+  intros [[v x] t] b H. unfold known_literal in H. cbn [fst snd] in H. destruct (known_fact T N k v x) as [c|] eqn:F; [|discriminate]. injection H as <-.
+  apply known_fact_ok in F. destruct F as [[vals F] E]. unfold is_literal, is_fact. cbn [fst snd]. rewrite (d_val _ _ F), E. reflexivity.
 Qed.
-Lemma condition3_ok : forall c szs ch, condition3 T N k c szs ch = true -> holds c ds szs ch = true.
+Lemma known_condition_ok : forall c szs ch, known_condition T N k c szs ch = true -> holds c ds szs ch = true.
 Proof.
-  intros c szs ch H. unfold condition3 in H. rewrite !andb_true_iff in H. destruct H as [[H1 H2] H3]. rewrite forallb_forall in H1, H2, H3.
+  intros c szs ch H. unfold known_condition in H. rewrite !andb_true_iff in H. destruct H as [[H1 H2] H3]. rewrite forallb_forall in H1, H2, H3.
   unfold holds, holds_facts. rewrite !andb_true_iff. split; [split|]; apply forallb_forall.
-  - intros [v x] I. specialize (H1 _ I). cbn [fst snd] in H1. destruct (fact3 T N k v x) as [[]|] eqn:F; try discriminate.
-    apply fact3_ok in F. destruct F as [[vals F] E]. unfold is_fact. cbn [fst snd]. rewrite (d_val _ _ F). exact E.
+  - intros [v x] I. specialize (H1 _ I). cbn [fst snd] in H1. destruct (known_fact T N k v x) as [[]|] eqn:F; try discriminate.
+    apply known_fact_ok in F. destruct F as [[vals F] E]. unfold is_fact. cbn [fst snd]. rewrite (d_val _ _ F). exact E.
   - intros cl I. specialize (H2 _ I). apply existsb_exists in H2. destruct H2 as [l [J E]]. apply existsb_exists. exists l. split; [exact J|].
-    destruct (literal3 T N k l) as [[]|] eqn:F; try discriminate. apply literal3_ok, F.
+    destruct (known_literal T N k l) as [[]|] eqn:F; try discriminate. apply known_literal_ok, F.
   - intros l I. specialize (H3 _ I). destruct (form_of N l szs ch) as [g|] eqn:F; [|discriminate]. apply Z.leb_le. eapply required_ok; eassumption.
 Qed.
-Lemma fired3_ok : forall cs l, fired3 T N k cs = Some l -> l = flat_map snd (filter (fires ds) cs).
+Lemma known_effects_ok : forall cs l, known_effects T N k cs = Some l -> l = flat_map snd (filter (fires ds) cs).
 Proof.
-  induction cs as [|c cs IH]; intros l H; cbn [fired3 filter] in *; [injection H as <-; reflexivity|].
+  induction cs as [|c cs IH]; intros l H; cbn [known_effects filter] in *; [injection H as <-; reflexivity|].
   destruct (existsb _ (fst c)) eqn:E.
   - replace (fires ds c) with false; [apply IH, H|]. symmetry. unfold fires. apply existsb_exists in E. destruct E as [x [I E]].
-    destruct (literal3 T N k x) as [[]|] eqn:F; try discriminate. apply literal3_ok in F. destruct (forallb _ _) eqn:A; [|reflexivity].
+    destruct (known_literal T N k x) as [[]|] eqn:F; try discriminate. apply known_literal_ok in F. destruct (forallb _ _) eqn:A; [|reflexivity].
     rewrite forallb_forall in A. rewrite (A _ I) in F. discriminate.
-  - destruct (forallb _ (fst c)) eqn:A; [|discriminate]. destruct (fired3 T N k cs) as [r|]; [|discriminate]. injection H as <-.
+  - destruct (forallb _ (fst c)) eqn:A; [|discriminate]. destruct (known_effects T N k cs) as [r|]; [|discriminate]. injection H as <-.
     replace (fires ds c) with true; [simpl; f_equal; apply IH; reflexivity|]. symmetry. unfold fires. apply forallb_forall. intros x I.
-    rewrite forallb_forall in A. specialize (A _ I). destruct (literal3 T N k x) as [[]|] eqn:F; try discriminate. apply literal3_ok, F.
+    rewrite forallb_forall in A. specialize (A _ I). destruct (known_literal T N k x) as [[]|] eqn:F; try discriminate. apply known_literal_ok, F.
 Qed.
 
 Lemma admitted_ok : forall o ch, admitted_choice o ch = true -> admitted o ch.
@@ -204,9 +204,9 @@ Proof.
   rewrite !andb_true_iff in H. destruct H as [[H1 H2] H3]. rewrite forallb_forall in H1, H2.
   assert (Pre : match o with Some (o, ch) => admitted o ch /\ holds (precondition o) ds (slot_sizes o) ch = true /\ distinct (map fst (number_effects o)) = true /\ made = made_facts o ds
                 | None => made = [] end).
-  { destruct o as [[o ch]|]; [|congruence]. destruct (admitted_choice o ch && condition3 T N k (precondition o) (slot_sizes o) ch && distinct (map fst (number_effects o))) eqn:A; [|discriminate].
-    rewrite !andb_true_iff in A. destruct A as [[A1 A2] A3]. split; [apply admitted_ok, A1|]. split; [apply condition3_ok, A2|]. split; [exact A3|].
-    destruct (fired3 T N k (conditional o)) as [l|] eqn:F; [|discriminate]. apply fired3_ok in F. simpl in E. injection E as <-. unfold made_facts. congruence. }
+  { destruct o as [[o ch]|]; [|congruence]. destruct (admitted_choice o ch && known_condition T N k (precondition o) (slot_sizes o) ch && distinct (map fst (number_effects o))) eqn:A; [|discriminate].
+    rewrite !andb_true_iff in A. destruct A as [[A1 A2] A3]. split; [apply admitted_ok, A1|]. split; [apply known_condition_ok, A2|]. split; [exact A3|].
+    destruct (known_effects T N k (conditional o)) as [l|] eqn:F; [|discriminate]. apply known_effects_ok in F. simpl in E. injection E as <-. unfold made_facts. congruence. }
   assert (Val : forall v vals, M.find v (variables N) = Some vals -> var_value (after_of o) v = last_put made v (var_value s v)).
   { intros v vals F. destruct o as [[o ch]|].
     - destruct Pre as [_ [_ [_ ->]]]. unfold after_of, apply, var_value at 1. cbn [var_values]. rewrite get_puts. change (get (var_values ds) v) with (var_value ds v). rewrite (d_val _ _ F). reflexivity.
@@ -284,8 +284,8 @@ Proof.
     destruct (changing N p); [|apply knows_nothing]. split; [intros b0 c [I|[]]; congruence|intros b0 c []]. }
   induction f; intro H; try (exact knows_nothing); cbn [truth conjuncts] in *.
   - destruct (ground env ts) as [l|] eqn:G; [|exact knows_nothing]. injection H as H. eapply L; eassumption.
-  - pose proof (linear_ok P N w static_value w1 sy d r D A env (Minus a b)) as Q. cbn [eval] in Q.
-    destruct (linear_of P N sy r env (Minus a b)) as [| |g]; try (exact knows_nothing).
+  - pose proof (symbolic_expression_ok P N w static_value w1 sy d r D A env (Minus a b)) as Q. cbn [eval] in Q.
+    destruct (symbolic_expression P N sy r env (Minus a b)) as [| |g]; try (exact knows_nothing).
     destruct (eval w1 d env a) as [x|]; [|discriminate]. destruct (eval w1 d env b) as [y|]; [|discriminate]. unfold agrees in Q. specialize (Q _ eq_refl). simpl in Q.
     injection H as H. split; [intros b0 c []|intros b0 c [I|[]]]. injection I as <- <-. destruct strict; [apply less_spec in H|apply Qle_bool_iff in H]; lra.
   - destruct f; try (exact knows_nothing). cbn [truth] in H. destruct (ground env ts) as [l|] eqn:G; [|exact knows_nothing].
@@ -301,16 +301,16 @@ Proof.
   destruct (duration a) as [e|] eqn:A.
   2: { destruct (happening P w None env (at_start a) (start_effect a)) as [x|] eqn:E; [|discriminate]. apply happening_holds in E.
        apply (conjuncts_ok w unchanged None Undefined); [apply describes_itself|exact eq_refl|exact E]. }
-  destruct (eval w None env e) as [q|] eqn:Ev; [|discriminate]. pose proof (length3_ok P N w static_value a env e q A Ev) as L.
-  destruct (length3 P N a env) as [| |[[|t l] c]]; try (exact knows_nothing). unfold agrees in L. specialize (L q eq_refl). rewrite ev_empty in L.
+  destruct (eval w None env e) as [q|] eqn:Ev; [|discriminate]. pose proof (symbolic_duration_ok P N w static_value a env e q A Ev) as L.
+  destruct (symbolic_duration P N a env) as [| |[[|t l] c]]; try (exact knows_nothing). unfold agrees in L. specialize (L q eq_refl). rewrite ev_empty in L.
   assert (R1 : agrees w (Some q) (Is (constant c))) by (simpl; intros x X; injection X as <-; rewrite ev_constant; exact L).
   destruct (less q 0); [discriminate|]. rewrite (Qeqb_comp q c L 0 0 (Qeq_refl 0)) in H. cbv zeta. destruct (Qeq_bool c 0).
   - match type of H with option_map _ ?h = _ => destruct h as [x|] eqn:E end; [|discriminate]. apply happening_holds in E.
     apply (conjuncts_ok w unchanged (Some q) (Is (constant c)) (describes_itself w) R1 env (And (at_start a) (at_end a))). exact E.
   - destruct (happening P w (Some q) env (at_start a) (start_effect a)) as [w1|] eqn:E1; [|discriminate].
     pose proof (conjuncts_ok w unchanged (Some q) (Is (constant c)) (describes_itself w) R1 env _ (happening_holds _ _ _ _ _ _ E1)) as K0.
-    apply (happening3_ok P T N w _ (base_truth_ok _ K0) static_value K0 w unchanged (Some q) (Is (constant c)) c) in E1; [|apply describes_itself|exact R1].
-    destruct (happening3 _ _ _ _ _ _ _ _ _ _) as [| |s1 t1]; try exact K0. destruct E1 as [_ E1].
+    apply (symbolic_happening_ok P T N w _ (base_truth_ok _ K0) static_value K0 w unchanged (Some q) (Is (constant c)) c) in E1; [|apply describes_itself|exact R1].
+    destruct (symbolic_happening _ _ _ _ _ _ _ _ _ _) as [| |s1 t1]; try exact K0. destruct E1 as [_ E1].
     match type of H with option_map _ ?h = _ => destruct h as [x|] eqn:E end; [|discriminate]. apply happening_holds in E.
     apply knows_join; [exact K0|]. apply (conjuncts_ok w1 s1 (Some q) (Is (constant c)) E1 R1 env _ E).
 Qed.
@@ -433,13 +433,13 @@ Proof.
 Qed.
 
 (* Metric *)
-Definition measure (w : world) : Q := match linear_of P N unchanged Undefined [] (metric P) with Is f => ev w f | _ => 0 end.
+Definition measure (w : world) : Q := match symbolic_expression P N unchanged Undefined [] (metric P) with Is f => ev w f | _ => 0 end.
 Lemma measure_changes : forall w w' s sy e f g, Rel w s -> (forall f, changing N (fst f) = false -> value_in w' f = value_in w f) -> Describes w w' sy ->
-  linear_of P N unchanged Undefined [] e = Is f -> linear_of P N sy Undefined [] e = Is g -> ev w' f == ev w g.
+  symbolic_expression P N unchanged Undefined [] e = Is f -> symbolic_expression P N sy Undefined [] e = Is g -> ev w' f == ev w g.
 Proof.
-  intros w w' s sy e f g R St D. revert f g. induction e; intros x y; cbn [linear_of].
+  intros w w' s sy e f g R St D. revert f g. induction e; intros x y; cbn [symbolic_expression].
   - intros H K. injection H as <-. injection K as <-. rewrite !ev_constant. reflexivity.
-  - destruct (ground [] ts) as [l|]; [|discriminate]. unfold value3. cbn [unchanged new_values assoc].
+  - destruct (ground [] ts) as [l|]; [|discriminate]. unfold symbolic_value. cbn [unchanged new_values assoc].
     pose proof (d_value _ _ _ D (f, l)) as V. cbn [fst]. destruct (changing N f) eqn:C.
     + intros H K. injection H as <-. rewrite ev_fluent. destruct (assoc (f, l) (new_values sy)) as [z|].
       * injection K as <-. destruct V as [q [V1 V2]]. rewrite V1. exact V2.
@@ -449,19 +449,19 @@ Proof.
       * injection K as <-. destruct V as [q' [V1 V2]]. rewrite St, (r_value _ _ R), Q in V1 by exact C. injection V1 as <-. exact V2.
       * injection K as <-. rewrite ev_constant. reflexivity.
   - discriminate.
-  - destruct (linear_of P N unchanged Undefined [] e1) as [| |a], (linear_of P N unchanged Undefined [] e2) as [| |b]; simpl; try discriminate.
-    destruct (linear_of P N sy Undefined [] e1) as [| |c], (linear_of P N sy Undefined [] e2) as [| |d]; simpl; try discriminate.
+  - destruct (symbolic_expression P N unchanged Undefined [] e1) as [| |a], (symbolic_expression P N unchanged Undefined [] e2) as [| |b]; simpl; try discriminate.
+    destruct (symbolic_expression P N sy Undefined [] e1) as [| |c], (symbolic_expression P N sy Undefined [] e2) as [| |d]; simpl; try discriminate.
     intros H K. injection H as <-. injection K as <-. rewrite !ev_plus_form, (IHe1 _ _ eq_refl eq_refl), (IHe2 _ _ eq_refl eq_refl). reflexivity.
-  - destruct (linear_of P N unchanged Undefined [] e1) as [| |a], (linear_of P N unchanged Undefined [] e2) as [| |b]; simpl; try discriminate.
-    destruct (linear_of P N sy Undefined [] e1) as [| |c], (linear_of P N sy Undefined [] e2) as [| |d]; simpl; try discriminate.
+  - destruct (symbolic_expression P N unchanged Undefined [] e1) as [| |a], (symbolic_expression P N unchanged Undefined [] e2) as [| |b]; simpl; try discriminate.
+    destruct (symbolic_expression P N sy Undefined [] e1) as [| |c], (symbolic_expression P N sy Undefined [] e2) as [| |d]; simpl; try discriminate.
     intros H K. injection H as <-. injection K as <-. rewrite !ev_plus_form, (IHe1 _ _ eq_refl eq_refl), (IHe2 _ _ eq_refl eq_refl). reflexivity.
-  - destruct (linear_of P N unchanged Undefined [] e1) as [| |[[|] a]], (linear_of P N unchanged Undefined [] e2) as [| |[[|] b]]; try discriminate;
-    destruct (linear_of P N sy Undefined [] e1) as [| |[[|] c]], (linear_of P N sy Undefined [] e2) as [| |[[|] d]]; try discriminate;
+  - destruct (symbolic_expression P N unchanged Undefined [] e1) as [| |[[|] a]], (symbolic_expression P N unchanged Undefined [] e2) as [| |[[|] b]]; try discriminate;
+    destruct (symbolic_expression P N sy Undefined [] e1) as [| |[[|] c]], (symbolic_expression P N sy Undefined [] e2) as [| |[[|] d]]; try discriminate;
     intros H K; injection H as <-; injection K as <-; rewrite !ev_plus_form, !ev_constant;
     specialize (IHe1 _ _ eq_refl eq_refl); specialize (IHe2 _ _ eq_refl eq_refl); rewrite ?ev_empty in *; rewrite ?IHe1, ?IHe2; try ring; try (rewrite <- IHe1, <- IHe2; ring); try (rewrite <- IHe1; ring); rewrite <- IHe2; ring.
-  - destruct (linear_of P N unchanged Undefined [] e1) as [| |a], (linear_of P N unchanged Undefined [] e2) as [| |[[|] b]]; try discriminate.
+  - destruct (symbolic_expression P N unchanged Undefined [] e1) as [| |a], (symbolic_expression P N unchanged Undefined [] e2) as [| |[[|] b]]; try discriminate.
     destruct (Qeq_bool b 0); [discriminate|].
-    destruct (linear_of P N sy Undefined [] e1) as [| |c], (linear_of P N sy Undefined [] e2) as [| |[[|] d]]; try discriminate.
+    destruct (symbolic_expression P N sy Undefined [] e1) as [| |c], (symbolic_expression P N sy Undefined [] e2) as [| |[[|] d]]; try discriminate.
     destruct (Qeq_bool d 0); [discriminate|]. intros H K. injection H as <-. injection K as <-.
     specialize (IHe1 _ _ eq_refl eq_refl). specialize (IHe2 _ _ eq_refl eq_refl). rewrite !ev_empty in IHe2.
     rewrite !ev_plus_form, !ev_constant, IHe1, IHe2. reflexivity.
@@ -481,9 +481,9 @@ Proof.
     split; [|split; [setoid_replace (measure w + spent - measure w - spent) with 0 by ring; change (inject_Z 0) with 0; lra|exists s; exact R]].
     constructor. destruct parts as [_ [_ [_ [_ [B _]]]]]. 
     eapply (tree_cases w s R (goal_leaf P T N)); [|apply (conjuncts_ok w s R w unchanged None Undefined); [apply describes_itself|exact eq_refl|exact G]|exact B].
-    intros k o K L. unfold goal_leaf in L. destruct (truth3 P T N k unchanged Undefined [] (goal_formula P)) as [[]|] eqn:E.
-    2: { exfalso. apply (truth3_ok P T N w k (base_truth_ok w s R k K) (static_value w s R) K w unchanged None Undefined (describes_itself w) eq_refl) in E. apply E. exact G. }
-    all: apply (condition3_ok w s R k K); exact L.
+    intros k o K L. unfold goal_leaf in L. destruct (symbolic_truth P T N k unchanged Undefined [] (goal_formula P)) as [[]|] eqn:E.
+    2: { exfalso. apply (symbolic_truth_ok P T N w k (base_truth_ok w s R k K) (static_value w s R) K w unchanged None Undefined (describes_itself w) eq_refl) in E. apply E. exact G. }
+    all: apply (known_condition_ok w s R k K); exact L.
   - destruct (nth_error (actions P) i) as [a|] eqn:Ni; [|discriminate]. destruct (step P true w a env) as [[w1 d]|] eqn:S; [|discriminate].
     destruct parts as [_ [_ [_ [_ [_ B]]]]]. specialize (B _ _ Ni). unfold action_ok in B. apply andb_true_iff in B. destruct B as [C B].
     pose proof (step_statics w a env w1 d C (r_fact _ _ R) S) as [[K1 K2] Pr].
@@ -500,14 +500,14 @@ Proof.
       { unfold instance_leaf in L. destruct o as [[j ch]|]; [|exists None; split; [exact Logic.I|exact L]].
         destruct (nth_error (operators T) j) as [o|] eqn:Nj; [|discriminate]. exists (Some (o, ch)). split; [eapply nth_error_In, Nj|exact L]. }
       clear L. destruct L' as [o' [Io L]]. unfold leaf_ok in L.
-      pose proof (step3_ok P T N w k (base_truth_ok w s R k K) (static_value w s R) K a env w1 d S) as Q.
-      destruct (step3 P T N k a env) as [| |sy t]; [destruct Q|discriminate|]. destruct Q as [Q D]. apply andb_true_iff in L. destruct L as [L1 L2].
+      pose proof (symbolic_step_ok P T N w k (base_truth_ok w s R k K) (static_value w s R) K a env w1 d S) as Q.
+      destruct (symbolic_step P T N k a env) as [| |sy t]; [destruct Q|discriminate|]. destruct Q as [Q D]. apply andb_true_iff in L. destruct L as [L1 L2].
       destruct (simulated_ok w s R k K sy t o' w1 D K1 K2 L1 Io L2) as [R1 [Ad G]]. exists o', sy, t. tauto. }
     destruct Go as [o [sy [t [Io [R1 [Ad [D [Td [g [Gr Co]]]]]]]]]].
     destruct (IH _ _ _ _ _ H R1) as [ps [c [Pl [Le End]]]].
     assert (M : g == measure w1 - measure w + per_time P * d + per_step P).
-    { unfold growth in Gr. unfold measure. destruct (linear_of P N unchanged Undefined [] (metric P)) as [| |f] eqn:E0;
-        destruct (linear_of P N sy Undefined [] (metric P)) as [| |h] eqn:E1; cbn [plus_result] in Gr; try discriminate.
+    { unfold growth in Gr. unfold measure. destruct (symbolic_expression P N unchanged Undefined [] (metric P)) as [| |f] eqn:E0;
+        destruct (symbolic_expression P N sy Undefined [] (metric P)) as [| |h] eqn:E1; cbn [plus_result] in Gr; try discriminate.
       pose proof (measure_changes w w1 s sy (metric P) f h R K2 D E0 E1) as X. pose proof (ev_plus_form w h (-1 # 1) f) as Y.
       destruct (plus_form h (-1 # 1) f) as [[|] z]; [|discriminate]. injection Gr as <-. rewrite ev_empty in Y. rewrite X, Y, Td. ring. }
     rewrite Qred_correct in Le.

@@ -87,13 +87,13 @@ Hypothesis base_truth_ok : forall a b, base_truth P T N k a = Some b -> holds_in
 Hypothesis static_value : forall f, changing N (fst f) = false -> value_in w0 f = value_in (initial P) f.
 Hypothesis known : Knows w0 k.
 
-Lemma atom3_ok : forall w s a b, Describes w0 w s -> atom3 P T N k s a = Some b -> holds_in w a = b.
+Lemma symbolic_atom_ok : forall w s a b, Describes w0 w s -> symbolic_atom P T N k s a = Some b -> holds_in w a = b.
 Proof.
-  intros w s a b D H. rewrite (d_fact _ _ _ D). unfold atom3 in H. destruct (assoc a (new_truths s)); [congruence|]. apply base_truth_ok, H.
+  intros w s a b D H. rewrite (d_fact _ _ _ D). unfold symbolic_atom in H. destruct (assoc a (new_truths s)); [congruence|]. apply base_truth_ok, H.
 Qed.
-Lemma value3_ok : forall w s f, Describes w0 w s -> agrees w0 (value_in w f) (value3 P N s f).
+Lemma symbolic_value_ok : forall w s f, Describes w0 w s -> agrees w0 (value_in w f) (symbolic_value P N s f).
 Proof.
-  intros w s f D. pose proof (d_value _ _ _ D f) as H. unfold value3. destruct (assoc f (new_values s)) as [g|].
+  intros w s f D. pose proof (d_value _ _ _ D f) as H. unfold symbolic_value. destruct (assoc f (new_values s)) as [g|].
   - destruct H as [q [E H]]. simpl. intros x X. rewrite E in X. injection X as <-. exact H.
   - rewrite H. destruct (changing N (fst f)) eqn:C; simpl.
     + intros q E. rewrite ev_fluent, E. reflexivity.
@@ -108,19 +108,19 @@ Proof.
   intros q E. destruct a as [u|]; [|discriminate]. destruct b as [v|]; [|discriminate]. simpl in E. injection E as <-.
   rewrite F, ev_plus_form, (A u eq_refl), (B v eq_refl). reflexivity.
 Qed.
-Lemma linear_ok : forall w s d r, Describes w0 w s -> agrees w0 d r -> forall env e, agrees w0 (eval w d env e) (linear_of P N s r env e).
+Lemma symbolic_expression_ok : forall w s d r, Describes w0 w s -> agrees w0 d r -> forall env e, agrees w0 (eval w d env e) (symbolic_expression P N s r env e).
 Proof.
-  intros w s d r D R env. induction e; cbn [eval linear_of].
+  intros w s d r D R env. induction e; cbn [eval symbolic_expression].
   - simpl. intros x X. injection X as <-. rewrite ev_constant. reflexivity.
-  - destruct (ground env ts); [apply value3_ok, D|exact eq_refl].
+  - destruct (ground env ts); [apply symbolic_value_ok, D|exact eq_refl].
   - exact R.
   - apply agrees_plus; auto. intros. ring.
   - apply agrees_plus; auto. intros. ring.
-  - destruct (linear_of P N s r env e1) as [| |[[|t l] x]], (linear_of P N s r env e2) as [| |[[|u l'] y]]; simpl in *; auto;
+  - destruct (symbolic_expression P N s r env e1) as [| |[[|t l] x]], (symbolic_expression P N s r env e2) as [| |[[|u l'] y]]; simpl in *; auto;
       try (rewrite IHe1; reflexivity); try (rewrite IHe2; destruct (eval w d env e1); reflexivity);
       intros q E; destruct (eval w d env e1) as [a|]; try discriminate; destruct (eval w d env e2) as [b|]; try discriminate;
       simpl in E; injection E as <-; rewrite ev_plus_form, ev_constant, (IHe1 a eq_refl), (IHe2 b eq_refl), ?ev_empty; ring.
-  - destruct (linear_of P N s r env e1) as [| |x], (linear_of P N s r env e2) as [| |[[|u l'] y]]; simpl in *; auto;
+  - destruct (symbolic_expression P N s r env e1) as [| |x], (symbolic_expression P N s r env e2) as [| |[[|u l'] y]]; simpl in *; auto;
       try (rewrite IHe1; destruct (eval w d env e2); [destruct (Qeq_bool _ 0)|]; reflexivity);
       try (rewrite IHe2; reflexivity).
     destruct (Qeq_bool y 0) eqn:Z; simpl.
@@ -141,33 +141,33 @@ Proof.
     rewrite ev_empty in E. destruct st, sb; simpl in H; try (apply less_spec in H); try (apply Qle_bool_iff in H); lra.
   - destruct f as [[|] c]; [|discriminate]. apply andb_true_iff in H. destruct H as [S H]. subst st. apply less_spec in H. rewrite ev_empty. exact H.
 Qed.
-Lemma truth3_ok : forall w s d r, Describes w0 w s -> agrees w0 d r ->
-  forall f env b, truth3 P T N k s r env f = Some b -> truth P w d env f <> Some (negb b).
+Lemma symbolic_truth_ok : forall w s d r, Describes w0 w s -> agrees w0 d r ->
+  forall f env b, symbolic_truth P T N k s r env f = Some b -> truth P w d env f <> Some (negb b).
 Proof.
-  intros w s d r D R. induction f; intros env v H; cbn [truth3 truth] in *.
+  intros w s d r D R. induction f; intros env v H; cbn [symbolic_truth truth] in *.
   - injection H as <-. destruct b; discriminate.
-  - destruct (ground env ts); [|discriminate]. apply (atom3_ok w) in H; [|exact D]. rewrite H. destruct v; discriminate.
+  - destruct (ground env ts); [|discriminate]. apply (symbolic_atom_ok w) in H; [|exact D]. rewrite H. destruct v; discriminate.
   - destruct (object_of env t); [|discriminate]. destruct (object_of env u); [|discriminate]. injection H as <-. destruct (Pos.eqb _ _); discriminate.
-  - pose proof (linear_ok w s d r D R env (Minus a b)) as G. cbn [eval] in G. unfold compare3 in H.
+  - pose proof (symbolic_expression_ok w s d r D R env (Minus a b)) as G. cbn [eval] in G. unfold symbolic_comparison in H.
     destruct (eval w d env a) as [x|]; [|discriminate]. destruct (eval w d env b) as [y|]; [|discriminate]. cbn [lift] in G.
-    destruct (linear_of P N s r env (Minus a b)) as [| |g]; unfold agrees in G; cbn [agrees compare3] in *; try discriminate.
+    destruct (symbolic_expression P N s r env (Minus a b)) as [| |g]; unfold agrees in G; cbn [agrees symbolic_comparison] in *; try discriminate.
     specialize (G _ eq_refl). destruct (implied k strict g) eqn:I.
     + injection H as <-. apply implied_ok in I. intro E. injection E as E. destruct strict; [apply less_false in E|apply le_false in E]; lra.
     + destruct (implied k (negb strict) _) eqn:J; [|discriminate]. injection H as <-. apply implied_ok in J.
       intro E. injection E as E. destruct strict; cbn [negb] in J, E; rewrite ev_plus_form, ev_constant in J; [apply less_spec in E|apply Qle_bool_iff in E]; lra.
-  - destruct (truth3 P T N k s r env f) as [x|] eqn:E; [|discriminate]. simpl in H. injection H as <-. specialize (IHf env x E).
+  - destruct (symbolic_truth P T N k s r env f) as [x|] eqn:E; [|discriminate]. simpl in H. injection H as <-. specialize (IHf env x E).
     destruct (truth P w d env f) as [[]|]; destruct x; simpl in *; congruence.
-  - destruct (truth3 P T N k s r env f1) as [[]|] eqn:E1.
-    1: pose proof (IHf1 env _ E1); destruct (truth3 P T N k s r env f2) as [[]|] eqn:E2; simpl in H; try discriminate.
+  - destruct (symbolic_truth P T N k s r env f1) as [[]|] eqn:E1.
+    1: pose proof (IHf1 env _ E1); destruct (symbolic_truth P T N k s r env f2) as [[]|] eqn:E2; simpl in H; try discriminate.
     1,2: pose proof (IHf2 env _ E2). 
     all: try (pose proof (IHf1 env _ E1)).
-    all: try (destruct (truth3 P T N k s r env f2) as [[]|] eqn:E3; simpl in H; try discriminate; pose proof (IHf2 env _ E3)).
+    all: try (destruct (symbolic_truth P T N k s r env f2) as [[]|] eqn:E3; simpl in H; try discriminate; pose proof (IHf2 env _ E3)).
     all: injection H as <-; destruct (truth P w d env f1) as [[]|], (truth P w d env f2) as [[]|]; simpl in *; congruence.
   - revert v H. induction (objects P type) as [|o os IH]; intros v H; cbn [fold_right] in *; [injection H as <-; discriminate|].
     pose proof (fun v => IHf (env ++ [o]) v) as A. revert v H A.
-    generalize (truth3 P T N k s r (env ++ [o]) f) as x. generalize (truth P w d (env ++ [o]) f) as t. revert IH.
-    generalize (fold_right (fun o r0 => and3 (truth3 P T N k s r (env ++ [o]) f) r0) (Some true) os) as y.
-    generalize (fold_right (fun o r0 => and3 (truth P w d (env ++ [o]) f) r0) (Some true) os) as u.
+    generalize (symbolic_truth P T N k s r (env ++ [o]) f) as x. generalize (truth P w d (env ++ [o]) f) as t. revert IH.
+    generalize (fold_right (fun o r0 => and_kleene (symbolic_truth P T N k s r (env ++ [o]) f) r0) (Some true) os) as y.
+    generalize (fold_right (fun o r0 => and_kleene (truth P w d (env ++ [o]) f) r0) (Some true) os) as u.
     intros u y B t x v H A.
     destruct x as [x|]; [specialize (A x eq_refl)|clear A]; (destruct y as [y|]; [specialize (B y eq_refl)|clear B]);
       try destruct x; try destruct y; simpl in *; try discriminate; injection H as <-; destruct t as [[]|], u as [[]|]; simpl in *; congruence.
@@ -186,17 +186,17 @@ Lemma both_ok : forall (a b : option (list change)) (c d : option (list symbolic
 Proof.
   intros [a|] [b|] [c|] [d|] A B cs ss H K; try discriminate. injection H as <-. injection K as <-. apply Forall2_app; auto.
 Qed.
-Lemma changes3_ok : forall w s d r, Describes w0 w s -> agrees w0 d r -> forall e env cs ss,
-  changes P w d env e = Some cs -> changes3 P T N k s r env e = Some ss -> Forall2 matches cs ss.
+Lemma symbolic_changes_ok : forall w s d r, Describes w0 w s -> agrees w0 d r -> forall e env cs ss,
+  changes P w d env e = Some cs -> symbolic_changes P T N k s r env e = Some ss -> Forall2 matches cs ss.
 Proof.
-  intros w s d r D R. induction e; intros env cs ss H K; cbn [changes changes3] in *.
+  intros w s d r D R. induction e; intros env cs ss H K; cbn [changes symbolic_changes] in *.
   - injection H as <-. injection K as <-. constructor.
   - destruct (ground env ts); [|discriminate]. injection H as <-. injection K as <-. constructor; [split; reflexivity|constructor].
-  - destruct (ground env ts); [|discriminate]. pose proof (linear_ok w s d r D R env e) as G.
-    destruct (eval w d env e) as [q|]; [|discriminate]. destruct (linear_of P N s r env e) as [| |g]; try discriminate.
+  - destruct (ground env ts); [|discriminate]. pose proof (symbolic_expression_ok w s d r D R env e) as G.
+    destruct (eval w d env e) as [q|]; [|discriminate]. destruct (symbolic_expression P N s r env e) as [| |g]; try discriminate.
     injection H as <-. injection K as <-. constructor; [|constructor]. simpl. repeat split. apply G. reflexivity.
   - eapply both_ok; [| |exact H|exact K]; intros; [eapply IHe1|eapply IHe2]; eassumption.
-  - destruct (truth3 P T N k s r env f) as [b|] eqn:E; [|discriminate]. apply (truth3_ok w s d r D R) in E.
+  - destruct (symbolic_truth P T N k s r env f) as [b|] eqn:E; [|discriminate]. apply (symbolic_truth_ok w s d r D R) in E.
     destruct (truth P w d env f) as [[]|]; [| |discriminate]; destruct b; simpl in E; try congruence.
     + eapply IHe; eassumption.
     + injection H as <-. injection K as <-. constructor.
@@ -204,9 +204,9 @@ Proof.
     + injection H as <-. injection K as <-. constructor.
     + eapply both_ok; [| |exact H|exact K]; [intros; eapply IHe; eassumption|exact IH].
 Qed.
-Lemma targets_same : forall cs ss, Forall2 matches cs ss -> changed_fluents cs = targets3 ss.
+Lemma targets_same : forall cs ss, Forall2 matches cs ss -> changed_fluents cs = symbolic_changed_fluents ss.
 Proof. induction 1 as [|c s cs ss M F IH]; [reflexivity|]. destruct c, s; simpl in *; try contradiction; [exact IH|]. destruct M as [-> _]. f_equal. exact IH. Qed.
-Lemma on_same : forall f cs ss, Forall2 matches cs ss -> Forall2 (fun a b => fst a = fst b /\ snd a == ev w0 (snd b)) (on f cs) (on3 f ss).
+Lemma changes_of_same : forall f cs ss, Forall2 matches cs ss -> Forall2 (fun a b => fst a = fst b /\ snd a == ev w0 (snd b)) (changes_of f cs) (symbolic_changes_of f ss).
 Proof.
   intros f. induction 1 as [|c s cs ss M F IH]; [constructor|]. destruct c, s; simpl in *; try contradiction; [exact IH|].
   destruct M as [-> [-> M]]. destruct (atom_eqb f a0); [constructor; [split; [reflexivity|exact M]|exact IH]|exact IH].
@@ -218,76 +218,76 @@ Proof.
   apply IH. rewrite Qred_correct, ev_plus_form, G, H. ring.
 Qed.
 Lemma changed_ok : forall l m old r q g, Forall2 (fun (a : bool * Q) b => fst a = fst b /\ snd a == ev w0 (snd b)) l m -> agrees w0 old r ->
-  changed_value old l = Some q -> combine3 r m = Some g -> q == ev w0 g.
+  changed_value old l = Some q -> symbolic_new_value r m = Some g -> q == ev w0 g.
 Proof.
   intros l m old r q g F A H K. destruct F as [|[b x] [b' y] l m [E1 E2] F]; [discriminate|]. simpl in E1, E2. subst b'.
   destruct b.
   - destruct m; [|discriminate]. inversion F; subst. simpl in *. injection H as <-. injection K as <-. exact E2.
-  - cbn [changed_value combine3] in *. destruct (existsb fst ((false, x) :: l)) ; [discriminate|].
+  - cbn [changed_value symbolic_new_value] in *. destruct (existsb fst ((false, x) :: l)) ; [discriminate|].
     destruct old as [o|]; [|discriminate]. destruct (existsb fst ((false, y) :: m)); [discriminate|]. destruct r as [| |z]; try discriminate.
     injection H as <-. injection K as <-. apply (sum_ok ((false, x) :: l) ((false, y) :: m)).
     + constructor; [split; [reflexivity|exact E2]|exact F].
     + apply A. reflexivity.
 Qed.
 Lemma updates_ok : forall w s cs ss, Describes w0 w s -> Forall2 matches cs ss -> forall fs l m,
-  updates w cs fs = Some l -> updates3 P N s ss fs = Some m ->
+  updates w cs fs = Some l -> symbolic_updates P N s ss fs = Some m ->
   forall f, match assoc f m with Some g => exists q, assoc f l = Some q /\ q == ev w0 g | None => assoc f l = None end.
 Proof.
-  intros w s cs ss D F. induction fs as [|h fs IH]; intros l m H K f; cbn [updates updates3] in *.
+  intros w s cs ss D F. induction fs as [|h fs IH]; intros l m H K f; cbn [updates symbolic_updates] in *.
   - injection H as <-. injection K as <-. reflexivity.
   - destruct (changed_value _ _) as [q|] eqn:E1; [|discriminate]. destruct (updates w cs fs) as [l'|]; [|discriminate]. injection H as <-.
-    destruct (combine3 _ _) as [g|] eqn:E2; [|discriminate]. destruct (updates3 P N s ss fs) as [m'|]; [|discriminate]. injection K as <-.
+    destruct (symbolic_new_value _ _) as [g|] eqn:E2; [|discriminate]. destruct (symbolic_updates P N s ss fs) as [m'|]; [|discriminate]. injection K as <-.
     simpl. destruct (atom_eqb f h); [|apply IH; reflexivity]. exists q. split; [reflexivity|].
-    eapply changed_ok; [apply on_same, F|apply value3_ok, D|exact E1|exact E2].
+    eapply changed_ok; [apply changes_of_same, F|apply symbolic_value_ok, D|exact E1|exact E2].
 Qed.
-Lemma truths_ok : forall a b cs ss, Forall2 matches cs ss -> assoc a (truths3 ss b) = if sets_atom cs a b then Some b else None.
+Lemma truths_ok : forall a b cs ss, Forall2 matches cs ss -> assoc a (atoms_set_to ss b) = if sets_atom cs a b then Some b else None.
 Proof.
-  intros a b. induction 1 as [|c s cs ss M F IH]; [reflexivity|]. unfold sets_atom, truths3 in *. cbn [flat_map existsb].
+  intros a b. induction 1 as [|c s cs ss M F IH]; [reflexivity|]. unfold sets_atom, atoms_set_to in *. cbn [flat_map existsb].
   destruct c as [x y|], s as [x' y'|]; simpl in M; try contradiction; cbn [orb app].
   - destruct M as [<- <-]. destruct (Bool.eqb b y); simpl; [rewrite andb_true_r; destruct (atom_eqb a x); [reflexivity|exact IH]|].
     rewrite andb_false_r. exact IH.
   - exact IH.
 Qed.
-Lemma happening3_ok : forall w s d r t env f e w', Describes w0 w s -> agrees w0 d r -> happening P w d env f e = Some w' ->
-  match happening3 P T N k s r t env f e with Never => False | Unclear => True | After s' t' => t' = t /\ Describes w0 w' s' end.
+Lemma symbolic_happening_ok : forall w s d r t env f e w', Describes w0 w s -> agrees w0 d r -> happening P w d env f e = Some w' ->
+  match symbolic_happening P T N k s r t env f e with Never => False | Unclear => True | After s' t' => t' = t /\ Describes w0 w' s' end.
 Proof.
   intros w s d r t env f e w' D R H. unfold happening in H. destruct (truth P w d env f) as [[]|] eqn:E; try discriminate.
   destruct (changes P w d env e) as [cs|] eqn:C; [|discriminate]. destruct (updates w cs (changed_fluents cs)) as [l|] eqn:U; [|discriminate].
-  injection H as <-. unfold happening3. destruct (truth3 P T N k s r env f) as [[]|] eqn:E3.
-  2: { apply (truth3_ok w s d r D R) in E3. apply E3. exact E. }
-  all: destruct (changes3 P T N k s r env e) as [ss|] eqn:C3; [|exact I];
-    pose proof (changes3_ok w s d r D R e env cs ss C C3) as F; rewrite (targets_same _ _ F) in U;
-    destruct (updates3 P N s ss (targets3 ss)) as [m|] eqn:U3; [|exact I]; split; [reflexivity|]; split; cbn [holds_in value_in new_truths new_values].
+  injection H as <-. unfold symbolic_happening. destruct (symbolic_truth P T N k s r env f) as [[]|] eqn:E3.
+  2: { apply (symbolic_truth_ok w s d r D R) in E3. apply E3. exact E. }
+  all: destruct (symbolic_changes P T N k s r env e) as [ss|] eqn:C3; [|exact I];
+    pose proof (symbolic_changes_ok w s d r D R e env cs ss C C3) as F; rewrite (targets_same _ _ F) in U;
+    destruct (symbolic_updates P N s ss (symbolic_changed_fluents ss)) as [m|] eqn:U3; [|exact I]; split; [reflexivity|]; split; cbn [holds_in value_in new_truths new_values].
   1,3: intro a; rewrite !assoc_app, !(truths_ok _ _ _ _ F), (d_fact _ _ _ D); destruct (sets_atom cs a true); [reflexivity|];
        destruct (sets_atom cs a false); [reflexivity|]; reflexivity.
   all: intro g; rewrite assoc_app; pose proof (updates_ok w s cs ss D F _ l m U U3 g) as Q; destruct (assoc g m);
        [destruct Q as [q [Q1 Q2]]; exists q; rewrite Q1; split; [reflexivity|exact Q2]|rewrite Q; apply (d_value _ _ _ D)].
 Qed.
-Lemma length3_ok : forall a env e d, duration a = Some e -> eval w0 None env e = Some d -> agrees w0 (Some d) (length3 P N a env).
-Proof. intros a env e d A E. unfold length3. rewrite A, <- E. apply linear_ok; [apply describes_itself|exact eq_refl]. Qed.
-Lemma step3_ok : forall a env w' d, step P true w0 a env = Some (w', d) ->
-  match step3 P T N k a env with Never => False | Unclear => True | After s t => t == d /\ Describes w0 w' s end.
+Lemma symbolic_duration_ok : forall a env e d, duration a = Some e -> eval w0 None env e = Some d -> agrees w0 (Some d) (symbolic_duration P N a env).
+Proof. intros a env e d A E. unfold symbolic_duration. rewrite A, <- E. apply symbolic_expression_ok; [apply describes_itself|exact eq_refl]. Qed.
+Lemma symbolic_step_ok : forall a env w' d, step P true w0 a env = Some (w', d) ->
+  match symbolic_step P T N k a env with Never => False | Unclear => True | After s t => t == d /\ Describes w0 w' s end.
 Proof.
-  intros a env w' d H. unfold step in H. destruct (negb _); [discriminate|]. unfold step3.
+  intros a env w' d H. unfold step in H. destruct (negb _); [discriminate|]. unfold symbolic_step.
   destruct (duration a) as [e|] eqn:A.
   2: { destruct (happening P w0 None env (at_start a) (start_effect a)) as [x|] eqn:E; [|discriminate]. injection H as <- <-.
-       apply (happening3_ok w0 unchanged None Undefined 0) in E; [|apply describes_itself|exact eq_refl].
-       destruct (happening3 _ _ _ _ _ _ _ _ _ _); auto. destruct E as [-> E]. split; [reflexivity|exact E]. }
-  destruct (eval w0 None env e) as [q|] eqn:Ev; [|discriminate]. pose proof (length3_ok a env e q A Ev) as L.
-  destruct (length3 P N a env) as [| |[[|t l] c]]; try exact I; [discriminate L|].
+       apply (symbolic_happening_ok w0 unchanged None Undefined 0) in E; [|apply describes_itself|exact eq_refl].
+       destruct (symbolic_happening _ _ _ _ _ _ _ _ _ _); auto. destruct E as [-> E]. split; [reflexivity|exact E]. }
+  destruct (eval w0 None env e) as [q|] eqn:Ev; [|discriminate]. pose proof (symbolic_duration_ok a env e q A Ev) as L.
+  destruct (symbolic_duration P N a env) as [| |[[|t l] c]]; try exact I; [discriminate L|].
   specialize (L q eq_refl). rewrite ev_empty in L.
   assert (R : agrees w0 (Some q) (Is (constant c))) by (simpl; intros x X; injection X as <-; rewrite ev_constant; exact L).
   assert (L1 : less q 0 = less c 0) by (unfold less; rewrite (Qleb_comp 0 0 (Qeq_refl 0) q c L); reflexivity). rewrite L1 in H.
   destruct (less c 0); [discriminate|].
   rewrite (Qeqb_comp q c L 0 0 (Qeq_refl 0)) in H. destruct (Qeq_bool c 0).
   - match type of H with option_map _ ?h = _ => destruct h as [x|] eqn:E end; [|discriminate]. injection H as <- <-.
-    apply (happening3_ok w0 unchanged (Some q) (Is (constant c)) c) in E; [|apply describes_itself|exact R].
-    destruct (happening3 _ _ _ _ _ _ _ _ _ _); auto. destruct E as [-> E]. split; [symmetry; exact L|exact E].
+    apply (symbolic_happening_ok w0 unchanged (Some q) (Is (constant c)) c) in E; [|apply describes_itself|exact R].
+    destruct (symbolic_happening _ _ _ _ _ _ _ _ _ _); auto. destruct E as [-> E]. split; [symmetry; exact L|exact E].
   - destruct (happening P w0 (Some q) env (at_start a) (start_effect a)) as [w1|] eqn:E1; [|discriminate].
-    apply (happening3_ok w0 unchanged (Some q) (Is (constant c)) c) in E1; [|apply describes_itself|exact R].
-    destruct (happening3 _ _ _ _ _ _ _ _ _ _) as [| |s1 t1]; auto. destruct E1 as [_ E1].
+    apply (symbolic_happening_ok w0 unchanged (Some q) (Is (constant c)) c) in E1; [|apply describes_itself|exact R].
+    destruct (symbolic_happening _ _ _ _ _ _ _ _ _ _) as [| |s1 t1]; auto. destruct E1 as [_ E1].
     match type of H with option_map _ ?h = _ => destruct h as [x|] eqn:E end; [|discriminate]. injection H as <- <-.
-    apply (happening3_ok w1 s1 (Some q) (Is (constant c)) c) in E; [|exact E1|exact R].
-    destruct (happening3 _ _ _ _ _ _ _ _ _ _); auto. destruct E as [-> E]. split; [symmetry; exact L|exact E].
+    apply (symbolic_happening_ok w1 s1 (Some q) (Is (constant c)) c) in E; [|exact E1|exact R].
+    destruct (symbolic_happening _ _ _ _ _ _ _ _ _ _); auto. destruct E as [-> E]. split; [symmetry; exact L|exact E].
 Qed.
 End Evaluation.

@@ -1,6 +1,7 @@
 #!/bin/sh
-# Compiles every proof, fails if a theorem rests on an assumption, extracts the checker to ocaml/checker.ml, and builds the programs
-# check, prepare, mutants and differential in ocaml/. Needs Debian's coq, libcoq-stdlib, ocaml-nox and ocaml-findlib.
+# Compiles every proof, fails if a theorem rests on an assumption, extracts the checker to
+# ocaml/checker.ml, and builds the programs in ocaml/. Needs Debian's coq, libcoq-stdlib, ocaml-nox and
+# ocaml-findlib.
 set -e
 cd "$(dirname "$0")"
 for file in Task Check Proof Sound Derived Lifted Faithful Symbolic Simulation Optimal Extract; do coqc -Q . Proved "$file.v" >/dev/null; done
@@ -11,6 +12,6 @@ for theorem in Sound.sound Derived.layer_closed Optimal.optimal; do
 done
 cd ocaml
 ocamlfind ocamlopt -c checker.mli checker.ml reader.ml evidence.ml
-for program in check prepare mutants differential; do
+for program in check prepare mutants differential semantics; do
   ocamlfind ocamlopt checker.cmx reader.cmx evidence.cmx "$program.ml" -o "$program"
 done

@@ -9,12 +9,13 @@ let check directory evidence_file =
   let problem = Reader.problem (read "domain.pddl") (read "problem.pddl") in
   let plan = if Sys.file_exists (Filename.concat directory "plan.txt") then Reader.plan problem (read "plan.txt") else [] in
   let evidence = Evidence.read problem.Reader.action_names (read_file evidence_file) in
-  if not (Checker.check_certificate problem.Reader.task evidence.Evidence.ground_task evidence.names evidence.case evidence.goal_case
-            evidence.argument evidence.labels_at plan evidence.claim)
+  let claim = Reader.claim problem evidence.Evidence.claim in
+  if not (Checker.check_certificate problem.Reader.task evidence.ground_task evidence.names evidence.case evidence.goal_case
+            evidence.argument evidence.labels_at plan claim)
   then (print_endline "not proved"; 30)
   else begin
-    (match evidence.claim with
-     | Some _ -> Printf.printf "proved: the plan of %d steps is optimal, metric %s\n" (List.length plan) evidence.metric
+    (match claim with
+     | Some _ -> Printf.printf "proved: the plan of %d steps is optimal, metric %s\n" (List.length plan) evidence.claim
      | None -> print_endline "proved: there is no plan");
     0
   end

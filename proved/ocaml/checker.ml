@@ -1872,9 +1872,9 @@ let rec eval w d env = function
 let less x y =
   negb (qle_bool y x)
 
-(** val and3 : bool option -> bool option -> bool option **)
+(** val and_kleene : bool option -> bool option -> bool option **)
 
-let and3 a b =
+let and_kleene a b =
   match a with
   | Some b0 -> if b0 then b else Some false
   | None ->
@@ -1906,10 +1906,10 @@ let rec truth p w d env = function
       | None -> None)
    | None -> None)
 | Not g -> option_map negb (truth p w d env g)
-| And (g, h) -> and3 (truth p w d env g) (truth p w d env h)
+| And (g, h) -> and_kleene (truth p w d env g) (truth p w d env h)
 | Forall (t0, g) ->
-  fold_right (fun o r -> and3 (truth p w d (app env (o :: [])) g) r) (Some
-    true) (p.objects t0)
+  fold_right (fun o r -> and_kleene (truth p w d (app env (o :: [])) g) r)
+    (Some true) (p.objects t0)
 
 type change =
 | Fact of atom * bool
@@ -1957,9 +1957,9 @@ let sets_atom cs a b =
     | Fact (a', b') -> (&&) (atom_eqb a a') (eqb b b')
     | Number (_, _, _) -> false) cs
 
-(** val on : atom -> change list -> (bool * q) list **)
+(** val changes_of : atom -> change list -> (bool * q) list **)
 
-let on f cs =
+let changes_of f cs =
   flat_map (fun c ->
     match c with
     | Fact (_, _) -> []
@@ -1995,7 +1995,7 @@ let rec changed_fluents = function
 let rec updates w cs = function
 | [] -> Some []
 | f :: r ->
-  (match changed_value (w.value_in f) (on f cs) with
+  (match changed_value (w.value_in f) (changes_of f cs) with
    | Some q0 ->
      (match updates w cs r with
       | Some l -> Some ((f, q0) :: l)
@@ -2171,9 +2171,10 @@ let possible t0 n k v =
      | Some p -> let (x, _) = p in x :: []
      | None -> range (get t0.domain_size v))
 
-(** val fact3 : task -> names -> knowledge -> key1 -> z -> bool option **)
+(** val known_fact :
+    task -> names -> knowledge -> key1 -> z -> bool option **)
 
-let fact3 t0 n k v x =
+let known_fact t0 n k v x =
   match M.find v n.variables with
   | Some _ ->
     let ys = possible t0 n k v in
@@ -2194,7 +2195,7 @@ let base_truth p t0 n k a =
           if negb (mem0 n.may_hold a)
           then Some false
           else (match find_atom n.fact_of a with
-                | Some p0 -> let (v, x) = p0 in fact3 t0 n k v x
+                | Some p0 -> let (v, x) = p0 in known_fact t0 n k v x
                 | None -> None))
 
 type symbolic = { new_truths : (atom * bool) list;
@@ -2205,17 +2206,17 @@ type symbolic = { new_truths : (atom * bool) list;
 let unchanged =
   { new_truths = []; new_values = [] }
 
-(** val atom3 :
+(** val symbolic_atom :
     problem -> task -> names -> knowledge -> symbolic -> atom -> bool option **)
 
-let atom3 p t0 n k s a =
+let symbolic_atom p t0 n k s a =
   match assoc a s.new_truths with
   | Some b -> Some b
   | None -> base_truth p t0 n k a
 
-(** val value3 : problem -> names -> symbolic -> atom -> result **)
+(** val symbolic_value : problem -> names -> symbolic -> atom -> result **)
 
-let value3 p n s f =
+let symbolic_value p n s f =
   match assoc f s.new_values with
   | Some g -> Is g
   | None ->
@@ -2225,39 +2226,39 @@ let value3 p n s f =
           | Some q0 -> Is (constant q0)
           | None -> Undefined)
 
-(** val linear_of :
+(** val symbolic_expression :
     problem -> names -> symbolic -> result -> key1 list -> expression ->
     result **)
 
-let rec linear_of p n s d env = function
+let rec symbolic_expression p n s d env = function
 | Constant q0 -> Is (constant q0)
 | Fluent (f, ts) ->
   (match ground env ts with
-   | Some l -> value3 p n s (f, l)
+   | Some l -> symbolic_value p n s (f, l)
    | None -> Undefined)
 | Duration -> d
 | Plus (a, b) ->
-  plus_result (linear_of p n s d env a) { qnum = (Zpos XH); qden = XH }
-    (linear_of p n s d env b)
+  plus_result (symbolic_expression p n s d env a) { qnum = (Zpos XH); qden =
+    XH } (symbolic_expression p n s d env b)
 | Minus (a, b) ->
-  plus_result (linear_of p n s d env a) { qnum = (Zneg XH); qden = XH }
-    (linear_of p n s d env b)
+  plus_result (symbolic_expression p n s d env a) { qnum = (Zneg XH); qden =
+    XH } (symbolic_expression p n s d env b)
 | Times (a, b) ->
-  (match linear_of p n s d env a with
+  (match symbolic_expression p n s d env a with
    | Undefined -> Undefined
    | Unknown ->
-     (match linear_of p n s d env b with
+     (match symbolic_expression p n s d env b with
       | Undefined -> Undefined
       | _ -> Unknown)
    | Is x ->
      let (l, x0) = x in
      (match l with
       | [] ->
-        (match linear_of p n s d env b with
+        (match symbolic_expression p n s d env b with
          | Is y -> Is (plus_form (constant { qnum = Z0; qden = XH }) x0 y)
          | x1 -> x1)
       | _ :: _ ->
-        (match linear_of p n s d env b with
+        (match symbolic_expression p n s d env b with
          | Is f ->
            let (l1, y) = f in
            (match l1 with
@@ -2265,14 +2266,14 @@ let rec linear_of p n s d env = function
             | _ :: _ -> Unknown)
          | x1 -> x1)))
 | Over (a, b) ->
-  (match linear_of p n s d env a with
+  (match symbolic_expression p n s d env a with
    | Undefined -> Undefined
    | Unknown ->
-     (match linear_of p n s d env b with
+     (match symbolic_expression p n s d env b with
       | Undefined -> Undefined
       | _ -> Unknown)
    | Is x ->
-     (match linear_of p n s d env b with
+     (match symbolic_expression p n s d env b with
       | Is f ->
         let (l, y) = f in
         (match l with
@@ -2301,9 +2302,9 @@ let implied k strict f =
       | [] -> (&&) strict (less { qnum = Z0; qden = XH } c)
       | _ :: _ -> false))
 
-(** val compare3 : knowledge -> bool -> result -> bool option **)
+(** val symbolic_comparison : knowledge -> bool -> result -> bool option **)
 
-let compare3 k strict = function
+let symbolic_comparison k strict = function
 | Undefined -> Some false
 | Unknown -> None
 | Is f ->
@@ -2315,15 +2316,15 @@ let compare3 k strict = function
        then Some false
        else None
 
-(** val truth3 :
+(** val symbolic_truth :
     problem -> task -> names -> knowledge -> symbolic -> result -> key1 list
     -> formula -> bool option **)
 
-let rec truth3 p t0 n k s d env = function
+let rec symbolic_truth p t0 n k s d env = function
 | Truth b -> Some b
 | Atom (p0, ts) ->
   (match ground env ts with
-   | Some l -> atom3 p t0 n k s (p0, l)
+   | Some l -> symbolic_atom p t0 n k s (p0, l)
    | None -> Some false)
 | Same (t1, u) ->
   (match object_of env t1 with
@@ -2333,26 +2334,30 @@ let rec truth3 p t0 n k s d env = function
       | None -> Some false)
    | None -> Some false)
 | Compare (strict, a, b) ->
-  compare3 k strict (linear_of p n s d env (Minus (a, b)))
-| Not g -> option_map negb (truth3 p t0 n k s d env g)
+  symbolic_comparison k strict
+    (symbolic_expression p n s d env (Minus (a, b)))
+| Not g -> option_map negb (symbolic_truth p t0 n k s d env g)
 | And (g, h) ->
-  (match truth3 p t0 n k s d env g with
+  (match symbolic_truth p t0 n k s d env g with
    | Some b ->
-     if b then and3 (Some true) (truth3 p t0 n k s d env h) else Some false
-   | None -> and3 None (truth3 p t0 n k s d env h))
+     if b
+     then and_kleene (Some true) (symbolic_truth p t0 n k s d env h)
+     else Some false
+   | None -> and_kleene None (symbolic_truth p t0 n k s d env h))
 | Forall (t1, g) ->
-  fold_right (fun o r -> and3 (truth3 p t0 n k s d (app env (o :: [])) g) r)
-    (Some true) (p.objects t1)
+  fold_right (fun o r ->
+    and_kleene (symbolic_truth p t0 n k s d (app env (o :: [])) g) r) (Some
+    true) (p.objects t1)
 
 type symbolic_change =
 | SFact of atom * bool
 | SNumber of atom * bool * form
 
-(** val changes3 :
+(** val symbolic_changes :
     problem -> task -> names -> knowledge -> symbolic -> result -> key1 list
     -> effect -> symbolic_change list option **)
 
-let rec changes3 p t0 n k s d env = function
+let rec symbolic_changes p t0 n k s d env = function
 | Nothing -> Some []
 | Put (b, p0, ts) ->
   (match ground env ts with
@@ -2361,32 +2366,34 @@ let rec changes3 p t0 n k s d env = function
 | Change (assigns, f, ts, x) ->
   (match ground env ts with
    | Some l ->
-     (match linear_of p n s d env x with
+     (match symbolic_expression p n s d env x with
       | Is g -> Some ((SNumber ((f, l), assigns, g)) :: [])
       | _ -> None)
    | None -> None)
 | Both (a, b) ->
-  both (changes3 p t0 n k s d env a) (changes3 p t0 n k s d env b)
+  both (symbolic_changes p t0 n k s d env a)
+    (symbolic_changes p t0 n k s d env b)
 | When (f, a) ->
-  (match truth3 p t0 n k s d env f with
-   | Some b -> if b then changes3 p t0 n k s d env a else Some []
+  (match symbolic_truth p t0 n k s d env f with
+   | Some b -> if b then symbolic_changes p t0 n k s d env a else Some []
    | None -> None)
 | Each (t1, a) ->
   fold_right (fun o r ->
-    both (changes3 p t0 n k s d (app env (o :: [])) a) r) (Some [])
+    both (symbolic_changes p t0 n k s d (app env (o :: [])) a) r) (Some [])
     (p.objects t1)
 
-(** val on3 : atom -> symbolic_change list -> (bool * form) list **)
+(** val symbolic_changes_of :
+    atom -> symbolic_change list -> (bool * form) list **)
 
-let on3 f cs =
+let symbolic_changes_of f cs =
   flat_map (fun c ->
     match c with
     | SFact (_, _) -> []
     | SNumber (f', b, g) -> if atom_eqb f f' then (b, g) :: [] else []) cs
 
-(** val combine3 : result -> (bool * form) list -> form option **)
+(** val symbolic_new_value : result -> (bool * form) list -> form option **)
 
-let combine3 old l = match l with
+let symbolic_new_value old l = match l with
 | [] -> None
 | p :: l0 ->
   let (b, g) = p in
@@ -2403,32 +2410,33 @@ let combine3 old l = match l with
                    plus_form s { qnum = (Zpos XH); qden = XH } (snd c)) l x)
              | _ -> None)
 
-(** val targets3 : symbolic_change list -> atom list **)
+(** val symbolic_changed_fluents : symbolic_change list -> atom list **)
 
-let rec targets3 = function
+let rec symbolic_changed_fluents = function
 | [] -> []
 | s :: r ->
   (match s with
-   | SFact (_, _) -> targets3 r
-   | SNumber (f, _, _) -> f :: (targets3 r))
+   | SFact (_, _) -> symbolic_changed_fluents r
+   | SNumber (f, _, _) -> f :: (symbolic_changed_fluents r))
 
-(** val updates3 :
+(** val symbolic_updates :
     problem -> names -> symbolic -> symbolic_change list -> atom list ->
     (atom * form) list option **)
 
-let rec updates3 p n s cs = function
+let rec symbolic_updates p n s cs = function
 | [] -> Some []
 | f :: r ->
-  (match combine3 (value3 p n s f) (on3 f cs) with
+  (match symbolic_new_value (symbolic_value p n s f)
+           (symbolic_changes_of f cs) with
    | Some g ->
-     (match updates3 p n s cs r with
+     (match symbolic_updates p n s cs r with
       | Some l -> Some ((f, g) :: l)
       | None -> None)
    | None -> None)
 
-(** val truths3 : symbolic_change list -> bool -> (atom * bool) list **)
+(** val atoms_set_to : symbolic_change list -> bool -> (atom * bool) list **)
 
-let truths3 cs b =
+let atoms_set_to cs b =
   flat_map (fun c ->
     match c with
     | SFact (a, b') -> if eqb b b' then (a, b) :: [] else []
@@ -2439,49 +2447,52 @@ type outcome =
 | Unclear
 | After of symbolic * q
 
-(** val happening3 :
+(** val symbolic_happening :
     problem -> task -> names -> knowledge -> symbolic -> result -> q -> key1
     list -> formula -> effect -> outcome **)
 
-let happening3 p t0 n k s d time env f e =
-  match truth3 p t0 n k s d env f with
+let symbolic_happening p t0 n k s d time env f e =
+  match symbolic_truth p t0 n k s d env f with
   | Some b ->
     if b
-    then (match changes3 p t0 n k s d env e with
+    then (match symbolic_changes p t0 n k s d env e with
           | Some cs ->
-            (match updates3 p n s cs (targets3 cs) with
+            (match symbolic_updates p n s cs (symbolic_changed_fluents cs) with
              | Some l ->
                After ({ new_truths =
-                 (app (truths3 cs true) (app (truths3 cs false) s.new_truths));
-                 new_values = (app l s.new_values) }, time)
+                 (app (atoms_set_to cs true)
+                   (app (atoms_set_to cs false) s.new_truths)); new_values =
+                 (app l s.new_values) }, time)
              | None -> Unclear)
           | None -> Unclear)
     else Never
   | None ->
-    (match changes3 p t0 n k s d env e with
+    (match symbolic_changes p t0 n k s d env e with
      | Some cs ->
-       (match updates3 p n s cs (targets3 cs) with
+       (match symbolic_updates p n s cs (symbolic_changed_fluents cs) with
         | Some l ->
           After ({ new_truths =
-            (app (truths3 cs true) (app (truths3 cs false) s.new_truths));
-            new_values = (app l s.new_values) }, time)
+            (app (atoms_set_to cs true)
+              (app (atoms_set_to cs false) s.new_truths)); new_values =
+            (app l s.new_values) }, time)
         | None -> Unclear)
      | None -> Unclear)
 
-(** val length3 : problem -> names -> action -> key1 list -> result **)
+(** val symbolic_duration :
+    problem -> names -> action -> key1 list -> result **)
 
-let length3 p n a env =
+let symbolic_duration p n a env =
   match a.duration with
-  | Some e -> linear_of p n unchanged Undefined env e
+  | Some e -> symbolic_expression p n unchanged Undefined env e
   | None -> Undefined
 
-(** val step3 :
+(** val symbolic_step :
     problem -> task -> names -> knowledge -> action -> key1 list -> outcome **)
 
-let step3 p t0 n k a env =
+let symbolic_step p t0 n k a env =
   match a.duration with
   | Some _ ->
-    (match length3 p n a env with
+    (match symbolic_duration p n a env with
      | Undefined -> Never
      | Unknown -> Unclear
      | Is f ->
@@ -2491,19 +2502,19 @@ let step3 p t0 n k a env =
           if less d { qnum = Z0; qden = XH }
           then Never
           else if qeq_bool d { qnum = Z0; qden = XH }
-               then happening3 p t0 n k unchanged (Is (constant d)) d env
-                      (And (a.at_start, a.at_end)) (Both (a.start_effect,
+               then symbolic_happening p t0 n k unchanged (Is (constant d)) d
+                      env (And (a.at_start, a.at_end)) (Both (a.start_effect,
                       a.end_effect))
-               else (match happening3 p t0 n k unchanged (Is (constant d)) d
-                             env a.at_start a.start_effect with
+               else (match symbolic_happening p t0 n k unchanged (Is
+                             (constant d)) d env a.at_start a.start_effect with
                      | After (s, _) ->
-                       happening3 p t0 n k s (Is (constant d)) d env (And
-                         (a.over_all, a.at_end)) a.end_effect
+                       symbolic_happening p t0 n k s (Is (constant d)) d env
+                         (And (a.over_all, a.at_end)) a.end_effect
                      | x -> x)
         | _ :: _ -> Unclear))
   | None ->
-    happening3 p t0 n k unchanged Undefined { qnum = Z0; qden = XH } env
-      a.at_start a.start_effect
+    symbolic_happening p t0 n k unchanged Undefined { qnum = Z0; qden = XH }
+      env a.at_start a.start_effect
 
 (** val conjuncts :
     problem -> names -> symbolic -> result -> key1 list -> formula ->
@@ -2521,7 +2532,7 @@ let rec conjuncts p n s d env = function
         else { literals = []; bounds = [] })
    | None -> { literals = []; bounds = [] })
 | Compare (strict, a, b) ->
-  (match linear_of p n s d env (Minus (a, b)) with
+  (match symbolic_expression p n s d env (Minus (a, b)) with
    | Is g -> { literals = []; bounds = ((strict, g) :: []) }
    | _ -> { literals = []; bounds = [] })
 | Not f0 ->
@@ -2554,7 +2565,7 @@ let join k l =
 let gathered p t0 n a env =
   match a.duration with
   | Some _ ->
-    (match length3 p n a env with
+    (match symbolic_duration p n a env with
      | Is f ->
        let (l, d) = f in
        (match l with
@@ -2563,8 +2574,8 @@ let gathered p t0 n a env =
           let k = conjuncts p n unchanged time env a.at_start in
           if qeq_bool d { qnum = Z0; qden = XH }
           then join k (conjuncts p n unchanged time env a.at_end)
-          else (match happening3 p t0 n k unchanged time d env a.at_start
-                        a.start_effect with
+          else (match symbolic_happening p t0 n k unchanged time d env
+                        a.at_start a.start_effect with
                 | After (s, _) ->
                   join k
                     (conjuncts p n s time env (And (a.over_all, a.at_end)))
@@ -2635,11 +2646,12 @@ let required n k f =
   implied k true
     (plus_form f { qnum = (Zpos XH); qden = XH } (constant (qinv (scaled n))))
 
-(** val literal3 : task -> names -> knowledge -> literal -> bool option **)
+(** val known_literal :
+    task -> names -> knowledge -> literal -> bool option **)
 
-let literal3 t0 n k l =
+let known_literal t0 n k l =
   option_map (fun b -> eqb b (snd l))
-    (fact3 t0 n k (fst (fst l)) (snd (fst l)))
+    (known_fact t0 n k (fst (fst l)) (snd (fst l)))
 
 (** val is_true : bool option -> bool **)
 
@@ -2653,29 +2665,31 @@ let is_false = function
 | Some b -> negb b
 | None -> false
 
-(** val condition3 :
+(** val known_condition :
     task -> names -> knowledge -> condition -> z list -> choice -> bool **)
 
-let condition3 t0 n k c szs ch =
+let known_condition t0 n k c szs ch =
   (&&)
-    ((&&) (forallb (fun f -> is_true (fact3 t0 n k (fst f) (snd f))) c.facts)
-      (forallb (existsb (fun l -> is_true (literal3 t0 n k l))) c.clauses))
+    ((&&)
+      (forallb (fun f -> is_true (known_fact t0 n k (fst f) (snd f))) c.facts)
+      (forallb (existsb (fun l -> is_true (known_literal t0 n k l)))
+        c.clauses))
     (forallb (fun l ->
       match form_of n l szs ch with
       | Some f -> required n k f
       | None -> false) c.comparisons)
 
-(** val fired3 :
+(** val known_effects :
     task -> names -> knowledge -> (literal list * fact list) list -> fact
     list option **)
 
-let rec fired3 t0 n k = function
+let rec known_effects t0 n k = function
 | [] -> Some []
 | c :: r ->
-  if existsb (fun l -> is_false (literal3 t0 n k l)) (fst c)
-  then fired3 t0 n k r
-  else if forallb (fun l -> is_true (literal3 t0 n k l)) (fst c)
-       then option_map (app (snd c)) (fired3 t0 n k r)
+  if existsb (fun l -> is_false (known_literal t0 n k l)) (fst c)
+  then known_effects t0 n k r
+  else if forallb (fun l -> is_true (known_literal t0 n k l)) (fst c)
+       then option_map (app (snd c)) (known_effects t0 n k r)
        else None
 
 (** val admitted_choice : operator -> choice -> bool **)
@@ -2737,8 +2751,9 @@ let number_ok n s o n0 =
 (** val growth : problem -> names -> symbolic -> q -> q option **)
 
 let growth p n s time =
-  match plus_result (linear_of p n s Undefined [] p.metric) { qnum = (Zneg
-          XH); qden = XH } (linear_of p n unchanged Undefined [] p.metric) with
+  match plus_result (symbolic_expression p n s Undefined [] p.metric)
+          { qnum = (Zneg XH); qden = XH }
+          (symbolic_expression p n unchanged Undefined [] p.metric) with
   | Is f ->
     let (l, c) = f in
     (match l with
@@ -2762,9 +2777,10 @@ let simulated p t0 n k s time o =
           let (o0, ch) = p0 in
           if (&&)
                ((&&) (admitted_choice o0 ch)
-                 (condition3 t0 n k o0.precondition o0.slot_sizes ch))
+                 (known_condition t0 n k o0.precondition o0.slot_sizes ch))
                (distinct (map fst o0.number_effects))
-          then option_map (app o0.effects) (fired3 t0 n k o0.conditional)
+          then option_map (app o0.effects)
+                 (known_effects t0 n k o0.conditional)
           else None
         | None -> Some [] with
   | Some made ->
@@ -2797,7 +2813,7 @@ let simulated p t0 n k s time o =
     (operator * choice) option -> bool **)
 
 let leaf_ok p t0 n k a env o =
-  match step3 p t0 n k a env with
+  match symbolic_step p t0 n k a env with
   | Never -> true
   | Unclear -> false
   | After (s, time) ->
@@ -2844,9 +2860,9 @@ let instance_leaf p t0 n a env k = function
     problem -> task -> names -> knowledge -> (nat * choice) option -> bool **)
 
 let goal_leaf p t0 n k _ =
-  match truth3 p t0 n k unchanged Undefined [] p.goal_formula with
-  | Some b -> if b then condition3 t0 n k t0.goal [] [] else true
-  | None -> condition3 t0 n k t0.goal [] []
+  match symbolic_truth p t0 n k unchanged Undefined [] p.goal_formula with
+  | Some b -> if b then known_condition t0 n k t0.goal [] [] else true
+  | None -> known_condition t0 n k t0.goal [] []
 
 (** val static_false : problem -> names -> key1 list -> formula -> bool **)
 
@@ -2981,7 +2997,7 @@ let faithful p t0 n case goal_case =
 (** val is_linear : problem -> names -> bool **)
 
 let is_linear p n =
-  match linear_of p n unchanged Undefined [] p.metric with
+  match symbolic_expression p n unchanged Undefined [] p.metric with
   | Is _ -> true
   | _ -> false
 

@@ -704,7 +704,7 @@ val eval : world -> q option -> key1 list -> expression -> q option
 
 val less : q -> q -> bool
 
-val and3 : bool option -> bool option -> bool option
+val and_kleene : bool option -> bool option -> bool option
 
 val truth :
   problem -> world -> q option -> key1 list -> formula -> bool option
@@ -720,7 +720,7 @@ val changes :
 
 val sets_atom : change list -> atom -> bool -> bool
 
-val on : atom -> change list -> (bool * q) list
+val changes_of : atom -> change list -> (bool * q) list
 
 val changed_value : q option -> (bool * q) list -> q option
 
@@ -777,7 +777,7 @@ val in_variable : names -> knowledge -> key1 -> (z * bool) list
 
 val possible : task -> names -> knowledge -> key1 -> z list
 
-val fact3 : task -> names -> knowledge -> key1 -> z -> bool option
+val known_fact : task -> names -> knowledge -> key1 -> z -> bool option
 
 val base_truth : problem -> task -> names -> knowledge -> atom -> bool option
 
@@ -786,19 +786,19 @@ type symbolic = { new_truths : (atom * bool) list;
 
 val unchanged : symbolic
 
-val atom3 :
+val symbolic_atom :
   problem -> task -> names -> knowledge -> symbolic -> atom -> bool option
 
-val value3 : problem -> names -> symbolic -> atom -> result
+val symbolic_value : problem -> names -> symbolic -> atom -> result
 
-val linear_of :
+val symbolic_expression :
   problem -> names -> symbolic -> result -> key1 list -> expression -> result
 
 val implied : knowledge -> bool -> form -> bool
 
-val compare3 : knowledge -> bool -> result -> bool option
+val symbolic_comparison : knowledge -> bool -> result -> bool option
 
-val truth3 :
+val symbolic_truth :
   problem -> task -> names -> knowledge -> symbolic -> result -> key1 list ->
   formula -> bool option
 
@@ -806,34 +806,34 @@ type symbolic_change =
 | SFact of atom * bool
 | SNumber of atom * bool * form
 
-val changes3 :
+val symbolic_changes :
   problem -> task -> names -> knowledge -> symbolic -> result -> key1 list ->
   effect -> symbolic_change list option
 
-val on3 : atom -> symbolic_change list -> (bool * form) list
+val symbolic_changes_of : atom -> symbolic_change list -> (bool * form) list
 
-val combine3 : result -> (bool * form) list -> form option
+val symbolic_new_value : result -> (bool * form) list -> form option
 
-val targets3 : symbolic_change list -> atom list
+val symbolic_changed_fluents : symbolic_change list -> atom list
 
-val updates3 :
+val symbolic_updates :
   problem -> names -> symbolic -> symbolic_change list -> atom list ->
   (atom * form) list option
 
-val truths3 : symbolic_change list -> bool -> (atom * bool) list
+val atoms_set_to : symbolic_change list -> bool -> (atom * bool) list
 
 type outcome =
 | Never
 | Unclear
 | After of symbolic * q
 
-val happening3 :
+val symbolic_happening :
   problem -> task -> names -> knowledge -> symbolic -> result -> q -> key1
   list -> formula -> effect -> outcome
 
-val length3 : problem -> names -> action -> key1 list -> result
+val symbolic_duration : problem -> names -> action -> key1 list -> result
 
-val step3 :
+val symbolic_step :
   problem -> task -> names -> knowledge -> action -> key1 list -> outcome
 
 val conjuncts :
@@ -853,16 +853,16 @@ val form_of : names -> linear -> z list -> choice -> form option
 
 val required : names -> knowledge -> form -> bool
 
-val literal3 : task -> names -> knowledge -> literal -> bool option
+val known_literal : task -> names -> knowledge -> literal -> bool option
 
 val is_true : bool option -> bool
 
 val is_false : bool option -> bool
 
-val condition3 :
+val known_condition :
   task -> names -> knowledge -> condition -> z list -> choice -> bool
 
-val fired3 :
+val known_effects :
   task -> names -> knowledge -> (literal list * fact list) list -> fact list
   option
 

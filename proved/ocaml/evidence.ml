@@ -99,7 +99,7 @@ module Cases = Map.Make (struct type t = string * C.positive list let compare = 
 module Values = Map.Make (struct type t = C.z list let compare = compare end)
 
 type t = {
-  claim : C.q option; metric : string; ground_task : C.task; names : C.names; argument : C.argument;
+  claim : string; ground_task : C.task; names : C.names; argument : C.argument;
   labels_at : C.state -> C.positive list;     (* the labels whose variables have the values of a state *)
   case : C.nat -> C.positive list -> C.case_tree; goal_case : C.case_tree }
 
@@ -107,7 +107,6 @@ let read action_names text =
   let sections = List.map (function List (Word name :: items) -> name, items | _ -> reject "a section is expected") (expressions text) in
   let section name = match List.assoc_opt name sections with Some items -> items | None -> reject "there is no section %s" name in
   let only name = match section name with [item] -> item | _ -> reject "%s has one part" name in
-  let metric = word (only "claim") in
   let ground_task = ground_task (section "task") and argument = argument (section "argument") in
   let basics = C.basics ground_task in
   let values state = List.map (C.var_value state) basics in
@@ -120,7 +119,7 @@ let read action_names text =
         | _ -> reject "an instance of an action is expected") tree item in
       Cases.add (name, arguments) tree map) Cases.empty (section "cases") in
   let rec nth names = function C.O -> List.hd names | C.S n -> nth (List.tl names) n in
-  { claim = (if metric = "unsolvable" then None else Some (fraction metric)); metric; ground_task; names = names (section "names"); argument;
+  { claim = word (only "claim"); ground_task; names = names (section "names"); argument;
     labels_at = (fun state -> Option.value ~default:[] (Values.find_opt (values state) labels));
     case = (fun action arguments ->
       Option.value ~default:(C.Decided None) (Cases.find_opt (nth action_names action, arguments) cases));

@@ -116,8 +116,9 @@ let () =
   let evidence_text = read_file Sys.argv.(2) in
   let names = problem.R.action_names @ ["shortcut"] in
   let original = Evidence.read names evidence_text in
-  let best = match original.claim with Some value -> value | None -> failwith "the certificate has no plan" in
-  let true_statement = { name = "the true statement"; problem = problem.R.task; plan; claim = original.claim } in
+  let claim = R.claim problem original.claim in
+  let best = match claim with Some value -> value | None -> failwith "the certificate has no plan" in
+  let true_statement = { name = "the true statement"; problem = problem.R.task; plan; claim } in
   if not (holds true_statement original) then failwith "the certificate itself is not accepted";
   let false_statements = false_statements problem.R.task plan best in
   let sections = R.expressions evidence_text in

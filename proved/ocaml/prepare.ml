@@ -168,7 +168,7 @@ let splits_of problem names duration =
   let rec formula env = function
     | C.Truth _ | C.Same _ -> []
     | C.Atom (p, terms) -> (match C.ground env terms with Some arguments when names.C.changing p -> [Atom (p, arguments)] | _ -> [])
-    | C.Compare (_, a, b) -> (match C.linear_of problem names C.unchanged duration env (C.Minus (a, b)) with
+    | C.Compare (_, a, b) -> (match C.symbolic_expression problem names C.unchanged duration env (C.Minus (a, b)) with
         | C.Is ((_ :: _, _) as form) -> [Form form]
         | _ -> [])
     | C.Not f -> formula env f
@@ -216,12 +216,13 @@ let search problem task names leaf candidates splits knowledge =
 
 (* Operators of an action with their arguments: an object, or the objects that may fill a slot. *)
 let operators_by_action task =
-  let objects = Array.of_list (List.map string (array (field task "objects"))) in
+  let name item = String.lowercase_ascii (string item) in
+  let objects = Array.of_list (List.map name (array (field task "objects"))) in
   let slots = List.map (fun slot -> List.map (fun i -> objects.(int i)) (array slot)) (array (field task "slots")) in
   let designs = List.map (fun uses -> List.map (fun use -> match array use with
       | [slot; suitable] -> List.map (fun i -> nth (nth slots (int slot)) (int i)) (array suitable)
       | _ -> R.reject "JSON: a slot is expected") (array uses)) (array (field task "uses")) in
-  let schemas = List.map string (array (field task "schemas")) in
+  let schemas = List.map name (array (field task "schemas")) in
   let by_action = Hashtbl.create 100 in
   List.iteri (fun i operator ->
     let uses = nth designs (int (field operator "uses")) in
@@ -276,7 +277,7 @@ let prepare directory =
       let objects = List.map (fun key -> snd (Hashtbl.find keys key)) env in
       let candidates = List.filter_map (fun (i, arguments, uses) ->
           Option.map (fun choice -> Some (R.nat i, choice)) (choice_for arguments uses objects)) (Hashtbl.find_all by_action name) in
-      let formula, effect = splits_of problem_ names (C.length3 problem_ names action env) in
+      let formula, effect = splits_of problem_ names (C.symbolic_duration problem_ names action env) in
       let operator_splits = List.concat_map (fun candidate ->
           match candidate with
           | Some (i, _) -> (match C.nth_error ground_task.C.operators i with

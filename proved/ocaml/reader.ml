@@ -104,7 +104,9 @@ let function_key name = key ("function " ^ name)
 let distinct what names =
   List.iteri (fun i name -> if List.mem name (List.filteri (fun j _ -> j < i) names) then reject "%s is declared twice: %s" what name) names
 
-type problem = { task : C.problem; action_names : string list; object_names : string list }
+type problem = { task : C.problem; maximizes : bool; action_names : string list; object_names : string list }
+
+let negative q = C.qred (C.qminus zero q)
 
 let problem domain_text problem_text =
   let sections kind text = match expressions text with
@@ -307,7 +309,9 @@ let problem domain_text problem_text =
   if List.mem_assoc "total-cost" functions && C.find_atom !initial_values (function_key "total-cost", []) = None then
     set_value "total-cost" [] zero;
 
-  (* Goal and metric: an expression over functions, and the weight of the total time *)
+  (* Goal and metric: an expression over functions, and the weight of the total time. A metric to
+     maximise is negated. Without a metric, a plan is measured by its total time if some action has
+     a duration, and otherwise by its number of steps. *)
   let goal_formula = match section problem ":goal" with [goal] -> condition [] goal | _ -> reject "a goal is expected" in
   let rec weighted = function
     | List [Word "total-time"] -> one, C.Constant zero
@@ -319,14 +323,22 @@ let problem domain_text problem_text =
       let weight, value = weighted item in
       C.qred (C.qmult factor weight), C.Times (C.Constant factor, value)
     | item -> zero, expression [] item in
-  let per_time, metric, per_step = match section problem ":metric" with
-    | [Word "minimize"; item] -> let weight, value = weighted item in weight, value, zero
-    | [] when List.for_all (fun (_, action) -> action.C.duration = None) actions -> zero, C.Constant zero, one
-    | _ -> reject "not covered: a metric other than (:metric minimize ...)" in
+  let maximizes, (per_time, metric), per_step = match section problem ":metric" with
+    | [Word "minimize"; item] -> false, weighted item, zero
+    | [Word "maximize"; item] ->
+      let weight, value = weighted item in
+      true, (negative weight, C.Minus (C.Constant zero, value)), zero
+    | [] when List.exists (fun (_, action) -> action.C.duration <> None) actions -> false, (one, C.Constant zero), zero
+    | [] -> false, (zero, C.Constant zero), one
+    | _ -> reject "not covered: a metric other than minimize or maximize" in
   { task = { C.objects = (fun kind -> Option.value ~default:[] (Hashtbl.find_opt members kind));
              actions = List.map snd actions; initial_atoms = !initial_atoms; initial_values = !initial_values;
              goal_formula; metric; per_time; per_step };
-    action_names = List.map fst actions; object_names = List.map fst objects }
+    maximizes; action_names = List.map fst actions; object_names = List.map fst objects }
+
+(* The claim: the metric of an optimal plan, or that there is no plan. *)
+let claim problem text =
+  if text = "unsolvable" then None else Some (if problem.maximizes then negative (fraction text) else fraction text)
 
 (* A plan: one step after another; start times and durations, as in 0.0: (go a b) [2.5], are not
    read. *)
