@@ -152,10 +152,20 @@ Fixpoint symbolic_updates (s : symbolic) (cs : list symbolic_change) (fs : list 
 Definition atoms_set_to (cs : list symbolic_change) (b : bool) : list (atom * bool) :=
   flat_map (fun c => match c with SFact a b' => if Bool.eqb b b' then [(a, b)] else [] | _ => [] end) cs.
 Inductive outcome := Never | Unclear | After (s : symbolic) (time : Q).
+(* Returns [true] if the effect needs an undefined value, so that the action cannot be executed. *)
+Fixpoint needs_undefined (k : knowledge) (s : symbolic) (d : result) (env : list key) (e : effect) : bool :=
+  match e with
+  | Nothing | Put _ _ _ => false
+  | Change _ _ _ x => match symbolic_expression s d env x with Undefined => true | _ => false end
+  | Both a b => needs_undefined k s d env a || needs_undefined k s d env b
+  | When f a => match symbolic_truth k s d env f with Some true => needs_undefined k s d env a | _ => false end
+  | Each t a => existsb (fun o => needs_undefined k s d (env ++ [o]) a) (objects P t)
+  end.
 Definition symbolic_happening (k : knowledge) (s : symbolic) (d : result) (time : Q) (env : list key) (f : formula) (e : effect) : outcome :=
   match symbolic_truth k s d env f with
   | Some false => Never
-  | _ => match symbolic_changes k s d env e with
+  | _ => if needs_undefined k s d env e then Never else
+         match symbolic_changes k s d env e with
          | None => Unclear
          | Some cs => match symbolic_updates s cs (symbolic_changed_fluents cs) with
                       | None => Unclear

@@ -248,6 +248,21 @@ Proof.
     rewrite andb_false_r. exact IH.
   - exact IH.
 Qed.
+Lemma needs_undefined_ok : forall w s d r, Describes w0 w s -> agrees w0 d r -> forall e env,
+  needs_undefined P T N k s r env e = true -> changes P w d env e = None.
+Proof.
+  intros w s d r D R. induction e; intros env H; cbn [needs_undefined changes] in *; try discriminate.
+  - destruct (ground env ts); [|reflexivity]. pose proof (symbolic_expression_ok w s d r D R env e) as G.
+    destruct (symbolic_expression P N s r env e); try discriminate. unfold agrees in G. rewrite G. reflexivity.
+  - apply orb_true_iff in H. destruct H as [H|H].
+    + rewrite (IHe1 _ H). reflexivity.
+    + rewrite (IHe2 _ H). destruct (changes P w d env e1); reflexivity.
+  - destruct (symbolic_truth P T N k s r env f) as [[]|] eqn:E; try discriminate. apply (symbolic_truth_ok w s d r D R) in E.
+    destruct (truth P w d env f) as [[]|]; [apply IHe, H|exfalso; apply E; reflexivity|reflexivity].
+  - induction (objects P type) as [|o os IH]; [discriminate|]. cbn [existsb fold_right] in *. apply orb_true_iff in H. destruct H as [H|H].
+    + rewrite (IHe _ H). reflexivity.
+    + rewrite (IH H). destruct (changes P w d (env ++ [o]) e); reflexivity.
+Qed.
 Lemma symbolic_happening_ok : forall w s d r t env f e w', Describes w0 w s -> agrees w0 d r -> happening P w d env f e = Some w' ->
   match symbolic_happening P T N k s r t env f e with Never => False | Unclear => True | After s' t' => t' = t /\ Describes w0 w' s' end.
 Proof.
@@ -255,6 +270,7 @@ Proof.
   destruct (changes P w d env e) as [cs|] eqn:C; [|discriminate]. destruct (updates w cs (changed_fluents cs)) as [l|] eqn:U; [|discriminate].
   injection H as <-. unfold symbolic_happening. destruct (symbolic_truth P T N k s r env f) as [[]|] eqn:E3.
   2: { apply (symbolic_truth_ok w s d r D R) in E3. apply E3. exact E. }
+  all: destruct (needs_undefined P T N k s r env e) eqn:NU; [rewrite (needs_undefined_ok w s d r D R e env NU) in C; discriminate C|].
   all: destruct (symbolic_changes P T N k s r env e) as [ss|] eqn:C3; [|exact I];
     pose proof (symbolic_changes_ok w s d r D R e env cs ss C C3) as F; rewrite (targets_same _ _ F) in U;
     destruct (symbolic_updates P N s ss (symbolic_changed_fluents ss)) as [m|] eqn:U3; [|exact I]; split; [reflexivity|]; split; cbn [holds_in value_in new_truths new_values].

@@ -2447,6 +2447,27 @@ type outcome =
 | Unclear
 | After of symbolic * q
 
+(** val needs_undefined :
+    problem -> task -> names -> knowledge -> symbolic -> result -> key1 list
+    -> effect -> bool **)
+
+let rec needs_undefined p t0 n k s d env = function
+| Change (_, _, _, x) ->
+  (match symbolic_expression p n s d env x with
+   | Undefined -> true
+   | _ -> false)
+| Both (a, b) ->
+  (||) (needs_undefined p t0 n k s d env a)
+    (needs_undefined p t0 n k s d env b)
+| When (f, a) ->
+  (match symbolic_truth p t0 n k s d env f with
+   | Some b -> if b then needs_undefined p t0 n k s d env a else false
+   | None -> false)
+| Each (t1, a) ->
+  existsb (fun o -> needs_undefined p t0 n k s d (app env (o :: [])) a)
+    (p.objects t1)
+| _ -> false
+
 (** val symbolic_happening :
     problem -> task -> names -> knowledge -> symbolic -> result -> q -> key1
     list -> formula -> effect -> outcome **)
@@ -2455,7 +2476,24 @@ let symbolic_happening p t0 n k s d time env f e =
   match symbolic_truth p t0 n k s d env f with
   | Some b ->
     if b
-    then (match symbolic_changes p t0 n k s d env e with
+    then if needs_undefined p t0 n k s d env e
+         then Never
+         else (match symbolic_changes p t0 n k s d env e with
+               | Some cs ->
+                 (match symbolic_updates p n s cs
+                          (symbolic_changed_fluents cs) with
+                  | Some l ->
+                    After ({ new_truths =
+                      (app (atoms_set_to cs true)
+                        (app (atoms_set_to cs false) s.new_truths));
+                      new_values = (app l s.new_values) }, time)
+                  | None -> Unclear)
+               | None -> Unclear)
+    else Never
+  | None ->
+    if needs_undefined p t0 n k s d env e
+    then Never
+    else (match symbolic_changes p t0 n k s d env e with
           | Some cs ->
             (match symbolic_updates p n s cs (symbolic_changed_fluents cs) with
              | Some l ->
@@ -2465,18 +2503,6 @@ let symbolic_happening p t0 n k s d time env f e =
                  (app l s.new_values) }, time)
              | None -> Unclear)
           | None -> Unclear)
-    else Never
-  | None ->
-    (match symbolic_changes p t0 n k s d env e with
-     | Some cs ->
-       (match symbolic_updates p n s cs (symbolic_changed_fluents cs) with
-        | Some l ->
-          After ({ new_truths =
-            (app (atoms_set_to cs true)
-              (app (atoms_set_to cs false) s.new_truths)); new_values =
-            (app l s.new_values) }, time)
-        | None -> Unclear)
-     | None -> Unclear)
 
 (** val symbolic_duration :
     problem -> names -> action -> key1 list -> result **)

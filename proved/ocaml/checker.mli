@@ -827,6 +827,10 @@ type outcome =
 | Unclear
 | After of symbolic * q
 
+val needs_undefined :
+  problem -> task -> names -> knowledge -> symbolic -> result -> key1 list ->
+  effect -> bool
+
 val symbolic_happening :
   problem -> task -> names -> knowledge -> symbolic -> result -> q -> key1
   list -> formula -> effect -> outcome
