@@ -31,6 +31,7 @@ Record names := Names {
   fact_of : atom_map (key * Z); number_of : atom_map key;
   changing : key -> bool;                          (* predicates and functions that actions change *)
   may_hold : atom_map unit;                        (* atoms of changing predicates that may hold in some state *)
+  exclusive : list (list atom);                    (* groups of atoms of which at most one holds *)
   scale : positive;                                (* number = fluent times scale *)
   cost_scale : positive }.
 Inductive case_tree :=
@@ -49,10 +50,17 @@ Record knowledge := Knowledge { literals : list (atom * bool); bounds : list (bo
 Definition in_variable (k : knowledge) (v : key) : list (Z * bool) :=
   flat_map (fun l => match find_atom (fact_of N) (fst l) with
                      | Some (u, x) => if Pos.eqb u v then [(x, snd l)] else [] | None => [] end) (literals k).
+Definition in_group (a : atom) (g : list atom) : bool := existsb (atom_eqb a) g.
+(* Returns [true] if another atom of a group of [a] holds. *)
+Definition excluded_by (k : knowledge) (a : atom) : bool :=
+  existsb (fun g => in_group a g &&
+    existsb (fun l => snd l && negb (atom_eqb (fst l) a) && in_group (fst l) g) (literals k)) (exclusive N).
 (* The values that a variable may have. *)
 Definition possible (k : knowledge) (v : key) : list Z :=
   let known := in_variable k v in
-  filter (fun y => forallb (fun xb => Bool.eqb (Z.eqb y (fst xb)) (snd xb)) known)
+  let atoms := match M.find v (variables N) with Some vals => vals | None => [] end in
+  filter (fun y => forallb (fun xb => Bool.eqb (Z.eqb y (fst xb)) (snd xb)) known &&
+                   negb (existsb (fun xa => Z.eqb y (fst xa) && excluded_by k (snd xa)) atoms))
          (match List.find snd known with Some (x, _) => [x] | None => range (get (domain_size T) v) end).
 Definition known_fact (k : knowledge) (v : key) (x : Z) : option bool :=
   match M.find v (variables N) with
@@ -64,7 +72,7 @@ Definition base_truth (k : knowledge) (a : atom) : option bool :=
   if negb (changing N (fst a)) then Some (holds_in (initial P) a)
   else match assoc a (literals k) with
        | Some b => Some b
-       | None => if negb (mem (may_hold N) a) then Some false
+       | None => if excluded_by k a || negb (mem (may_hold N) a) then Some false
                  else match find_atom (fact_of N) a with Some (v, x) => known_fact k v x | None => None end
        end.
 (* A state in terms of the one before the step: atoms and fluents that have changed. *)
@@ -223,6 +231,7 @@ Definition gathered (a : action) (env : list key) : knowledge :=
   end.
 Definition impossible (k : knowledge) : bool :=
   existsb (fun l => match base_truth (Knowledge [] (bounds k)) (fst l) with Some b => negb (Bool.eqb b (snd l)) | None => false end
+                    || snd l && excluded_by k (fst l)
                     || match find_atom (fact_of N) (fst l) with
                        | Some (v, _) => match possible k v with [] => true | _ => false end
                        | None => false end) (literals k)
@@ -307,13 +316,18 @@ Definition simulated (k : knowledge) (s : symbolic) (time : Q) (o : option (oper
       | None => false
       end
   end.
+(* At most one atom of a group holds after the step. *)
+Definition stays_exclusive (k : knowledge) (s : symbolic) (g : list atom) : bool :=
+  forallb (fun a => match assoc a (new_truths s) with
+                    | Some true => forallb (fun b => atom_eqb a b || is_false (symbolic_atom k s b)) g
+                    | _ => true end) g.
 Definition leaf_ok (k : knowledge) (a : action) (env : list key) (o : option (operator * choice)) : bool :=
   match symbolic_step k a env with
   | Never => true
   | Unclear => false
   | After s time =>
       forallb (fun l => match assoc (fst l) (new_truths s) with Some true => mem (may_hold N) (fst l) | _ => true end) (new_truths s) &&
-      simulated k s time o
+      forallb (stays_exclusive k s) (exclusive N) && simulated k s time o
   end.
 Fixpoint tree_ok (leaf : knowledge -> option (nat * choice) -> bool) (k : knowledge) (t : case_tree) : bool :=
   match t with
@@ -373,7 +387,9 @@ Definition faithful : bool :=
      match value_in (initial P) f with Some q => Qeq_bool (q * scaled) (inject_Z (num_value (init T) n)) | None => false end &&
      match find_atom (number_of N) f with Some m => Pos.eqb m n | None => false end) (M.elements (fluents N)) &&
   tree_ok goal_leaf (conjuncts unchanged Undefined [] (goal_formula P)) goal_case &&
-  forallb (fun ia => action_ok (fst ia) (snd ia)) (combine (seq 0 (length (actions P))) (actions P)).
+  forallb (fun ia => action_ok (fst ia) (snd ia)) (combine (seq 0 (length (actions P))) (actions P)) &&
+  forallb (fun g => forallb (fun a => negb (holds_in (initial P) a) ||
+    forallb (fun b => atom_eqb a b || negb (holds_in (initial P) b)) g) g) (exclusive N).
 End Faithful.
 
 Definition is_linear (P : problem) (N : names) : bool :=

@@ -15,6 +15,7 @@ Record Rel (w : world) (s : state) : Prop := {
   r_fact : forall p os, changing N p = false -> holds_in w (p, os) = holds_in (initial P) (p, os);
   r_value : forall f, changing N (fst f) = false -> value_in w f = value_in (initial P) f;
   r_may : forall a, changing N (fst a) = true -> holds_in w a = true -> mem (may_hold N) a = true;
+  r_exclusive : forall g a b, In g (exclusive N) -> In a g -> In b g -> holds_in w a = true -> holds_in w b = true -> a = b;
   r_wf : wf T s }.
 
 Lemma parts :
@@ -27,7 +28,7 @@ Lemma parts :
   tree_ok P T N (goal_leaf P T N) (conjuncts P N unchanged Undefined [] (goal_formula P)) goal_case = true /\
   (forall i a, nth_error (actions P) i = Some a -> action_ok P T N case i a = true).
 Proof.
-  unfold faithful in ok. rewrite !andb_true_iff in ok. destruct ok as [[[[[H1 H2] H3] H4] H5] H6].
+  unfold faithful in ok. rewrite !andb_true_iff in ok. destruct ok as [[[[[[H1 H2] H3] H4] H5] H6] _].
   rewrite forallb_forall in H1, H2, H3, H4, H6. split; [|split; [|split; [|split; [|split]]]].
   - intros a C H. simpl in H. destruct (find_atom (initial_atoms P) a) as [u|] eqn:F; [|discriminate]. apply find_entries in F.
     specialize (H1 _ F). cbn [fst] in H1. rewrite C in H1. exact H1.
@@ -51,6 +52,14 @@ Proof.
     apply (G _ 0%nat _ _ Hn).
 Qed.
 
+Lemma exclusive_at_first : forall g a b, In g (exclusive N) -> In a g -> In b g ->
+  holds_in (initial P) a = true -> holds_in (initial P) b = true -> a = b.
+Proof.
+  intros g a b G A B Ha Hb. unfold faithful in ok. rewrite !andb_true_iff in ok. destruct ok as [_ H].
+  rewrite forallb_forall in H. specialize (H _ G). rewrite forallb_forall in H. specialize (H _ A). rewrite Ha in H. cbn [negb orb] in H.
+  rewrite forallb_forall in H. specialize (H _ B). rewrite Hb in H. rewrite orb_false_r in H. apply atom_eqb_eq, H.
+Qed.
+
 Section State.
 Variables (w : world) (s : state).
 Hypothesis R : Rel w s.
@@ -70,13 +79,26 @@ Proof.
   injection J as -> ->. subst u. destruct parts as [_ [_ [A _]]]. destruct (A _ _ _ F) as [vals [F1 F2]].
   rewrite <- (r_var _ _ R _ _ _ _ F1 F2). apply K, I.
 Qed.
+Lemma excluded_by_ok : forall a, excluded_by N k a = true -> holds_in w a = false.
+Proof.
+  intros a H. unfold excluded_by, in_group in H. apply existsb_exists in H. destruct H as [g [G H]]. apply andb_true_iff in H. destruct H as [A H].
+  apply existsb_exists in A. destruct A as [a' [A E]]. apply atom_eqb_eq in E. subst a'.
+  apply existsb_exists in H. destruct H as [[b c] [I H]]. cbn [fst snd] in H. rewrite !andb_true_iff in H. destruct H as [[C Ne] B]. subst c.
+  apply existsb_exists in B. destruct B as [b' [B E]]. apply atom_eqb_eq in E. subst b'.
+  destruct (holds_in w a) eqn:Ha; [|reflexivity]. pose proof (r_exclusive _ _ R g b a G B A (proj1 K _ _ I) Ha) as E. subst b.
+  rewrite (proj2 (atom_eqb_eq a a) eq_refl) in Ne. discriminate.
+Qed.
 Lemma possible_ok : forall v vals, M.find v (variables N) = Some vals -> In (var_value s v) (possible T N k v).
 Proof.
   intros v vals F. unfold possible. apply filter_In. split.
   - destruct (List.find snd (in_variable N k v)) as [[x b]|] eqn:E.
     + apply find_some in E. destruct E as [I E]. simpl in E. subst b. apply in_variable_ok in I. apply Z.eqb_eq in I. left. symmetry. exact I.
     + apply range_In, (r_wf _ _ R). destruct parts as [_ [A _]]. apply (A _ _ F).
-  - apply forallb_forall. intros [x b] I. apply in_variable_ok in I. cbn [fst snd]. rewrite I. apply eqb_reflx.
+  - apply andb_true_iff. split.
+    + apply forallb_forall. intros [x b] I. apply in_variable_ok in I. cbn [fst snd]. rewrite I. apply eqb_reflx.
+    + rewrite F. apply negb_true_iff. destruct (existsb _ vals) eqn:E; [|reflexivity]. exfalso. apply existsb_exists in E.
+      destruct E as [[x a] [I E]]. cbn [fst snd] in E. apply andb_true_iff in E. destruct E as [E1 E2]. apply excluded_by_ok in E2.
+      rewrite (r_var _ _ R _ _ _ _ F I), E1 in E2. discriminate.
 Qed.
 Lemma known_fact_ok : forall v x b, known_fact T N k v x = Some b -> (exists vals, M.find v (variables N) = Some vals) /\ Z.eqb (var_value s v) x = b.
 Proof.
@@ -92,6 +114,7 @@ Proof.
   2: { destruct a as [p os]. rewrite (r_fact _ _ R) by exact C. congruence. }
   destruct (assoc a (literals k)) as [c|] eqn:E.
   { apply assoc_In in E. rewrite (proj1 K _ _ E). congruence. }
+  destruct (excluded_by N k a) eqn:Ex; cbn [orb] in H; [injection H as <-; apply excluded_by_ok, Ex|].
   destruct (mem (may_hold N) a) eqn:M; cbn [negb] in H.
   - destruct (find_atom (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. apply known_fact_ok in H. destruct H as [_ H].
     destruct parts as [_ [_ [A _]]]. destruct (A _ _ _ F) as [vals [F1 F2]]. rewrite (r_var _ _ R _ _ _ _ F1 F2). exact H.
@@ -99,31 +122,26 @@ Proof.
 Qed.
 Lemma static_value : forall f, changing N (fst f) = false -> value_in w f = value_in (initial P) f.
 Proof. apply (r_value _ _ R). Qed.
-Lemma impossible_ok : impossible P T N k = true -> False.
+End Known.
+Lemma impossible_ok : forall k, Knows w k -> impossible P T N k = true -> False.
 Proof.
-  intro H. unfold impossible in H. apply orb_true_iff in H. destruct H as [H|H].
-  - apply existsb_exists in H. destruct H as [[a b] [I H]]. cbn [fst snd] in H. apply orb_true_iff in H. destruct H as [H|H].
+  intros k K H. unfold impossible in H. apply orb_true_iff in H. destruct H as [H|H].
+  - apply existsb_exists in H. destruct H as [[a b] [I H]]. cbn [fst snd] in H. rewrite !orb_true_iff in H. destruct H as [[H|H]|H].
+    2: { apply andb_true_iff in H. destruct H as [-> H]. apply (excluded_by_ok k K) in H. rewrite (proj1 K _ _ I) in H. discriminate. }
     + destruct (base_truth P T N (Knowledge [] (bounds k)) a) as [c|] eqn:E; [|discriminate].
-      assert (E' : holds_in w a = c).
-      { destruct (changing N (fst a)) eqn:C; unfold base_truth in E; rewrite C in E; cbn [negb literals assoc] in E.
-        2: { destruct a as [p os]. rewrite (r_fact _ _ R) by exact C. congruence. }
-        destruct (mem (may_hold N) a) eqn:M; cbn [negb] in E.
-        - destruct (find_atom (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. unfold known_fact in E. cbv zeta in E.
-          destruct parts as [_ [_ [A _]]]. destruct (A _ _ _ F) as [vals [F1 F2]]. rewrite F1 in E. rewrite (r_var _ _ R _ _ _ _ F1 F2).
-          assert (In_ : In (var_value s v) (possible T N (Knowledge [] (bounds k)) v)).
-          { unfold possible. apply filter_In. split; [|reflexivity]. simpl. apply range_In, (r_wf _ _ R). destruct parts as [_ [B _]]. apply (B _ _ F1). }
-          destruct (forallb (Z.eqb x) _) eqn:Y1.
-          + injection E as <-. rewrite forallb_forall in Y1. rewrite Z.eqb_sym. apply Y1, In_.
-          + destruct (forallb (fun y => negb (Z.eqb x y)) _) eqn:Y; [|discriminate]. injection E as <-. rewrite forallb_forall in Y. specialize (Y _ In_). apply negb_true_iff in Y. rewrite Z.eqb_sym. exact Y.
-        - injection E as <-. destruct (holds_in w a) eqn:E2; [|reflexivity]. rewrite (r_may _ _ R a C E2) in M. discriminate. }
+      assert (K0 : Knows w (Knowledge [] (bounds k))) by (split; [intros ? ? []|apply K]).
+      apply (base_truth_ok _ K0) in E. rename E into E'.
       rewrite (proj1 K _ _ I) in E'. subst c. rewrite eqb_reflx in H. discriminate.
     + destruct (find_atom (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. destruct parts as [_ [_ [A _]]]. destruct (A _ _ _ F) as [vals [F1 _]].
-      pose proof (possible_ok _ _ F1) as Q. destruct (possible T N k v); [destruct Q|discriminate].
+      pose proof (possible_ok k K _ _ F1) as Q. destruct (possible T N k v); [destruct Q|discriminate].
   - apply existsb_exists in H. destruct H as [[st f] [I H]]. cbn [fst snd] in H. pose proof (proj2 K _ _ I) as B.
     destruct f as [[|] c]; [|discriminate]. destruct st; rewrite ev_empty in B; [apply Qle_bool_iff in H|apply less_spec in H]; lra.
 Qed.
 
 (* Operators *)
+Section Operators.
+Variable k : knowledge.
+Hypothesis K : Knows w k.
 Lemma factors_ok : forall l g, factors_of N l = Some g -> forall a : Z, ev w g * scaled N + inject_Z a
   == inject_Z (fold_left (fun a t => (a + num_value ds (fst t) * snd t)%Z) l a).
 Proof.
@@ -150,14 +168,14 @@ Qed.
 Lemma known_literal_ok : forall l b, known_literal T N k l = Some b -> is_literal ds l = b.
 Proof.
   intros [[v x] t] b H. unfold known_literal in H. cbn [fst snd] in H. destruct (known_fact T N k v x) as [c|] eqn:F; [|discriminate]. injection H as <-.
-  apply known_fact_ok in F. destruct F as [[vals F] E]. unfold is_literal, is_fact. cbn [fst snd]. rewrite (d_val _ _ F), E. reflexivity.
+  apply (known_fact_ok k K) in F. destruct F as [[vals F] E]. unfold is_literal, is_fact. cbn [fst snd]. rewrite (d_val _ _ F), E. reflexivity.
 Qed.
 Lemma known_condition_ok : forall c szs ch, known_condition T N k c szs ch = true -> holds c ds szs ch = true.
 Proof.
   intros c szs ch H. unfold known_condition in H. rewrite !andb_true_iff in H. destruct H as [[H1 H2] H3]. rewrite forallb_forall in H1, H2, H3.
   unfold holds, holds_facts. rewrite !andb_true_iff. split; [split|]; apply forallb_forall.
   - intros [v x] I. specialize (H1 _ I). cbn [fst snd] in H1. destruct (known_fact T N k v x) as [[]|] eqn:F; try discriminate.
-    apply known_fact_ok in F. destruct F as [[vals F] E]. unfold is_fact. cbn [fst snd]. rewrite (d_val _ _ F). exact E.
+    apply (known_fact_ok k K) in F. destruct F as [[vals F] E]. unfold is_fact. cbn [fst snd]. rewrite (d_val _ _ F). exact E.
   - intros cl I. specialize (H2 _ I). apply existsb_exists in H2. destruct H2 as [l [J E]]. apply existsb_exists. exists l. split; [exact J|].
     destruct (known_literal T N k l) as [[]|] eqn:F; try discriminate. apply known_literal_ok, F.
   - intros l I. specialize (H3 _ I). destruct (form_of N l szs ch) as [g|] eqn:F; [|discriminate]. apply Z.leb_le. eapply required_ok; eassumption.
@@ -194,12 +212,13 @@ Lemma simulated_ok : forall sy time o w', Describes w w' sy ->
   (forall p os, changing N p = false -> holds_in w' (p, os) = holds_in w (p, os)) ->
   (forall f, changing N (fst f) = false -> value_in w' f = value_in w f) ->
   forallb (fun l => match assoc (fst l) (new_truths sy) with Some true => mem (may_hold N) (fst l) | _ => true end) (new_truths sy) = true ->
+  forallb (stays_exclusive P T N k sy) (exclusive N) = true ->
   match o with Some (o, _) => In o (operators T) | None => True end ->
   simulated P T N k sy time o = true ->
   Rel w' (after_of o) /\ match o with Some (o, ch) => admitted o ch /\ holds (precondition o) ds (slot_sizes o) ch = true | None => True end /\
   exists g, growth P N sy time = Some g /\ inject_Z (step_cost o) <= g * (Zpos (cost_scale N) # 1).
 Proof.
-  intros sy time o w' D Sf Sv May Io H. unfold simulated in H.
+  intros sy time o w' D Sf Sv May Excl Io H. unfold simulated in H.
   match type of H with match ?e with None => _ | Some _ => _ end = _ => destruct e as [made|] eqn:E end; [|discriminate].
   rewrite !andb_true_iff in H. destruct H as [[H1 H2] H3]. rewrite forallb_forall in H1, H2.
   assert (Pre : match o with Some (o, ch) => admitted o ch /\ holds (precondition o) ds (slot_sizes o) ch = true /\ distinct (map fst (number_effects o)) = true /\ made = made_facts o ds
@@ -222,7 +241,7 @@ Proof.
           + destruct (assoc a (new_truths sy)) as [b|] eqn:A; [|reflexivity]. exfalso. apply J, in_or_app. right. apply in_flat_map.
             exists (a, b). split; [apply assoc_In, A|]. cbn [fst]. destruct parts as [_ [B _]]. destruct (B _ _ F) as [_ B']. destruct (B' _ _ I) as [_ B'']. rewrite B''. left. reflexivity. }
       rewrite (Val _ _ F). destruct Q as [Q|[Q1 Q2]].
-      * unfold variable_ok in Q. rewrite F in Q. rewrite forallb_forall in Q. specialize (Q _ (possible_ok _ _ F)). cbv zeta in Q.
+      * unfold variable_ok in Q. rewrite F in Q. rewrite forallb_forall in Q. specialize (Q _ (possible_ok k K _ _ F)). cbv zeta in Q.
         rewrite forallb_forall in Q. specialize (Q _ I). cbn [fst snd] in Q. apply eqb_prop in Q. rewrite <- Q.
         destruct (assoc a (new_truths sy)); [reflexivity|]. apply (r_var _ _ R _ _ _ _ F I).
       * rewrite Q1, Q2. apply (r_var _ _ R _ _ _ _ F I).
@@ -261,11 +280,23 @@ Proof.
     + intros f C. rewrite Sv by exact C. apply (r_value _ _ R), C.
     + intros a C Ha. rewrite (d_fact _ _ _ D) in Ha. destruct (assoc a (new_truths sy)) as [b|] eqn:A; [|apply (r_may _ _ R); assumption].
       subst b. rewrite forallb_forall in May. specialize (May _ (assoc_In _ _ _ _ A)). cbn [fst] in May. rewrite A in May. exact May.
+    + intros g a b G A B Ha Hb. rewrite forallb_forall in Excl. specialize (Excl _ G). unfold stays_exclusive in Excl. rewrite forallb_forall in Excl.
+      assert (One : forall x y, In x g -> In y g -> assoc x (new_truths sy) = Some true -> holds_in w' y = true -> x = y).
+      { intros x y X Y Et Hy. specialize (Excl _ X). rewrite Et in Excl. rewrite forallb_forall in Excl. specialize (Excl _ Y).
+        apply orb_true_iff in Excl. destruct Excl as [Eq|F]; [apply atom_eqb_eq, Eq|]. exfalso.
+        destruct (symbolic_atom P T N k sy y) as [[]|] eqn:Sy; try discriminate.
+        apply (symbolic_atom_ok P T N w k (base_truth_ok k K) w' sy y false D) in Sy. congruence. }
+      pose proof (d_fact _ _ _ D a) as Da. pose proof (d_fact _ _ _ D b) as Db.
+      destruct (assoc a (new_truths sy)) as [ta|] eqn:Ea.
+      * rewrite Da in Ha. subst ta. apply (One a b); assumption.
+      * destruct (assoc b (new_truths sy)) as [tb|] eqn:Eb.
+        -- rewrite Db in Hb. subst tb. symmetry. apply (One b a); assumption.
+        -- apply (r_exclusive _ _ R g); congruence.
     + destruct o as [[o ch]|]; [|apply R]. apply wf_apply; [exact task_ok|exact Io|]. apply wf_derive; [apply heads|apply deriveds|apply R]; exact task_ok.
   - destruct o as [[o ch]|]; [|exact I]. tauto.
   - destruct (growth P N sy time) as [g|]; [|discriminate]. exists g. split; [reflexivity|]. apply Qle_bool_iff, H3.
 Qed.
-End Known.
+End Operators.
 
 (* Knowledge from conditions that hold *)
 Lemma knows_join : forall a b, Knows w a -> Knows w b -> Knows w (join a b).
@@ -471,6 +502,7 @@ Proof.
   destruct parts as [A1 [A2 [_ [A4 _]]]]. split; auto.
   - intros v vals x a F I. destruct (A2 _ _ F) as [_ B]. apply B, I.
   - intros n f F. apply A4, F.
+  - apply exclusive_at_first.
   - apply wf_init; exact task_ok.
 Qed.
 Lemma simulation : forall steps w s spent w' spent', execute P true w spent steps = Some (w', spent') -> Rel w s ->
@@ -501,8 +533,8 @@ Proof.
         destruct (nth_error (operators T) j) as [o|] eqn:Nj; [|discriminate]. exists (Some (o, ch)). split; [eapply nth_error_In, Nj|exact L]. }
       clear L. destruct L' as [o' [Io L]]. unfold leaf_ok in L.
       pose proof (symbolic_step_ok P T N w k (base_truth_ok w s R k K) (static_value w s R) K a env w1 d S) as Q.
-      destruct (symbolic_step P T N k a env) as [| |sy t]; [destruct Q|discriminate|]. destruct Q as [Q D]. apply andb_true_iff in L. destruct L as [L1 L2].
-      destruct (simulated_ok w s R k K sy t o' w1 D K1 K2 L1 Io L2) as [R1 [Ad G]]. exists o', sy, t. tauto. }
+      destruct (symbolic_step P T N k a env) as [| |sy t]; [destruct Q|discriminate|]. destruct Q as [Q D]. rewrite !andb_true_iff in L. destruct L as [[L1 LX] L2].
+      destruct (simulated_ok w s R k K sy t o' w1 D K1 K2 L1 LX Io L2) as [R1 [Ad G]]. exists o', sy, t. tauto. }
     destruct Go as [o [sy [t [Io [R1 [Ad [D [Td [g [Gr Co]]]]]]]]]].
     destruct (IH _ _ _ _ _ H R1) as [ps [c [Pl [Le End]]]].
     assert (M : g == measure w1 - measure w + per_time P * d + per_step P).

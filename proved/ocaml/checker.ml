@@ -2136,7 +2136,8 @@ let plus_result a c b =
 type names = { variables : (z * atom) list M.t; fluents : atom M.t;
                fact_of : (key1 * z) atom_map; number_of : key1 atom_map;
                changing : (key1 -> bool); may_hold : unit atom_map;
-               scale : positive; cost_scale : positive }
+               exclusive : atom list list; scale : positive;
+               cost_scale : positive }
 
 type case_tree =
 | Decided of (nat * choice) option
@@ -2162,11 +2163,33 @@ let in_variable n k v =
       let (u, x) = p in if Coq_Pos.eqb u v then (x, (snd l)) :: [] else []
     | None -> []) k.literals
 
+(** val in_group : atom -> atom list -> bool **)
+
+let in_group a g =
+  existsb (atom_eqb a) g
+
+(** val excluded_by : names -> knowledge -> atom -> bool **)
+
+let excluded_by n k a =
+  existsb (fun g ->
+    (&&) (in_group a g)
+      (existsb (fun l ->
+        (&&) ((&&) (snd l) (negb (atom_eqb (fst l) a))) (in_group (fst l) g))
+        k.literals)) n.exclusive
+
 (** val possible : task -> names -> knowledge -> key1 -> z list **)
 
 let possible t0 n k v =
   let known = in_variable n k v in
-  filter (fun y -> forallb (fun xb -> eqb (Z.eqb y (fst xb)) (snd xb)) known)
+  let atoms = match M.find v n.variables with
+              | Some vals -> vals
+              | None -> []
+  in
+  filter (fun y ->
+    (&&) (forallb (fun xb -> eqb (Z.eqb y (fst xb)) (snd xb)) known)
+      (negb
+        (existsb (fun xa ->
+          (&&) (Z.eqb y (fst xa)) (excluded_by n k (snd xa))) atoms)))
     (match find snd known with
      | Some p -> let (x, _) = p in x :: []
      | None -> range (get t0.domain_size v))
@@ -2192,7 +2215,7 @@ let base_truth p t0 n k a =
   else (match assoc a k.literals with
         | Some b -> Some b
         | None ->
-          if negb (mem0 n.may_hold a)
+          if (||) (excluded_by n k a) (negb (mem0 n.may_hold a))
           then Some false
           else (match find_atom n.fact_of a with
                 | Some p0 -> let (v, x) = p0 in known_fact t0 n k v x
@@ -2616,9 +2639,11 @@ let impossible p t0 n k =
   (||)
     (existsb (fun l ->
       (||)
-        (match base_truth p t0 n { literals = []; bounds = k.bounds } (fst l) with
-         | Some b -> negb (eqb b (snd l))
-         | None -> false)
+        ((||)
+          (match base_truth p t0 n { literals = []; bounds = k.bounds }
+                   (fst l) with
+           | Some b -> negb (eqb b (snd l))
+           | None -> false) ((&&) (snd l) (excluded_by n k (fst l))))
         (match find_atom n.fact_of (fst l) with
          | Some p0 ->
            let (v, _) = p0 in
@@ -2834,6 +2859,19 @@ let simulated p t0 n k s time o =
        | None -> false)
   | None -> false
 
+(** val stays_exclusive :
+    problem -> task -> names -> knowledge -> symbolic -> atom list -> bool **)
+
+let stays_exclusive p t0 n k s g =
+  forallb (fun a ->
+    match assoc a s.new_truths with
+    | Some b ->
+      if b
+      then forallb (fun b0 ->
+             (||) (atom_eqb a b0) (is_false (symbolic_atom p t0 n k s b0))) g
+      else true
+    | None -> true) g
+
 (** val leaf_ok :
     problem -> task -> names -> knowledge -> action -> key1 list ->
     (operator * choice) option -> bool **)
@@ -2844,10 +2882,13 @@ let leaf_ok p t0 n k a env o =
   | Unclear -> false
   | After (s, time) ->
     (&&)
-      (forallb (fun l ->
-        match assoc (fst l) s.new_truths with
-        | Some b -> if b then mem0 n.may_hold (fst l) else true
-        | None -> true) s.new_truths) (simulated p t0 n k s time o)
+      ((&&)
+        (forallb (fun l ->
+          match assoc (fst l) s.new_truths with
+          | Some b -> if b then mem0 n.may_hold (fst l) else true
+          | None -> true) s.new_truths)
+        (forallb (stays_exclusive p t0 n k s) n.exclusive))
+      (simulated p t0 n k s time o)
 
 (** val tree_ok :
     problem -> task -> names -> (knowledge -> (nat * choice) option -> bool)
@@ -2980,45 +3021,52 @@ let faithful p t0 n case goal_case =
       ((&&)
         ((&&)
           ((&&)
+            ((&&)
+              (forallb (fun e ->
+                (||) (negb (n.changing (fst (fst e))))
+                  (mem0 n.may_hold (fst e))) (all_entries p.initial_atoms))
+              (forallb (fun vl ->
+                let (v, vals) = vl in
+                (&&) (is_basic t0 v)
+                  (forallb (fun xa ->
+                    let (x, a) = xa in
+                    (&&)
+                      (eqb ((initial p).holds_in a)
+                        (Z.eqb (var_value t0.init v) x))
+                      (match find_atom n.fact_of a with
+                       | Some p0 ->
+                         let (u, y) = p0 in (&&) (Coq_Pos.eqb u v) (Z.eqb y x)
+                       | None -> false)) vals)) (M.elements n.variables)))
             (forallb (fun e ->
-              (||) (negb (n.changing (fst (fst e)))) (mem0 n.may_hold (fst e)))
-              (all_entries p.initial_atoms))
-            (forallb (fun vl ->
-              let (v, vals) = vl in
-              (&&) (is_basic t0 v)
-                (forallb (fun xa ->
-                  let (x, a) = xa in
-                  (&&)
-                    (eqb ((initial p).holds_in a)
-                      (Z.eqb (var_value t0.init v) x))
-                    (match find_atom n.fact_of a with
-                     | Some p0 ->
-                       let (u, y) = p0 in (&&) (Coq_Pos.eqb u v) (Z.eqb y x)
-                     | None -> false)) vals)) (M.elements n.variables)))
-          (forallb (fun e ->
-            let (a, y) = e in
-            let (v, x) = y in
-            (match M.find v n.variables with
-             | Some vals ->
-               existsb (fun xa ->
-                 (&&) (Z.eqb (fst xa) x) (atom_eqb (snd xa) a)) vals
-             | None -> false)) (all_entries n.fact_of)))
-        (forallb (fun nf ->
-          let (n0, f) = nf in
-          (&&)
-            ((&&) ((&&) (mem_key n0 t0.numbers) (n.changing (fst f)))
-              (match (initial p).value_in f with
-               | Some q0 ->
-                 qeq_bool (qmult q0 (scaled n))
-                   (inject_Z (num_value t0.init n0))
-               | None -> false))
-            (match find_atom n.number_of f with
-             | Some m -> Coq_Pos.eqb m n0
-             | None -> false)) (M.elements n.fluents)))
-      (tree_ok p t0 n (goal_leaf p t0 n)
-        (conjuncts p n unchanged Undefined [] p.goal_formula) goal_case))
-    (forallb (fun ia -> action_ok p t0 n case (fst ia) (snd ia))
-      (combine (seq O (length p.actions)) p.actions))
+              let (a, y) = e in
+              let (v, x) = y in
+              (match M.find v n.variables with
+               | Some vals ->
+                 existsb (fun xa ->
+                   (&&) (Z.eqb (fst xa) x) (atom_eqb (snd xa) a)) vals
+               | None -> false)) (all_entries n.fact_of)))
+          (forallb (fun nf ->
+            let (n0, f) = nf in
+            (&&)
+              ((&&) ((&&) (mem_key n0 t0.numbers) (n.changing (fst f)))
+                (match (initial p).value_in f with
+                 | Some q0 ->
+                   qeq_bool (qmult q0 (scaled n))
+                     (inject_Z (num_value t0.init n0))
+                 | None -> false))
+              (match find_atom n.number_of f with
+               | Some m -> Coq_Pos.eqb m n0
+               | None -> false)) (M.elements n.fluents)))
+        (tree_ok p t0 n (goal_leaf p t0 n)
+          (conjuncts p n unchanged Undefined [] p.goal_formula) goal_case))
+      (forallb (fun ia -> action_ok p t0 n case (fst ia) (snd ia))
+        (combine (seq O (length p.actions)) p.actions)))
+    (forallb (fun g ->
+      forallb (fun a ->
+        (||) (negb ((initial p).holds_in a))
+          (forallb (fun b ->
+            (||) (atom_eqb a b) (negb ((initial p).holds_in b))) g)) g)
+      n.exclusive)
 
 (** val is_linear : problem -> names -> bool **)
 

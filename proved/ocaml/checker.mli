@@ -761,7 +761,8 @@ val plus_result : result -> q -> result -> result
 type names = { variables : (z * atom) list M.t; fluents : atom M.t;
                fact_of : (key1 * z) atom_map; number_of : key1 atom_map;
                changing : (key1 -> bool); may_hold : unit atom_map;
-               scale : positive; cost_scale : positive }
+               exclusive : atom list list; scale : positive;
+               cost_scale : positive }
 
 type case_tree =
 | Decided of (nat * choice) option
@@ -774,6 +775,10 @@ val mem0 : 'a1 atom_map -> atom -> bool
 type knowledge = { literals : (atom * bool) list; bounds : (bool * form) list }
 
 val in_variable : names -> knowledge -> key1 -> (z * bool) list
+
+val in_group : atom -> atom list -> bool
+
+val excluded_by : names -> knowledge -> atom -> bool
 
 val possible : task -> names -> knowledge -> key1 -> z list
 
@@ -887,6 +892,9 @@ val step_cost : (operator * choice) option -> z
 val simulated :
   problem -> task -> names -> knowledge -> symbolic -> q ->
   (operator * choice) option -> bool
+
+val stays_exclusive :
+  problem -> task -> names -> knowledge -> symbolic -> atom list -> bool
 
 val leaf_ok :
   problem -> task -> names -> knowledge -> action -> key1 list ->

@@ -70,7 +70,7 @@ let atom_of name_key = function
 let atom = atom_of predicate_key and fluent = atom_of function_key
 let set insert items = List.fold_left insert C.M.empty items
 let names = function
-  | [variables; fluents; predicates; functions; may_hold; scale; cost_scale] ->
+  | [variables; fluents; predicates; functions; may_hold; exclusive; scale; cost_scale] ->
     let variables = list (pair position (list (pair whole atom))) variables and fluents = list (pair position fluent) fluents in
     let changing = set (fun set key -> C.M.add key () set) (list (fun item -> predicate_key (word item)) predicates
                                                            @ list (fun item -> function_key (word item)) functions) in
@@ -81,6 +81,7 @@ let names = function
       number_of = set (fun map (n, fluent) -> C.add_atom fluent n map) fluents;
       changing = (fun key -> C.M.find key changing <> None);
       may_hold = set (fun map atom -> C.add_atom atom () map) (list atom may_hold);
+      exclusive = list (list atom) exclusive;
       scale = C.Z.to_pos (whole scale); cost_scale = C.Z.to_pos (whole cost_scale) }
   | _ -> reject "names are expected"
 

@@ -129,8 +129,9 @@ let names_text problem task witness =
     Printf.sprintf "(%d %s)\n" i (list (fun (x, atom) -> Printf.sprintf "(%d %s)" x atom) (List.filter (fun (x, _) -> x < last) atoms)) in
   let variables = List.filteri (fun i _ -> i < basic) (List.mapi variable (array (field task "variables"))) in
   let fluents = List.mapi (fun i fluent -> Printf.sprintf "(%d %s)" i (string fluent)) (array (field task "fluents")) in
-  Printf.sprintf "(names %s %s %s %s %s %s %s)\n" (list Fun.id variables) (list Fun.id fluents)
-    (list Fun.id (heads "predicate")) (list Fun.id (heads "function")) (list string (items witness "atoms"))
+  let group item = list string (array item) in
+  Printf.sprintf "(names %s %s %s %s %s %s %s %s)\n" (list Fun.id variables) (list Fun.id fluents)
+    (list Fun.id (heads "predicate")) (list Fun.id (heads "function")) (list string (items witness "atoms")) (list group (items witness "exclusive"))
     (number (field task "number_scale")) (number (field (field task "objective") "scale"))
 
 let integer_text number =
