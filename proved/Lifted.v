@@ -15,7 +15,7 @@ Fixpoint assoc {X} (a : atom) (l : list (atom * X)) : option X :=
 (* Finite maps from atoms: buckets in a search tree. Collisions of [bucket] cost time only. *)
 Definition atom_map X := PositiveMap.t (list (atom * X)).
 Definition bucket (a : atom) : positive :=
-  fold_left (fun h o => Pos.add (xO (xO (xO (xO (xO (xO (xO (xO (xO (xO (xO (xO h)))))))))))) o) (snd a) (fst a).
+  fold_left (fun h o => (h * 4096 + o)%positive) (snd a) (fst a).
 Definition bucket_entries {X} (m : atom_map X) (a : atom) : list (atom * X) :=
   match PositiveMap.find (bucket a) m with Some l => l | None => [] end.
 Definition find_atom {X} (m : atom_map X) (a : atom) : option X := assoc a (bucket_entries m a).
@@ -53,10 +53,12 @@ Record problem := Problem {
   metric : expression;                             (* to be minimized, with *)
   per_time : Q; per_step : Q }.                  (* weights of the total time and of the number of steps *)
 Definition initial (P : problem) : world :=
-  World (fun a => match find_atom (initial_atoms P) a with Some _ => true | None => false end) (find_atom (initial_values P)).
+  World (fun a => match find_atom (initial_atoms P) a with Some _ => true | None => false end)
+        (find_atom (initial_values P)).
 
 (* Terms, expressions, conditions. [None] is undefined. *)
-Definition object_of (env : list key) (t : term) : option key := match t with Var i => nth_error env i | Object o => Some o end.
+Definition object_of (env : list key) (t : term) : option key :=
+  match t with Var i => nth_error env i | Object o => Some o end.
 Fixpoint ground (env : list key) (ts : list term) : option (list key) :=
   match ts with
   | [] => Some []
@@ -77,7 +79,8 @@ Fixpoint eval (w : world) (d : option Q) (env : list key) (e : expression) : opt
                 | None => None end
   end.
 Definition less (x y : Q) : bool := negb (Qle_bool y x).
-Definition and_kleene (a b : option bool) : option bool :=          (* undefined only where the truth depends on it *)
+(* Kleene's conjunction: undefined only where the truth depends on an undefined operand. *)
+Definition and_kleene (a b : option bool) : option bool :=
   match a, b with
   | Some false, _ => Some false | _, Some false => Some false
   | Some true, Some true => Some true | _, _ => None
@@ -88,9 +91,11 @@ Fixpoint truth (w : world) (d : option Q) (env : list key) (f : formula) : optio
   match f with
   | Truth b => Some b
   | Atom p ts => match ground env ts with Some l => Some (holds_in w (p, l)) | None => None end
-  | Same t u => match object_of env t, object_of env u with Some a, Some b => Some (Pos.eqb a b) | _, _ => None end
+  | Same t u => match object_of env t, object_of env u with
+                | Some a, Some b => Some (Pos.eqb a b) | _, _ => None end
   | Compare strict a b => match eval w d env a, eval w d env b with
-                          | Some x, Some y => Some (if strict then less y x else Qle_bool y x) | _, _ => None end
+                          | Some x, Some y => Some (if strict then less y x else Qle_bool y x)
+                          | _, _ => None end
   | Not g => option_map negb (truth w d env g)
   | And g h => and_kleene (truth w d env g) (truth w d env h)
   | Forall t g => fold_right (fun o r => and_kleene (truth w d (env ++ [o]) g) r) (Some true) (objects P t)
@@ -125,7 +130,11 @@ Definition changed_value (old : option Q) (l : list (bool * Q)) : option Q :=
                        else option_map (fun x => fold_left (fun s c => Qred (s + snd c)) l x) old
   end.
 Fixpoint changed_fluents (cs : list change) : list atom :=
-  match cs with [] => [] | Number f _ _ :: r => f :: changed_fluents r | Fact _ _ :: r => changed_fluents r end.
+  match cs with
+  | [] => []
+  | Number f _ _ :: r => f :: changed_fluents r
+  | Fact _ _ :: r => changed_fluents r
+  end.
 Fixpoint updates (w : world) (cs : list change) (fs : list atom) : option (list (atom * Q)) :=
   match fs with
   | [] => Some []
@@ -144,9 +153,8 @@ Definition happening (w : world) (d : option Q) (env : list key) (f : formula) (
   | _, _ => None
   end.
 (* One step: the state after it and its duration. With duration 0, start and end are one happening.
-   The definition forbids that start and end interfere then; [zero] says whether such steps are
-   allowed at all. *)
-Definition step (is_zero_bound : bool) (w : world) (a : action) (env : list key) : option (world * Q) :=
+   The definition forbids that start and end interfere then; [allow_zero] permits such steps. *)
+Definition step (allow_zero : bool) (w : world) (a : action) (env : list key) : option (world * Q) :=
   if negb (Nat.eqb (length env) (length (parameters a)) &&
            forallb (fun x => existsb (Pos.eqb (fst x)) (objects P (snd x))) (combine env (parameters a)))
   then None else
@@ -158,7 +166,7 @@ Definition step (is_zero_bound : bool) (w : world) (a : action) (env : list key)
       | Some d =>
           if less d 0 then None
           else if Qeq_bool d 0 then
-            if is_zero_bound then option_map (fun w => (w, d))
+            if allow_zero then option_map (fun w => (w, d))
               (happening w (Some d) env (And (at_start a) (at_end a)) (Both (start_effect a) (end_effect a)))
             else None
           else match happening w (Some d) env (at_start a) (start_effect a) with
@@ -170,14 +178,15 @@ Definition step (is_zero_bound : bool) (w : world) (a : action) (env : list key)
   end.
 (* A plan names actions by their positions. The goal state in which it ends, with what its steps add
    to the metric. *)
-Fixpoint execute (is_zero_bound : bool) (w : world) (spent : Q) (plan : list (nat * list key)) : option (world * Q) :=
+Fixpoint execute (allow_zero : bool) (w : world) (spent : Q) (plan : list (nat * list key))
+    : option (world * Q) :=
   match plan with
   | [] => match truth w None [] (goal_formula P) with Some true => Some (w, spent) | _ => None end
   | (i, env) :: r =>
       match nth_error (actions P) i with
       | None => None
-      | Some a => match step is_zero_bound w a env with
-                  | Some (w', d) => execute is_zero_bound w' (Qred (spent + per_time P * d + per_step P)) r
+      | Some a => match step allow_zero w a env with
+                  | Some (w', d) => execute allow_zero w' (Qred (spent + per_time P * d + per_step P)) r
                   | None => None
                   end
       end
@@ -190,7 +199,9 @@ Definition final_metric (P : problem) (w : world) (spent : Q) : option Q :=
 Definition is_optimal (P : problem) (plan : list (nat * list key)) (claim : option Q) : Prop :=
   match claim with
   | Some m =>
-      (exists w spent m', execute P false (initial P) 0 plan = Some (w, spent) /\ final_metric P w spent = Some m' /\ m' == m) /\
-      forall other w spent m', execute P true (initial P) 0 other = Some (w, spent) -> final_metric P w spent = Some m' -> m <= m'
+      (exists w spent m', execute P false (initial P) 0 plan = Some (w, spent)
+         /\ final_metric P w spent = Some m' /\ m' == m) /\
+      forall other w spent m', execute P true (initial P) 0 other = Some (w, spent) ->
+         final_metric P w spent = Some m' -> m <= m'
   | None => forall other, execute P true (initial P) 0 other = None
   end.

@@ -100,9 +100,11 @@ Proof.
   - intros f F e. rewrite forallb_forall in derived_derived. apply derived_derived in F.
     rewrite e, H in F. discriminate.
 Qed.
-Lemma reset_num : forall s n, num_value (reset_derived T s) n = if mem_key n (numbers T) then num_value s n else 0.
+Lemma reset_num : forall s n, num_value (reset_derived T s) n = if mem_key n (numbers T)
+  then num_value s n else 0.
 Proof.
-  intros. unfold reset_derived, num_value at 1. simpl. rewrite get_puts, (last_put_copy (num_value s)). unfold get.
+  intros. unfold reset_derived, num_value at 1. simpl. rewrite get_puts, (last_put_copy (num_value s)).
+  unfold get.
   rewrite M.gempty. reflexivity.
 Qed.
 Lemma layer_num : forall fuel rules s n, num_value (evaluate_layer fuel rules s) n = num_value s n.
@@ -110,7 +112,8 @@ Proof.
   induction fuel; intros; simpl; [reflexivity|]. destruct (new_facts rules s); [reflexivity|].
   rewrite IHfuel. reflexivity.
 Qed.
-Lemma layer_val : forall rules, forallb (fun r : fact * condition => negb (is_basic T (fst (fst r)))) rules = true ->
+Lemma layer_val : forall rules, forallb (fun r : fact * condition =>
+  negb (is_basic T (fst (fst r)))) rules = true ->
   forall fuel s v, bas v -> var_value (evaluate_layer fuel rules s) v = var_value s v.
 Proof.
   intros rules R. induction fuel; intros s v B; cbn [evaluate_layer]; [reflexivity|].
@@ -130,7 +133,8 @@ Proof.
 Qed.
 Lemma derive_num : forall s n, num_value (derive T s) n = if mem_key n (numbers T) then num_value s n else 0.
 Proof.
-  intros s n. unfold derive. rewrite <- reset_num. generalize (reset_derived T s) as t. generalize (layers T) as ls.
+  intros s n. unfold derive. rewrite <- reset_num. generalize (reset_derived T s) as t.
+  generalize (layers T) as ls.
   induction ls as [|l ls IH]; intros t; cbn [fold_left]; [reflexivity|]. rewrite IH. apply layer_num.
 Qed.
 
@@ -139,7 +143,8 @@ Definition rel (mono : bool) (a b : Z) : Prop := if mono then b <= a else a = b.
 Definition same (mono : bool) (s t : state) : Prop :=
   (forall v, var_value s v = var_value t v) /\ forall n, rel mono (num_value s n) (num_value t n).
 Definition no_worse (mono : bool) (s t : state) : Prop :=
-  (forall v, bas v -> var_value s v = var_value t v) /\ forall n, In n (numbers T) -> rel mono (num_value s n) (num_value t n).
+  (forall v, bas v -> var_value s v = var_value t v) /\ forall n, In n (numbers T) ->
+    rel mono (num_value s n) (num_value t n).
 
 Lemma rel_refl : forall m a, rel m a a.
 Proof. intros [] a; simpl; lia. Qed.
@@ -177,7 +182,8 @@ Definition no_dearer (m : bool) (o : operator) (ch ch' : choice) : Prop :=
   amount (cost o) (slot_sizes o) ch <= amount (cost o) (slot_sizes o) ch' /\
   forall l, In l (comparisons (precondition o) ++ map snd (number_effects o)) ->
     rel m (amount (offset l) (slot_sizes o) ch) (amount (offset l) (slot_sizes o) ch').
-Lemma holds_mono2 : forall m c s t sz ch ch', (m = true -> forallb nonneg (comparisons c) = true) -> same m s t ->
+Lemma holds_mono2 : forall m c s t sz ch ch', (m = true -> forallb nonneg (comparisons c) = true) ->
+  same m s t ->
   (forall l, In l (comparisons c) -> rel m (amount (offset l) sz ch) (amount (offset l) sz ch')) ->
   holds c t sz ch' = true -> holds c s sz ch = true.
 Proof.
@@ -185,7 +191,8 @@ Proof.
   rewrite !andb_true_iff. intros [F C]. split; [exact F|].
   rewrite forallb_forall in C |- *. intros l L. specialize (C l L). apply Z.leb_le in C. apply Z.leb_le.
   assert (Q : rel m (value l s sz ch) (value l t sz ch')).
-  { apply value_rel2; [|exact H|apply D, L]. intro e. specialize (P e). rewrite forallb_forall in P. apply P, L. }
+  { apply value_rel2; [|exact H|apply D, L]. intro e. specialize (P e). rewrite forallb_forall in P.
+    apply P, L. }
   destruct m; simpl in Q; lia.
 Qed.
 Lemma holds_mono : forall m c s t sz ch, (m = true -> forallb nonneg (comparisons c) = true) -> same m s t ->
@@ -200,7 +207,8 @@ Proof.
   - apply forallb_ext. intro l. f_equal. apply (value_rel false); [discriminate|exact H].
 Qed.
 Lemma news_same : forall m rules s t,
-  (m = true -> forall r, In r rules -> comparisons (snd r) = []) -> same m s t -> new_facts rules s = new_facts rules t.
+  (m = true -> forall r, In r rules -> comparisons (snd r) = []) -> same m s t ->
+    new_facts rules s = new_facts rules t.
 Proof.
   intros m rules s t P H. unfold new_facts. f_equal.
   assert (Q : forall r, In r rules -> negb (is_fact s (fst r)) && holds (snd r) s [] []
@@ -217,7 +225,8 @@ Proof.
   apply IHfuel. destruct H as [H1 H2]. split; [|exact H2].
   intro v. unfold var_value. cbn [var_values]. rewrite !get_puts. f_equal. apply H1.
 Qed.
-Lemma derive_same : forall m, (m = true -> forall ls, In ls (layers T) -> forall r, In r ls -> comparisons (snd r) = []) ->
+Lemma derive_same : forall m, (m = true -> forall ls, In ls (layers T) -> forall r, In r ls ->
+  comparisons (snd r) = []) ->
   forall s t, no_worse m s t -> same m (derive T s) (derive T t).
 Proof.
   intros m P s t [H1 H2]. unfold derive.
@@ -231,7 +240,8 @@ Proof.
       rewrite <- (Nat2Pos.id i) in I by lia. lia.
     - intro n. rewrite !reset_num. destruct (mem_key n (numbers T)) eqn:E; [|apply rel_refl].
       apply H2. apply memb_In, E. }
-  revert R. generalize (reset_derived T s) as a. generalize (reset_derived T t) as b. revert P. generalize (layers T) as ls.
+  revert R. generalize (reset_derived T s) as a. generalize (reset_derived T t) as b. revert P.
+  generalize (layers T) as ls.
   induction ls as [|l ls IH]; intros P b a R; cbn [fold_left]; [exact R|].
   apply IH; [intros e l' L; apply P; [exact e|right; exact L]|].
   apply layer_same; [|exact R]. intros e r. apply P; [exact e|left; reflexivity].
@@ -244,8 +254,10 @@ Proof.
   replace (fires s c) with (fires t c); [rewrite IH; reflexivity|].
   unfold fires. apply forallb_ext. intro. symmetry. eapply is_literal_same, H.
 Qed.
-Lemma puts_rel : forall m o s t ch ch', (m = true -> forallb (fun c => nonneg (snd c)) (number_effects o) = true) -> same m s t ->
-  (forall l, In l (map snd (number_effects o)) -> rel m (amount (offset l) (slot_sizes o) ch) (amount (offset l) (slot_sizes o) ch')) ->
+Lemma puts_rel : forall m o s t ch ch', (m = true ->
+  forallb (fun c => nonneg (snd c)) (number_effects o) = true) -> same m s t ->
+  (forall l, In l (map snd (number_effects o)) ->
+    rel m (amount (offset l) (slot_sizes o) ch) (amount (offset l) (slot_sizes o) ch')) ->
   forall n, rel m (num_value (apply o s ch) n) (num_value (apply o t ch') n).
 Proof.
   intros m o s t ch ch' P H D n. unfold apply, num_value. cbn [num_values]. rewrite !get_puts.
@@ -259,23 +271,27 @@ Proof.
   - destruct (Pos.eqb (fst c) n); [|exact Q]. apply value_rel2; [|exact R|apply D; left; reflexivity].
     intro e. specialize (P e). simpl in P. apply andb_true_iff in P. apply P.
 Qed.
-Lemma apply_no_worse : forall m o s t ch ch', (m = true -> forallb (fun c => nonneg (snd c)) (number_effects o) = true) ->
+Lemma apply_no_worse : forall m o s t ch ch', (m = true ->
+  forallb (fun c => nonneg (snd c)) (number_effects o) = true) ->
   same m s t -> no_dearer m o ch ch' -> no_worse m (apply o s ch) (apply o t ch').
 Proof.
   intros m o s t ch ch' P H D. split.
   - intros v _. unfold apply, var_value. cbn [var_values]. rewrite !get_puts, (makes_same _ _ _ _ H).
     f_equal. apply H.
-  - intros n _. apply puts_rel; [assumption|assumption|]. intros l L. apply D. apply in_or_app. right. exact L.
+  - intros n _. apply puts_rel; [assumption|assumption|]. intros l L. apply D. apply in_or_app. right.
+    exact L.
 Qed.
 
 (* Patterns and tables *)
 Definition shape (s : state) (pat : list key) : list Z := map (var_value s) pat.
 Lemma after_map : forall pat g fs, pattern_after pat (map g pat) fs = map (fun v => last_put fs v (g v)) pat.
 Proof. induction pat; intros; simpl; [reflexivity|]. rewrite IHpat. reflexivity. Qed.
-Lemma value_in_map : forall pat g v, pattern_value pat (map g pat) v = if mem_key v pat then Some (g v) else None.
+Lemma value_in_map : forall pat g v, pattern_value pat (map g pat) v = if mem_key v pat
+  then Some (g v) else None.
 Proof.
   induction pat as [|w pat IH]; intros g v; simpl; [reflexivity|].
-  unfold mem_key. simpl. rewrite (Pos.eqb_sym v w). destruct (Pos.eqb_spec w v); simpl; [subst; reflexivity|apply IH].
+  unfold mem_key. simpl. rewrite (Pos.eqb_sym v w).
+  destruct (Pos.eqb_spec w v); simpl; [subst; reflexivity|apply IH].
 Qed.
 Lemma truth_ok : forall pat s l b, pattern_truth pat (shape s pat) l = Some b -> is_literal s l = b.
 Proof.
@@ -283,7 +299,8 @@ Proof.
   destruct (mem_key _ pat); [|discriminate]. intro e. injection e as e. exact e.
 Qed.
 Lemma fired_false : forall pat s c,
-  existsb (fun t => match t with Some false => true | _ => false end) (map (pattern_truth pat (shape s pat)) (fst c)) = true ->
+  existsb (fun t => match t with Some false => true
+    | _ => false end) (map (pattern_truth pat (shape s pat)) (fst c)) = true ->
   fires s c = false.
 Proof.
   intros pat s c H. unfold fires. apply existsb_exists in H. destruct H as [t [I E]].
@@ -292,7 +309,8 @@ Proof.
   rewrite forallb_forall in F. rewrite (F l I) in L. discriminate.
 Qed.
 Lemma fired_true : forall pat s c,
-  forallb (fun t => match t with Some true => true | _ => false end) (map (pattern_truth pat (shape s pat)) (fst c)) = true ->
+  forallb (fun t => match t with Some true => true
+    | _ => false end) (map (pattern_truth pat (shape s pat)) (fst c)) = true ->
   fires s c = true.
 Proof.
   intros pat s c H. unfold fires. rewrite forallb_forall in H |- *. intros l I.
@@ -300,23 +318,27 @@ Proof.
   destruct (pattern_truth pat (shape s pat) l) as [[]|] eqn:E; try discriminate. apply truth_ok in E. exact E.
 Qed.
 Lemma targets_ok : forall pat s cs ts g, In (map g pat) ts ->
-  In (map (fun v => last_put (flat_map snd (filter (fires s) cs)) v (g v)) pat) (reached_patterns pat (shape s pat) cs ts).
+  In (map (fun v => last_put (flat_map snd (filter (fires s) cs)) v (g v)) pat)
+    (reached_patterns pat (shape s pat) cs ts).
 Proof.
   intros pat s. induction cs as [|c cs IH]; intros ts g H; simpl; [exact H|].
   destruct (existsb _ _) eqn:E.
   { rewrite (fired_false _ _ _ E). apply IH, H. }
-  assert (N : In (map (fun v => last_put (snd c) v (g v)) pat) (map (fun t => pattern_after pat t (snd c)) ts)).
+  assert (N : In (map (fun v => last_put (snd c) v (g v)) pat) (map (fun t =>
+    pattern_after pat t (snd c)) ts)).
   { rewrite <- after_map. apply (in_map (fun t => pattern_after pat t (snd c))). exact H. }
   match goal with |- context [if forallb ?a ?b then _ else _] => destruct (forallb a b) eqn:F end.
   - rewrite (fired_true _ _ _ F). simpl.
     apply (IH _ _) in N. erewrite map_ext; [exact N|]. intro v. simpl. apply last_put_app.
   - destruct (fires s c); simpl.
-    + assert (N' : In (map (fun v => last_put (snd c) v (g v)) pat) (ts ++ map (fun t => pattern_after pat t (snd c)) ts))
+    + assert (N' : In (map (fun v => last_put (snd c) v (g v)) pat) (ts ++ map (fun t =>
+        pattern_after pat t (snd c)) ts))
         by (apply in_or_app; right; exact N).
       apply (IH _ _) in N'. erewrite map_ext; [exact N'|]. intro v. simpl. apply last_put_app.
     + apply IH. apply in_or_app. left. exact H.
 Qed.
-Lemma all_targets_ok : forall pat o s ch, In (shape (apply o s ch) pat) (successor_patterns pat o (shape s pat)).
+Lemma all_targets_ok : forall pat o s ch, In (shape (apply o s ch) pat)
+  (successor_patterns pat o (shape s pat)).
 Proof.
   intros. unfold successor_patterns.
   pose proof (targets_ok pat s (conditional o) [pattern_after pat (shape s pat) (effects o)]
@@ -340,13 +362,16 @@ Lemma lookup_ok : forall v fs x, fact_value v fs = Some x -> In (v, x) fs.
 Proof.
   intros v fs x H. unfold fact_value in H.
   match type of H with match ?e with _ => _ end = _ => destruct e as [[w y]|] eqn:F end; [|discriminate].
-  apply find_some in F. destruct F as [F E]. apply Pos.eqb_eq in E. simpl in *. injection H as ->. subst. exact F.
+  apply find_some in F. destruct F as [F E]. apply Pos.eqb_eq in E. simpl in *. injection H as ->. subst.
+  exact F.
 Qed.
-Lemma matching_ok : forall s pat fs, wf s -> forallb (is_basic T) pat = true -> forallb (is_fact s) fs = true ->
+Lemma matching_ok : forall s pat fs, wf s -> forallb (is_basic T) pat = true ->
+  forallb (is_fact s) fs = true ->
   In (shape s pat) (matching T pat fs).
 Proof.
   intros s pat fs W B F. induction pat as [|v pat IH]; simpl; [left; reflexivity|].
-  simpl in B. apply andb_true_iff in B. destruct B as [B1 B2]. apply in_flat_map. exists (var_value s v). split.
+  simpl in B. apply andb_true_iff in B. destruct B as [B1 B2]. apply in_flat_map. exists (var_value s v).
+  split.
   - destruct (fact_value v fs) as [x|] eqn:L; [|apply range_In, W, B1].
     apply lookup_ok in L. rewrite forallb_forall in F. specialize (F _ L). unfold is_fact in F. simpl in F.
     apply Z.eqb_eq in F. left. symmetry. exact F.
@@ -364,7 +389,8 @@ Proof. intros s W v B. rewrite derive_val by exact B. apply W, B. Qed.
 Hypothesis task_ok : check_task T = true.
 Lemma wf_init : wf (init T).
 Proof.
-  intros v B. unfold check_task in task_ok. rewrite !andb_true_iff in task_ok. destruct task_ok as [[[H _] _] _].
+  intros v B. unfold check_task in task_ok. rewrite !andb_true_iff in task_ok.
+  destruct task_ok as [[[H _] _] _].
   rewrite forallb_forall in H. specialize (H v (basics_In v B)). unfold in_range in H. lia.
 Qed.
 Lemma wf_apply : forall o s ch, In o (operators T) -> wf s -> wf (apply o s ch).
@@ -386,7 +412,8 @@ Proof. intros c s sz ch H. unfold holds, holds_facts in H. rewrite !andb_true_if
 
 (* A potential is a lower bound on the cost of every plan. *)
 Lemma potential_ok : forall t, check_potential T (map prepare (operators T)) t = true ->
-  forall s steps c, plan T s steps c -> wf s -> exists k, table_bound T t (shape s (pattern t)) = Some k /\ k <= c.
+  forall s steps c, plan T s steps c -> wf s ->
+    exists k, table_bound T t (shape s (pattern t)) = Some k /\ k <= c.
 Proof.
   intros t H. unfold check_potential in H. rewrite !andb_true_iff in H. destruct H as [[B G] O].
   intros s steps c P. induction P as [s HG|s o ch steps c Io Ad Ho P IH]; intro W.
@@ -397,8 +424,10 @@ Proof.
     specialize (G M). unfold at_most in G. destruct (table_bound T t _) as [k|]; [|discriminate].
     exists k. split; [reflexivity|lia].
   - destruct (IH (wf_apply _ _ _ Io (wf_derive _ W))) as [k [K L]]. clear IH P.
-    rewrite forallb_forall in O. specialize (O (prepare o) (in_map _ _ _ Io)). unfold potential_ok_for, prepare in O.
-    destruct (minimum_le _ _ (in_map (amount (cost o) (slot_sizes o)) _ _ (choices_In o ch Ad))) as [least [E Le]].
+    rewrite forallb_forall in O. specialize (O (prepare o) (in_map _ _ _ Io)).
+    unfold potential_ok_for, prepare in O.
+    destruct (minimum_le _ _ (in_map (amount (cost o) (slot_sizes o)) _ _ (choices_In o ch Ad))) as
+      [least [E Le]].
     rewrite E in O. destruct (mentions (pattern t) o) eqn:U.
     + rewrite forallb_forall in O. specialize (O (shape s (pattern t))).
       assert (M : In (shape s (pattern t)) (matching T (pattern t) (facts (precondition o)))).
@@ -407,14 +436,16 @@ Proof.
       specialize (O M). rewrite forallb_forall in O.
       specialize (O (shape (apply o (derive T s) ch) (pattern t))).
       rewrite <- (shape_derive s _ B) in O at 1. specialize (O (all_targets_ok _ _ _ _)).
-      rewrite K in O. unfold at_most in O. destruct (table_bound T t (shape s (pattern t))) as [b|]; [|discriminate].
+      rewrite K in O. unfold at_most in O.
+      destruct (table_bound T t (shape s (pattern t))) as [b|]; [|discriminate].
       exists b. split; [reflexivity|lia].
     + rewrite untouched in K by exact U. rewrite shape_derive in K by exact B.
       exists k. split; [exact K|lia].
 Qed.
 
 (* Needs *)
-Lemma alone_value : forall l n s sz ch, is_number l n = true -> value l s sz ch = num_value s n + amount (offset l) sz ch.
+Lemma alone_value : forall l n s sz ch, is_number l n = true ->
+  value l s sz ch = num_value s n + amount (offset l) sz ch.
 Proof.
   intros [fs r] n s sz ch H. unfold is_number in H. unfold value. simpl in *.
   destruct fs as [|[m f] [|]]; try discriminate. apply andb_true_iff in H. destruct H as [H1 H2].
@@ -437,7 +468,8 @@ Qed.
 (* [least_use] bounds the consumption of a step. *)
 Lemma lowers_ok : forall n o s ch least, In o (operators T) -> In n (numbers T) -> admitted o ch ->
   holds (precondition o) (derive T s) (slot_sizes o) ch = true -> least_use n (prepare o) = Some least ->
-  num_value (apply o (derive T s) ch) n + least <= num_value s n /\ 0 <= least /\ (0 < least -> 0 <= num_value (apply o (derive T s) ch) n).
+  num_value (apply o (derive T s) ch) n + least <= num_value s n /\ 0 <= least /\ (0 < least ->
+    0 <= num_value (apply o (derive T s) ch) n).
 Proof.
   intros n o s ch least Io In_ Ad Ho L.
   assert (D : distinct (map fst (number_effects o)) = true).
@@ -445,15 +477,18 @@ Proof.
     rewrite forallb_forall in H. specialize (H o Io). rewrite !andb_true_iff in H. tauto. }
   assert (V : num_value (derive T s) n = num_value s n).
   { rewrite derive_num. apply memb_In in In_. rewrite In_. reflexivity. }
-  pose proof (changed (fun l => value l (derive T s) (slot_sizes o) ch) (number_effects o) n (get (num_values (derive T s)) n) D) as CH.
+  pose proof (changed (fun l => value l (derive T s) (slot_sizes o) ch) (number_effects o) n
+    (get (num_values (derive T s)) n) D) as CH.
   cbv beta in CH. unfold apply, num_value at 1 3. cbn [num_values]. rewrite get_puts, CH. clear CH.
   change (get (num_values (derive T s)) n) with (num_value (derive T s) n). rewrite V.
   unfold least_use, prepare in L.
-  match goal with |- context [match ?e with [] => num_value s n | _ => _ end] => destruct e as [|[m l] r] eqn:F end.
+  match goal with |- context [match ?e with [] => num_value s n
+    | _ => _ end] => destruct e as [|[m l] r] eqn:F end.
   { injection L as <-. lia. }
   destruct r; [|discriminate]. destruct (is_number l n) eqn:E; [|discriminate]. cbn [snd].
   rewrite (alone_value _ _ _ _ _ E), V.
-  destruct (minimum_le _ _ (in_map (fun ch => - amount (offset l) (slot_sizes o) ch) _ _ (choices_In o ch Ad))) as [m' [E' Le]].
+  destruct (minimum_le _ _ (in_map (fun ch =>
+    - amount (offset l) (slot_sizes o) ch) _ _ (choices_In o ch Ad))) as [m' [E' Le]].
   rewrite E' in L. destruct (_ && _) eqn:C; [|discriminate]. injection L as <-.
   apply andb_true_iff in C. destruct C as [C1 C2]. apply Z.leb_le in C1.
   split; [lia|]. split; [exact C1|]. intro Pos. apply orb_true_iff in C2. destruct C2 as [C2|C2]; [lia|].
@@ -485,7 +520,8 @@ Proof.
     apply memb_In in N. rewrite N in HG. lia.
   - pose proof (wf_apply o (derive T s) ch Io (wf_derive _ W)) as W'.
     destruct (IH W') as [k' [K' [P' L']]]. clear IH P.
-    rewrite forallb_forall in O. specialize (O (prepare o) (in_map _ _ _ Io)). unfold need_ok_for in O. cbn [fst prepare] in O.
+    rewrite forallb_forall in O. specialize (O (prepare o) (in_map _ _ _ Io)). unfold need_ok_for in O.
+    cbn [fst prepare] in O.
     assert (Q : match least_use n (prepare o) with
                 | Some least => at_most (table_bound T t (shape s (pattern t))) (Some k') least = true
                 | None => exists x, table_bound T t (shape s (pattern t)) = Some x /\ x = 0
@@ -498,12 +534,14 @@ Proof.
         specialize (O M). rewrite forallb_forall in O.
         specialize (O (shape (apply o (derive T s) ch) (pattern t))).
         rewrite <- (shape_derive s _ B) in O at 1. specialize (O (all_targets_ok _ _ _ _)).
-        rewrite K' in O. change (o, (choices o, minimum (map (amount (cost o) (slot_sizes o)) (choices o)))) with (prepare o) in O.
+        rewrite K' in O. change (o, (choices o, minimum (map (amount (cost o) (slot_sizes o)) (choices o))))
+          with (prepare o) in O.
         destruct (least_use n (prepare o)); [exact O|]. unfold is_infinite, is_zero_bound in O.
         destruct (table_bound T t (shape s (pattern t))) as [x|]; simpl in O; [|discriminate].
         exists x. split; [reflexivity|]. rewrite orb_false_r in O. lia.
       - rewrite untouched in K' by exact U. rewrite shape_derive in K' by exact B.
-        change (o, (choices o, minimum (map (amount (cost o) (slot_sizes o)) (choices o)))) with (prepare o) in O.
+        change (o, (choices o, minimum (map (amount (cost o) (slot_sizes o)) (choices o)))) with
+          (prepare o) in O.
         destruct (least_use n (prepare o)) as [least|] eqn:L.
         + rewrite K'. simpl. destruct (lowers_ok n o s ch least Io N Ad Ho L). lia.
         + exists k'. split; [exact K'|]. rewrite forallb_forall in O. specialize (O (shape s (pattern t))).
@@ -529,24 +567,30 @@ Proof.
   apply andb_true_iff in H. destruct H as [H1 H2]. destruct I as [I|I]; [subst|apply IH; assumption].
   destruct m; simpl; lia.
 Qed.
-Lemma front_ok : forall m o ch, admitted o ch -> exists ch', In ch' (undominated_choices m o) /\ no_dearer m o ch' ch.
+Lemma front_ok : forall m o ch, admitted o ch ->
+  exists ch', In ch' (undominated_choices m o) /\ no_dearer m o ch' ch.
 Proof.
   intros m o ch Ad. apply choices_In in Ad. unfold undominated_choices.
   match goal with |- context [if forallb ?a ?b then _ else _] => destruct (forallb a b) eqn:F end.
   - set (e := fun ch => (ch, (amount (cost o) (slot_sizes o) ch, profile o ch))) in *.
     assert (H0 : forall l, (forall x : choice_profile, In x l -> snd x = snd (e (fst x))) ->
                  forall all, (forall x : choice_profile, In x all -> snd x = snd (e (fst x))) ->
-                 forall x : choice_profile, In x (fold_left (fun f e => if existsb (fun x => dominates m x e) f then f
-                                    else e :: filter (fun x => negb (dominates m e x)) f) all l) -> snd x = snd (e (fst x))).
-    { intros l Hl all. revert l Hl. induction all as [|y all IH]; intros l Hl Ha x I; simpl in I; [apply Hl, I|].
+                 forall x : choice_profile, In x (fold_left (fun f e =>
+                   if existsb (fun x => dominates m x e) f then f
+                                    else e :: filter (fun x => negb (dominates m e x)) f) all l) ->
+                                      snd x = snd (e (fst x))).
+    { intros l Hl all. revert l Hl.
+      induction all as [|y all IH]; intros l Hl Ha x I; simpl in I; [apply Hl, I|].
       revert I. apply IH; [|intros z Z; apply Ha; right; exact Z].
       intros z Iz. destruct (existsb _ l); [apply Hl, Iz|].
       destruct Iz as [Iz|Iz]; [subst; apply Ha; left; reflexivity|apply filter_In in Iz; apply Hl, Iz]. }
     rewrite forallb_forall in F. specialize (F (e ch) (in_map e _ _ Ad)).
     apply existsb_exists in F. destruct F as [x [Ix G]].
     exists (fst x). split; [apply in_map, Ix|].
-    apply H0 in Ix; [|intros ? []|intros z Iz; apply in_map_iff in Iz; destruct Iz as [c [E _]]; subst z; reflexivity].
+    apply H0 in Ix; [|intros ? []|intros z Iz; apply in_map_iff in Iz; destruct Iz as [c [E _]]; subst z;
+      reflexivity].
     unfold dominates in G. rewrite Ix in G. apply andb_true_iff in G. destruct G as [G1 G2]. simpl in G1, G2.
-    split; [lia|]. apply (fits_ok m (fun l => amount (offset l) (slot_sizes o) (fst x)) (fun l => amount (offset l) (slot_sizes o) ch)). exact G2.
+    split; [lia|]. apply (fits_ok m (fun l => amount (offset l) (slot_sizes o) (fst x)) (fun l =>
+      amount (offset l) (slot_sizes o) ch)). exact G2.
   - exists ch. split; [exact Ad|]. split; [lia|]. intros. apply rel_refl.
 Qed.

@@ -10,42 +10,59 @@ Hypothesis task_ok : check_task T = true.
 Hypothesis ok : faithful P T N case goal_case = true.
 
 Record Rel (w : world) (s : state) : Prop := {
-  r_var : forall v vals x a, M.find v (variables N) = Some vals -> In (x, a) vals -> holds_in w a = Z.eqb (var_value s v) x;
-  r_num : forall n f, M.find n (fluents N) = Some f -> exists q, value_in w f = Some q /\ q * scaled N == inject_Z (num_value s n);
+  r_var : forall v vals x a, M.find v (variables N) = Some vals -> In (x, a) vals ->
+    holds_in w a = Z.eqb (var_value s v) x;
+  r_num : forall n f, M.find n (fluents N) = Some f ->
+    exists q, value_in w f = Some q /\ q * scaled N == inject_Z (num_value s n);
   r_fact : forall p os, changing N p = false -> holds_in w (p, os) = holds_in (initial P) (p, os);
   r_value : forall f, changing N (fst f) = false -> value_in w f = value_in (initial P) f;
   r_may : forall a, changing N (fst a) = true -> holds_in w a = true -> mem (may_hold N) a = true;
-  r_exclusive : forall g a b, In g (exclusive N) -> In a g -> In b g -> holds_in w a = true -> holds_in w b = true -> a = b;
+  r_exclusive : forall g a b, In g (exclusive N) -> In a g -> In b g -> holds_in w a = true ->
+    holds_in w b = true -> a = b;
   r_wf : wf T s }.
 
 Lemma parts :
   (forall a, changing N (fst a) = true -> holds_in (initial P) a = true -> mem (may_hold N) a = true) /\
   (forall v vals, M.find v (variables N) = Some vals -> is_basic T v = true /\
-     forall x a, In (x, a) vals -> holds_in (initial P) a = Z.eqb (var_value (init T) v) x /\ find_atom (fact_of N) a = Some (v, x)) /\
-  (forall a v x, find_atom (fact_of N) a = Some (v, x) -> exists vals, M.find v (variables N) = Some vals /\ In (x, a) vals) /\
+     forall x a, In (x, a) vals -> holds_in (initial P) a = Z.eqb (var_value (init T) v) x /\
+       find_atom (fact_of N) a = Some (v, x)) /\
+  (forall a v x, find_atom (fact_of N) a = Some (v, x) ->
+    exists vals, M.find v (variables N) = Some vals /\ In (x, a) vals) /\
   (forall n f, M.find n (fluents N) = Some f -> mem_key n (numbers T) = true /\ changing N (fst f) = true /\
-     find_atom (number_of N) f = Some n /\ exists q, value_in (initial P) f = Some q /\ q * scaled N == inject_Z (num_value (init T) n)) /\
+     find_atom (number_of N) f = Some n /\ exists q, value_in (initial P) f = Some q /\
+       q * scaled N == inject_Z (num_value (init T) n)) /\
   tree_ok P T N (goal_leaf P T N) (conjuncts P N unchanged Undefined [] (goal_formula P)) goal_case = true /\
   (forall i a, nth_error (actions P) i = Some a -> action_ok P T N case i a = true).
 Proof.
   unfold faithful in ok. rewrite !andb_true_iff in ok. destruct ok as [[[[[[H1 H2] H3] H4] H5] H6] _].
   rewrite forallb_forall in H1, H2, H3, H4, H6. split; [|split; [|split; [|split; [|split]]]].
-  - intros a C H. simpl in H. destruct (find_atom (initial_atoms P) a) as [u|] eqn:F; [|discriminate]. apply find_entries in F.
+  - intros a C H. simpl in H. destruct (find_atom (initial_atoms P) a) as [u|] eqn:F; [|discriminate].
+    apply find_entries in F.
     specialize (H1 _ F). cbn [fst] in H1. rewrite C in H1. exact H1.
-  - intros v vals F. apply M.elements_correct in F. specialize (H2 _ F). cbn beta iota in H2. apply andb_true_iff in H2. destruct H2 as [B H2].
-    split; [exact B|]. intros x a I. rewrite forallb_forall in H2. specialize (H2 _ I). cbn beta iota in H2. apply andb_true_iff in H2.
-    destruct H2 as [E H2]. apply eqb_prop in E. split; [exact E|]. destruct (find_atom (fact_of N) a) as [[u y]|]; [|discriminate].
-    apply andb_true_iff in H2. destruct H2 as [E1 E2]. apply Pos.eqb_eq in E1. apply Z.eqb_eq in E2. subst. reflexivity.
-  - intros a v x F. apply find_entries in F. specialize (H3 _ F). cbn beta iota in H3. destruct (M.find v (variables N)) as [vals|]; [|discriminate].
-    exists vals. split; [reflexivity|]. apply existsb_exists in H3. destruct H3 as [[y b] [I E]]. apply andb_true_iff in E. destruct E as [E1 E2].
+  - intros v vals F. apply M.elements_correct in F. specialize (H2 _ F). cbn beta iota in H2.
+    apply andb_true_iff in H2. destruct H2 as [B H2].
+    split; [exact B|]. intros x a I. rewrite forallb_forall in H2. specialize (H2 _ I). cbn beta iota in H2.
+    apply andb_true_iff in H2.
+    destruct H2 as [E H2]. apply eqb_prop in E. split; [exact E|].
+    destruct (find_atom (fact_of N) a) as [[u y]|]; [|discriminate].
+    apply andb_true_iff in H2. destruct H2 as [E1 E2]. apply Pos.eqb_eq in E1. apply Z.eqb_eq in E2. subst.
+    reflexivity.
+  - intros a v x F. apply find_entries in F. specialize (H3 _ F). cbn beta iota in H3.
+    destruct (M.find v (variables N)) as [vals|]; [|discriminate].
+    exists vals. split; [reflexivity|]. apply existsb_exists in H3. destruct H3 as [[y b] [I E]].
+    apply andb_true_iff in E. destruct E as [E1 E2].
     cbn [fst snd] in *. apply Z.eqb_eq in E1. apply atom_eqb_eq in E2. subst. exact I.
-  - intros n f F. apply M.elements_correct in F. specialize (H4 _ F). cbn beta iota in H4. rewrite !andb_true_iff in H4. destruct H4 as [[[A B] C] D].
+  - intros n f F. apply M.elements_correct in F. specialize (H4 _ F). cbn beta iota in H4.
+    rewrite !andb_true_iff in H4. destruct H4 as [[[A B] C] D].
     split; [exact A|]. split; [exact B|]. split.
-    + destruct (find_atom (number_of N) f) as [m|]; [|discriminate]. apply Pos.eqb_eq in D. subst. reflexivity.
-    + destruct (value_in (initial P) f) as [q|]; [|discriminate]. apply Qeq_bool_iff in C. exists q. split; [reflexivity|exact C].
+    + destruct (find_atom (number_of N) f) as [m|]; [|discriminate]. apply Pos.eqb_eq in D. subst.
+      reflexivity.
+    + destruct (value_in (initial P) f) as [q|]; [|discriminate]. apply Qeq_bool_iff in C. exists q.
+      split; [reflexivity|exact C].
   - exact H5.
   - intros i a Hn. apply (H6 (i, a)). clear -Hn.
-    assert (G : forall (l : list action) k i a, nth_error l i = Some a -> In ((k + i)%nat, a) (combine (seq k (length l)) l)).
+    assert (G : forall (l : list action) k i a, nth_error l i = Some a ->
+      In ((k + i)%nat, a) (combine (seq k (length l)) l)).
     { induction l as [|b l IH]; intros k j c E; destruct j; simpl in *; try discriminate.
       - injection E as ->. left. f_equal. lia.
       - right. specialize (IH (S k) j c E). replace (k + S j)%nat with (S k + j)%nat by lia. exact IH. }
@@ -56,8 +73,10 @@ Lemma exclusive_at_first : forall g a b, In g (exclusive N) -> In a g -> In b g 
   holds_in (initial P) a = true -> holds_in (initial P) b = true -> a = b.
 Proof.
   intros g a b G A B Ha Hb. unfold faithful in ok. rewrite !andb_true_iff in ok. destruct ok as [_ H].
-  rewrite forallb_forall in H. specialize (H _ G). rewrite forallb_forall in H. specialize (H _ A). rewrite Ha in H. cbn [negb orb] in H.
-  rewrite forallb_forall in H. specialize (H _ B). rewrite Hb in H. rewrite orb_false_r in H. apply atom_eqb_eq, H.
+  rewrite forallb_forall in H. specialize (H _ G). rewrite forallb_forall in H. specialize (H _ A).
+  rewrite Ha in H. cbn [negb orb] in H.
+  rewrite forallb_forall in H. specialize (H _ B). rewrite Hb in H. rewrite orb_false_r in H.
+  apply atom_eqb_eq, H.
 Qed.
 
 Section State.
@@ -65,47 +84,62 @@ Variables (w : world) (s : state).
 Hypothesis R : Rel w s.
 Notation ds := (derive T s).
 Lemma d_val : forall v vals, M.find v (variables N) = Some vals -> var_value ds v = var_value s v.
-Proof. intros v vals F. apply derive_val; [apply heads|apply deriveds|]; auto. destruct parts as [_ [A _]]. apply (A _ _ F). Qed.
+Proof. intros v vals F. apply derive_val; [apply heads|apply deriveds|]; auto. destruct parts as [_ [A _]].
+apply (A _ _ F). Qed.
 Lemma d_num : forall n f, M.find n (fluents N) = Some f -> num_value ds n = num_value s n.
-Proof. intros n f F. rewrite derive_num. destruct parts as [_ [_ [_ [A _]]]]. rewrite (proj1 (A _ _ F)). reflexivity. Qed.
+Proof. intros n f F. rewrite derive_num. destruct parts as [_ [_ [_ [A _]]]]. rewrite (proj1 (A _ _ F)).
+reflexivity. Qed.
 
 Section Known.
 Variable k : knowledge.
 Hypothesis K : Knows w k.
 Lemma in_variable_ok : forall v x b, In (x, b) (in_variable N k v) -> Z.eqb (var_value s v) x = b.
 Proof.
-  intros v x b I. unfold in_variable in I. apply in_flat_map in I. destruct I as [[a c] [I J]]. cbn [fst snd] in J.
-  destruct (find_atom (fact_of N) a) as [[u y]|] eqn:F; [|destruct J]. destruct (Pos.eqb_spec u v); [|destruct J]. destruct J as [J|[]].
+  intros v x b I. unfold in_variable in I. apply in_flat_map in I. destruct I as [[a c] [I J]].
+  cbn [fst snd] in J.
+  destruct (find_atom (fact_of N) a) as [[u y]|] eqn:F; [|destruct J].
+  destruct (Pos.eqb_spec u v); [|destruct J]. destruct J as [J|[]].
   injection J as -> ->. subst u. destruct parts as [_ [_ [A _]]]. destruct (A _ _ _ F) as [vals [F1 F2]].
   rewrite <- (r_var _ _ R _ _ _ _ F1 F2). apply K, I.
 Qed.
 Lemma excluded_by_ok : forall a, excluded_by N k a = true -> holds_in w a = false.
 Proof.
-  intros a H. unfold excluded_by, in_group in H. apply existsb_exists in H. destruct H as [g [G H]]. apply andb_true_iff in H. destruct H as [A H].
+  intros a H. unfold excluded_by, in_group in H. apply existsb_exists in H. destruct H as [g [G H]].
+  apply andb_true_iff in H. destruct H as [A H].
   apply existsb_exists in A. destruct A as [a' [A E]]. apply atom_eqb_eq in E. subst a'.
-  apply existsb_exists in H. destruct H as [[b c] [I H]]. cbn [fst snd] in H. rewrite !andb_true_iff in H. destruct H as [[C Ne] B]. subst c.
+  apply existsb_exists in H. destruct H as [[b c] [I H]]. cbn [fst snd] in H. rewrite !andb_true_iff in H.
+  destruct H as [[C Ne] B]. subst c.
   apply existsb_exists in B. destruct B as [b' [B E]]. apply atom_eqb_eq in E. subst b'.
-  destruct (holds_in w a) eqn:Ha; [|reflexivity]. pose proof (r_exclusive _ _ R g b a G B A (proj1 K _ _ I) Ha) as E. subst b.
+  destruct (holds_in w a) eqn:Ha; [|reflexivity].
+  pose proof (r_exclusive _ _ R g b a G B A (proj1 K _ _ I) Ha) as E. subst b.
   rewrite (proj2 (atom_eqb_eq a a) eq_refl) in Ne. discriminate.
 Qed.
-Lemma possible_ok : forall v vals, M.find v (variables N) = Some vals -> In (var_value s v) (possible T N k v).
+Lemma possible_ok : forall v vals, M.find v (variables N) = Some vals ->
+  In (var_value s v) (possible T N k v).
 Proof.
   intros v vals F. unfold possible. apply filter_In. split.
   - destruct (List.find snd (in_variable N k v)) as [[x b]|] eqn:E.
-    + apply find_some in E. destruct E as [I E]. simpl in E. subst b. apply in_variable_ok in I. apply Z.eqb_eq in I. left. symmetry. exact I.
+    + apply find_some in E. destruct E as [I E]. simpl in E. subst b. apply in_variable_ok in I.
+      apply Z.eqb_eq in I. left. symmetry. exact I.
     + apply range_In, (r_wf _ _ R). destruct parts as [_ [A _]]. apply (A _ _ F).
   - apply andb_true_iff. split.
-    + apply forallb_forall. intros [x b] I. apply in_variable_ok in I. cbn [fst snd]. rewrite I. apply eqb_reflx.
-    + rewrite F. apply negb_true_iff. destruct (existsb _ vals) eqn:E; [|reflexivity]. exfalso. apply existsb_exists in E.
-      destruct E as [[x a] [I E]]. cbn [fst snd] in E. apply andb_true_iff in E. destruct E as [E1 E2]. apply excluded_by_ok in E2.
+    + apply forallb_forall. intros [x b] I. apply in_variable_ok in I. cbn [fst snd]. rewrite I.
+      apply eqb_reflx.
+    + rewrite F. apply negb_true_iff. destruct (existsb _ vals) eqn:E; [|reflexivity]. exfalso.
+      apply existsb_exists in E.
+      destruct E as [[x a] [I E]]. cbn [fst snd] in E. apply andb_true_iff in E. destruct E as [E1 E2].
+      apply excluded_by_ok in E2.
       rewrite (r_var _ _ R _ _ _ _ F I), E1 in E2. discriminate.
 Qed.
-Lemma known_fact_ok : forall v x b, known_fact T N k v x = Some b -> (exists vals, M.find v (variables N) = Some vals) /\ Z.eqb (var_value s v) x = b.
+Lemma known_fact_ok : forall v x b, known_fact T N k v x = Some b ->
+  (exists vals, M.find v (variables N) = Some vals) /\ Z.eqb (var_value s v) x = b.
 Proof.
-  intros v x b H. unfold known_fact in H. destruct (M.find v (variables N)) as [vals|] eqn:F; [|discriminate]. split; [exists vals; reflexivity|].
+  intros v x b H. unfold known_fact in H. destruct (M.find v (variables N)) as [vals|] eqn:F; [|discriminate].
+  split; [exists vals; reflexivity|].
   pose proof (possible_ok _ _ F) as I. cbv zeta in H. destruct (forallb (Z.eqb x) (possible T N k v)) eqn:A.
   - injection H as <-. rewrite forallb_forall in A. specialize (A _ I). rewrite Z.eqb_sym. exact A.
-  - destruct (forallb (fun y => negb (Z.eqb x y)) (possible T N k v)) eqn:B; [|discriminate]. injection H as <-. rewrite forallb_forall in B. specialize (B _ I).
+  - destruct (forallb (fun y => negb (Z.eqb x y)) (possible T N k v)) eqn:B; [|discriminate].
+    injection H as <-. rewrite forallb_forall in B. specialize (B _ I).
     apply negb_true_iff in B. rewrite Z.eqb_sym. exact B.
 Qed.
 Lemma base_truth_ok : forall a b, base_truth P T N k a = Some b -> holds_in w a = b.
@@ -116,9 +150,12 @@ Proof.
   { apply assoc_In in E. rewrite (proj1 K _ _ E). congruence. }
   destruct (excluded_by N k a) eqn:Ex; cbn [orb] in H; [injection H as <-; apply excluded_by_ok, Ex|].
   destruct (mem (may_hold N) a) eqn:M; cbn [negb] in H.
-  - destruct (find_atom (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. apply known_fact_ok in H. destruct H as [_ H].
-    destruct parts as [_ [_ [A _]]]. destruct (A _ _ _ F) as [vals [F1 F2]]. rewrite (r_var _ _ R _ _ _ _ F1 F2). exact H.
-  - injection H as <-. destruct (holds_in w a) eqn:E2; [|reflexivity]. rewrite (r_may _ _ R a C E2) in M. discriminate.
+  - destruct (find_atom (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. apply known_fact_ok in H.
+    destruct H as [_ H].
+    destruct parts as [_ [_ [A _]]]. destruct (A _ _ _ F) as [vals [F1 F2]].
+    rewrite (r_var _ _ R _ _ _ _ F1 F2). exact H.
+  - injection H as <-. destruct (holds_in w a) eqn:E2; [|reflexivity]. rewrite (r_may _ _ R a C E2) in M.
+    discriminate.
 Qed.
 Lemma static_value : forall f, changing N (fst f) = false -> value_in w f = value_in (initial P) f.
 Proof. apply (r_value _ _ R). Qed.
@@ -126,16 +163,21 @@ End Known.
 Lemma impossible_ok : forall k, Knows w k -> impossible P T N k = true -> False.
 Proof.
   intros k K H. unfold impossible in H. apply orb_true_iff in H. destruct H as [H|H].
-  - apply existsb_exists in H. destruct H as [[a b] [I H]]. cbn [fst snd] in H. rewrite !orb_true_iff in H. destruct H as [[H|H]|H].
-    2: { apply andb_true_iff in H. destruct H as [-> H]. apply (excluded_by_ok k K) in H. rewrite (proj1 K _ _ I) in H. discriminate. }
+  - apply existsb_exists in H. destruct H as [[a b] [I H]]. cbn [fst snd] in H. rewrite !orb_true_iff in H.
+    destruct H as [[H|H]|H].
+    2: { apply andb_true_iff in H. destruct H as [-> H]. apply (excluded_by_ok k K) in H.
+         rewrite (proj1 K _ _ I) in H. discriminate. }
     + destruct (base_truth P T N (Knowledge [] (bounds k)) a) as [c|] eqn:E; [|discriminate].
       assert (K0 : Knows w (Knowledge [] (bounds k))) by (split; [intros ? ? []|apply K]).
       apply (base_truth_ok _ K0) in E. rename E into E'.
       rewrite (proj1 K _ _ I) in E'. subst c. rewrite eqb_reflx in H. discriminate.
-    + destruct (find_atom (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. destruct parts as [_ [_ [A _]]]. destruct (A _ _ _ F) as [vals [F1 _]].
+    + destruct (find_atom (fact_of N) a) as [[v x]|] eqn:F; [|discriminate]. destruct parts as [_ [_ [A _]]].
+      destruct (A _ _ _ F) as [vals [F1 _]].
       pose proof (possible_ok k K _ _ F1) as Q. destruct (possible T N k v); [destruct Q|discriminate].
-  - apply existsb_exists in H. destruct H as [[st f] [I H]]. cbn [fst snd] in H. pose proof (proj2 K _ _ I) as B.
-    destruct f as [[|] c]; [|discriminate]. destruct st; rewrite ev_empty in B; [apply Qle_bool_iff in H|apply less_spec in H]; lra.
+  - apply existsb_exists in H. destruct H as [[st f] [I H]]. cbn [fst snd] in H.
+    pose proof (proj2 K _ _ I) as B.
+    destruct f as [[|] c]; [|discriminate].
+    destruct st; rewrite ev_empty in B; [apply Qle_bool_iff in H|apply less_spec in H]; lra.
 Qed.
 
 (* Operators *)
@@ -147,142 +189,212 @@ Lemma factors_ok : forall l g, factors_of N l = Some g -> forall a : Z, ev w g *
 Proof.
   induction l as [|[n f] l IH]; intros g H a; cbn [factors_of fold_left] in *.
   - injection H as <-. rewrite ev_constant. ring.
-  - destruct (M.find n (fluents N)) as [h|] eqn:F; [|discriminate]. destruct (factors_of N l) as [g'|]; [|discriminate]. injection H as <-.
-    rewrite <- (IH _ eq_refl), ev_plus_form. destruct (r_num _ _ R _ _ F) as [q [E Q]]. cbn [fst snd]. rewrite (d_num _ _ F), inject_Z_plus, inject_Z_mult.
+  - destruct (M.find n (fluents N)) as [h|] eqn:F; [|discriminate].
+    destruct (factors_of N l) as [g'|]; [|discriminate]. injection H as <-.
+    rewrite <- (IH _ eq_refl), ev_plus_form. destruct (r_num _ _ R _ _ F) as [q [E Q]]. cbn [fst snd].
+    rewrite (d_num _ _ F), inject_Z_plus, inject_Z_mult.
     rewrite <- Q. unfold ev at 2. cbn [fst snd fold_right]. rewrite E. cbn [default]. ring.
 Qed.
 Lemma scaled_pos : 0 < scaled N. Proof. unfold scaled. reflexivity. Qed.
-Lemma form_of_ok : forall l szs ch g, form_of N l szs ch = Some g -> ev w g * scaled N == inject_Z (value l ds szs ch).
+Lemma form_of_ok : forall l szs ch g, form_of N l szs ch = Some g ->
+  ev w g * scaled N == inject_Z (value l ds szs ch).
 Proof.
-  intros l szs ch g H. unfold form_of in H. destruct (factors_of N (factors l)) as [f|] eqn:E; [|discriminate]. injection H as <-.
+  intros l szs ch g H. unfold form_of in H.
+  destruct (factors_of N (factors l)) as [f|] eqn:E; [|discriminate]. injection H as <-.
   unfold value. rewrite <- (factors_ok _ _ E), ev_plus_form, ev_constant. field. pose proof scaled_pos. lra.
 Qed.
-Lemma required_ok : forall l szs ch g, form_of N l szs ch = Some g -> required N k g = true -> (0 <= value l ds szs ch)%Z.
+Lemma required_ok : forall l szs ch g, form_of N l szs ch = Some g -> required N k g = true ->
+  (0 <= value l ds szs ch)%Z.
 Proof.
-  intros l szs ch g F H. unfold required in H. apply (implied_ok w k K) in H. rewrite ev_plus_form, ev_constant in H.
+  intros l szs ch g F H. unfold required in H. apply (implied_ok w k K) in H.
+  rewrite ev_plus_form, ev_constant in H.
   apply form_of_ok in F. pose proof scaled_pos as S.
   assert (B : 0 < (ev w g + 1 * / scaled N) * scaled N) by (apply Qmult_lt_0_compat; assumption).
   setoid_replace ((ev w g + 1 * / scaled N) * scaled N) with (ev w g * scaled N + 1) in B by (field; lra).
-  rewrite F in B. change 1 with (inject_Z 1) in B. rewrite <- inject_Z_plus in B. change 0 with (inject_Z 0) in B. rewrite <- Zlt_Qlt in B. lia.
+  rewrite F in B. change 1 with (inject_Z 1) in B. rewrite <- inject_Z_plus in B.
+  change 0 with (inject_Z 0) in B. rewrite <- Zlt_Qlt in B. lia.
 Qed.
 Lemma known_literal_ok : forall l b, known_literal T N k l = Some b -> is_literal ds l = b.
 Proof.
-  intros [[v x] t] b H. unfold known_literal in H. cbn [fst snd] in H. destruct (known_fact T N k v x) as [c|] eqn:F; [|discriminate]. injection H as <-.
-  apply (known_fact_ok k K) in F. destruct F as [[vals F] E]. unfold is_literal, is_fact. cbn [fst snd]. rewrite (d_val _ _ F), E. reflexivity.
+  intros [[v x] t] b H. unfold known_literal in H. cbn [fst snd] in H.
+  destruct (known_fact T N k v x) as [c|] eqn:F; [|discriminate]. injection H as <-.
+  apply (known_fact_ok k K) in F. destruct F as [[vals F] E]. unfold is_literal, is_fact. cbn [fst snd].
+  rewrite (d_val _ _ F), E. reflexivity.
 Qed.
 Lemma known_condition_ok : forall c szs ch, known_condition T N k c szs ch = true -> holds c ds szs ch = true.
 Proof.
-  intros c szs ch H. unfold known_condition in H. rewrite !andb_true_iff in H. destruct H as [[H1 H2] H3]. rewrite forallb_forall in H1, H2, H3.
+  intros c szs ch H. unfold known_condition in H. rewrite !andb_true_iff in H. destruct H as [[H1 H2] H3].
+  rewrite forallb_forall in H1, H2, H3.
   unfold holds, holds_facts. rewrite !andb_true_iff. split; [split|]; apply forallb_forall.
-  - intros [v x] I. specialize (H1 _ I). cbn [fst snd] in H1. destruct (known_fact T N k v x) as [[]|] eqn:F; try discriminate.
-    apply (known_fact_ok k K) in F. destruct F as [[vals F] E]. unfold is_fact. cbn [fst snd]. rewrite (d_val _ _ F). exact E.
-  - intros cl I. specialize (H2 _ I). apply existsb_exists in H2. destruct H2 as [l [J E]]. apply existsb_exists. exists l. split; [exact J|].
+  - intros [v x] I. specialize (H1 _ I). cbn [fst snd] in H1.
+    destruct (known_fact T N k v x) as [[]|] eqn:F; try discriminate.
+    apply (known_fact_ok k K) in F. destruct F as [[vals F] E]. unfold is_fact. cbn [fst snd].
+    rewrite (d_val _ _ F). exact E.
+  - intros cl I. specialize (H2 _ I). apply existsb_exists in H2. destruct H2 as [l [J E]].
+    apply existsb_exists. exists l. split; [exact J|].
     destruct (known_literal T N k l) as [[]|] eqn:F; try discriminate. apply known_literal_ok, F.
-  - intros l I. specialize (H3 _ I). destruct (form_of N l szs ch) as [g|] eqn:F; [|discriminate]. apply Z.leb_le. eapply required_ok; eassumption.
+  - intros l I. specialize (H3 _ I). destruct (form_of N l szs ch) as [g|] eqn:F; [|discriminate].
+    apply Z.leb_le. eapply required_ok; eassumption.
 Qed.
-Lemma known_effects_ok : forall cs l, known_effects T N k cs = Some l -> l = flat_map snd (filter (fires ds) cs).
+Lemma known_effects_ok : forall cs l, known_effects T N k cs = Some l ->
+  l = flat_map snd (filter (fires ds) cs).
 Proof.
   induction cs as [|c cs IH]; intros l H; cbn [known_effects filter] in *; [injection H as <-; reflexivity|].
   destruct (existsb _ (fst c)) eqn:E.
-  - replace (fires ds c) with false; [apply IH, H|]. symmetry. unfold fires. apply existsb_exists in E. destruct E as [x [I E]].
-    destruct (known_literal T N k x) as [[]|] eqn:F; try discriminate. apply known_literal_ok in F. destruct (forallb _ _) eqn:A; [|reflexivity].
+  - replace (fires ds c) with false; [apply IH, H|]. symmetry. unfold fires. apply existsb_exists in E.
+    destruct E as [x [I E]].
+    destruct (known_literal T N k x) as [[]|] eqn:F; try discriminate. apply known_literal_ok in F.
+    destruct (forallb _ _) eqn:A; [|reflexivity].
     rewrite forallb_forall in A. rewrite (A _ I) in F. discriminate.
-  - destruct (forallb _ (fst c)) eqn:A; [|discriminate]. destruct (known_effects T N k cs) as [r|]; [|discriminate]. injection H as <-.
-    replace (fires ds c) with true; [simpl; f_equal; apply IH; reflexivity|]. symmetry. unfold fires. apply forallb_forall. intros x I.
-    rewrite forallb_forall in A. specialize (A _ I). destruct (known_literal T N k x) as [[]|] eqn:F; try discriminate. apply known_literal_ok, F.
+  - destruct (forallb _ (fst c)) eqn:A; [|discriminate].
+    destruct (known_effects T N k cs) as [r|]; [|discriminate]. injection H as <-.
+    replace (fires ds c) with true; [simpl; f_equal; apply IH; reflexivity|]. symmetry. unfold fires.
+    apply forallb_forall. intros x I.
+    rewrite forallb_forall in A. specialize (A _ I).
+    destruct (known_literal T N k x) as [[]|] eqn:F; try discriminate. apply known_literal_ok, F.
 Qed.
 
 Lemma admitted_ok : forall o ch, admitted_choice o ch = true -> admitted o ch.
 Proof.
   intros o ch H. unfold admitted_choice in H. rewrite !andb_true_iff in H. destruct H as [[H1 H2] H3]. split.
-  - apply Nat.eqb_eq in H1. revert H1 H2. generalize (slot_sizes o) as ns. clear. induction ch as [|x ch IH]; intros [|n ns] L F; try discriminate; constructor.
+  - apply Nat.eqb_eq in H1. revert H1 H2. generalize (slot_sizes o) as ns. clear.
+    induction ch as [|x ch IH]; intros [|n ns] L F; try discriminate; constructor.
     + simpl in F. rewrite !andb_true_iff in F. destruct F as [F _]. lia.
     + simpl in F. rewrite !andb_true_iff in F. destruct F as [_ F]. apply IH; [simpl in L; lia|exact F].
   - intros slots bad I J. unfold admits in H3. rewrite forallb_forall in H3. specialize (H3 _ I). simpl in H3.
-    apply negb_true_iff in H3. assert (E : existsb (equal_lists (map (fun i => nth i ch 0%Z) slots)) bad = true); [|congruence].
+    apply negb_true_iff in H3.
+    assert (E : existsb (equal_lists (map (fun i => nth i ch 0%Z) slots)) bad = true); [|congruence].
     apply existsb_exists. exists (map (fun i => nth i ch 0%Z) slots). split; [exact J|].
     unfold equal_lists. destruct (list_eq_dec _ _ _); [reflexivity|congruence].
 Qed.
-Lemma find_filter : forall X (f : X -> bool) l, List.find f l = match filter f l with [] => None | c :: _ => Some c end.
-Proof. intros X f. induction l as [|x l IH]; simpl; [reflexivity|]. destruct (f x); [reflexivity|exact IH]. Qed.
-Definition after_of (o : option (operator * choice)) : state := match o with Some (o, ch) => apply o ds ch | None => s end.
+Lemma find_filter : forall X (f : X -> bool) l, List.find f l = match filter f l with [] => None
+  | c :: _ => Some c end.
+Proof. intros X f. induction l as [|x l IH]; simpl; [reflexivity|]. destruct (f x); [reflexivity|exact IH].
+Qed.
+Definition after_of (o : option (operator * choice)) : state := match o with Some (o, ch) => apply o ds ch
+  | None => s end.
 Lemma is_zero_ok : forall f, is_zero f = true -> ev w f == 0.
 Proof. intros [[|] c] H; [|discriminate]. apply Qeq_bool_iff in H. rewrite ev_empty. exact H. Qed.
 Lemma simulated_ok : forall sy time o w', Describes w w' sy ->
   (forall p os, changing N p = false -> holds_in w' (p, os) = holds_in w (p, os)) ->
   (forall f, changing N (fst f) = false -> value_in w' f = value_in w f) ->
-  forallb (fun l => match assoc (fst l) (new_truths sy) with Some true => mem (may_hold N) (fst l) | _ => true end) (new_truths sy) = true ->
+  forallb (fun l => match assoc (fst l) (new_truths sy) with Some true => mem (may_hold N) (fst l)
+    | _ => true end) (new_truths sy) = true ->
   forallb (stays_exclusive P T N k sy) (exclusive N) = true ->
   match o with Some (o, _) => In o (operators T) | None => True end ->
   simulated P T N k sy time o = true ->
-  Rel w' (after_of o) /\ match o with Some (o, ch) => admitted o ch /\ holds (precondition o) ds (slot_sizes o) ch = true | None => True end /\
+  Rel w' (after_of o) /\ match o with Some (o, ch) => admitted o ch /\
+    holds (precondition o) ds (slot_sizes o) ch = true | None => True end /\
   exists g, growth P N sy time = Some g /\ inject_Z (step_cost o) <= g * (Zpos (cost_scale N) # 1).
 Proof.
   intros sy time o w' D Sf Sv May Excl Io H. unfold simulated in H.
-  match type of H with match ?e with None => _ | Some _ => _ end = _ => destruct e as [made|] eqn:E end; [|discriminate].
+  match type of H with match ?e with None => _ | Some _ => _ end = _ => destruct e as [made|] eqn:E end;
+    [|discriminate].
   rewrite !andb_true_iff in H. destruct H as [[H1 H2] H3]. rewrite forallb_forall in H1, H2.
-  assert (Pre : match o with Some (o, ch) => admitted o ch /\ holds (precondition o) ds (slot_sizes o) ch = true /\ distinct (map fst (number_effects o)) = true /\ made = made_facts o ds
+  assert (Pre : match o with Some (o, ch) => admitted o ch /\
+    holds (precondition o) ds (slot_sizes o) ch = true /\ distinct (map fst (number_effects o)) = true /\
+    made = made_facts o ds
                 | None => made = [] end).
-  { destruct o as [[o ch]|]; [|congruence]. destruct (admitted_choice o ch && known_condition T N k (precondition o) (slot_sizes o) ch && distinct (map fst (number_effects o))) eqn:A; [|discriminate].
-    rewrite !andb_true_iff in A. destruct A as [[A1 A2] A3]. split; [apply admitted_ok, A1|]. split; [apply known_condition_ok, A2|]. split; [exact A3|].
-    destruct (known_effects T N k (conditional o)) as [l|] eqn:F; [|discriminate]. apply known_effects_ok in F. simpl in E. injection E as <-. unfold made_facts. congruence. }
-  assert (Val : forall v vals, M.find v (variables N) = Some vals -> var_value (after_of o) v = last_put made v (var_value s v)).
+  { destruct o as [[o ch]|]; [|congruence].
+    destruct (admitted_choice o ch && known_condition T N k (precondition o) (slot_sizes o) ch &&
+      distinct (map fst (number_effects o))) eqn:A; [|discriminate].
+    rewrite !andb_true_iff in A. destruct A as [[A1 A2] A3]. split; [apply admitted_ok, A1|].
+    split; [apply known_condition_ok, A2|]. split; [exact A3|].
+    destruct (known_effects T N k (conditional o)) as [l|] eqn:F; [|discriminate].
+    apply known_effects_ok in F. simpl in E. injection E as <-. unfold made_facts. congruence. }
+  assert (Val : forall v vals, M.find v (variables N) = Some vals ->
+    var_value (after_of o) v = last_put made v (var_value s v)).
   { intros v vals F. destruct o as [[o ch]|].
-    - destruct Pre as [_ [_ [_ ->]]]. unfold after_of, apply, var_value at 1. cbn [var_values]. rewrite get_puts. change (get (var_values ds) v) with (var_value ds v). rewrite (d_val _ _ F). reflexivity.
+    - destruct Pre as [_ [_ [_ ->]]]. unfold after_of, apply, var_value at 1. cbn [var_values].
+      rewrite get_puts. change (get (var_values ds) v) with (var_value ds v). rewrite (d_val _ _ F).
+      reflexivity.
     - rewrite Pre. reflexivity. }
   split; [|split].
   - split.
     + intros v vals x a F I. rewrite (d_fact _ _ _ D).
-      assert (Q : variable_ok T N k sy made v = true \/ (last_put made v (var_value s v) = var_value s v /\ assoc a (new_truths sy) = None)).
-      { destruct (in_dec Pos.eq_dec v (map fst made ++ flat_map (fun l => match find_atom (fact_of N) (fst l) with Some f => [fst f] | None => [] end) (new_truths sy))) as [J|J].
+      assert (Q : variable_ok T N k sy made v = true \/ (last_put made v (var_value s v) = var_value s v /\
+        assoc a (new_truths sy) = None)).
+      { destruct (in_dec Pos.eq_dec v (map fst made ++ flat_map (fun l =>
+          match find_atom (fact_of N) (fst l) with Some f => [fst f]
+          | None => [] end) (new_truths sy))) as [J|J].
         - left. apply H1, J.
         - right. split.
-          + apply last_put_none. intros f If e. apply J, in_or_app. left. apply in_map_iff. exists f. split; assumption.
-          + destruct (assoc a (new_truths sy)) as [b|] eqn:A; [|reflexivity]. exfalso. apply J, in_or_app. right. apply in_flat_map.
-            exists (a, b). split; [apply assoc_In, A|]. cbn [fst]. destruct parts as [_ [B _]]. destruct (B _ _ F) as [_ B']. destruct (B' _ _ I) as [_ B'']. rewrite B''. left. reflexivity. }
+          + apply last_put_none. intros f If e. apply J, in_or_app. left. apply in_map_iff. exists f.
+            split; assumption.
+          + destruct (assoc a (new_truths sy)) as [b|] eqn:A; [|reflexivity]. exfalso. apply J, in_or_app.
+            right. apply in_flat_map.
+            exists (a, b). split; [apply assoc_In, A|]. cbn [fst]. destruct parts as [_ [B _]].
+            destruct (B _ _ F) as [_ B']. destruct (B' _ _ I) as [_ B'']. rewrite B''. left. reflexivity. }
       rewrite (Val _ _ F). destruct Q as [Q|[Q1 Q2]].
-      * unfold variable_ok in Q. rewrite F in Q. rewrite forallb_forall in Q. specialize (Q _ (possible_ok k K _ _ F)). cbv zeta in Q.
-        rewrite forallb_forall in Q. specialize (Q _ I). cbn [fst snd] in Q. apply eqb_prop in Q. rewrite <- Q.
+      * unfold variable_ok in Q. rewrite F in Q. rewrite forallb_forall in Q.
+        specialize (Q _ (possible_ok k K _ _ F)). cbv zeta in Q.
+        rewrite forallb_forall in Q. specialize (Q _ I). cbn [fst snd] in Q. apply eqb_prop in Q.
+        rewrite <- Q.
         destruct (assoc a (new_truths sy)); [reflexivity|]. apply (r_var _ _ R _ _ _ _ F I).
       * rewrite Q1, Q2. apply (r_var _ _ R _ _ _ _ F I).
     + intros n f F. pose proof (d_value _ _ _ D f) as V. destruct (r_num _ _ R _ _ F) as [q0 [E0 Q0]].
-      assert (X : exists q, value_in w' f = Some q /\ q == ev w (match assoc f (new_values sy) with Some g => g | None => fluent f end)).
-      { destruct (assoc f (new_values sy)) as [g|]; [exact V|]. exists q0. rewrite V, ev_fluent, E0. split; reflexivity. }
+      assert (X : exists q, value_in w' f = Some q /\
+        q == ev w (match assoc f (new_values sy) with Some g => g | None => fluent f end)).
+      { destruct (assoc f (new_values sy)) as [g|]; [exact V|]. exists q0. rewrite V, ev_fluent, E0.
+        split; reflexivity. }
       destruct X as [q [X1 X2]]. exists q. split; [exact X1|]. rewrite X2.
-      assert (Q : number_ok N sy o n = true \/ (match assoc f (new_values sy) with Some g => g | None => fluent f end = fluent f /\
-                    match o with Some (o, _) => List.find (fun c => Pos.eqb (fst c) n) (number_effects o) = None | None => True end)).
+      assert (Q : number_ok N sy o n = true \/ (match assoc f (new_values sy) with Some g => g
+        | None => fluent f end = fluent f /\
+                    match o with Some (o, _) =>
+                      List.find (fun c => Pos.eqb (fst c) n) (number_effects o) = None | None => True end)).
       { destruct (in_dec Pos.eq_dec n (match o with Some (o, _) => map fst (number_effects o) | None => [] end
-           ++ flat_map (fun l => match find_atom (number_of N) (fst l) with Some n => [n] | None => [] end) (new_values sy))) as [J|J].
+           ++ flat_map (fun l => match find_atom (number_of N) (fst l) with Some n => [n]
+                | None => [] end) (new_values sy))) as [J|J].
         - left. apply H2, J.
         - right. split.
-          + destruct (assoc f (new_values sy)) as [g|] eqn:A; [|reflexivity]. exfalso. apply J, in_or_app. right. apply in_flat_map.
-            exists (f, g). split; [apply assoc_In, A|]. cbn [fst]. destruct parts as [_ [_ [_ [B _]]]]. destruct (B _ _ F) as [_ [_ [B' _]]]. rewrite B'. left. reflexivity.
-          + destruct o as [[o ch]|]; [|exact I]. destruct (List.find _ _) as [c|] eqn:A; [|reflexivity]. exfalso. apply find_some in A. destruct A as [A1 A2].
+          + destruct (assoc f (new_values sy)) as [g|] eqn:A; [|reflexivity]. exfalso. apply J, in_or_app.
+            right. apply in_flat_map.
+            exists (f, g). split; [apply assoc_In, A|]. cbn [fst]. destruct parts as [_ [_ [_ [B _]]]].
+            destruct (B _ _ F) as [_ [_ [B' _]]]. rewrite B'. left. reflexivity.
+          + destruct o as [[o ch]|]; [|exact I]. destruct (List.find _ _) as [c|] eqn:A; [|reflexivity].
+            exfalso. apply find_some in A. destruct A as [A1 A2].
             apply Pos.eqb_eq in A2. apply J, in_or_app. left. rewrite <- A2. apply in_map, A1. }
-      assert (Y : match o with Some (o, ch) => match List.find (fun c => Pos.eqb (fst c) n) (number_effects o) with
-                     | Some c => num_value (after_of (Some (o, ch))) n = value (snd c) ds (slot_sizes o) ch | None => num_value (after_of (Some (o, ch))) n = num_value s n end
+      assert (Y : match o with Some (o, ch) =>
+        match List.find (fun c => Pos.eqb (fst c) n) (number_effects o) with
+                     | Some c => num_value (after_of (Some (o, ch))) n = value (snd c) ds (slot_sizes o) ch
+                       | None => num_value (after_of (Some (o, ch))) n = num_value s n end
                   | None => num_value (after_of o) n = num_value s n end).
       { destruct o as [[o ch]|]; [|reflexivity]. destruct Pre as [_ [_ [Di _]]].
-        pose proof (changed (fun l => value l ds (slot_sizes o) ch) (number_effects o) n (get (num_values ds) n) Di) as CH. cbv beta in CH.
-        rewrite find_filter. unfold after_of, apply, num_value at 1 2. cbn [num_values]. rewrite get_puts, CH. change (get (num_values ds) n) with (num_value ds n).
+        pose proof (changed (fun l => value l ds (slot_sizes o) ch) (number_effects o) n
+          (get (num_values ds) n) Di) as CH. cbv beta in CH.
+        rewrite find_filter. unfold after_of, apply, num_value at 1 2. cbn [num_values]. rewrite get_puts, CH.
+        change (get (num_values ds) n) with (num_value ds n).
         destruct (filter _ _); [apply (d_num _ _ F)|reflexivity]. }
       destruct Q as [Q|[Q1 Q2]].
       * unfold number_ok in Q. rewrite F in Q. cbv zeta in Q. destruct o as [[o ch]|].
         -- destruct (List.find (fun c : positive * linear => Pos.eqb (fst c) n) (number_effects o)) as [c|].
-           ++ destruct (form_of N (snd c) (slot_sizes o) ch) as [g|] eqn:G; [|discriminate]. apply is_zero_ok in Q. rewrite ev_plus_form in Q.
-              apply form_of_ok in G. rewrite Y, <- G. setoid_replace (ev w g) with (ev w (match assoc f (new_values sy) with Some g => g | None => fluent f end)) by lra. reflexivity.
-           ++ apply is_zero_ok in Q. rewrite ev_plus_form, (ev_fluent w f), E0 in Q. cbn [default] in Q. rewrite Y, <- Q0.
-              setoid_replace q0 with (ev w (match assoc f (new_values sy) with Some g => g | None => fluent f end)) by lra. reflexivity.
-        -- apply is_zero_ok in Q. rewrite ev_plus_form, (ev_fluent w f), E0 in Q. cbn [default] in Q. rewrite Y, <- Q0.
-           setoid_replace q0 with (ev w (match assoc f (new_values sy) with Some g => g | None => fluent f end)) by lra. reflexivity.
-      * rewrite Q1, (ev_fluent w f), E0. cbn [default]. rewrite Q0. destruct o as [[o ch]|]; [rewrite Q2 in Y|]; rewrite Y; reflexivity.
+           ++ destruct (form_of N (snd c) (slot_sizes o) ch) as [g|] eqn:G; [|discriminate].
+              apply is_zero_ok in Q. rewrite ev_plus_form in Q.
+              apply form_of_ok in G. rewrite Y, <- G.
+              setoid_replace (ev w g) with (ev w (match assoc f (new_values sy) with Some g => g
+                | None => fluent f end)) by lra. reflexivity.
+           ++ apply is_zero_ok in Q. rewrite ev_plus_form, (ev_fluent w f), E0 in Q. cbn [default] in Q.
+              rewrite Y, <- Q0.
+              setoid_replace q0 with (ev w (match assoc f (new_values sy) with Some g => g
+                | None => fluent f end)) by lra. reflexivity.
+        -- apply is_zero_ok in Q. rewrite ev_plus_form, (ev_fluent w f), E0 in Q. cbn [default] in Q.
+           rewrite Y, <- Q0.
+           setoid_replace q0 with (ev w (match assoc f (new_values sy) with Some g => g
+             | None => fluent f end)) by lra. reflexivity.
+      * rewrite Q1, (ev_fluent w f), E0. cbn [default]. rewrite Q0.
+        destruct o as [[o ch]|]; [rewrite Q2 in Y|]; rewrite Y; reflexivity.
     + intros p os C. rewrite Sf by exact C. apply (r_fact _ _ R), C.
     + intros f C. rewrite Sv by exact C. apply (r_value _ _ R), C.
-    + intros a C Ha. rewrite (d_fact _ _ _ D) in Ha. destruct (assoc a (new_truths sy)) as [b|] eqn:A; [|apply (r_may _ _ R); assumption].
-      subst b. rewrite forallb_forall in May. specialize (May _ (assoc_In _ _ _ _ A)). cbn [fst] in May. rewrite A in May. exact May.
-    + intros g a b G A B Ha Hb. rewrite forallb_forall in Excl. specialize (Excl _ G). unfold stays_exclusive in Excl. rewrite forallb_forall in Excl.
-      assert (One : forall x y, In x g -> In y g -> assoc x (new_truths sy) = Some true -> holds_in w' y = true -> x = y).
-      { intros x y X Y Et Hy. specialize (Excl _ X). rewrite Et in Excl. rewrite forallb_forall in Excl. specialize (Excl _ Y).
+    + intros a C Ha. rewrite (d_fact _ _ _ D) in Ha.
+      destruct (assoc a (new_truths sy)) as [b|] eqn:A; [|apply (r_may _ _ R); assumption].
+      subst b. rewrite forallb_forall in May. specialize (May _ (assoc_In _ _ _ _ A)). cbn [fst] in May.
+      rewrite A in May. exact May.
+    + intros g a b G A B Ha Hb. rewrite forallb_forall in Excl. specialize (Excl _ G).
+      unfold stays_exclusive in Excl. rewrite forallb_forall in Excl.
+      assert (One : forall x y, In x g -> In y g -> assoc x (new_truths sy) = Some true ->
+        holds_in w' y = true -> x = y).
+      { intros x y X Y Et Hy. specialize (Excl _ X). rewrite Et in Excl. rewrite forallb_forall in Excl.
+        specialize (Excl _ Y).
         apply orb_true_iff in Excl. destruct Excl as [Eq|F]; [apply atom_eqb_eq, Eq|]. exfalso.
         destruct (symbolic_atom P T N k sy y) as [[]|] eqn:Sy; try discriminate.
         apply (symbolic_atom_ok P T N w k (base_truth_ok k K) w' sy y false D) in Sy. congruence. }
@@ -292,16 +404,19 @@ Proof.
       * destruct (assoc b (new_truths sy)) as [tb|] eqn:Eb.
         -- rewrite Db in Hb. subst tb. symmetry. apply (One b a); assumption.
         -- apply (r_exclusive _ _ R g); congruence.
-    + destruct o as [[o ch]|]; [|apply R]. apply wf_apply; [exact task_ok|exact Io|]. apply wf_derive; [apply heads|apply deriveds|apply R]; exact task_ok.
+    + destruct o as [[o ch]|]; [|apply R]. apply wf_apply; [exact task_ok|exact Io|].
+      apply wf_derive; [apply heads|apply deriveds|apply R]; exact task_ok.
   - destruct o as [[o ch]|]; [|exact I]. tauto.
-  - destruct (growth P N sy time) as [g|]; [|discriminate]. exists g. split; [reflexivity|]. apply Qle_bool_iff, H3.
+  - destruct (growth P N sy time) as [g|]; [|discriminate]. exists g. split; [reflexivity|].
+    apply Qle_bool_iff, H3.
 Qed.
 End Operators.
 
 (* Knowledge from conditions that hold *)
 Lemma knows_join : forall a b, Knows w a -> Knows w b -> Knows w (join a b).
 Proof.
-  intros a b [A1 A2] [B1 B2]. split; simpl; intros ? ? I; apply in_app_or in I; destruct I; auto; [apply A2|apply B2]; assumption.
+  intros a b [A1 A2] [B1 B2].
+  split; simpl; intros ? ? I; apply in_app_or in I; destruct I; auto; [apply A2|apply B2]; assumption.
 Qed.
 Lemma knows_nothing : Knows w (Knowledge [] []).
 Proof. split; intros ? ? []. Qed.
@@ -309,51 +424,74 @@ Lemma conjuncts_ok : forall w1 sy d r, Describes w w1 sy -> agrees w d r -> fora
   truth P w1 d env f = Some true -> Knows w (conjuncts P N sy r env f).
 Proof.
   intros w1 sy d r D A env. 
-  assert (L : forall p ts b l, ground env ts = Some l -> holds_in w1 (p, l) = b -> Knows w (match assoc (p, l) (new_truths sy) with
-             | None => if changing N p then Knowledge [((p, l), b)] [] else Knowledge [] [] | Some _ => Knowledge [] [] end)).
-  { intros p ts b l G H. rewrite (d_fact _ _ _ D) in H. destruct (assoc (p, l) (new_truths sy)); [apply knows_nothing|].
+  assert (L : forall p ts b l, ground env ts = Some l -> holds_in w1 (p, l) = b ->
+    Knows w (match assoc (p, l) (new_truths sy) with
+             | None => if changing N p then Knowledge [((p, l), b)] [] else Knowledge [] []
+               | Some _ => Knowledge [] [] end)).
+  { intros p ts b l G H. rewrite (d_fact _ _ _ D) in H.
+    destruct (assoc (p, l) (new_truths sy)); [apply knows_nothing|].
     destruct (changing N p); [|apply knows_nothing]. split; [intros b0 c [I|[]]; congruence|intros b0 c []]. }
   induction f; intro H; try (exact knows_nothing); cbn [truth conjuncts] in *.
   - destruct (ground env ts) as [l|] eqn:G; [|exact knows_nothing]. injection H as H. eapply L; eassumption.
-  - pose proof (symbolic_expression_ok P N w static_value w1 sy d r D A env (Minus a b)) as Q. cbn [eval] in Q.
+  - pose proof (symbolic_expression_ok P N w static_value w1 sy d r D A env (Minus a b)) as Q.
+    cbn [eval] in Q.
     destruct (symbolic_expression P N sy r env (Minus a b)) as [| |g]; try (exact knows_nothing).
-    destruct (eval w1 d env a) as [x|]; [|discriminate]. destruct (eval w1 d env b) as [y|]; [|discriminate]. unfold agrees in Q. specialize (Q _ eq_refl). simpl in Q.
-    injection H as H. split; [intros b0 c []|intros b0 c [I|[]]]. injection I as <- <-. destruct strict; [apply less_spec in H|apply Qle_bool_iff in H]; lra.
-  - destruct f; try (exact knows_nothing). cbn [truth] in H. destruct (ground env ts) as [l|] eqn:G; [|exact knows_nothing].
+    destruct (eval w1 d env a) as [x|]; [|discriminate]. destruct (eval w1 d env b) as [y|]; [|discriminate].
+    unfold agrees in Q. specialize (Q _ eq_refl). simpl in Q.
+    injection H as H. split; [intros b0 c []|intros b0 c [I|[]]]. injection I as <- <-.
+    destruct strict; [apply less_spec in H|apply Qle_bool_iff in H]; lra.
+  - destruct f; try (exact knows_nothing). cbn [truth] in H.
+    destruct (ground env ts) as [l|] eqn:G; [|exact knows_nothing].
     simpl in H. injection H as H. apply negb_true_iff in H. eapply L; eassumption.
   - apply (knows_join (conjuncts P N sy r env f1) (conjuncts P N sy r env f2)); [apply IHf1|apply IHf2];
-      destruct (truth P w1 d env f1) as [[]|]; try destruct (truth P w1 d env f2) as [[]|]; simpl in H; congruence.
+      destruct (truth P w1 d env f1) as [[]|]; try destruct (truth P w1 d env f2) as [[]|]; simpl in H;
+        congruence.
 Qed.
-Lemma happening_holds : forall w1 d env f e w2, happening P w1 d env f e = Some w2 -> truth P w1 d env f = Some true.
-Proof. intros w1 d env f e w2 H. unfold happening in H. destruct (truth P w1 d env f) as [[]|]; try discriminate. reflexivity. Qed.
+Lemma happening_holds : forall w1 d env f e w2, happening P w1 d env f e = Some w2 ->
+  truth P w1 d env f = Some true.
+Proof. intros w1 d env f e w2 H. unfold happening in H.
+destruct (truth P w1 d env f) as [[]|]; try discriminate. reflexivity. Qed.
 Lemma gathered_ok : forall a env w' d, step P true w a env = Some (w', d) -> Knows w (gathered P T N a env).
 Proof.
   intros a env w' d H. unfold step in H. destruct (negb _); [discriminate|]. unfold gathered.
   destruct (duration a) as [e|] eqn:A.
-  2: { destruct (happening P w None env (at_start a) (start_effect a)) as [x|] eqn:E; [|discriminate]. apply happening_holds in E.
+  2: { destruct (happening P w None env (at_start a) (start_effect a)) as [x|] eqn:E; [|discriminate].
+       apply happening_holds in E.
        apply (conjuncts_ok w unchanged None Undefined); [apply describes_itself|exact eq_refl|exact E]. }
-  destruct (eval w None env e) as [q|] eqn:Ev; [|discriminate]. pose proof (symbolic_duration_ok P N w static_value a env e q A Ev) as L.
-  destruct (symbolic_duration P N a env) as [| |[[|t l] c]]; try (exact knows_nothing). unfold agrees in L. specialize (L q eq_refl). rewrite ev_empty in L.
-  assert (R1 : agrees w (Some q) (Is (constant c))) by (simpl; intros x X; injection X as <-; rewrite ev_constant; exact L).
-  destruct (less q 0); [discriminate|]. rewrite (Qeqb_comp q c L 0 0 (Qeq_refl 0)) in H. cbv zeta. destruct (Qeq_bool c 0).
-  - match type of H with option_map _ ?h = _ => destruct h as [x|] eqn:E end; [|discriminate]. apply happening_holds in E.
-    apply (conjuncts_ok w unchanged (Some q) (Is (constant c)) (describes_itself w) R1 env (And (at_start a) (at_end a))). exact E.
+  destruct (eval w None env e) as [q|] eqn:Ev; [|discriminate].
+  pose proof (symbolic_duration_ok P N w static_value a env e q A Ev) as L.
+  destruct (symbolic_duration P N a env) as [| |[[|t l] c]]; try (exact knows_nothing). unfold agrees in L.
+  specialize (L q eq_refl). rewrite ev_empty in L.
+  assert (R1 : agrees w (Some q) (Is (constant c))) by (simpl; intros x X; injection X as <-;
+    rewrite ev_constant; exact L).
+  destruct (less q 0); [discriminate|]. rewrite (Qeqb_comp q c L 0 0 (Qeq_refl 0)) in H. cbv zeta.
+  destruct (Qeq_bool c 0).
+  - match type of H with option_map _ ?h = _ => destruct h as [x|] eqn:E end; [|discriminate].
+    apply happening_holds in E.
+    apply (conjuncts_ok w unchanged (Some q) (Is (constant c)) (describes_itself w) R1 env
+      (And (at_start a) (at_end a))). exact E.
   - destruct (happening P w (Some q) env (at_start a) (start_effect a)) as [w1|] eqn:E1; [|discriminate].
-    pose proof (conjuncts_ok w unchanged (Some q) (Is (constant c)) (describes_itself w) R1 env _ (happening_holds _ _ _ _ _ _ E1)) as K0.
-    apply (symbolic_happening_ok P T N w _ (base_truth_ok _ K0) static_value K0 w unchanged (Some q) (Is (constant c)) c) in E1; [|apply describes_itself|exact R1].
+    pose proof (conjuncts_ok w unchanged (Some q) (Is (constant c)) (describes_itself w) R1 env _
+      (happening_holds _ _ _ _ _ _ E1)) as K0.
+    apply (symbolic_happening_ok P T N w _ (base_truth_ok _ K0) static_value K0 w unchanged (Some q)
+      (Is (constant c)) c) in E1; [|apply describes_itself|exact R1].
     destruct (symbolic_happening _ _ _ _ _ _ _ _ _ _) as [| |s1 t1]; try exact K0. destruct E1 as [_ E1].
-    match type of H with option_map _ ?h = _ => destruct h as [x|] eqn:E end; [|discriminate]. apply happening_holds in E.
+    match type of H with option_map _ ?h = _ => destruct h as [x|] eqn:E end; [|discriminate].
+    apply happening_holds in E.
     apply knows_join; [exact K0|]. apply (conjuncts_ok w1 s1 (Some q) (Is (constant c)) E1 R1 env _ E).
 Qed.
 Lemma tree_cases : forall (leaf : knowledge -> option (nat * choice) -> bool) (Q : Prop),
-  (forall k o, Knows w k -> leaf k o = true -> Q) -> forall t k, Knows w k -> tree_ok P T N leaf k t = true -> Q.
+  (forall k o, Knows w k -> leaf k o = true -> Q) -> forall t k, Knows w k ->
+    tree_ok P T N leaf k t = true -> Q.
 Proof.
   intros leaf Q L. induction t; intros k K H; cbn [tree_ok] in H.
   - eapply L; eassumption.
   - exfalso. eapply impossible_ok; eassumption.
-  - apply andb_true_iff in H. destruct H as [H1 H2]. destruct (holds_in w a) eqn:E; [eapply IHt1; [|exact H1]|eapply IHt2; [|exact H2]];
+  - apply andb_true_iff in H. destruct H as [H1 H2].
+    destruct (holds_in w a) eqn:E; [eapply IHt1; [|exact H1]|eapply IHt2; [|exact H2]];
       (split; [intros b c [I|I]; [injection I as <- <-; exact E|apply K, I]|apply K]).
-  - apply andb_true_iff in H. destruct H as [H1 H2]. destruct (Qle_bool 0 (ev w f)) eqn:E; [eapply IHt1; [|exact H1]|eapply IHt2; [|exact H2]];
+  - apply andb_true_iff in H. destruct H as [H1 H2].
+    destruct (Qle_bool 0 (ev w f)) eqn:E; [eapply IHt1; [|exact H1]|eapply IHt2; [|exact H2]];
       (split; [apply K|intros st g [I|I]; [injection I as <- <-|apply K, I]]).
     + apply Qle_bool_iff, E.
     + apply le_false in E. rewrite ev_plus_form, ev_constant. lra.
@@ -364,109 +502,166 @@ End State.
 Lemma ground_prefix : forall e more ts l, ground e ts = Some l -> ground (e ++ more) ts = Some l.
 Proof.
   intros e more. induction ts as [|t ts IH]; intros l H; simpl in *; [exact H|].
-  destruct (object_of e t) as [o|] eqn:O; [|discriminate]. destruct (ground e ts) as [l'|]; [|discriminate]. rewrite (IH _ eq_refl).
-  replace (object_of (e ++ more) t) with (Some o); [exact H|]. destruct t; simpl in *; [|congruence]. rewrite nth_error_app1; [congruence|]. apply nth_error_Some. congruence.
+  destruct (object_of e t) as [o|] eqn:O; [|discriminate]. destruct (ground e ts) as [l'|]; [|discriminate].
+  rewrite (IH _ eq_refl).
+  replace (object_of (e ++ more) t) with (Some o); [exact H|]. destruct t; simpl in *; [|congruence].
+  rewrite nth_error_app1; [congruence|]. apply nth_error_Some. congruence.
 Qed.
 Lemma object_prefix : forall e more t o, object_of e t = Some o -> object_of (e ++ more) t = Some o.
-Proof. intros e more t o H. destruct t; simpl in *; [|exact H]. rewrite nth_error_app1; [exact H|]. apply nth_error_Some. congruence. Qed.
-Definition same_statics (w : world) := forall p os, changing N p = false -> holds_in w (p, os) = holds_in (initial P) (p, os).
-Lemma static_false_ok : forall w d e more f, same_statics w -> static_false P N e f = true -> truth P w d (e ++ more) f <> Some true.
+Proof. intros e more t o H. destruct t; simpl in *; [|exact H]. rewrite nth_error_app1; [exact H|].
+apply nth_error_Some. congruence. Qed.
+Definition same_statics (w : world) := forall p os, changing N p = false ->
+  holds_in w (p, os) = holds_in (initial P) (p, os).
+Lemma static_false_ok : forall w d e more f, same_statics w -> static_false P N e f = true ->
+  truth P w d (e ++ more) f <> Some true.
 Proof.
   intros w d e more f S. induction f; intro H; cbn [static_false truth] in *; try discriminate.
-  - apply andb_true_iff in H. destruct H as [C H]. apply negb_true_iff in C. destruct (ground e ts) as [l|] eqn:G; [|discriminate].
+  - apply andb_true_iff in H. destruct H as [C H]. apply negb_true_iff in C.
+    destruct (ground e ts) as [l|] eqn:G; [|discriminate].
     rewrite (ground_prefix _ _ _ _ G), S by exact C. apply negb_true_iff in H. rewrite H. discriminate.
-  - destruct (object_of e t) as [a|] eqn:A; [|discriminate]. destruct (object_of e u) as [b|] eqn:B; [|discriminate].
-    rewrite (object_prefix _ _ _ _ A), (object_prefix _ _ _ _ B). apply negb_true_iff in H. rewrite H. discriminate.
+  - destruct (object_of e t) as [a|] eqn:A; [|discriminate].
+    destruct (object_of e u) as [b|] eqn:B; [|discriminate].
+    rewrite (object_prefix _ _ _ _ A), (object_prefix _ _ _ _ B). apply negb_true_iff in H. rewrite H.
+    discriminate.
   - destruct f; try discriminate; cbn [truth] in *.
-    + apply andb_true_iff in H. destruct H as [C H]. apply negb_true_iff in C. destruct (ground e ts) as [l|] eqn:G; [|discriminate].
+    + apply andb_true_iff in H. destruct H as [C H]. apply negb_true_iff in C.
+      destruct (ground e ts) as [l|] eqn:G; [|discriminate].
       rewrite (ground_prefix _ _ _ _ G), S by exact C. rewrite H. discriminate.
-    + destruct (object_of e t) as [a|] eqn:A; [|discriminate]. destruct (object_of e u) as [b|] eqn:B; [|discriminate].
+    + destruct (object_of e t) as [a|] eqn:A; [|discriminate].
+      destruct (object_of e u) as [b|] eqn:B; [|discriminate].
       rewrite (object_prefix _ _ _ _ A), (object_prefix _ _ _ _ B), H. discriminate.
   - apply orb_true_iff in H. destruct H as [H|H]; [specialize (IHf1 H)|specialize (IHf2 H)];
-      destruct (truth P w d (e ++ more) f1) as [[]|], (truth P w d (e ++ more) f2) as [[]|]; simpl; congruence.
+      destruct (truth P w d (e ++ more) f1) as [[]|], (truth P w d (e ++ more) f2) as [[]|]; simpl;
+        congruence.
 Qed.
 (* Every change has a predicate or function among the heads of its effect. *)
 Definition head (c : change) : key := match c with Fact a _ => fst a | Number a _ _ => fst a end.
-Lemma changes_heads : forall w d e env cs c, changes P w d env e = Some cs -> In c cs -> In (head c) (effect_heads e).
+Lemma changes_heads : forall w d e env cs c, changes P w d env e = Some cs -> In c cs ->
+  In (head c) (effect_heads e).
 Proof.
   intros w d. induction e; intros env cs c H I; cbn [changes effect_heads] in *.
   - injection H as <-. destruct I.
   - destruct (ground env ts); [|discriminate]. injection H as <-. destruct I as [<-|[]]. left. reflexivity.
-  - destruct (ground env ts); [|discriminate]. destruct (eval w d env e); [|discriminate]. injection H as <-. destruct I as [<-|[]]. left. reflexivity.
-  - destruct (changes P w d env e1) as [x|] eqn:E1; [|discriminate]. destruct (changes P w d env e2) as [y|] eqn:E2; [|discriminate]. injection H as <-.
-    apply in_or_app. apply in_app_or in I. destruct I as [I|I]; [left; eapply IHe1|right; eapply IHe2]; eassumption.
-  - destruct (truth P w d env f) as [[]|]; try discriminate; [eapply IHe; eassumption|injection H as <-; destruct I].
-  - revert cs H I. induction (objects P type) as [|o os IH]; intros cs H I; cbn [fold_right] in H; [injection H as <-; destruct I|].
-    destruct (changes P w d (env ++ [o]) e) as [x|] eqn:E1; [|discriminate]. destruct (fold_right _ _ os) as [y|]; [|discriminate]. injection H as <-.
+  - destruct (ground env ts); [|discriminate]. destruct (eval w d env e); [|discriminate]. injection H as <-.
+    destruct I as [<-|[]]. left. reflexivity.
+  - destruct (changes P w d env e1) as [x|] eqn:E1; [|discriminate].
+    destruct (changes P w d env e2) as [y|] eqn:E2; [|discriminate]. injection H as <-.
+    apply in_or_app. apply in_app_or in I.
+    destruct I as [I|I]; [left; eapply IHe1|right; eapply IHe2]; eassumption.
+  - destruct (truth P w d env f) as [[]|]; try discriminate;
+      [eapply IHe; eassumption|injection H as <-; destruct I].
+  - revert cs H I. induction (objects P type) as [|o os IH]; intros cs H I; cbn [fold_right] in H;
+      [injection H as <-; destruct I|].
+    destruct (changes P w d (env ++ [o]) e) as [x|] eqn:E1; [|discriminate].
+    destruct (fold_right _ _ os) as [y|]; [|discriminate]. injection H as <-.
     apply in_app_or in I. destruct I as [I|I]; [eapply IHe; eassumption|eapply IH; [reflexivity|exact I]].
 Qed.
 Lemma updates_targets : forall w cs fs l f q, updates w cs fs = Some l -> assoc f l = Some q -> In f fs.
 Proof.
-  intros w cs. induction fs as [|h fs IH]; intros l f q H A; cbn [updates] in H; [injection H as <-; discriminate|].
-  destruct (changed_value _ _); [|discriminate]. destruct (updates w cs fs) as [l'|]; [|discriminate]. injection H as <-. simpl in A.
-  destruct (atom_eqb f h) eqn:E; [left; symmetry; apply atom_eqb_eq, E|right; eapply IH; [reflexivity|exact A]].
+  intros w cs. induction fs as [|h fs IH]; intros l f q H A; cbn [updates] in H;
+    [injection H as <-; discriminate|].
+  destruct (changed_value _ _); [|discriminate]. destruct (updates w cs fs) as [l'|]; [|discriminate].
+  injection H as <-. simpl in A.
+  destruct (atom_eqb f h) eqn:E; [left; symmetry; apply atom_eqb_eq,
+    E|right; eapply IH; [reflexivity|exact A]].
 Qed.
 Lemma targets_In : forall cs f, In f (changed_fluents cs) -> exists b q, In (Number f b q) cs.
 Proof.
   induction cs as [|c cs IH]; intros f I; [destruct I|]. destruct c; simpl in I.
   - destruct (IH _ I) as [b [q J]]. exists b, q. right. exact J.
-  - destruct I as [<-|I]; [exists assigns, q; left; reflexivity|]. destruct (IH _ I) as [b [q' J]]. exists b, q'. right. exact J.
+  - destruct I as [<-|I]; [exists assigns, q; left; reflexivity|]. destruct (IH _ I) as [b [q' J]].
+    exists b, q'. right. exact J.
 Qed.
-Definition keeps_statics (w w' : world) := (forall p os, changing N p = false -> holds_in w' (p, os) = holds_in w (p, os)) /\
+Definition keeps_statics (w w' : world) := (forall p os, changing N p = false ->
+  holds_in w' (p, os) = holds_in w (p, os)) /\
   (forall f, changing N (fst f) = false -> value_in w' f = value_in w f).
-Lemma happening_statics : forall w d env f e w', forallb (changing N) (effect_heads e) = true -> happening P w d env f e = Some w' -> keeps_statics w w'.
+Lemma happening_statics : forall w d env f e w', forallb (changing N) (effect_heads e) = true ->
+  happening P w d env f e = Some w' -> keeps_statics w w'.
 Proof.
-  intros w d env f e w' C H. rewrite forallb_forall in C. unfold happening in H. destruct (truth P w d env f) as [[]|]; try discriminate.
-  destruct (changes P w d env e) as [cs|] eqn:E; [|discriminate]. destruct (updates w cs (changed_fluents cs)) as [l|] eqn:U; [|discriminate]. injection H as <-.
-  assert (X : forall c, In c cs -> changing N (head c) = true) by (intros c I; apply C; eapply changes_heads; eassumption).
+  intros w d env f e w' C H. rewrite forallb_forall in C. unfold happening in H.
+  destruct (truth P w d env f) as [[]|]; try discriminate.
+  destruct (changes P w d env e) as [cs|] eqn:E; [|discriminate].
+  destruct (updates w cs (changed_fluents cs)) as [l|] eqn:U; [|discriminate]. injection H as <-.
+  assert (X : forall c, In c cs -> changing N (head c) = true) by (intros c I; apply C; eapply changes_heads;
+    eassumption).
   split; simpl.
   - intros p os S. assert (Y : forall b, sets_atom cs (p, os) b = false).
-    { intro b. destruct (sets_atom cs (p, os) b) eqn:Z; [|reflexivity]. unfold sets_atom in Z. apply existsb_exists in Z. destruct Z as [[a b'|] [I Z]]; [|discriminate].
-      apply andb_true_iff in Z. destruct Z as [Z _]. apply atom_eqb_eq in Z. subst a. specialize (X _ I). simpl in X. congruence. }
+    { intro b. destruct (sets_atom cs (p, os) b) eqn:Z; [|reflexivity]. unfold sets_atom in Z.
+      apply existsb_exists in Z. destruct Z as [[a b'|] [I Z]]; [|discriminate].
+      apply andb_true_iff in Z. destruct Z as [Z _]. apply atom_eqb_eq in Z. subst a. specialize (X _ I).
+      simpl in X. congruence. }
     rewrite !Y. reflexivity.
-  - intros g S. destruct (assoc g l) as [q|] eqn:A; [|reflexivity]. exfalso. apply (updates_targets _ _ _ _ _ _ U) in A. apply targets_In in A.
+  - intros g S. destruct (assoc g l) as [q|] eqn:A; [|reflexivity]. exfalso.
+    apply (updates_targets _ _ _ _ _ _ U) in A. apply targets_In in A.
     destruct A as [b [q' I]]. specialize (X _ I). simpl in X. congruence.
 Qed.
-Lemma step_statics : forall w a env w' d, forallb (changing N) (effect_heads (start_effect a) ++ effect_heads (end_effect a)) = true ->
-  same_statics w -> step P true w a env = Some (w', d) -> keeps_statics w w' /\ (forall e more, env = e ++ more -> pruned P N a e = false).
+Lemma step_statics : forall w a env w' d, forallb (changing N)
+  (effect_heads (start_effect a) ++ effect_heads (end_effect a)) = true ->
+  same_statics w -> step P true w a env = Some (w', d) ->
+    keeps_statics w w' /\ (forall e more, env = e ++ more -> pruned P N a e = false).
 Proof.
-  intros w a env w' d C S H. rewrite forallb_app in C. pose proof C as C0. apply andb_true_iff in C. destruct C as [C1 C2]. unfold step in H. destruct (negb _); [discriminate|].
-  assert (T1 : forall q e more, env = e ++ more -> truth P w q env (at_start a) = Some true -> static_false P N e (at_start a) = false).
-  { intros q e more E Tr. destruct (static_false P N e (at_start a)) eqn:F; [|reflexivity]. exfalso. rewrite E in Tr. eapply static_false_ok; eassumption. }
+  intros w a env w' d C S H. rewrite forallb_app in C. pose proof C as C0. apply andb_true_iff in C.
+  destruct C as [C1 C2]. unfold step in H. destruct (negb _); [discriminate|].
+  assert (T1 : forall q e more, env = e ++ more -> truth P w q env (at_start a) = Some true ->
+    static_false P N e (at_start a) = false).
+  { intros q e more E Tr. destruct (static_false P N e (at_start a)) eqn:F; [|reflexivity]. exfalso.
+    rewrite E in Tr. eapply static_false_ok; eassumption. }
   destruct (duration a) as [x|] eqn:A.
-  2: { destruct (happening P w None env (at_start a) (start_effect a)) as [y|] eqn:E; [|discriminate]. injection H as <- <-. split; [exact (happening_statics _ _ _ _ _ _ C1 E)|].
-       intros e more Q. unfold pruned. rewrite A, (T1 None e more Q); [reflexivity|]. eapply happening_holds, E. }
-  destruct (eval w None env x) as [q|]; [|discriminate]. destruct (less q 0); [discriminate|]. destruct (Qeq_bool q 0).
-  - match type of H with option_map _ ?h = _ => destruct h as [y|] eqn:E end; [|discriminate]. injection H as <- <-. split.
+  2: { destruct (happening P w None env (at_start a) (start_effect a)) as [y|] eqn:E; [|discriminate].
+       injection H as <- <-. split; [exact (happening_statics _ _ _ _ _ _ C1 E)|].
+       intros e more Q. unfold pruned. rewrite A, (T1 None e more Q); [reflexivity|].
+       eapply happening_holds, E. }
+  destruct (eval w None env x) as [q|]; [|discriminate]. destruct (less q 0); [discriminate|].
+  destruct (Qeq_bool q 0).
+  - match type of H with option_map _ ?h = _ => destruct h as [y|] eqn:E end; [|discriminate].
+    injection H as <- <-. split.
     + eapply happening_statics; [|exact E]. cbn [effect_heads]. rewrite forallb_app. exact C0.
     + intros e more Q. apply happening_holds in E. cbn [truth] in E. unfold pruned. rewrite A.
-      assert (Ts : truth P w (Some q) env (at_start a) = Some true) by (destruct (truth P w (Some q) env (at_start a)) as [[]|], (truth P w (Some q) env (at_end a)) as [[]|]; simpl in E; congruence).
-      assert (Te : truth P w (Some q) env (at_end a) = Some true) by (destruct (truth P w (Some q) env (at_start a)) as [[]|], (truth P w (Some q) env (at_end a)) as [[]|]; simpl in E; congruence).
-      rewrite (T1 _ _ _ Q Ts). destruct (static_false P N e (at_end a)) eqn:F; [|reflexivity]. exfalso. rewrite Q in Te. eapply static_false_ok; eassumption.
+      assert (Ts : truth P w (Some q) env (at_start a) = Some true) by
+        (destruct (truth P w (Some q) env (at_start a)) as [[]|],
+        (truth P w (Some q) env (at_end a)) as [[]|]; simpl in E; congruence).
+      assert (Te : truth P w (Some q) env (at_end a) = Some true) by
+        (destruct (truth P w (Some q) env (at_start a)) as [[]|],
+        (truth P w (Some q) env (at_end a)) as [[]|]; simpl in E; congruence).
+      rewrite (T1 _ _ _ Q Ts). destruct (static_false P N e (at_end a)) eqn:F; [|reflexivity]. exfalso.
+      rewrite Q in Te. eapply static_false_ok; eassumption.
   - destruct (happening P w (Some q) env (at_start a) (start_effect a)) as [w1|] eqn:E1; [|discriminate].
-    match type of H with option_map _ ?h = _ => destruct h as [y|] eqn:E end; [|discriminate]. injection H as <- <-.
-    pose proof (happening_statics _ _ _ _ _ _ C1 E1) as [K1 K2]. pose proof (happening_statics _ _ _ _ _ _ C2 E) as [K3 K4]. split.
-    + split; [intros p os Z; rewrite K3, K1 by exact Z; reflexivity|intros f Z; rewrite K4, K2 by exact Z; reflexivity].
-    + intros e more Q. apply happening_holds in E1. apply happening_holds in E. cbn [truth] in E. unfold pruned. rewrite A, (T1 _ _ _ Q E1).
-      assert (Te : truth P w1 (Some q) env (at_end a) = Some true) by (destruct (truth P w1 (Some q) env (over_all a)) as [[]|], (truth P w1 (Some q) env (at_end a)) as [[]|]; simpl in E; congruence).
+    match type of H with option_map _ ?h = _ => destruct h as [y|] eqn:E end; [|discriminate].
+    injection H as <- <-.
+    pose proof (happening_statics _ _ _ _ _ _ C1 E1) as [K1 K2].
+    pose proof (happening_statics _ _ _ _ _ _ C2 E) as [K3 K4]. split.
+    + split; [intros p os Z; rewrite K3, K1 by exact Z; reflexivity|intros f Z; rewrite K4, K2 by exact Z;
+        reflexivity].
+    + intros e more Q. apply happening_holds in E1. apply happening_holds in E. cbn [truth] in E.
+      unfold pruned. rewrite A, (T1 _ _ _ Q E1).
+      assert (Te : truth P w1 (Some q) env (at_end a) = Some true) by
+        (destruct (truth P w1 (Some q) env (over_all a)) as [[]|],
+        (truth P w1 (Some q) env (at_end a)) as [[]|]; simpl in E; congruence).
       destruct (static_false P N e (at_end a)) eqn:F; [|reflexivity]. exfalso. rewrite Q in Te.
       eapply static_false_ok; [|exact F|exact Te]. intros p os Z. rewrite K1 by exact Z. apply S, Z.
 Qed.
 Lemma instances_ok : forall (prune : list key -> bool) env types e more, env = e ++ more ->
   (forall e more, env = e ++ more -> prune e = false) -> length more = length types ->
-  forallb (fun x => existsb (Pos.eqb (fst x)) (objects P (snd x))) (combine more types) = true -> In env (instances P prune types e).
+  forallb (fun x => existsb (Pos.eqb (fst x)) (objects P (snd x))) (combine more types) = true ->
+    In env (instances P prune types e).
 Proof.
-  intros prune env. induction types as [|t types IH]; intros e more E Pr L F; destruct more as [|o more]; try discriminate; simpl.
+  intros prune env. induction types as [|t types IH]; intros e more E Pr L F; destruct more as [|o more];
+    try discriminate; simpl.
   - left. rewrite app_nil_r in E. symmetry. exact E.
-  - simpl in F. apply andb_true_iff in F. destruct F as [F1 F2]. apply existsb_exists in F1. destruct F1 as [o' [I E1]]. apply Pos.eqb_eq in E1. subst o'.
-    apply in_flat_map. exists o. split; [exact I|]. rewrite (Pr (e ++ [o]) more) by (rewrite <- app_assoc; exact E).
+  - simpl in F. apply andb_true_iff in F. destruct F as [F1 F2]. apply existsb_exists in F1.
+    destruct F1 as [o' [I E1]]. apply Pos.eqb_eq in E1. subst o'.
+    apply in_flat_map. exists o. split; [exact I|].
+    rewrite (Pr (e ++ [o]) more) by (rewrite <- app_assoc; exact E).
     apply (IH _ more); [rewrite <- app_assoc; exact E|exact Pr|simpl in L; lia|exact F2].
 Qed.
 
 (* Metric *)
-Definition measure (w : world) : Q := match symbolic_expression P N unchanged Undefined [] (metric P) with Is f => ev w f | _ => 0 end.
-Lemma measure_changes : forall w w' s sy e f g, Rel w s -> (forall f, changing N (fst f) = false -> value_in w' f = value_in w f) -> Describes w w' sy ->
-  symbolic_expression P N unchanged Undefined [] e = Is f -> symbolic_expression P N sy Undefined [] e = Is g -> ev w' f == ev w g.
+Definition measure (w : world) : Q := match symbolic_expression P N unchanged Undefined [] (metric P) with
+  Is f => ev w f | _ => 0 end.
+Lemma measure_changes : forall w w' s sy e f g, Rel w s ->
+  (forall f, changing N (fst f) = false -> value_in w' f = value_in w f) -> Describes w w' sy ->
+  symbolic_expression P N unchanged Undefined [] e = Is f ->
+    symbolic_expression P N sy Undefined [] e = Is g -> ev w' f == ev w g.
 Proof.
   intros w w' s sy e f g R St D. revert f g. induction e; intros x y; cbn [symbolic_expression].
   - intros H K. injection H as <-. injection K as <-. rewrite !ev_constant. reflexivity.
@@ -475,24 +670,38 @@ Proof.
     + intros H K. injection H as <-. rewrite ev_fluent. destruct (assoc (f, l) (new_values sy)) as [z|].
       * injection K as <-. destruct V as [q [V1 V2]]. rewrite V1. exact V2.
       * injection K as <-. rewrite ev_fluent, V. reflexivity.
-    + destruct (value_in (initial P) (f, l)) as [q|] eqn:Q; [|discriminate]. intros H K. injection H as <-. rewrite ev_constant.
+    + destruct (value_in (initial P) (f, l)) as [q|] eqn:Q; [|discriminate]. intros H K. injection H as <-.
+      rewrite ev_constant.
       destruct (assoc (f, l) (new_values sy)) as [z|].
-      * injection K as <-. destruct V as [q' [V1 V2]]. rewrite St, (r_value _ _ R), Q in V1 by exact C. injection V1 as <-. exact V2.
+      * injection K as <-. destruct V as [q' [V1 V2]]. rewrite St, (r_value _ _ R), Q in V1 by exact C.
+        injection V1 as <-. exact V2.
       * injection K as <-. rewrite ev_constant. reflexivity.
   - discriminate.
-  - destruct (symbolic_expression P N unchanged Undefined [] e1) as [| |a], (symbolic_expression P N unchanged Undefined [] e2) as [| |b]; simpl; try discriminate.
-    destruct (symbolic_expression P N sy Undefined [] e1) as [| |c], (symbolic_expression P N sy Undefined [] e2) as [| |d]; simpl; try discriminate.
-    intros H K. injection H as <-. injection K as <-. rewrite !ev_plus_form, (IHe1 _ _ eq_refl eq_refl), (IHe2 _ _ eq_refl eq_refl). reflexivity.
-  - destruct (symbolic_expression P N unchanged Undefined [] e1) as [| |a], (symbolic_expression P N unchanged Undefined [] e2) as [| |b]; simpl; try discriminate.
-    destruct (symbolic_expression P N sy Undefined [] e1) as [| |c], (symbolic_expression P N sy Undefined [] e2) as [| |d]; simpl; try discriminate.
-    intros H K. injection H as <-. injection K as <-. rewrite !ev_plus_form, (IHe1 _ _ eq_refl eq_refl), (IHe2 _ _ eq_refl eq_refl). reflexivity.
-  - destruct (symbolic_expression P N unchanged Undefined [] e1) as [| |[[|] a]], (symbolic_expression P N unchanged Undefined [] e2) as [| |[[|] b]]; try discriminate;
-    destruct (symbolic_expression P N sy Undefined [] e1) as [| |[[|] c]], (symbolic_expression P N sy Undefined [] e2) as [| |[[|] d]]; try discriminate;
+  - destruct (symbolic_expression P N unchanged Undefined [] e1) as [| |a],
+      (symbolic_expression P N unchanged Undefined [] e2) as [| |b]; simpl; try discriminate.
+    destruct (symbolic_expression P N sy Undefined [] e1) as [| |c],
+      (symbolic_expression P N sy Undefined [] e2) as [| |d]; simpl; try discriminate.
+    intros H K. injection H as <-. injection K as <-.
+    rewrite !ev_plus_form, (IHe1 _ _ eq_refl eq_refl), (IHe2 _ _ eq_refl eq_refl). reflexivity.
+  - destruct (symbolic_expression P N unchanged Undefined [] e1) as [| |a],
+      (symbolic_expression P N unchanged Undefined [] e2) as [| |b]; simpl; try discriminate.
+    destruct (symbolic_expression P N sy Undefined [] e1) as [| |c],
+      (symbolic_expression P N sy Undefined [] e2) as [| |d]; simpl; try discriminate.
+    intros H K. injection H as <-. injection K as <-.
+    rewrite !ev_plus_form, (IHe1 _ _ eq_refl eq_refl), (IHe2 _ _ eq_refl eq_refl). reflexivity.
+  - destruct (symbolic_expression P N unchanged Undefined [] e1) as [| |[[|] a]],
+      (symbolic_expression P N unchanged Undefined [] e2) as [| |[[|] b]]; try discriminate;
+    destruct (symbolic_expression P N sy Undefined [] e1) as [| |[[|] c]],
+      (symbolic_expression P N sy Undefined [] e2) as [| |[[|] d]]; try discriminate;
     intros H K; injection H as <-; injection K as <-; rewrite !ev_plus_form, !ev_constant;
-    specialize (IHe1 _ _ eq_refl eq_refl); specialize (IHe2 _ _ eq_refl eq_refl); rewrite ?ev_empty in *; rewrite ?IHe1, ?IHe2; try ring; try (rewrite <- IHe1, <- IHe2; ring); try (rewrite <- IHe1; ring); rewrite <- IHe2; ring.
-  - destruct (symbolic_expression P N unchanged Undefined [] e1) as [| |a], (symbolic_expression P N unchanged Undefined [] e2) as [| |[[|] b]]; try discriminate.
+    specialize (IHe1 _ _ eq_refl eq_refl); specialize (IHe2 _ _ eq_refl eq_refl); rewrite ?ev_empty in *;
+      rewrite ?IHe1, ?IHe2; try ring; try (rewrite <- IHe1, <- IHe2; ring); try (rewrite <- IHe1; ring);
+      rewrite <- IHe2; ring.
+  - destruct (symbolic_expression P N unchanged Undefined [] e1) as [| |a],
+      (symbolic_expression P N unchanged Undefined [] e2) as [| |[[|] b]]; try discriminate.
     destruct (Qeq_bool b 0); [discriminate|].
-    destruct (symbolic_expression P N sy Undefined [] e1) as [| |c], (symbolic_expression P N sy Undefined [] e2) as [| |[[|] d]]; try discriminate.
+    destruct (symbolic_expression P N sy Undefined [] e1) as [| |c],
+      (symbolic_expression P N sy Undefined [] e2) as [| |[[|] d]]; try discriminate.
     destruct (Qeq_bool d 0); [discriminate|]. intros H K. injection H as <-. injection K as <-.
     specialize (IHe1 _ _ eq_refl eq_refl). specialize (IHe2 _ _ eq_refl eq_refl). rewrite !ev_empty in IHe2.
     rewrite !ev_plus_form, !ev_constant, IHe1, IHe2. reflexivity.
@@ -505,52 +714,77 @@ Proof.
   - apply exclusive_at_first.
   - apply wf_init; exact task_ok.
 Qed.
-Lemma simulation : forall steps w s spent w' spent', execute P true w spent steps = Some (w', spent') -> Rel w s ->
-  exists ps c, Task.plan T s ps c /\ inject_Z c <= (measure w' + spent' - measure w - spent) * (Zpos (cost_scale N) # 1) /\ exists s', Rel w' s'.
+Lemma simulation : forall steps w s spent w' spent', execute P true w spent steps = Some (w', spent') ->
+  Rel w s ->
+  exists ps c, Task.plan T s ps c /\ inject_Z c <= (measure w' + spent' - measure w - spent) *
+    (Zpos (cost_scale N) # 1) /\ exists s', Rel w' s'.
 Proof.
   induction steps as [|[i env] steps IH]; intros w s spent w' spent' H R; cbn [execute] in H.
-  - destruct (truth P w None [] (goal_formula P)) as [[]|] eqn:G; try discriminate. injection H as <- <-. exists [], 0%Z.
-    split; [|split; [setoid_replace (measure w + spent - measure w - spent) with 0 by ring; change (inject_Z 0) with 0; lra|exists s; exact R]].
+  - destruct (truth P w None [] (goal_formula P)) as [[]|] eqn:G; try discriminate. injection H as <- <-.
+    exists [], 0%Z.
+    split; [|split; [setoid_replace (measure w + spent - measure w - spent) with 0 by ring;
+      change (inject_Z 0) with 0; lra|exists s; exact R]].
     constructor. destruct parts as [_ [_ [_ [_ [B _]]]]]. 
-    eapply (tree_cases w s R (goal_leaf P T N)); [|apply (conjuncts_ok w s R w unchanged None Undefined); [apply describes_itself|exact eq_refl|exact G]|exact B].
-    intros k o K L. unfold goal_leaf in L. destruct (symbolic_truth P T N k unchanged Undefined [] (goal_formula P)) as [[]|] eqn:E.
-    2: { exfalso. apply (symbolic_truth_ok P T N w k (base_truth_ok w s R k K) (static_value w s R) K w unchanged None Undefined (describes_itself w) eq_refl) in E. apply E. exact G. }
+    eapply (tree_cases w s R (goal_leaf P T N));
+      [|apply (conjuncts_ok w s R w unchanged None Undefined);
+      [apply describes_itself|exact eq_refl|exact G]|exact B].
+    intros k o K L. unfold goal_leaf in L.
+    destruct (symbolic_truth P T N k unchanged Undefined [] (goal_formula P)) as [[]|] eqn:E.
+    2: { exfalso. apply (symbolic_truth_ok P T N w k (base_truth_ok w s R k K) (static_value w s R) K w
+           unchanged None Undefined (describes_itself w) eq_refl) in E. apply E. exact G. }
     all: apply (known_condition_ok w s R k K); exact L.
-  - destruct (nth_error (actions P) i) as [a|] eqn:Ni; [|discriminate]. destruct (step P true w a env) as [[w1 d]|] eqn:S; [|discriminate].
-    destruct parts as [_ [_ [_ [_ [_ B]]]]]. specialize (B _ _ Ni). unfold action_ok in B. apply andb_true_iff in B. destruct B as [C B].
+  - destruct (nth_error (actions P) i) as [a|] eqn:Ni; [|discriminate].
+    destruct (step P true w a env) as [[w1 d]|] eqn:S; [|discriminate].
+    destruct parts as [_ [_ [_ [_ [_ B]]]]]. specialize (B _ _ Ni). unfold action_ok in B.
+    apply andb_true_iff in B. destruct B as [C B].
     pose proof (step_statics w a env w1 d C (r_fact _ _ R) S) as [[K1 K2] Pr].
     rewrite forallb_forall in B. specialize (B env).
     assert (I : In env (instances P (pruned P N a) (parameters a) [])).
-    { pose proof S as S'. unfold step in S'. destruct (negb _) eqn:Ng; [discriminate|]. apply negb_false_iff in Ng. apply andb_true_iff in Ng. destruct Ng as [N1 N2].
+    { pose proof S as S'. unfold step in S'. destruct (negb _) eqn:Ng; [discriminate|].
+      apply negb_false_iff in Ng. apply andb_true_iff in Ng. destruct Ng as [N1 N2].
       apply (instances_ok _ env _ [] env); auto. apply Nat.eqb_eq, N1. }
     specialize (B I).
-    assert (Go : exists o sy t, match o with Some (o, _) => In o (operators T) | None => True end /\ Rel w1 (after_of s o) /\
-       match o with Some (o, ch) => admitted o ch /\ holds (precondition o) (derive T s) (slot_sizes o) ch = true | None => True end /\ Describes w w1 sy /\ t == d /\
+    assert (Go : exists o sy t, match o with Some (o, _) => In o (operators T)
+      | None => True end /\ Rel w1 (after_of s o) /\
+       match o with Some (o, ch) => admitted o ch /\
+         holds (precondition o) (derive T s) (slot_sizes o) ch = true
+         | None => True end /\ Describes w w1 sy /\ t == d /\
        exists g, growth P N sy t = Some g /\ inject_Z (step_cost o) <= g * (Zpos (cost_scale N) # 1)).
     { eapply (tree_cases w s R); [|eapply gathered_ok; eassumption|exact B]. intros k o K L.
-      assert (L' : exists o, match o with Some (o, _) => In o (operators T) | None => True end /\ leaf_ok P T N k a env o = true).
+      assert (L' : exists o, match o with Some (o, _) => In o (operators T)
+        | None => True end /\ leaf_ok P T N k a env o = true).
       { unfold instance_leaf in L. destruct o as [[j ch]|]; [|exists None; split; [exact Logic.I|exact L]].
-        destruct (nth_error (operators T) j) as [o|] eqn:Nj; [|discriminate]. exists (Some (o, ch)). split; [eapply nth_error_In, Nj|exact L]. }
+        destruct (nth_error (operators T) j) as [o|] eqn:Nj; [|discriminate]. exists (Some (o, ch)).
+        split; [eapply nth_error_In, Nj|exact L]. }
       clear L. destruct L' as [o' [Io L]]. unfold leaf_ok in L.
-      pose proof (symbolic_step_ok P T N w k (base_truth_ok w s R k K) (static_value w s R) K a env w1 d S) as Q.
-      destruct (symbolic_step P T N k a env) as [| |sy t]; [destruct Q|discriminate|]. destruct Q as [Q D]. rewrite !andb_true_iff in L. destruct L as [[L1 LX] L2].
-      destruct (simulated_ok w s R k K sy t o' w1 D K1 K2 L1 LX Io L2) as [R1 [Ad G]]. exists o', sy, t. tauto. }
+      pose proof (symbolic_step_ok P T N w k (base_truth_ok w s R k K) (static_value w s R) K a env w1 d S)
+        as Q.
+      destruct (symbolic_step P T N k a env) as [| |sy t]; [destruct Q|discriminate|]. destruct Q as [Q D].
+      rewrite !andb_true_iff in L. destruct L as [[L1 LX] L2].
+      destruct (simulated_ok w s R k K sy t o' w1 D K1 K2 L1 LX Io L2) as [R1 [Ad G]]. exists o', sy, t.
+      tauto. }
     destruct Go as [o [sy [t [Io [R1 [Ad [D [Td [g [Gr Co]]]]]]]]]].
     destruct (IH _ _ _ _ _ H R1) as [ps [c [Pl [Le End]]]].
     assert (M : g == measure w1 - measure w + per_time P * d + per_step P).
-    { unfold growth in Gr. unfold measure. destruct (symbolic_expression P N unchanged Undefined [] (metric P)) as [| |f] eqn:E0;
-        destruct (symbolic_expression P N sy Undefined [] (metric P)) as [| |h] eqn:E1; cbn [plus_result] in Gr; try discriminate.
-      pose proof (measure_changes w w1 s sy (metric P) f h R K2 D E0 E1) as X. pose proof (ev_plus_form w h (-1 # 1) f) as Y.
-      destruct (plus_form h (-1 # 1) f) as [[|] z]; [|discriminate]. injection Gr as <-. rewrite ev_empty in Y. rewrite X, Y, Td. ring. }
+    { unfold growth in Gr. unfold measure.
+      destruct (symbolic_expression P N unchanged Undefined [] (metric P)) as [| |f] eqn:E0;
+        destruct (symbolic_expression P N sy Undefined [] (metric P)) as [| |h] eqn:E1;
+          cbn [plus_result] in Gr; try discriminate.
+      pose proof (measure_changes w w1 s sy (metric P) f h R K2 D E0 E1) as X.
+      pose proof (ev_plus_form w h (-1 # 1) f) as Y.
+      destruct (plus_form h (-1 # 1) f) as [[|] z]; [|discriminate]. injection Gr as <-.
+      rewrite ev_empty in Y. rewrite X, Y, Td. ring. }
     rewrite Qred_correct in Le.
     set (k := Zpos (cost_scale N) # 1) in *.
     assert (Sum : inject_Z (step_cost o + c) <= (measure w' + spent' - measure w - spent) * k).
     { rewrite inject_Z_plus. rewrite M in Co.
       setoid_replace ((measure w' + spent' - measure w - spent) * k) with
-        ((measure w1 - measure w + per_time P * d + per_step P) * k + (measure w' + spent' - measure w1 - (spent + per_time P * d + per_step P)) * k) by ring.
+        ((measure w1 - measure w + per_time P * d + per_step P) * k +
+          (measure w' + spent' - measure w1 - (spent + per_time P * d + per_step P)) * k) by ring.
       lra. }
     destruct o as [[o ch]|].
-    + exists ((o, ch) :: ps), (amount (cost o) (slot_sizes o) ch + c)%Z. split; [destruct Ad; constructor; assumption|split; [exact Sum|exact End]].
+    + exists ((o, ch) :: ps), (amount (cost o) (slot_sizes o) ch + c)%Z.
+      split; [destruct Ad; constructor; assumption|split; [exact Sum|exact End]].
     + exists ps, c. split; [exact Pl|split; [exact Sum|exact End]].
 Qed.
 End Simulation.

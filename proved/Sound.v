@@ -12,7 +12,8 @@ Notation mono := (is_monotone T).
 Definition reached (total : Z) : Prop := match claim with Some c => c <= total | None => False end.
 
 Hypothesis task_ok : check_task T = true.
-Lemma heads : forallb (forallb (fun r : fact * condition => negb (is_basic T (fst (fst r))))) (layers T) = true.
+Lemma heads : forallb (forallb (fun r : fact * condition =>
+  negb (is_basic T (fst (fst r))))) (layers T) = true.
 Proof. unfold check_task in task_ok. rewrite !andb_true_iff in task_ok. tauto. Qed.
 Lemma deriveds : forallb (fun d : key * Z => negb (is_basic T (fst d))) (derived T) = true.
 Proof. unfold check_task in task_ok. rewrite !andb_true_iff in task_ok. tauto. Qed.
@@ -66,12 +67,14 @@ Proof.
 Qed.
 
 Lemma mono_op : forall o, In o (operators T) -> mono = true ->
-  forallb nonneg (comparisons (precondition o)) = true /\ forallb (fun c => nonneg (snd c)) (number_effects o) = true.
+  forallb nonneg (comparisons (precondition o)) = true /\
+    forallb (fun c => nonneg (snd c)) (number_effects o) = true.
 Proof.
   intros o I M. unfold is_monotone in M. rewrite !andb_true_iff in M. destruct M as [[M _] _].
   rewrite forallb_forall in M. specialize (M o I). apply andb_true_iff in M. exact M.
 Qed.
-Lemma mono_rules : mono = true -> forall ls, In ls (layers T) -> forall r, In r ls -> comparisons (snd r) = [].
+Lemma mono_rules : mono = true -> forall ls, In ls (layers T) -> forall r, In r ls ->
+  comparisons (snd r) = [].
 Proof.
   intros M ls I r R. unfold is_monotone in M. rewrite !andb_true_iff in M. destruct M as [_ M].
   rewrite forallb_forall in M. specialize (M ls I). rewrite forallb_forall in M. specialize (M r R).
@@ -85,7 +88,8 @@ Proof.
   all: destruct C as [[x [I E]]|[[[n x] [I E]]|[i [l [F [L Nw]]]]]].
   1,4: (pose proof (proj1 (forallb_forall _ _) pots_ok x I) as PO;
         destruct (potential_ok T heads deriveds task_ok x PO _ _ _ Q W) as [k [K Le]];
-        unfold potential_prunes, shape in *; rewrite K in E; unfold reached; destruct claim; [lia|discriminate]).
+        unfold potential_prunes, shape in *; rewrite K in E; unfold reached; destruct claim;
+          [lia|discriminate]).
   1,3: (pose proof (proj1 (forallb_forall _ _) needs_ok _ I) as NO;
         destruct (need_ok T heads deriveds task_ok n x NO _ _ _ Q W) as [k [K [K0 Le]]];
         unfold need_prunes, shape in *; cbn [fst snd] in *; rewrite K in E; exfalso; lia).
@@ -98,7 +102,9 @@ Proof.
       rewrite !andb_true_iff in M. tauto. }
     rewrite Hl in G. simpl in G. unfold reached. destruct claim; [lia|discriminate].
   - destruct (front_ok mono o ch Ad) as [ch' [If Nd]].
-    rewrite forallb_forall in O. specialize (O (o, undominated_choices mono o) (in_map (fun o => (o, undominated_choices mono o)) _ _ Io)). cbn [fst snd] in O.
+    rewrite forallb_forall in O.
+    specialize (O (o, undominated_choices mono o) (in_map (fun o => (o, undominated_choices mono o)) _ _ Io)).
+    cbn [fst snd] in O.
     assert (Hl : holds (precondition o) (derive T (label_state l)) (slot_sizes o) ch' = true).
     { eapply holds_mono2; [|exact Sa| |exact Ho].
       - intro M. apply (mono_op o Io M).
@@ -107,7 +113,8 @@ Proof.
     { unfold holds in Hl. apply andb_true_iff in Hl. tauto. }
     rewrite Hf in O. rewrite forallb_forall in O. specialize (O ch' If). rewrite Hl in O.
     apply covered_Covered in O.
-    replace (p + (amount (cost o) (slot_sizes o) ch + c)) with ((p + amount (cost o) (slot_sizes o) ch) + c) by lia.
+    replace (p + (amount (cost o) (slot_sizes o) ch + c)) with
+      ((p + amount (cost o) (slot_sizes o) ch) + c) by lia.
     apply IH; [apply wf_apply, wf_derive; auto using heads, deriveds|].
     eapply Covered_worse; [exact O| |].
     + apply apply_no_worse; [|exact Sa|exact Nd]. intro M. apply (mono_op o Io M).
@@ -118,7 +125,8 @@ End Main.
 (* Every plan of an accepted task costs at least the claimed bound; without a bound, there is no
    plan. *)
 Theorem sound : forall T A claim oracle, check T A claim oracle = true ->
-  forall steps c, plan T (init T) steps c -> match claim with Some table_bound => table_bound <= c | None => False end.
+  forall steps c, plan T (init T) steps c -> match claim with Some table_bound => table_bound <= c
+    | None => False end.
 Proof.
   intros T A claim oracle H steps c P. unfold check in H.
   destruct claim as [b|].
@@ -127,7 +135,8 @@ Proof.
        assert (G : forall s sz ch, holds (goal T) s sz ch = false).
        { intros. unfold holds, holds_facts. apply existsb_exists in E. destruct E as [cl [I E]].
          destruct cl; [|discriminate].
-         replace (forallb (existsb (is_literal s)) (clauses (goal T))) with false; [rewrite andb_false_r; reflexivity|].
+         replace (forallb (existsb (is_literal s)) (clauses (goal T))) with false;
+           [rewrite andb_false_r; reflexivity|].
          symmetry. destruct (forallb _ (clauses (goal T))) eqn:F; [|reflexivity].
          rewrite forallb_forall in F. specialize (F [] I). discriminate. }
        clear -P G. induction P; [rewrite G in H; discriminate|assumption]. }

@@ -26,5 +26,6 @@ let () =
     exit (try check directory evidence_file with
       | Reader.Rejected message -> Printf.printf "rejected: %s\n" message; 3
       | Stack_overflow -> print_endline "rejected: too deep for the stack"; 3
-      | Sys_error message -> Printf.printf "rejected: %s\n" message; 3)
+      | Sys_error message -> Printf.printf "rejected: %s\n" message; 3
+      | error -> Printf.printf "rejected: %s\n" (Printexc.to_string error); 3)
   | _ -> prerr_endline "usage: check CERTIFICATE EVIDENCE"; exit 2

@@ -1731,8 +1731,9 @@ type 'x atom_map = (atom * 'x) list PositiveMap.t
 
 let bucket a =
   fold_left (fun h o ->
-    Coq_Pos.add (XO (XO (XO (XO (XO (XO (XO (XO (XO (XO (XO (XO h))))))))))))
-      o) (snd a) (fst a)
+    Coq_Pos.add
+      (Coq_Pos.mul h (XO (XO (XO (XO (XO (XO (XO (XO (XO (XO (XO (XO
+        XH))))))))))))) o) (snd a) (fst a)
 
 (** val bucket_entries : 'a1 atom_map -> atom -> (atom * 'a1) list **)
 
@@ -2029,7 +2030,7 @@ let happening p w d env f e =
 (** val step :
     problem -> bool -> world -> action -> key1 list -> (world * q) option **)
 
-let step p is_zero_bound0 w a env =
+let step p allow_zero w a env =
   if negb
        ((&&) (Nat.eqb (length env) (length a.parameters))
          (forallb (fun x ->
@@ -2043,7 +2044,7 @@ let step p is_zero_bound0 w a env =
              if less d { qnum = Z0; qden = XH }
              then None
              else if qeq_bool d { qnum = Z0; qden = XH }
-                  then if is_zero_bound0
+                  then if allow_zero
                        then option_map (fun w0 -> (w0, d))
                               (happening p w (Some d) env (And (a.at_start,
                                 a.at_end)) (Both (a.start_effect,
@@ -2065,7 +2066,7 @@ let step p is_zero_bound0 w a env =
     problem -> bool -> world -> q -> (nat * key1 list) list -> (world * q)
     option **)
 
-let rec execute p is_zero_bound0 w spent = function
+let rec execute p allow_zero w spent = function
 | [] ->
   (match truth p w None [] p.goal_formula with
    | Some b -> if b then Some (w, spent) else None
@@ -2074,10 +2075,10 @@ let rec execute p is_zero_bound0 w spent = function
   let (i, env) = p0 in
   (match nth_error p.actions i with
    | Some a ->
-     (match step p is_zero_bound0 w a env with
+     (match step p allow_zero w a env with
       | Some p1 ->
         let (w', d) = p1 in
-        execute p is_zero_bound0 w'
+        execute p allow_zero w'
           (qred (qplus (qplus spent (qmult p.per_time d)) p.per_step)) r
       | None -> None)
    | None -> None)
