@@ -296,16 +296,20 @@ let problem domain_text problem_text =
   let set_value name arguments value =
     applied "function" functions name arguments;
     let fluent = function_key name, ground arguments in
-    if C.find_atom !initial_values fluent <> None then reject "two initial values: %s" name;
+    (match C.find_atom !initial_values fluent with
+     | Some other when not (C.qeq_bool other value) -> reject "two initial values: %s" name
+     | _ -> ());
     initial_values := C.add_atom fluent value !initial_values in
+  let atom name arguments = applied "predicate" predicates name arguments; predicate_key name, ground arguments in
+  let negated = ref [] in
   List.iter (function
     | List [Word "="; List (Word name :: arguments); Word value] -> set_value name arguments (decimal value)
     | List [Word "at"; Word time; List _] when is_number time -> reject "not covered: timed initial literals"
-    | List (Word "not" :: _) -> reject "not covered: negated initial atoms"
-    | List (Word name :: arguments) ->
-      applied "predicate" predicates name arguments;
-      initial_atoms := C.add_atom (predicate_key name, ground arguments) () !initial_atoms
+    | List [Word "not"; List (Word name :: arguments)] -> negated := atom name arguments :: !negated
+    | List (Word name :: arguments) -> initial_atoms := C.add_atom (atom name arguments) () !initial_atoms
     | _ -> reject "not covered in :init") (section problem ":init");
+  if List.exists (fun atom -> C.find_atom !initial_atoms atom <> None) !negated then
+    reject "an atom holds in :init and does not";
   if List.mem_assoc "total-cost" functions && C.find_atom !initial_values (function_key "total-cost", []) = None then
     set_value "total-cost" [] zero;
 
