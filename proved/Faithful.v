@@ -181,6 +181,33 @@ Definition symbolic_happening (k : knowledge) (s : symbolic) (d : result) (time 
                       end
          end
   end.
+(* The part of the changes of an instantaneous action that concerns some atoms, or the numbers.
+   Effects under unknown conditions are left out if they have no such part. *)
+Fixpoint projected (keep : atom -> bool) (with_numbers : bool) (k : knowledge) (env : list key) (e : effect)
+    : option (list symbolic_change) :=
+  match e with
+  | Nothing => Some []
+  | Put b p ts => match ground env ts with
+                  | Some l => Some (if keep (p, l) then [SFact (p, l) b] else []) | None => None end
+  | Change assigns f ts x =>
+      if with_numbers then match ground env ts, symbolic_expression unchanged Undefined env x with
+                           | Some l, Is g => Some [SNumber (f, l) assigns g] | _, _ => None end
+      else Some []
+  | Both a b => both (projected keep with_numbers k env a) (projected keep with_numbers k env b)
+  | When f a => match symbolic_truth k unchanged Undefined env f, projected keep with_numbers k env a with
+                | Some true, r => r | Some false, _ => Some [] | None, Some [] => Some [] | None, _ => None end
+  | Each t a => fold_right (fun o r => both (projected keep with_numbers k (env ++ [o]) a) r) (Some []) (objects P t)
+  end.
+(* The atoms that an instantaneous action may add or delete. *)
+Fixpoint possible_facts (k : knowledge) (env : list key) (e : effect) : option (list (atom * bool)) :=
+  match e with
+  | Nothing | Change _ _ _ _ => Some []
+  | Put b p ts => match ground env ts with Some l => Some [((p, l), b)] | None => None end
+  | Both a b => both (possible_facts k env a) (possible_facts k env b)
+  | When f a => match symbolic_truth k unchanged Undefined env f with
+                | Some false => Some [] | _ => possible_facts k env a end
+  | Each t a => fold_right (fun o r => both (possible_facts k (env ++ [o]) a) r) (Some []) (objects P t)
+  end.
 Definition symbolic_duration (a : action) (env : list key) : result :=
   match duration a with Some e => symbolic_expression unchanged Undefined env e | None => Undefined end.
 Definition symbolic_step (k : knowledge) (a : action) (env : list key) : outcome :=
@@ -271,14 +298,16 @@ Fixpoint known_effects (k : knowledge) (cs : list (list literal * list fact)) : 
 Definition admitted_choice (o : operator) (ch : choice) : bool :=
   Nat.eqb (length ch) (length (slot_sizes o)) &&
   forallb (fun xn : Z * Z => Z.leb 0 (fst xn) && Z.ltb (fst xn) (snd xn)) (combine ch (slot_sizes o)) && admits o ch.
-(* The value of a variable after the step agrees with its atoms, for each possible value before the
-   step. *)
+(* The value of a variable after the step agrees with its atoms, if the value before the step is
+   [y]. *)
+Definition value_ok (truths : list (atom * bool)) (made : list fact) (v : key) (vals : list (Z * atom)) (y : Z) : bool :=
+  let z := last_put made v y in
+  forallb (fun xa => Bool.eqb (match assoc (snd xa) truths with Some b => b | None => Z.eqb y (fst xa) end)
+                              (Z.eqb z (fst xa))) vals.
 Definition variable_ok (k : knowledge) (s : symbolic) (made : list fact) (v : key) : bool :=
   match M.find v (variables N) with
   | None => true
-  | Some vals => forallb (fun y => let z := last_put made v y in
-      forallb (fun xa => Bool.eqb (match assoc (snd xa) (new_truths s) with Some b => b | None => Z.eqb y (fst xa) end)
-                                  (Z.eqb z (fst xa))) vals) (possible k v)
+  | Some vals => forallb (value_ok (new_truths s) made v vals) (possible k v)
   end.
 Definition is_zero (f : form) : bool := match f with ([], c) => Qeq_bool c 0 | _ => false end.
 Definition number_ok (s : symbolic) (o : option (operator * choice)) (n : key) : bool :=
@@ -321,10 +350,62 @@ Definition stays_exclusive (k : knowledge) (s : symbolic) (g : list atom) : bool
   forallb (fun a => match assoc a (new_truths s) with
                     | Some true => forallb (fun b => atom_eqb a b || is_false (symbolic_atom k s b)) g
                     | _ => true end) g.
+(* The check of an instantaneous action whose effects have unknown conditions: for each variable,
+   each group and the numbers by itself, only the effects that concern it have to be known. *)
+Definition with_value (k : knowledge) (vals : list (Z * atom)) (y : Z) : knowledge :=
+  Knowledge (map (fun xa => (snd xa, Z.eqb y (fst xa))) vals ++ literals k) (bounds k).
+Fixpoint known_effects_on (v : key) (k : knowledge) (cs : list (list literal * list fact)) : option (list fact) :=
+  match cs with
+  | [] => Some []
+  | c :: r => if forallb (fun f => negb (Pos.eqb (fst f) v)) (snd c) then known_effects_on v k r
+              else if existsb (fun l => is_false (known_literal k l)) (fst c) then known_effects_on v k r
+              else if forallb (fun l => is_true (known_literal k l)) (fst c)
+                   then option_map (app (snd c)) (known_effects_on v k r)
+              else None
+  end.
+Definition truths_of (cs : list symbolic_change) := atoms_set_to cs true ++ atoms_set_to cs false.
+Definition projected_variable_ok (k : knowledge) (a : action) (env : list key) (o : option (operator * choice))
+    (v : key) : bool :=
+  match M.find v (variables N) with
+  | None => true
+  | Some vals => forallb (fun y =>
+      let k := with_value k vals y in
+      match projected (fun a => existsb (fun xa => atom_eqb a (snd xa)) vals) false k env (start_effect a),
+            match o with
+            | Some (o, _) => option_map (app (effects o)) (known_effects_on v k (conditional o)) | None => Some [] end with
+      | Some cs, Some made => value_ok (truths_of cs) made v vals y | _, _ => false end) (possible k v)
+  end.
+Definition projected_ok (k : knowledge) (a : action) (env : list key) (o : option (operator * choice)) : bool :=
+  match duration a, possible_facts k env (start_effect a), projected (fun _ => false) true k env (start_effect a) with
+  | None, Some touched, Some numbers =>
+      forallb (fun l : atom * bool => negb (snd l) || mem (may_hold N) (fst l)) touched &&
+      forallb (fun g => match projected (fun a => in_group a g) false k env (start_effect a) with
+                        | Some cs => stays_exclusive k (Symbolic (truths_of cs) []) g | None => false end) (exclusive N) &&
+      match o with
+      | Some (o, ch) => admitted_choice o ch && known_condition k (precondition o) (slot_sizes o) ch
+                        && distinct (map fst (number_effects o))
+      | None => true end &&
+      forallb (projected_variable_ok k a env o)
+        (match o with Some (o, _) => map fst (effects o ++ flat_map snd (conditional o)) | None => [] end
+         ++ flat_map (fun l => match find_atom (fact_of N) (fst l) with Some f => [fst f] | None => [] end) touched) &&
+      match symbolic_updates unchanged numbers (symbolic_changed_fluents numbers) with
+      | None => false
+      | Some l =>
+          let s := Symbolic [] l in
+          forallb (number_ok s o)
+            (match o with Some (o, _) => map fst (number_effects o) | None => [] end
+             ++ flat_map (fun l => match find_atom (number_of N) (fst l) with Some n => [n] | None => [] end) l) &&
+          match growth s 0 with
+          | Some g => Qle_bool (inject_Z (step_cost o)) (g * (Zpos (cost_scale N) # 1))
+          | None => false
+          end
+      end
+  | _, _, _ => false
+  end.
 Definition leaf_ok (k : knowledge) (a : action) (env : list key) (o : option (operator * choice)) : bool :=
   match symbolic_step k a env with
   | Never => true
-  | Unclear => false
+  | Unclear => projected_ok k a env o
   | After s time =>
       forallb (fun l => match assoc (fst l) (new_truths s) with Some true => mem (may_hold N) (fst l) | _ => true end) (new_truths s) &&
       forallb (stays_exclusive k s) (exclusive N) && simulated k s time o

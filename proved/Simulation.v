@@ -271,10 +271,75 @@ Lemma find_filter : forall X (f : X -> bool) l, List.find f l = match filter f l
   | c :: _ => Some c end.
 Proof. intros X f. induction l as [|x l IH]; simpl; [reflexivity|]. destruct (f x); [reflexivity|exact IH].
 Qed.
+Definition describes_values (w' : world) (news : list (atom * form)) : Prop :=
+  forall f, match assoc f news with
+            | Some g => exists q, value_in w' f = Some q /\ q == ev w g
+            | None => value_in w' f = value_in w f end.
 Definition after_of (o : option (operator * choice)) : state := match o with Some (o, ch) => apply o ds ch
   | None => s end.
 Lemma is_zero_ok : forall f, is_zero f = true -> ev w f == 0.
 Proof. intros [[|] c] H; [|discriminate]. apply Qeq_bool_iff in H. rewrite ev_empty. exact H. Qed.
+(* The part of [Rel] on numbers *)
+Lemma numbers_ok : forall sy o w', describes_values w' (new_values sy) ->
+  match o with Some (o, _) => distinct (map fst (number_effects o)) = true | None => True end ->
+  (forall n, In n (match o with Some (o, _) => map fst (number_effects o) | None => [] end
+     ++ flat_map (fun l => match find_atom (number_of N) (fst l) with Some n => [n] | None => [] end)
+          (new_values sy)) -> number_ok N sy o n = true) ->
+  forall n f, M.find n (fluents N) = Some f ->
+  exists q, value_in w' f = Some q /\ q * scaled N == inject_Z (num_value (after_of o) n).
+Proof.
+  intros sy o w' DV Dist H2 n f F. pose proof (DV f) as V. destruct (r_num _ _ R _ _ F) as [q0 [E0 Q0]].
+      assert (X : exists q, value_in w' f = Some q /\
+        q == ev w (match assoc f (new_values sy) with Some g => g | None => fluent f end)).
+      { destruct (assoc f (new_values sy)) as [g|]; [exact V|]. exists q0. rewrite V, ev_fluent, E0.
+        split; reflexivity. }
+      destruct X as [q [X1 X2]]. exists q. split; [exact X1|]. rewrite X2.
+      assert (Q : number_ok N sy o n = true \/ (match assoc f (new_values sy) with Some g => g
+        | None => fluent f end = fluent f /\
+                    match o with Some (o, _) =>
+                      List.find (fun c => Pos.eqb (fst c) n) (number_effects o) = None | None => True end)).
+      { destruct (in_dec Pos.eq_dec n (match o with Some (o, _) => map fst (number_effects o) | None => [] end
+           ++ flat_map (fun l => match find_atom (number_of N) (fst l) with Some n => [n]
+                | None => [] end) (new_values sy))) as [J|J].
+        - left. apply H2, J.
+        - right. split.
+          + destruct (assoc f (new_values sy)) as [g|] eqn:A; [|reflexivity]. exfalso. apply J, in_or_app.
+            right. apply in_flat_map.
+            exists (f, g). split; [apply assoc_In, A|]. cbn [fst]. destruct parts as [_ [_ [_ [B _]]]].
+            destruct (B _ _ F) as [_ [_ [B' _]]]. rewrite B'. left. reflexivity.
+          + destruct o as [[o ch]|]; [|exact I]. destruct (List.find _ _) as [c|] eqn:A; [|reflexivity].
+            exfalso. apply find_some in A. destruct A as [A1 A2].
+            apply Pos.eqb_eq in A2. apply J, in_or_app. left. rewrite <- A2. apply in_map, A1. }
+      assert (Y : match o with Some (o, ch) =>
+        match List.find (fun c => Pos.eqb (fst c) n) (number_effects o) with
+                     | Some c => num_value (after_of (Some (o, ch))) n = value (snd c) ds (slot_sizes o) ch
+                       | None => num_value (after_of (Some (o, ch))) n = num_value s n end
+                  | None => num_value (after_of o) n = num_value s n end).
+      { destruct o as [[o ch]|]; [|reflexivity]. pose proof Dist as Di.
+        pose proof (changed (fun l => value l ds (slot_sizes o) ch) (number_effects o) n
+          (get (num_values ds) n) Di) as CH. cbv beta in CH.
+        rewrite find_filter. unfold after_of, apply, num_value at 1 2. cbn [num_values]. rewrite get_puts, CH.
+        change (get (num_values ds) n) with (num_value ds n).
+        destruct (filter _ _); [apply (d_num _ _ F)|reflexivity]. }
+      destruct Q as [Q|[Q1 Q2]].
+      * unfold number_ok in Q. rewrite F in Q. cbv zeta in Q. destruct o as [[o ch]|].
+        -- destruct (List.find (fun c : positive * linear => Pos.eqb (fst c) n) (number_effects o)) as [c|].
+           ++ destruct (form_of N (snd c) (slot_sizes o) ch) as [g|] eqn:G; [|discriminate].
+              apply is_zero_ok in Q. rewrite ev_plus_form in Q.
+              apply form_of_ok in G. rewrite Y, <- G.
+              setoid_replace (ev w g) with (ev w (match assoc f (new_values sy) with Some g => g
+                | None => fluent f end)) by lra. reflexivity.
+           ++ apply is_zero_ok in Q. rewrite ev_plus_form, (ev_fluent w f), E0 in Q. cbn [default] in Q.
+              rewrite Y, <- Q0.
+              setoid_replace q0 with (ev w (match assoc f (new_values sy) with Some g => g
+                | None => fluent f end)) by lra. reflexivity.
+        -- apply is_zero_ok in Q. rewrite ev_plus_form, (ev_fluent w f), E0 in Q. cbn [default] in Q.
+           rewrite Y, <- Q0.
+           setoid_replace q0 with (ev w (match assoc f (new_values sy) with Some g => g
+             | None => fluent f end)) by lra. reflexivity.
+      * rewrite Q1, (ev_fluent w f), E0. cbn [default]. rewrite Q0.
+        destruct o as [[o ch]|]; [rewrite Q2 in Y|]; rewrite Y; reflexivity.
+Qed.
 Lemma simulated_ok : forall sy time o w', Describes w w' sy ->
   (forall p os, changing N p = false -> holds_in w' (p, os) = holds_in w (p, os)) ->
   (forall f, changing N (fst f) = false -> value_in w' f = value_in w f) ->
@@ -327,62 +392,13 @@ Proof.
             destruct (B _ _ F) as [_ B']. destruct (B' _ _ I) as [_ B'']. rewrite B''. left. reflexivity. }
       rewrite (Val _ _ F). destruct Q as [Q|[Q1 Q2]].
       * unfold variable_ok in Q. rewrite F in Q. rewrite forallb_forall in Q.
-        specialize (Q _ (possible_ok k K _ _ F)). cbv zeta in Q.
+        specialize (Q _ (possible_ok k K _ _ F)). unfold value_ok in Q. cbv zeta in Q.
         rewrite forallb_forall in Q. specialize (Q _ I). cbn [fst snd] in Q. apply eqb_prop in Q.
         rewrite <- Q.
         destruct (assoc a (new_truths sy)); [reflexivity|]. apply (r_var _ _ R _ _ _ _ F I).
       * rewrite Q1, Q2. apply (r_var _ _ R _ _ _ _ F I).
-    + intros n f F. pose proof (d_value _ _ _ D f) as V. destruct (r_num _ _ R _ _ F) as [q0 [E0 Q0]].
-      assert (X : exists q, value_in w' f = Some q /\
-        q == ev w (match assoc f (new_values sy) with Some g => g | None => fluent f end)).
-      { destruct (assoc f (new_values sy)) as [g|]; [exact V|]. exists q0. rewrite V, ev_fluent, E0.
-        split; reflexivity. }
-      destruct X as [q [X1 X2]]. exists q. split; [exact X1|]. rewrite X2.
-      assert (Q : number_ok N sy o n = true \/ (match assoc f (new_values sy) with Some g => g
-        | None => fluent f end = fluent f /\
-                    match o with Some (o, _) =>
-                      List.find (fun c => Pos.eqb (fst c) n) (number_effects o) = None | None => True end)).
-      { destruct (in_dec Pos.eq_dec n (match o with Some (o, _) => map fst (number_effects o) | None => [] end
-           ++ flat_map (fun l => match find_atom (number_of N) (fst l) with Some n => [n]
-                | None => [] end) (new_values sy))) as [J|J].
-        - left. apply H2, J.
-        - right. split.
-          + destruct (assoc f (new_values sy)) as [g|] eqn:A; [|reflexivity]. exfalso. apply J, in_or_app.
-            right. apply in_flat_map.
-            exists (f, g). split; [apply assoc_In, A|]. cbn [fst]. destruct parts as [_ [_ [_ [B _]]]].
-            destruct (B _ _ F) as [_ [_ [B' _]]]. rewrite B'. left. reflexivity.
-          + destruct o as [[o ch]|]; [|exact I]. destruct (List.find _ _) as [c|] eqn:A; [|reflexivity].
-            exfalso. apply find_some in A. destruct A as [A1 A2].
-            apply Pos.eqb_eq in A2. apply J, in_or_app. left. rewrite <- A2. apply in_map, A1. }
-      assert (Y : match o with Some (o, ch) =>
-        match List.find (fun c => Pos.eqb (fst c) n) (number_effects o) with
-                     | Some c => num_value (after_of (Some (o, ch))) n = value (snd c) ds (slot_sizes o) ch
-                       | None => num_value (after_of (Some (o, ch))) n = num_value s n end
-                  | None => num_value (after_of o) n = num_value s n end).
-      { destruct o as [[o ch]|]; [|reflexivity]. destruct Pre as [_ [_ [Di _]]].
-        pose proof (changed (fun l => value l ds (slot_sizes o) ch) (number_effects o) n
-          (get (num_values ds) n) Di) as CH. cbv beta in CH.
-        rewrite find_filter. unfold after_of, apply, num_value at 1 2. cbn [num_values]. rewrite get_puts, CH.
-        change (get (num_values ds) n) with (num_value ds n).
-        destruct (filter _ _); [apply (d_num _ _ F)|reflexivity]. }
-      destruct Q as [Q|[Q1 Q2]].
-      * unfold number_ok in Q. rewrite F in Q. cbv zeta in Q. destruct o as [[o ch]|].
-        -- destruct (List.find (fun c : positive * linear => Pos.eqb (fst c) n) (number_effects o)) as [c|].
-           ++ destruct (form_of N (snd c) (slot_sizes o) ch) as [g|] eqn:G; [|discriminate].
-              apply is_zero_ok in Q. rewrite ev_plus_form in Q.
-              apply form_of_ok in G. rewrite Y, <- G.
-              setoid_replace (ev w g) with (ev w (match assoc f (new_values sy) with Some g => g
-                | None => fluent f end)) by lra. reflexivity.
-           ++ apply is_zero_ok in Q. rewrite ev_plus_form, (ev_fluent w f), E0 in Q. cbn [default] in Q.
-              rewrite Y, <- Q0.
-              setoid_replace q0 with (ev w (match assoc f (new_values sy) with Some g => g
-                | None => fluent f end)) by lra. reflexivity.
-        -- apply is_zero_ok in Q. rewrite ev_plus_form, (ev_fluent w f), E0 in Q. cbn [default] in Q.
-           rewrite Y, <- Q0.
-           setoid_replace q0 with (ev w (match assoc f (new_values sy) with Some g => g
-             | None => fluent f end)) by lra. reflexivity.
-      * rewrite Q1, (ev_fluent w f), E0. cbn [default]. rewrite Q0.
-        destruct o as [[o ch]|]; [rewrite Q2 in Y|]; rewrite Y; reflexivity.
+    + apply (numbers_ok sy); [exact (d_value _ _ _ D)| |exact H2].
+      destruct o as [[o ch]|]; [apply Pre|exact Logic.I].
     + intros p os C. rewrite Sf by exact C. apply (r_fact _ _ R), C.
     + intros f C. rewrite Sv by exact C. apply (r_value _ _ R), C.
     + intros a C Ha. rewrite (d_fact _ _ _ D) in Ha.
@@ -411,6 +427,149 @@ Proof.
     apply Qle_bool_iff, H3.
 Qed.
 End Operators.
+
+(* Projections: actions whose effects have unknown conditions *)
+Lemma with_value_ok : forall k v vals, Knows w k -> M.find v (variables N) = Some vals ->
+  Knows w (with_value k vals (var_value s v)).
+Proof.
+  intros k v vals [K1 K2] F. split; [|exact K2]. intros a b I. cbn [with_value literals] in I.
+  apply in_app_or in I. destruct I as [I|I]; [|apply K1, I]. apply in_map_iff in I.
+  destruct I as [[x c] [E I]]. injection E as <- <-. apply (r_var _ _ R _ _ _ _ F I).
+Qed.
+Lemma known_effects_on_ok : forall k, Knows w k -> forall v cs l x, known_effects_on T N v k cs = Some l ->
+  last_put l v x = last_put (flat_map snd (filter (fires ds) cs)) v x.
+Proof.
+  intros k K v. induction cs as [|c cs IH]; intros l x H; cbn [known_effects_on filter] in *;
+    [injection H as <-; reflexivity|].
+  destruct (forallb (fun f => negb (Pos.eqb (fst f) v)) (snd c)) eqn:Z.
+  - rewrite (IH _ _ H). destruct (fires ds c); [|reflexivity]. cbn [flat_map]. rewrite last_put_app. f_equal.
+    symmetry. apply last_put_none. intros f I E. rewrite forallb_forall in Z. specialize (Z _ I).
+    apply negb_true_iff in Z. apply Pos.eqb_neq in Z. contradiction.
+  - destruct (existsb _ (fst c)) eqn:E.
+    + replace (fires ds c) with false; [apply IH, H|]. symmetry. unfold fires. apply existsb_exists in E.
+      destruct E as [y [I E]]. destruct (known_literal T N k y) as [[]|] eqn:F; try discriminate.
+      apply (known_literal_ok k K) in F. destruct (forallb (is_literal ds) (fst c)) eqn:A; [|reflexivity].
+      rewrite forallb_forall in A. rewrite (A _ I) in F. discriminate.
+    + destruct (forallb _ (fst c)) eqn:A; [|discriminate].
+      destruct (known_effects_on T N v k cs) as [r|]; [|discriminate]. injection H as <-.
+      replace (fires ds c) with true.
+      * cbn [flat_map]. rewrite !last_put_app. apply IH. reflexivity.
+      * symmetry. unfold fires. apply forallb_forall. intros y I. rewrite forallb_forall in A.
+        specialize (A _ I). destruct (known_literal T N k y) as [[]|] eqn:F; try discriminate.
+        apply (known_literal_ok k K), F.
+Qed.
+Lemma step_instantaneous : forall a env w' d, duration a = None -> step P true w a env = Some (w', d) ->
+  happening P w None env (at_start a) (start_effect a) = Some w' /\ d = 0.
+Proof.
+  intros a env w' d A H. unfold step in H. destruct (negb _); [discriminate|]. rewrite A in H.
+  destruct (happening P w None env (at_start a) (start_effect a)) as [x|]; [|discriminate].
+  injection H as <- <-. split; reflexivity.
+Qed.
+Lemma projected_ok_ok : forall k a env o w' d, Knows w k -> step P true w a env = Some (w', d) ->
+  (forall p os, changing N p = false -> holds_in w' (p, os) = holds_in w (p, os)) ->
+  (forall f, changing N (fst f) = false -> value_in w' f = value_in w f) ->
+  match o with Some (o, _) => In o (operators T) | None => True end ->
+  projected_ok P T N k a env o = true ->
+  Rel w' (after_of o) /\
+  match o with Some (o, ch) => admitted o ch /\ holds (precondition o) ds (slot_sizes o) ch = true
+    | None => True end /\
+  d = 0 /\ exists l g, describes_values w' l /\ growth P N (Symbolic [] l) 0 = Some g /\
+    inject_Z (step_cost o) <= g * (Zpos (cost_scale N) # 1).
+Proof.
+  intros k a env o w' d K St Sf Sv Io H. unfold projected_ok in H.
+  destruct (duration a) eqn:A; [discriminate|].
+  destruct (possible_facts P T N k env (start_effect a)) as [touched|] eqn:Po; [|discriminate].
+  destruct (projected P T N (fun _ => false) true k env (start_effect a)) as [nums|] eqn:Pn; [|discriminate].
+  destruct (step_instantaneous _ _ _ _ A St) as [Ha Hd].
+  rewrite !andb_true_iff in H. destruct H as [[[[H1 H2] H3] H4] H5].
+  destruct (symbolic_updates P N unchanged nums (symbolic_changed_fluents nums)) as [l|] eqn:U;
+    [|discriminate].
+  cbv zeta in H5. apply andb_true_iff in H5. destruct H5 as [H5 H6]. rewrite forallb_forall in H1, H2, H4, H5.
+  assert (Base : forall k, Knows w k -> forall a b, base_truth P T N k a = Some b -> holds_in w a = b)
+    by (intros k' K'; apply (base_truth_ok k' K')).
+  assert (V : describes_values w' l).
+  { exact (projected_numbers P T N w k (Base k K) static_value K env _ _ w' nums l Ha Pn U). }
+  assert (Pre : match o with Some (o, ch) => admitted o ch /\
+    holds (precondition o) ds (slot_sizes o) ch = true /\ distinct (map fst (number_effects o)) = true
+    | None => True end).
+  { destruct o as [[o ch]|]; [|exact Logic.I]. rewrite !andb_true_iff in H3. destruct H3 as [[A1 A2] A3].
+    split; [apply admitted_ok, A1|]. split; [apply (known_condition_ok k K), A2|exact A3]. }
+  split; [|split; [destruct o as [[o ch]|]; [tauto|exact Logic.I]|split; [exact Hd|]]].
+  2: { exists l. destruct (growth P N (Symbolic [] l) 0) as [g|]; [|discriminate]. exists g.
+       split; [exact V|]. split; [reflexivity|]. apply Qle_bool_iff, H6. }
+  split.
+  - intros v vals x b F I.
+    destruct (in_dec Pos.eq_dec v (match o with Some (o, _) =>
+      map fst (effects o ++ flat_map snd (conditional o))
+        | None => [] end ++ flat_map (fun l => match find_atom (fact_of N) (fst l) with Some f => [fst f]
+        | None => [] end) touched)) as [J|J].
+    + specialize (H4 _ J). unfold projected_variable_ok in H4. rewrite F in H4. rewrite forallb_forall in H4.
+      specialize (H4 _ (possible_ok k K _ _ F)). cbv zeta in H4.
+      set (kv := with_value k vals (var_value s v)) in *.
+      pose proof (with_value_ok k v vals K F : Knows w kv) as Kv.
+      set (keep := fun a => existsb (fun xa : Z * atom => atom_eqb a (snd xa)) vals) in *.
+      destruct (projected P T N keep false kv env (start_effect a)) as [cs|] eqn:Pv; [|discriminate].
+      match type of H4 with match ?e with Some _ => _ | None => _ end = _ => destruct e as [made|] eqn:E end;
+        [|discriminate].
+      unfold value_ok in H4. cbv zeta in H4. rewrite forallb_forall in H4. specialize (H4 _ I).
+      cbn [fst snd] in H4.
+      apply eqb_prop in H4.
+      assert (Kb : keep b = true).
+      { unfold keep. apply existsb_exists. exists (x, b). split; [exact I|]. apply atom_eqb_eq. reflexivity. }
+      rewrite (projected_facts P T N w kv (Base kv Kv) static_value Kv keep false env _ _ w' cs Ha Pv b Kb).
+      assert (Val : var_value (after_of o) v = last_put made v (var_value s v)).
+      { destruct o as [[o ch]|]; [|injection E as <-; reflexivity].
+        destruct (known_effects_on T N v kv (conditional o)) as [r|] eqn:Ke; [|discriminate].
+        injection E as <-.
+        unfold after_of, apply, var_value at 1. cbn [var_values]. rewrite get_puts.
+        change (get (var_values ds) v) with (var_value ds v). rewrite (d_val _ _ F). unfold made_facts.
+        rewrite !last_put_app. symmetry. apply (known_effects_on_ok kv Kv), Ke. }
+      rewrite Val, <- H4. destruct (assoc b (truths_of cs)); [reflexivity|]. apply (r_var _ _ R _ _ _ _ F I).
+    + rewrite (untouched P T N w k (Base k K) static_value K env _ _ w' touched Ha Po).
+      * rewrite (r_var _ _ R _ _ _ _ F I). f_equal. symmetry. destruct o as [[o ch]|]; [|reflexivity].
+        unfold after_of, apply, var_value at 1. cbn [var_values]. rewrite get_puts.
+        change (get (var_values ds) v) with (var_value ds v). rewrite (d_val _ _ F). apply last_put_none.
+        intros f If e. apply J, in_or_app. left. rewrite <- e. apply in_map. unfold made_facts in If.
+        apply in_app_or in If. apply in_or_app. destruct If as [If|If]; [left; exact If|right].
+        apply in_flat_map in If. destruct If as [c [Ic If]]. apply in_flat_map. exists c.
+        apply filter_In in Ic. split; [apply Ic|exact If].
+      * intros t It. apply J, in_or_app. right. apply in_flat_map. exists (b, t). split; [exact It|].
+        cbn [fst].
+        destruct parts as [_ [B _]]. destruct (B _ _ F) as [_ B']. destruct (B' _ _ I) as [_ B''].
+        rewrite B''.
+        left. reflexivity.
+  - apply (numbers_ok (Symbolic [] l)); [exact V| |exact H5].
+    destruct o as [[o ch]|]; [apply Pre|exact Logic.I].
+  - intros p os C. rewrite Sf by exact C. apply (r_fact _ _ R), C.
+  - intros f C. rewrite Sv by exact C. apply (r_value _ _ R), C.
+  - intros b C Hb. destruct (added P T N w k (Base k K) static_value K env _ _ w' touched Ha Po b Hb) as
+      [Q|Q];
+      [apply (r_may _ _ R); assumption|]. specialize (H1 _ Q). exact H1.
+  - intros g x y G X Y Hx Hy. specialize (H2 _ G).
+    destruct (projected P T N (fun a => in_group a g) false k env (start_effect a)) as [cs|] eqn:Pg;
+      [|discriminate].
+    assert (InG : forall z, In z g -> in_group z g = true).
+    { intros z Iz. apply existsb_exists. exists z. split; [exact Iz|]. apply atom_eqb_eq. reflexivity. }
+    pose proof (fun z Iz => projected_facts P T N w k (Base k K) static_value K (fun a => in_group a g) false
+      env _ _ w'
+      cs Ha Pg z (InG z Iz)) as D.
+    unfold stays_exclusive in H2. cbn [new_truths] in H2. rewrite forallb_forall in H2.
+    assert (One : forall u t, In u g -> In t g -> assoc u (truths_of cs) = Some true ->
+      holds_in w' t = true -> u = t).
+    { intros u t Iu It Et Ht. specialize (H2 _ Iu). rewrite Et in H2. rewrite forallb_forall in H2.
+      specialize (H2 _ It). apply orb_true_iff in H2. destruct H2 as [Eq|Fa]; [apply atom_eqb_eq, Eq|].
+      exfalso.
+      unfold symbolic_atom in Fa. cbn [new_truths] in Fa. rewrite (D t It) in Ht.
+      destruct (assoc t (truths_of cs)) as [b|]; [subst b; discriminate|].
+      destruct (base_truth P T N k t) as [[]|] eqn:Bt; try discriminate. apply (Base k K) in Bt. congruence. }
+    pose proof (D x X) as Dx. pose proof (D y Y) as Dy. destruct (assoc x (truths_of cs)) as [tx|] eqn:Ex.
+    + rewrite Dx in Hx. subst tx. apply (One x y); assumption.
+    + destruct (assoc y (truths_of cs)) as [ty|] eqn:Ey.
+      * rewrite Dy in Hy. subst ty. symmetry. apply (One y x); assumption.
+      * apply (r_exclusive _ _ R g); congruence.
+  - destruct o as [[o ch]|]; [|apply R]. apply wf_apply; [exact task_ok|exact Io|].
+    apply wf_derive; [apply heads|apply deriveds|apply R]; exact task_ok.
+Qed.
 
 (* Knowledge from conditions that hold *)
 Lemma knows_join : forall a b, Knows w a -> Knows w b -> Knows w (join a b).
@@ -659,14 +818,15 @@ Qed.
 Definition measure (w : world) : Q := match symbolic_expression P N unchanged Undefined [] (metric P) with
   Is f => ev w f | _ => 0 end.
 Lemma measure_changes : forall w w' s sy e f g, Rel w s ->
-  (forall f, changing N (fst f) = false -> value_in w' f = value_in w f) -> Describes w w' sy ->
+  (forall f, changing N (fst f) = false -> value_in w' f = value_in w f) ->
+    describes_values w w' (new_values sy) ->
   symbolic_expression P N unchanged Undefined [] e = Is f ->
     symbolic_expression P N sy Undefined [] e = Is g -> ev w' f == ev w g.
 Proof.
   intros w w' s sy e f g R St D. revert f g. induction e; intros x y; cbn [symbolic_expression].
   - intros H K. injection H as <-. injection K as <-. rewrite !ev_constant. reflexivity.
   - destruct (ground [] ts) as [l|]; [|discriminate]. unfold symbolic_value. cbn [unchanged new_values assoc].
-    pose proof (d_value _ _ _ D (f, l)) as V. cbn [fst]. destruct (changing N f) eqn:C.
+    pose proof (D (f, l)) as V. cbn [fst]. destruct (changing N f) eqn:C.
     + intros H K. injection H as <-. rewrite ev_fluent. destruct (assoc (f, l) (new_values sy)) as [z|].
       * injection K as <-. destruct V as [q [V1 V2]]. rewrite V1. exact V2.
       * injection K as <-. rewrite ev_fluent, V. reflexivity.
@@ -748,7 +908,7 @@ Proof.
       | None => True end /\ Rel w1 (after_of s o) /\
        match o with Some (o, ch) => admitted o ch /\
          holds (precondition o) (derive T s) (slot_sizes o) ch = true
-         | None => True end /\ Describes w w1 sy /\ t == d /\
+         | None => True end /\ describes_values w w1 (new_values sy) /\ t == d /\
        exists g, growth P N sy t = Some g /\ inject_Z (step_cost o) <= g * (Zpos (cost_scale N) # 1)).
     { eapply (tree_cases w s R); [|eapply gathered_ok; eassumption|exact B]. intros k o K L.
       assert (L' : exists o, match o with Some (o, _) => In o (operators T)
@@ -759,10 +919,15 @@ Proof.
       clear L. destruct L' as [o' [Io L]]. unfold leaf_ok in L.
       pose proof (symbolic_step_ok P T N w k (base_truth_ok w s R k K) (static_value w s R) K a env w1 d S)
         as Q.
-      destruct (symbolic_step P T N k a env) as [| |sy t]; [destruct Q|discriminate|]. destruct Q as [Q D].
+      destruct (symbolic_step P T N k a env) as [| |sy t]; [destruct Q| |].
+      { destruct (projected_ok_ok w s R k a env o' w1 d K S K1 K2 Io L) as [R1 [Ad [Td [l [g G]]]]].
+        exists o', (Symbolic [] l), 0. rewrite Td. cbn [new_values]. destruct G as [G1 [G2 G3]].
+        split; [exact Io|]. split; [exact R1|]. split; [exact Ad|]. split; [exact G1|]. split; [reflexivity|].
+        exists g. split; [exact G2|exact G3]. }
+      destruct Q as [Q D].
       rewrite !andb_true_iff in L. destruct L as [[L1 LX] L2].
       destruct (simulated_ok w s R k K sy t o' w1 D K1 K2 L1 LX Io L2) as [R1 [Ad G]]. exists o', sy, t.
-      tauto. }
+      pose proof (d_value _ _ _ D : describes_values w w1 (new_values sy)) as DV. tauto. }
     destruct Go as [o [sy [t [Io [R1 [Ad [D [Td [g [Gr Co]]]]]]]]]].
     destruct (IH _ _ _ _ _ H R1) as [ps [c [Pl [Le End]]]].
     assert (M : g == measure w1 - measure w + per_time P * d + per_step P).

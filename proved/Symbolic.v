@@ -395,4 +395,161 @@ Proof.
     destruct (symbolic_happening _ _ _ _ _ _ _ _ _ _); auto. destruct E as [-> E].
     split; [symmetry; exact L|exact E].
 Qed.
+
+(* Projections *)
+Definition kept (keep : atom -> bool) (with_numbers : bool) (c : change) : bool :=
+  match c with Fact a _ => keep a | Number _ _ _ => with_numbers end.
+Lemma both_filter : forall f (a b : option (list change)) (c d : option (list symbolic_change)),
+  (forall cs ss, a = Some cs -> c = Some ss -> Forall2 matches (filter f cs) ss) ->
+  (forall cs ss, b = Some cs -> d = Some ss -> Forall2 matches (filter f cs) ss) ->
+  forall cs ss, both a b = Some cs -> both c d = Some ss -> Forall2 matches (filter f cs) ss.
+Proof.
+  intros f [a|] [b|] [c|] [d|] A B cs ss H K; try discriminate. injection H as <-. injection K as <-.
+  rewrite filter_app. apply Forall2_app; auto.
+Qed.
+Lemma projected_matches : forall keep n e env cs ss, changes P w0 None env e = Some cs ->
+  projected P T N keep n k env e = Some ss -> Forall2 matches (filter (kept keep n) cs) ss.
+Proof.
+  intros keep n. induction e; intros env cs ss H K; cbn [changes projected] in *.
+  - injection H as <-. injection K as <-. constructor.
+  - destruct (ground env ts); [|discriminate]. injection H as <-. injection K as <-. cbn [filter kept].
+    destruct (keep _); [constructor; [split; reflexivity|constructor]|constructor].
+  - destruct (ground env ts); [|discriminate].
+    destruct (eval w0 None env e) as [q|] eqn:Ev; [|discriminate]. injection H as <-. cbn [filter kept].
+    destruct n; [|injection K as <-; constructor].
+    pose proof (symbolic_expression_ok w0 unchanged None Undefined (describes_itself w0) eq_refl env e) as G.
+    destruct (symbolic_expression P N unchanged Undefined env e) as [| |g]; try discriminate.
+    injection K as <-. constructor; [|constructor]. simpl. repeat split. apply G. exact Ev.
+  - eapply both_filter; [| |exact H|exact K]; intros; [eapply IHe1|eapply IHe2]; eassumption.
+  - destruct (symbolic_truth P T N k unchanged Undefined env f) as [b|] eqn:E.
+    + apply (symbolic_truth_ok w0 unchanged None Undefined (describes_itself w0) eq_refl) in E.
+      destruct (truth P w0 None env f) as [[]|]; [| |discriminate]; destruct b; simpl in E; try congruence.
+      * eapply IHe; eassumption.
+      * injection H as <-. injection K as <-. constructor.
+    + destruct (projected P T N keep n k env e) as [[|]|] eqn:Pr; try discriminate. injection K as <-.
+      destruct (truth P w0 None env f) as [[]|]; [| |discriminate].
+      * eapply IHe; eassumption.
+      * injection H as <-. constructor.
+  - revert cs ss H K. induction (objects P type) as [|o os IH]; intros cs ss H K; cbn [fold_right] in *.
+    + injection H as <-. injection K as <-. constructor.
+    + eapply both_filter; [| |exact H|exact K]; [intros; eapply IHe; eassumption|exact IH].
+Qed.
+Lemma both_in : forall X (a b : option (list change)) (c d : option (list X)) (Q : change -> list X -> Prop),
+  (forall c l m, Q c l -> Q c (l ++ m)) -> (forall c l m, Q c m -> Q c (l ++ m)) ->
+  (forall cs l, a = Some cs -> c = Some l -> forall x, In x cs -> Q x l) ->
+  (forall cs l, b = Some cs -> d = Some l -> forall x, In x cs -> Q x l) ->
+  forall cs l, both a b = Some cs -> both c d = Some l -> forall x, In x cs -> Q x l.
+Proof.
+  intros X [a|] [b|] [c|] [d|] Q L M A B cs l H K x I; try discriminate. injection H as <-. injection K as <-.
+  apply in_app_or in I. destruct I as [I|I]; [apply L; eapply A|apply M; eapply B]; eauto.
+Qed.
+Definition listed (c : change) (l : list (atom * bool)) : Prop := forall a b, c = Fact a b -> In (a, b) l.
+Lemma possible_facts_ok : forall e env cs l, changes P w0 None env e = Some cs ->
+  possible_facts P T N k env e = Some l -> forall c, In c cs -> listed c l.
+Proof.
+  assert (L : forall c l m, listed c l -> listed c (l ++ m)) by (intros c l m H a b E; apply in_or_app; left;
+    apply H, E).
+  assert (M : forall c l m, listed c m -> listed c (l ++ m)) by (intros c l m H a b E; apply in_or_app;
+    right; apply H, E).
+  induction e; intros env cs l H K; cbn [changes possible_facts] in *.
+  - injection H as <-. intros c [].
+  - destruct (ground env ts); [|discriminate]. injection H as <-. injection K as <-.
+    intros c [<-|[]] a b E. injection E as <- <-. left. reflexivity.
+  - destruct (ground env ts); [|discriminate]. destruct (eval w0 None env e); [|discriminate].
+    injection H as <-.
+    intros c [<-|[]] a b E. discriminate.
+  - eapply (both_in _ _ _ _ _ listed L M); [| |exact H|exact K]; intros; [eapply IHe1|eapply IHe2];
+      eassumption.
+  - destruct (symbolic_truth P T N k unchanged Undefined env f) as [b|] eqn:E.
+    + apply (symbolic_truth_ok w0 unchanged None Undefined (describes_itself w0) eq_refl) in E.
+      destruct (truth P w0 None env f) as [[]|]; [| |discriminate]; destruct b; simpl in E; try congruence.
+      * eapply IHe; eassumption.
+      * injection H as <-. intros c [].
+    + destruct (truth P w0 None env f) as [[]|]; [| |discriminate].
+      * eapply IHe; eassumption.
+      * injection H as <-. intros c [].
+  - revert cs l H K. induction (objects P type) as [|o os IH]; intros cs l H K; cbn [fold_right] in *.
+    + injection H as <-. intros c [].
+    + eapply (both_in _ _ _ _ _ listed L M); [| |exact H|exact K]; [intros; eapply IHe; eassumption|exact IH].
+Qed.
+
+(* The world after an instantaneous action, by its changes *)
+Lemma happening_changes : forall env f e w', happening P w0 None env f e = Some w' ->
+  exists cs l, changes P w0 None env e = Some cs /\ updates w0 cs (changed_fluents cs) = Some l /\
+    (forall a, holds_in w' a = sets_atom cs a true || (negb (sets_atom cs a false) && holds_in w0 a)) /\
+    (forall g, value_in w' g = match assoc g l with Some q => Some q | None => value_in w0 g end).
+Proof.
+  intros env f e w' H. unfold happening in H. destruct (truth P w0 None env f) as [[]|]; try discriminate.
+  destruct (changes P w0 None env e) as [cs|]; [|discriminate].
+  destruct (updates w0 cs (changed_fluents cs)) as [l|] eqn:U; [|discriminate]. injection H as <-.
+  exists cs, l. split; [reflexivity|]. split; [exact U|]. split; reflexivity.
+Qed.
+Lemma sets_atom_filter : forall keep n a b cs, keep a = true ->
+  sets_atom (filter (kept keep n) cs) a b = sets_atom cs a b.
+Proof.
+  intros keep n a b cs Ka. unfold sets_atom. induction cs as [|c cs IH]; [reflexivity|]. cbn [filter].
+  destruct c as [x y|x y z]; cbn [kept].
+  - destruct (keep x) eqn:Kx; cbn [existsb]; [rewrite IH; reflexivity|].
+    destruct (atom_eqb a x) eqn:E; [apply atom_eqb_eq in E; congruence|]. exact IH.
+  - destruct n; cbn [existsb orb]; exact IH.
+Qed.
+Lemma projected_facts : forall keep n env f e w' ss, happening P w0 None env f e = Some w' ->
+  projected P T N keep n k env e = Some ss -> forall a, keep a = true ->
+  holds_in w' a = match assoc a (truths_of ss) with Some b => b | None => holds_in w0 a end.
+Proof.
+  intros keep n env f e w' ss H Pr a Ka. destruct (happening_changes _ _ _ _ H) as [cs [l [C [_ [F _]]]]].
+  pose proof (projected_matches _ _ _ _ _ _ C Pr) as M. rewrite F. unfold truths_of.
+  rewrite assoc_app, !(truths_ok _ _ _ _ M), !sets_atom_filter by exact Ka.
+  destruct (sets_atom cs a true); [reflexivity|]. destruct (sets_atom cs a false); reflexivity.
+Qed.
+Lemma untouched : forall env f e w' l, happening P w0 None env f e = Some w' ->
+  possible_facts P T N k env e = Some l -> forall a, (forall b, ~ In (a, b) l) ->
+    holds_in w' a = holds_in w0 a.
+Proof.
+  intros env f e w' l H Po a No. destruct (happening_changes _ _ _ _ H) as [cs [m [C [_ [F _]]]]]. rewrite F.
+  assert (Z : forall b, sets_atom cs a b = false).
+  { intro b. destruct (sets_atom cs a b) eqn:E; [|reflexivity]. exfalso. unfold sets_atom in E.
+    apply existsb_exists in E. destruct E as [[x y|] [I E]]; [|discriminate]. apply andb_true_iff in E.
+    destruct E as [E _]. apply atom_eqb_eq in E. subst x.
+    apply (No y). exact (possible_facts_ok _ _ _ _ C Po _ I a y eq_refl). }
+  rewrite !Z. reflexivity.
+Qed.
+Lemma added : forall env f e w' l, happening P w0 None env f e = Some w' ->
+  possible_facts P T N k env e = Some l -> forall a, holds_in w' a = true ->
+    holds_in w0 a = true \/ In (a, true) l.
+Proof.
+  intros env f e w' l H Po a Ha. destruct (happening_changes _ _ _ _ H) as [cs [m [C [_ [F _]]]]].
+  rewrite F in Ha.
+  apply orb_true_iff in Ha. destruct Ha as [Ha|Ha]; [right|left].
+  - unfold sets_atom in Ha. apply existsb_exists in Ha. destruct Ha as [[x y|] [I E]]; [|discriminate].
+    apply andb_true_iff in E. destruct E as [E B]. apply atom_eqb_eq in E. subst x.
+    destruct y; [|discriminate].
+    exact (possible_facts_ok _ _ _ _ C Po _ I a true eq_refl).
+  - apply andb_true_iff in Ha. apply Ha.
+Qed.
+Lemma projected_numbers : forall env f e w' ss l, happening P w0 None env f e = Some w' ->
+  projected P T N (fun _ => false) true k env e = Some ss ->
+  symbolic_updates P N unchanged ss (symbolic_changed_fluents ss) = Some l ->
+  forall g, match assoc g l with Some h => exists q, value_in w' g = Some q /\ q == ev w0 h
+            | None => value_in w' g = value_in w0 g end.
+Proof.
+  intros env f e w' ss l H Pr U g. destruct (happening_changes _ _ _ _ H) as [cs [m [C [Um [_ V]]]]].
+  pose proof (projected_matches _ _ _ _ _ _ C Pr) as M.
+  set (fs := filter (kept (fun _ => false) true) cs) in *.
+  assert (A : changed_fluents fs = changed_fluents cs).
+  { subst fs. clear. induction cs as [|[x y|x y z] cs IH]; cbn [filter kept changed_fluents];
+      [reflexivity|exact IH|].
+    f_equal. exact IH. }
+  assert (B : forall h, changes_of h fs = changes_of h cs).
+  { intro h. subst fs. clear.
+    induction cs as [|[x y|x y z] cs IH]; cbn [filter kept changes_of flat_map]; [reflexivity|exact IH|].
+    f_equal. exact IH. }
+  assert (D : forall hs, updates w0 fs hs = updates w0 cs hs).
+  { induction hs as [|h hs IH]; cbn [updates]; [reflexivity|]. rewrite B, IH. reflexivity. }
+  rewrite (targets_same _ _ M) in A. rewrite <- A, <- D in Um.
+  pose proof (updates_ok w0 unchanged fs ss (describes_itself w0) M _ _ _ Um U g) as Q. rewrite V.
+  destruct (assoc g l) as [h|];
+    [destruct Q as [q [Q1 Q2]]; exists q; rewrite Q1; split; [reflexivity|exact Q2]|].
+  rewrite Q. reflexivity.
+Qed.
 End Evaluation.

@@ -2528,6 +2528,64 @@ let symbolic_happening p t0 n k s d time env f e =
              | None -> Unclear)
           | None -> Unclear)
 
+(** val projected :
+    problem -> task -> names -> (atom -> bool) -> bool -> knowledge -> key1
+    list -> effect -> symbolic_change list option **)
+
+let rec projected p t0 n keep with_numbers k env = function
+| Nothing -> Some []
+| Put (b, p0, ts) ->
+  (match ground env ts with
+   | Some l -> Some (if keep (p0, l) then (SFact ((p0, l), b)) :: [] else [])
+   | None -> None)
+| Change (assigns, f, ts, x) ->
+  if with_numbers
+  then (match ground env ts with
+        | Some l ->
+          (match symbolic_expression p n unchanged Undefined env x with
+           | Is g -> Some ((SNumber ((f, l), assigns, g)) :: [])
+           | _ -> None)
+        | None -> None)
+  else Some []
+| Both (a, b) ->
+  both (projected p t0 n keep with_numbers k env a)
+    (projected p t0 n keep with_numbers k env b)
+| When (f, a) ->
+  (match symbolic_truth p t0 n k unchanged Undefined env f with
+   | Some b ->
+     if b then projected p t0 n keep with_numbers k env a else Some []
+   | None ->
+     (match projected p t0 n keep with_numbers k env a with
+      | Some l -> (match l with
+                   | [] -> Some []
+                   | _ :: _ -> None)
+      | None -> None))
+| Each (t1, a) ->
+  fold_right (fun o r ->
+    both (projected p t0 n keep with_numbers k (app env (o :: [])) a) r)
+    (Some []) (p.objects t1)
+
+(** val possible_facts :
+    problem -> task -> names -> knowledge -> key1 list -> effect ->
+    (atom * bool) list option **)
+
+let rec possible_facts p t0 n k env = function
+| Put (b, p0, ts) ->
+  (match ground env ts with
+   | Some l -> Some (((p0, l), b) :: [])
+   | None -> None)
+| Both (a, b) ->
+  both (possible_facts p t0 n k env a) (possible_facts p t0 n k env b)
+| When (f, a) ->
+  (match symbolic_truth p t0 n k unchanged Undefined env f with
+   | Some b -> if b then possible_facts p t0 n k env a else Some []
+   | None -> possible_facts p t0 n k env a)
+| Each (t1, a) ->
+  fold_right (fun o r ->
+    both (possible_facts p t0 n k (app env (o :: [])) a) r) (Some [])
+    (p.objects t1)
+| _ -> Some []
+
 (** val symbolic_duration :
     problem -> names -> action -> key1 list -> result **)
 
@@ -2752,20 +2810,24 @@ let admitted_choice o ch =
       (forallb (fun xn -> (&&) (Z.leb Z0 (fst xn)) (Z.ltb (fst xn) (snd xn)))
         (combine ch o.slot_sizes))) (admits o ch)
 
+(** val value_ok :
+    (atom * bool) list -> fact list -> key1 -> (z * atom) list -> z -> bool **)
+
+let value_ok truths made v vals y =
+  let z0 = last_put made v y in
+  forallb (fun xa ->
+    eqb
+      (match assoc (snd xa) truths with
+       | Some b -> b
+       | None -> Z.eqb y (fst xa)) (Z.eqb z0 (fst xa))) vals
+
 (** val variable_ok :
     task -> names -> knowledge -> symbolic -> fact list -> key1 -> bool **)
 
 let variable_ok t0 n k s made v =
   match M.find v n.variables with
   | Some vals ->
-    forallb (fun y ->
-      let z0 = last_put made v y in
-      forallb (fun xa ->
-        eqb
-          (match assoc (snd xa) s.new_truths with
-           | Some b -> b
-           | None -> Z.eqb y (fst xa)) (Z.eqb z0 (fst xa))) vals)
-      (possible t0 n k v)
+    forallb (value_ok s.new_truths made v vals) (possible t0 n k v)
   | None -> true
 
 (** val is_zero : form -> bool **)
@@ -2873,6 +2935,125 @@ let stays_exclusive p t0 n k s g =
       else true
     | None -> true) g
 
+(** val with_value : knowledge -> (z * atom) list -> z -> knowledge **)
+
+let with_value k vals y =
+  { literals =
+    (app (map (fun xa -> ((snd xa), (Z.eqb y (fst xa)))) vals) k.literals);
+    bounds = k.bounds }
+
+(** val known_effects_on :
+    task -> names -> key1 -> knowledge -> (literal list * fact list) list ->
+    fact list option **)
+
+let rec known_effects_on t0 n v k = function
+| [] -> Some []
+| c :: r ->
+  if forallb (fun f -> negb (Coq_Pos.eqb (fst f) v)) (snd c)
+  then known_effects_on t0 n v k r
+  else if existsb (fun l -> is_false (known_literal t0 n k l)) (fst c)
+       then known_effects_on t0 n v k r
+       else if forallb (fun l -> is_true (known_literal t0 n k l)) (fst c)
+            then option_map (app (snd c)) (known_effects_on t0 n v k r)
+            else None
+
+(** val truths_of : symbolic_change list -> (atom * bool) list **)
+
+let truths_of cs =
+  app (atoms_set_to cs true) (atoms_set_to cs false)
+
+(** val projected_variable_ok :
+    problem -> task -> names -> knowledge -> action -> key1 list ->
+    (operator * choice) option -> key1 -> bool **)
+
+let projected_variable_ok p t0 n k a env o v =
+  match M.find v n.variables with
+  | Some vals ->
+    forallb (fun y ->
+      let k0 = with_value k vals y in
+      (match projected p t0 n (fun a0 ->
+               existsb (fun xa -> atom_eqb a0 (snd xa)) vals) false k0 env
+               a.start_effect with
+       | Some cs ->
+         (match match o with
+                | Some p0 ->
+                  let (o0, _) = p0 in
+                  option_map (app o0.effects)
+                    (known_effects_on t0 n v k0 o0.conditional)
+                | None -> Some [] with
+          | Some made -> value_ok (truths_of cs) made v vals y
+          | None -> false)
+       | None -> false)) (possible t0 n k v)
+  | None -> true
+
+(** val projected_ok :
+    problem -> task -> names -> knowledge -> action -> key1 list ->
+    (operator * choice) option -> bool **)
+
+let projected_ok p t0 n k a env o =
+  match a.duration with
+  | Some _ -> false
+  | None ->
+    (match possible_facts p t0 n k env a.start_effect with
+     | Some touched ->
+       (match projected p t0 n (fun _ -> false) true k env a.start_effect with
+        | Some numbers0 ->
+          (&&)
+            ((&&)
+              ((&&)
+                ((&&)
+                  (forallb (fun l ->
+                    (||) (negb (snd l)) (mem0 n.may_hold (fst l))) touched)
+                  (forallb (fun g ->
+                    match projected p t0 n (fun a0 -> in_group a0 g) false k
+                            env a.start_effect with
+                    | Some cs ->
+                      stays_exclusive p t0 n k { new_truths = (truths_of cs);
+                        new_values = [] } g
+                    | None -> false) n.exclusive))
+                (match o with
+                 | Some p0 ->
+                   let (o0, ch) = p0 in
+                   (&&)
+                     ((&&) (admitted_choice o0 ch)
+                       (known_condition t0 n k o0.precondition o0.slot_sizes
+                         ch)) (distinct (map fst o0.number_effects))
+                 | None -> true))
+              (forallb (projected_variable_ok p t0 n k a env o)
+                (app
+                  (match o with
+                   | Some p0 ->
+                     let (o0, _) = p0 in
+                     map fst (app o0.effects (flat_map snd o0.conditional))
+                   | None -> [])
+                  (flat_map (fun l ->
+                    match find_atom n.fact_of (fst l) with
+                    | Some f -> (fst f) :: []
+                    | None -> []) touched))))
+            (match symbolic_updates p n unchanged numbers0
+                     (symbolic_changed_fluents numbers0) with
+             | Some l ->
+               let s = { new_truths = []; new_values = l } in
+               (&&)
+                 (forallb (number_ok n s o)
+                   (app
+                     (match o with
+                      | Some p0 ->
+                        let (o0, _) = p0 in map fst o0.number_effects
+                      | None -> [])
+                     (flat_map (fun l0 ->
+                       match find_atom n.number_of (fst l0) with
+                       | Some n0 -> n0 :: []
+                       | None -> []) l)))
+                 (match growth p n s { qnum = Z0; qden = XH } with
+                  | Some g ->
+                    qle_bool (inject_Z (step_cost o))
+                      (qmult g { qnum = (Zpos n.cost_scale); qden = XH })
+                  | None -> false)
+             | None -> false)
+        | None -> false)
+     | None -> false)
+
 (** val leaf_ok :
     problem -> task -> names -> knowledge -> action -> key1 list ->
     (operator * choice) option -> bool **)
@@ -2880,7 +3061,7 @@ let stays_exclusive p t0 n k s g =
 let leaf_ok p t0 n k a env o =
   match symbolic_step p t0 n k a env with
   | Never -> true
-  | Unclear -> false
+  | Unclear -> projected_ok p t0 n k a env o
   | After (s, time) ->
     (&&)
       ((&&)

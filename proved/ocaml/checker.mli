@@ -840,6 +840,14 @@ val symbolic_happening :
   problem -> task -> names -> knowledge -> symbolic -> result -> q -> key1
   list -> formula -> effect -> outcome
 
+val projected :
+  problem -> task -> names -> (atom -> bool) -> bool -> knowledge -> key1
+  list -> effect -> symbolic_change list option
+
+val possible_facts :
+  problem -> task -> names -> knowledge -> key1 list -> effect ->
+  (atom * bool) list option
+
 val symbolic_duration : problem -> names -> action -> key1 list -> result
 
 val symbolic_step :
@@ -877,6 +885,9 @@ val known_effects :
 
 val admitted_choice : operator -> choice -> bool
 
+val value_ok :
+  (atom * bool) list -> fact list -> key1 -> (z * atom) list -> z -> bool
+
 val variable_ok :
   task -> names -> knowledge -> symbolic -> fact list -> key1 -> bool
 
@@ -895,6 +906,22 @@ val simulated :
 
 val stays_exclusive :
   problem -> task -> names -> knowledge -> symbolic -> atom list -> bool
+
+val with_value : knowledge -> (z * atom) list -> z -> knowledge
+
+val known_effects_on :
+  task -> names -> key1 -> knowledge -> (literal list * fact list) list ->
+  fact list option
+
+val truths_of : symbolic_change list -> (atom * bool) list
+
+val projected_variable_ok :
+  problem -> task -> names -> knowledge -> action -> key1 list ->
+  (operator * choice) option -> key1 -> bool
+
+val projected_ok :
+  problem -> task -> names -> knowledge -> action -> key1 list ->
+  (operator * choice) option -> bool
 
 val leaf_ok :
   problem -> task -> names -> knowledge -> action -> key1 list ->

@@ -129,7 +129,7 @@ let problem domain_text problem_text =
     other = "object" || kind = other
     || depth > 0 && List.exists (fun (name, parent) -> name = kind && is_below (depth - 1) parent other) supertypes in
   let known_type name = if List.mem name types then name else reject "unknown type: %s" name in
-  let objects = typed (section domain ":constants") @ typed (section problem ":objects") in
+  let objects = List.sort_uniq compare (typed (section domain ":constants") @ typed (section problem ":objects")) in
   distinct "an object" (List.map fst objects);
   List.iter (fun (_, kind) -> ignore (known_type kind)) objects;
   let members = Hashtbl.create 50 in
