@@ -198,6 +198,25 @@ Fixpoint projected (keep : atom -> bool) (with_numbers : bool) (k : knowledge) (
                 | Some true, r => r | Some false, _ => Some [] | None, Some [] => Some [] | None, _ => None end
   | Each t a => fold_right (fun o r => both (projected keep with_numbers k (env ++ [o]) a) r) (Some []) (objects P t)
   end.
+(* The atoms on which unknown conditions of the kept effects depend. *)
+Fixpoint atoms_of (env : list key) (f : formula) : list atom :=
+  match f with
+  | Atom p ts => match ground env ts with Some l => [(p, l)] | None => [] end
+  | Not g => atoms_of env g
+  | And g h => atoms_of env g ++ atoms_of env h
+  | Forall t g => flat_map (fun o => atoms_of (env ++ [o]) g) (objects P t)
+  | _ => []
+  end.
+Fixpoint deciding_atoms (keep : atom -> bool) (k : knowledge) (env : list key) (e : effect) : list atom :=
+  match e with
+  | Both a b => deciding_atoms keep k env a ++ deciding_atoms keep k env b
+  | When f a => match symbolic_truth k unchanged Undefined env f, projected keep false k env a with
+                | Some _, _ => deciding_atoms keep k env a
+                | None, Some [] => []
+                | None, _ => atoms_of env f ++ deciding_atoms keep k env a end
+  | Each t a => flat_map (fun o => deciding_atoms keep k (env ++ [o]) a) (objects P t)
+  | _ => []
+  end.
 (* The atoms that an instantaneous action may add or delete. *)
 Fixpoint possible_facts (k : knowledge) (env : list key) (e : effect) : option (list (atom * bool)) :=
   match e with
@@ -363,17 +382,30 @@ Fixpoint known_effects_on (v : key) (k : knowledge) (cs : list (list literal * l
                    then option_map (app (snd c)) (known_effects_on v k r)
               else None
   end.
+(* Splits on atoms until a check succeeds. *)
+Fixpoint split_on (atoms : list atom) (check : knowledge -> bool) (k : knowledge) : bool :=
+  check k || impossible k ||
+  match atoms with
+  | [] => false
+  | a :: r => split_on r check (Knowledge ((a, true) :: literals k) (bounds k)) &&
+              split_on r check (Knowledge ((a, false) :: literals k) (bounds k))
+  end.
+Definition max_splits := 10%nat.
 Definition truths_of (cs : list symbolic_change) := atoms_set_to cs true ++ atoms_set_to cs false.
 Definition projected_variable_ok (k : knowledge) (a : action) (env : list key) (o : option (operator * choice))
     (v : key) : bool :=
   match M.find v (variables N) with
   | None => true
-  | Some vals => forallb (fun y =>
-      let k := with_value k vals y in
-      match projected (fun a => existsb (fun xa => atom_eqb a (snd xa)) vals) false k env (start_effect a),
-            match o with
-            | Some (o, _) => option_map (app (effects o)) (known_effects_on v k (conditional o)) | None => Some [] end with
-      | Some cs, Some made => value_ok (truths_of cs) made v vals y | _, _ => false end) (possible k v)
+  | Some vals =>
+      let keep := fun a => existsb (fun xa => atom_eqb a (snd xa)) vals in
+      forallb (fun y =>
+        let k := with_value k vals y in
+        split_on (firstn max_splits (deciding_atoms keep k env (start_effect a))) (fun k =>
+          match projected keep false k env (start_effect a),
+                match o with
+                | Some (o, _) => option_map (app (effects o)) (known_effects_on v k (conditional o))
+                | None => Some [] end with
+          | Some cs, Some made => value_ok (truths_of cs) made v vals y | _, _ => false end) k) (possible k v)
   end.
 Definition projected_ok (k : knowledge) (a : action) (env : list key) (o : option (operator * choice)) : bool :=
   match duration a, possible_facts k env (start_effect a), projected (fun _ => false) true k env (start_effect a) with

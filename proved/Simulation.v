@@ -465,6 +465,18 @@ Proof.
   destruct (happening P w None env (at_start a) (start_effect a)) as [x|]; [|discriminate].
   injection H as <- <-. split; reflexivity.
 Qed.
+Lemma split_on_ok : forall check atoms k, Knows w k -> split_on P T N atoms check k = true ->
+  exists k, Knows w k /\ check k = true.
+Proof.
+  intros check. induction atoms as [|a atoms IH]; intros k K H; cbn [split_on] in H;
+    rewrite !orb_true_iff in H;
+    destruct H as [[H|H]|H]; try (exists k; split; assumption);
+      try (exfalso; eapply impossible_ok; eassumption);
+    try discriminate.
+  apply andb_true_iff in H. destruct H as [H1 H2].
+  destruct (holds_in w a) eqn:E; [apply (IH _) in H1; [exact H1|]|apply (IH _) in H2; [exact H2|]];
+    (split; [intros b c [I|I]; [injection I as <- <-; exact E|apply K, I]|apply K]).
+Qed.
 Lemma projected_ok_ok : forall k a env o w' d, Knows w k -> step P true w a env = Some (w', d) ->
   (forall p os, changing N p = false -> holds_in w' (p, os) = holds_in w (p, os)) ->
   (forall f, changing N (fst f) = false -> value_in w' f = value_in w f) ->
@@ -505,9 +517,8 @@ Proof.
         | None => [] end) touched)) as [J|J].
     + specialize (H4 _ J). unfold projected_variable_ok in H4. rewrite F in H4. rewrite forallb_forall in H4.
       specialize (H4 _ (possible_ok k K _ _ F)). cbv zeta in H4.
-      set (kv := with_value k vals (var_value s v)) in *.
-      pose proof (with_value_ok k v vals K F : Knows w kv) as Kv.
       set (keep := fun a => existsb (fun xa : Z * atom => atom_eqb a (snd xa)) vals) in *.
+      apply split_on_ok in H4; [|apply (with_value_ok k v vals K F)]. destruct H4 as [kv [Kv H4]].
       destruct (projected P T N keep false kv env (start_effect a)) as [cs|] eqn:Pv; [|discriminate].
       match type of H4 with match ?e with Some _ => _ | None => _ end = _ => destruct e as [made|] eqn:E end;
         [|discriminate].

@@ -650,6 +650,15 @@ let rec combine l l' =
      | [] -> []
      | y :: tl' -> (x, y) :: (combine tl tl'))
 
+(** val firstn : nat -> 'a1 list -> 'a1 list **)
+
+let rec firstn n l =
+  match n with
+  | O -> []
+  | S n0 -> (match l with
+             | [] -> []
+             | a :: l0 -> a :: (firstn n0 l0))
+
 (** val seq : nat -> nat -> nat list **)
 
 let rec seq start = function
@@ -2565,6 +2574,43 @@ let rec projected p t0 n keep with_numbers k env = function
     both (projected p t0 n keep with_numbers k (app env (o :: [])) a) r)
     (Some []) (p.objects t1)
 
+(** val atoms_of : problem -> key1 list -> formula -> atom list **)
+
+let rec atoms_of p env = function
+| Atom (p0, ts) ->
+  (match ground env ts with
+   | Some l -> (p0, l) :: []
+   | None -> [])
+| Not g -> atoms_of p env g
+| And (g, h) -> app (atoms_of p env g) (atoms_of p env h)
+| Forall (t0, g) ->
+  flat_map (fun o -> atoms_of p (app env (o :: [])) g) (p.objects t0)
+| _ -> []
+
+(** val deciding_atoms :
+    problem -> task -> names -> (atom -> bool) -> knowledge -> key1 list ->
+    effect -> atom list **)
+
+let rec deciding_atoms p t0 n keep k env = function
+| Both (a, b) ->
+  app (deciding_atoms p t0 n keep k env a)
+    (deciding_atoms p t0 n keep k env b)
+| When (f, a) ->
+  (match symbolic_truth p t0 n k unchanged Undefined env f with
+   | Some _ -> deciding_atoms p t0 n keep k env a
+   | None ->
+     (match projected p t0 n keep false k env a with
+      | Some l ->
+        (match l with
+         | [] -> []
+         | _ :: _ ->
+           app (atoms_of p env f) (deciding_atoms p t0 n keep k env a))
+      | None -> app (atoms_of p env f) (deciding_atoms p t0 n keep k env a)))
+| Each (t1, a) ->
+  flat_map (fun o -> deciding_atoms p t0 n keep k (app env (o :: [])) a)
+    (p.objects t1)
+| _ -> []
+
 (** val possible_facts :
     problem -> task -> names -> knowledge -> key1 list -> effect ->
     (atom * bool) list option **)
@@ -2957,6 +3003,26 @@ let rec known_effects_on t0 n v k = function
             then option_map (app (snd c)) (known_effects_on t0 n v k r)
             else None
 
+(** val split_on :
+    problem -> task -> names -> atom list -> (knowledge -> bool) -> knowledge
+    -> bool **)
+
+let rec split_on p t0 n atoms check0 k =
+  (||) ((||) (check0 k) (impossible p t0 n k))
+    (match atoms with
+     | [] -> false
+     | a :: r ->
+       (&&)
+         (split_on p t0 n r check0 { literals = ((a, true) :: k.literals);
+           bounds = k.bounds })
+         (split_on p t0 n r check0 { literals = ((a, false) :: k.literals);
+           bounds = k.bounds }))
+
+(** val max_splits : nat **)
+
+let max_splits =
+  S (S (S (S (S (S (S (S (S (S O)))))))))
+
 (** val truths_of : symbolic_change list -> (atom * bool) list **)
 
 let truths_of cs =
@@ -2969,21 +3035,23 @@ let truths_of cs =
 let projected_variable_ok p t0 n k a env o v =
   match M.find v n.variables with
   | Some vals ->
+    let keep = fun a0 -> existsb (fun xa -> atom_eqb a0 (snd xa)) vals in
     forallb (fun y ->
       let k0 = with_value k vals y in
-      (match projected p t0 n (fun a0 ->
-               existsb (fun xa -> atom_eqb a0 (snd xa)) vals) false k0 env
-               a.start_effect with
-       | Some cs ->
-         (match match o with
-                | Some p0 ->
-                  let (o0, _) = p0 in
-                  option_map (app o0.effects)
-                    (known_effects_on t0 n v k0 o0.conditional)
-                | None -> Some [] with
-          | Some made -> value_ok (truths_of cs) made v vals y
-          | None -> false)
-       | None -> false)) (possible t0 n k v)
+      split_on p t0 n
+        (firstn max_splits (deciding_atoms p t0 n keep k0 env a.start_effect))
+        (fun k1 ->
+        match projected p t0 n keep false k1 env a.start_effect with
+        | Some cs ->
+          (match match o with
+                 | Some p0 ->
+                   let (o0, _) = p0 in
+                   option_map (app o0.effects)
+                     (known_effects_on t0 n v k1 o0.conditional)
+                 | None -> Some [] with
+           | Some made -> value_ok (truths_of cs) made v vals y
+           | None -> false)
+        | None -> false) k0) (possible t0 n k v)
   | None -> true
 
 (** val projected_ok :

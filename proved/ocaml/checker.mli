@@ -176,6 +176,8 @@ val find : ('a1 -> bool) -> 'a1 list -> 'a1 option
 
 val combine : 'a1 list -> 'a2 list -> ('a1 * 'a2) list
 
+val firstn : nat -> 'a1 list -> 'a1 list
+
 val seq : nat -> nat -> nat list
 
 type q = { qnum : z; qden : positive }
@@ -844,6 +846,12 @@ val projected :
   problem -> task -> names -> (atom -> bool) -> bool -> knowledge -> key1
   list -> effect -> symbolic_change list option
 
+val atoms_of : problem -> key1 list -> formula -> atom list
+
+val deciding_atoms :
+  problem -> task -> names -> (atom -> bool) -> knowledge -> key1 list ->
+  effect -> atom list
+
 val possible_facts :
   problem -> task -> names -> knowledge -> key1 list -> effect ->
   (atom * bool) list option
@@ -912,6 +920,12 @@ val with_value : knowledge -> (z * atom) list -> z -> knowledge
 val known_effects_on :
   task -> names -> key1 -> knowledge -> (literal list * fact list) list ->
   fact list option
+
+val split_on :
+  problem -> task -> names -> atom list -> (knowledge -> bool) -> knowledge
+  -> bool
+
+val max_splits : nat
 
 val truths_of : symbolic_change list -> (atom * bool) list
 
