@@ -15,7 +15,7 @@ Fixpoint assoc {X} (a : atom) (l : list (atom * X)) : option X :=
 (* Finite maps from atoms: buckets in a search tree. Collisions of [bucket] cost time only. *)
 Definition atom_map X := PositiveMap.t (list (atom * X)).
 Definition bucket (a : atom) : positive :=
-  fold_left (fun h o => (h * 4096 + o)%positive) (snd a) (fst a).
+  fold_left (fun h o => (4096 * h + o)%positive) (snd a) (fst a).
 Definition bucket_entries {X} (m : atom_map X) (a : atom) : list (atom * X) :=
   match PositiveMap.find (bucket a) m with Some l => l | None => [] end.
 Definition find_atom {X} (m : atom_map X) (a : atom) : option X := assoc a (bucket_entries m a).

@@ -1741,8 +1741,8 @@ type 'x atom_map = (atom * 'x) list PositiveMap.t
 let bucket a =
   fold_left (fun h o ->
     Coq_Pos.add
-      (Coq_Pos.mul h (XO (XO (XO (XO (XO (XO (XO (XO (XO (XO (XO (XO
-        XH))))))))))))) o) (snd a) (fst a)
+      (Coq_Pos.mul (XO (XO (XO (XO (XO (XO (XO (XO (XO (XO (XO (XO
+        XH)))))))))))) h) o) (snd a) (fst a)
 
 (** val bucket_entries : 'a1 atom_map -> atom -> (atom * 'a1) list **)
 

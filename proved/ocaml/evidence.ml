@@ -4,7 +4,9 @@
 module C = Checker
 open Reader
 
-let list read = function List items -> List.map read items | Word text -> reject "a list is expected, not %s" text
+let list read = function
+  | List items -> List.rev (List.rev_map read items)          (* needs no stack for long lists *)
+  | Word text -> reject "a list is expected, not %s" text
 let pair read_first read_second = function
   | List [first; second] -> read_first first, read_second second
   | _ -> reject "a pair is expected"

@@ -29,8 +29,10 @@ let json text =
     characters (); Buffer.contents buffer in
   let items close read =
     if accept close then [] else
-      let rec more () = let item = read () in if accept ',' then item :: more () else (expect close; [item]) in
-      more () in
+      let rec more items =
+        let items = read () :: items in
+        if accept ',' then more items else (expect close; List.rev items) in
+      more [] in
   let rec value () =
     skip ();
     match peek () with
@@ -60,7 +62,7 @@ let nth list i = match List.nth_opt list i with Some item -> item | None -> R.re
 
 (* Text of the evidence *)
 
-let list write items = "(" ^ String.concat " " (List.map write items) ^ ")"
+let list write items = "(" ^ String.concat " " (List.rev (List.rev_map write items)) ^ ")"
 let pair write_first write_second item = match array item with
   | [first; second] -> "(" ^ write_first first ^ " " ^ write_second second ^ ")"
   | _ -> R.reject "JSON: a pair is expected"
@@ -256,29 +258,31 @@ let prepare directory =
     Fun.protect ~finally:(fun () -> close_in channel) (fun () -> really_input_string channel (in_channel_length channel)) in
   let problem = R.problem (read "domain.pddl") (read "problem.pddl") in
   let task = json (read "task.json") in
-  let first_part =
-    "(claim " ^ claim_text (json (read "manifest.json")) ^ ")\n" ^ task_text task ^ argument_text (json (read "argument.json"))
+  let argument = argument_text (json (read "argument.json")) in
+  let others =
+    "(claim " ^ claim_text (json (read "manifest.json")) ^ ")\n" ^ task_text task
     ^ names_text problem.R.task task (json (read "witness.json")) in
-  let evidence = Evidence.read problem.R.action_names (first_part ^ "(goal-case (nothing)) (cases)") in
-  let ground_task = evidence.Evidence.ground_task and names = evidence.Evidence.names and problem_ = problem.R.task in
+  let evidence = Evidence.read problem.R.action_names (others ^ "(argument () () ()) (goal-case (nothing)) (cases)") in
+  let ground_task = evidence.Evidence.ground_task and names = evidence.Evidence.names and pddl = problem.R.task in
   let keys = names_of_keys () in
-  let search = search problem_ ground_task names in
-  let formula_splits, _ = splits_of problem_ names C.Undefined in
+  let search = search pddl ground_task names in
+  let formula_splits, _ = splits_of pddl names C.Undefined in
   let goal_case =
-    try search (C.goal_leaf problem_ ground_task names) [None]
-        (formula_splits [] problem_.C.goal_formula @ splits_of_condition names ground_task.C.goal)
-        (C.conjuncts problem_ names C.unchanged C.Undefined [] problem_.C.goal_formula)
+    try search (C.goal_leaf pddl ground_task names) [None]
+        (formula_splits [] pddl.C.goal_formula @ splits_of_condition names ground_task.C.goal)
+        (C.conjuncts pddl names C.unchanged C.Undefined [] pddl.C.goal_formula)
     with No_tree -> R.reject "no case tree is found for the goal" in
-  print_string first_part;
+  print_string others;
+  print_string argument;
   Printf.printf "(goal-case %s)\n(cases" (tree_text keys goal_case);
   let by_action = operators_by_action task in
   List.iter2 (fun name action ->
-    let instances = C.instances problem_ (C.pruned problem_ names action) action.C.parameters [] in
+    let instances = C.instances pddl (C.pruned pddl names action) action.C.parameters [] in
     List.iter (fun env ->
       let objects = List.map (fun key -> snd (Hashtbl.find keys key)) env in
       let candidates = List.filter_map (fun (i, arguments, uses) ->
           Option.map (fun choice -> Some (R.nat i, choice)) (choice_for arguments uses objects)) (Hashtbl.find_all by_action name) in
-      let formula, effect = splits_of problem_ names (C.symbolic_duration problem_ names action env) in
+      let formula, effect = splits_of pddl names (C.symbolic_duration pddl names action env) in
       let operator_splits = List.concat_map (fun candidate ->
           match candidate with
           | Some (i, _) -> (match C.nth_error ground_task.C.operators i with
@@ -290,12 +294,12 @@ let prepare directory =
           | None -> []) candidates in
       let splits = formula env action.C.at_start @ formula env action.C.over_all @ formula env action.C.at_end
                    @ effect env action.C.start_effect @ effect env action.C.end_effect @ operator_splits in
-      match search (C.instance_leaf problem_ ground_task names action env) (candidates @ [None]) splits
-              (C.gathered problem_ ground_task names action env) with
+      match search (C.instance_leaf pddl ground_task names action env) (candidates @ [None]) splits
+              (C.gathered pddl ground_task names action env) with
       | C.Decided None -> ()
       | tree -> Printf.printf "\n((%s) %s)" (String.concat " " (name :: objects)) (tree_text keys tree)
       | exception No_tree -> R.reject "no case tree is found for (%s)" (String.concat " " (name :: objects))) instances)
-    problem.R.action_names problem_.C.actions;
+    problem.R.action_names pddl.C.actions;
   print_string ")\n"
 
 let () =
