@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use encodings::{
+use planner::{
     Alternatives, Exact, Front, Moment, Part, Plan, Point, Proof, Solution, Statistics, Step, Unbounded,
 };
 use schemars::JsonSchema;

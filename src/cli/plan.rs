@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
-use encodings::{Backend, Config, Limits, Plan, Semantics, Solution, Status};
 use metaplan::message::Message;
 use metaplan::mission::numbers::MissingValue;
 use metaplan::mission::{Mission, btcpp_text, plan_lines, popf_text};
 use metaplan::planner::{Planned, PlannedFront, Planner};
 use metaplan::report::Positions;
 use metaplan::visible::visible;
+use planner::{Backend, Config, Limits, Plan, Semantics, Solution, Status};
 
 use crate::cli::alternatives;
 use crate::cli::common::{Common, Exit, Failure, Format};
@@ -122,7 +122,7 @@ enum EngineName {
     Search,
 }
 
-impl From<EngineName> for encodings::Engine {
+impl From<EngineName> for planner::Engine {
     fn from(engine: EngineName) -> Self {
         match engine {
             EngineName::Auto => Self::Auto,
@@ -132,7 +132,7 @@ impl From<EngineName> for encodings::Engine {
     }
 }
 
-impl From<StrategyName> for encodings::Strategy {
+impl From<StrategyName> for planner::Strategy {
     fn from(strategy: StrategyName) -> Self {
         match strategy {
             StrategyName::Auto => Self::Auto,

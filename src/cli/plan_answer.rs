@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use encodings::{Part, Solution, Status};
 use metaplan::answers::{Preparation, milliseconds};
+use planner::{Part, Solution, Status};
 
 use crate::cli::output::counted;
 use crate::cli::plan_text::steps_text;

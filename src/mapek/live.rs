@@ -3,9 +3,9 @@
 //! The live planner knows the mission's own domain only. What is left of an action under way is a step that comes first: its
 //! configurations are tried one by one on the domain in which that action is shortened, see [`super::resume`].
 
-use encodings::{First, Limits, Progress, Query, Replanned, Replanner};
 use num_rational::BigRational;
 use pddl::validate::advance_each;
+use planner::{First, Limits, Progress, Query, Replanned, Replanner};
 
 use crate::mapek::ask::{Ask, Outcome};
 use crate::mapek::resume::{GATE, resume};

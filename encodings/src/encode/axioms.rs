@@ -10,13 +10,14 @@
 
 use std::collections::BTreeMap;
 
+use task::number::dense;
+use task::task::{Layer, VariableId};
+
 use crate::encode::arithmetic::Bits;
 use crate::encode::builder::Builder;
 use crate::encode::formula::{Family, Formula, Meaning};
 use crate::encode::numeric::is_at_least_zero;
-use crate::number::dense;
 use crate::sat::Lit;
-use crate::task::{Layer, VariableId};
 
 /// What derived variables hold before a step; `numbers` are the numeric variables then. None if numbers do not fit.
 pub(super) fn axioms(builder: &mut Builder<'_>, step: usize, numbers: &[Bits]) -> Option<()> {

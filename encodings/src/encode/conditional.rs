@@ -3,11 +3,12 @@
 //! - `f@t ↔ o@t ∧ ⋀ l@t` for an effect of operator o whose condition is the literals l;
 //! - `f@t → e@t+1` for each fact that it sets, unless an effect after it sets the variable to something else.
 
+use task::number::dense;
+use task::task::{Fact, OperatorId};
+
 use crate::encode::builder::Builder;
 use crate::encode::formula::{Family, Formula, Meaning};
-use crate::number::dense;
 use crate::sat::Lit;
-use crate::task::{Fact, OperatorId};
 
 /// A conditional effect at a step.
 pub(super) struct Fired<'a> {

@@ -10,29 +10,30 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::bounds::Bounds;
+use search::bounds::Bounds;
+use task::number::{Int, dense};
+use task::task::{Operator, OperatorId};
+
 use crate::encode::arithmetic::{Arithmetic, Bits, width};
 use crate::encode::builder::Builder;
 use crate::encode::designs::combinations;
 use crate::encode::formula::{Family, Formula, Meaning};
 use crate::encode::interference::Interference;
-use crate::number::{Int, dense};
 use crate::sat::Lit;
-use crate::task::{Operator, OperatorId};
 
 /// More amounts than this at one step, and the sum is binary.
 const AMOUNT_LIMIT: usize = 1_000;
 
 /// The cost limit of an encoding: only plans with cost at most `limit` count, by the estimates of `bounds`.
-pub(crate) struct CostLimit<'a> {
-    pub(crate) limit: Int,
-    pub(crate) bounds: &'a Bounds,
-    pub(crate) counting: Counting,
+pub struct CostLimit<'a> {
+    pub limit: Int,
+    pub bounds: &'a Bounds,
+    pub counting: Counting,
 }
 
 /// What an encoding makes of the costs of steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Counting {
+pub enum Counting {
     /// Their sum, which the limit holds down.
     Sum,
     /// Literals with weights, which the solver is to keep false. Only what exceeds the limit by itself is excluded.

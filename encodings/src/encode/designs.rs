@@ -1,7 +1,7 @@
 //! The designs of operators in the task's numbering.
 
-use crate::number::dense;
-use crate::task::{Operator, SlotUse};
+use task::number::dense;
+use task::task::{Operator, SlotUse};
 
 /// Slot and design in the task's numbering, from positions in an operator.
 pub(super) fn global(slots: &[SlotUse], slot: u32, design: u32) -> (usize, usize) {

@@ -7,11 +7,11 @@ use std::hash::{BuildHasher, Hash};
 
 use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
 
-use crate::context::Context;
-use crate::limits::Interrupted;
-use crate::number::Int;
-use crate::task::quantity::{Quantity, SlotSet};
-use crate::task::{Operator, SlotId};
+use task::context::Context;
+use task::limits::Interrupted;
+use task::number::Int;
+use task::task::quantity::{Quantity, SlotSet};
+use task::task::{Operator, SlotId};
 
 /// Something of a task that may tell designs of a slot apart: it speaks of those that one operator admits, in their order.
 struct Witness<'t> {

@@ -2,12 +2,13 @@
 
 use std::fmt;
 
-use crate::number::{Int, dense};
+use task::number::{Int, dense};
+
 use crate::sat::Lit;
 
 /// What a clause is for. The documentation of each family stands in the file that writes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(crate) enum Family {
+pub enum Family {
     /// State variables have exactly one value.
     Domain,
     /// At most one operator a step, none after the last.
@@ -79,7 +80,7 @@ impl Family {
 
 /// What a variable of the formula stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum Meaning {
+pub enum Meaning {
     /// The constant true.
     True,
     /// The operator is executed at the step.
@@ -114,7 +115,7 @@ pub(crate) enum Meaning {
 
 /// A formula in conjunctive normal form.
 #[derive(Default)]
-pub(crate) struct Formula {
+pub struct Formula {
     meanings: Vec<Meaning>,
     literals: Vec<Lit>,
     /// End of each clause in `literals`, and its family.
@@ -138,7 +139,7 @@ impl Formula {
         Lit::TRUE
     }
 
-    pub(crate) fn fresh(&mut self, meaning: Meaning) -> Lit {
+    pub fn fresh(&mut self, meaning: Meaning) -> Lit {
         let literal = Lit::positive(dense(self.meanings.len()));
         self.meanings.push(meaning);
         self.last.extend([0, 0]);
@@ -147,7 +148,7 @@ impl Formula {
 
     /// Adds a clause; one that is true for constants' sake is dropped, false constants are left out.
     #[expect(clippy::arithmetic_side_effects, reason = "clauses are held in memory")]
-    pub(crate) fn add(&mut self, family: Family, clause: impl IntoIterator<Item = Lit>) {
+    pub fn add(&mut self, family: Family, clause: impl IntoIterator<Item = Lit>) {
         let start = self.literals.len();
         let number = dense(self.clauses.len() + 1);
         for literal in clause {
@@ -229,22 +230,22 @@ impl Formula {
         }
     }
 
-    pub(crate) fn variables(&self) -> usize {
+    pub fn variables(&self) -> usize {
         self.meanings.len()
     }
 
-    pub(crate) fn len(&self) -> usize {
+    pub fn clause_count(&self) -> usize {
         self.clauses.len()
     }
 
     /// All clauses in the order in which they were added.
-    pub(crate) fn clauses(&self) -> impl Iterator<Item = (Family, &[Lit])> {
+    pub fn clauses(&self) -> impl Iterator<Item = (Family, &[Lit])> {
         self.clauses_from(0)
     }
 
     /// The clauses after so many others.
     #[expect(clippy::arithmetic_side_effects, reason = "the first clause is told apart")]
-    pub(crate) fn clauses_from(&self, start: usize) -> impl Iterator<Item = (Family, &[Lit])> {
+    pub fn clauses_from(&self, start: usize) -> impl Iterator<Item = (Family, &[Lit])> {
         (start..self.clauses.len()).map(|index| {
             let start = if index == 0 { 0 } else { self.clauses[index - 1].0 as usize };
             let (end, family) = self.clauses[index];
@@ -253,7 +254,7 @@ impl Formula {
     }
 
     /// How many clauses each family has.
-    pub(crate) fn counts(&self) -> Vec<(&'static str, usize)> {
+    pub fn counts(&self) -> Vec<(&'static str, usize)> {
         let count = |family| self.clauses.iter().filter(|(_, own)| *own == family).count();
         Family::ALL.iter().map(|family| (family.name(), count(*family))).collect()
     }
@@ -266,6 +267,6 @@ impl Formula {
 
 impl fmt::Debug for Formula {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Formula({} variables, {} clauses)", self.variables(), self.len())
+        write!(f, "Formula({} variables, {} clauses)", self.variables(), self.clause_count())
     }
 }

@@ -16,16 +16,16 @@
 //! \[2\] J. Rintanen, K. Heljanko, I. Niemelä: Planning as satisfiability: parallel plans and algorithms for plan search,
 //! Artificial Intelligence 170(12-13), 2006.
 
-use crate::words::words;
+use search::bounds::Projection;
 use std::collections::BTreeMap;
+use task::context::Context;
+use task::limits::{Interrupted, Limits};
+use task::task::{Condition, OperatorId, Task, VariableId};
+use task::words;
 
-use crate::bounds::Projection;
-use crate::context::Context;
 use crate::encode::builder::Builder;
 use crate::encode::formula::{Family, Formula, Meaning};
-use crate::limits::{Interrupted, Limits};
 use crate::sat::Lit;
-use crate::task::{Condition, OperatorId, Task, VariableId};
 
 /// How many operators can stand at one step of a formula.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -26,8 +26,8 @@ mod symmetry;
 mod tests;
 mod variables;
 
-pub(crate) use cost::{CostLimit, Counting};
-pub(crate) use encoding::{Encoding, Plans};
-pub(crate) use formula::{Family, Formula, Meaning};
+pub use cost::{CostLimit, Counting};
+pub use encoding::{Encoding, Plans};
+pub use formula::{Family, Formula, Meaning};
 pub use interference::Semantics;
-pub(crate) use symmetry::Symmetry;
+pub use symmetry::Symmetry;

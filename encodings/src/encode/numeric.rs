@@ -8,14 +8,15 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use task::number::{GROWTH_LIMIT, Int, dense};
+use task::task::quantity::{Linear, Quantity};
+use task::task::{NumericId, Operator, OperatorId};
+
 use crate::encode::arithmetic::{Arithmetic, Bits, width};
 use crate::encode::builder::Builder;
 use crate::encode::designs::combinations;
 use crate::encode::formula::{Family, Formula, Meaning};
-use crate::number::{GROWTH_LIMIT, Int, dense};
 use crate::sat::Lit;
-use crate::task::quantity::{Linear, Quantity};
-use crate::task::{NumericId, Operator, OperatorId};
 
 /// Conjunctions, each with the number that it stands for.
 type Premises = Vec<(Vec<Lit>, Int)>;

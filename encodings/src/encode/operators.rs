@@ -4,10 +4,11 @@
 //! - condition: `o@t → p@t` for each fact, `o@t → ⋁ l@t` for each clause;
 //! - effect: `o@t → e@t+1`, unless a conditional effect of the operator prevails.
 
+use task::number::dense;
+
 use crate::encode::builder::Builder;
 use crate::encode::conditional::Fires;
 use crate::encode::formula::{Family, Formula, Meaning};
-use crate::number::dense;
 
 /// One operator at most if it is to stand alone, and none after an idle step.
 pub(super) fn sequence(builder: &mut Builder<'_>, step: usize, is_alone: bool) {

@@ -4,10 +4,11 @@
 //! slot, and `slot=d@t → ⋁ {g@t : d ∈ D}`, so that an idle slot stays empty. Combinations that only together do not
 //! suit are forbidden one by one: `¬g@t ∨ ¬slot=d@t ∨ ¬slot'=d'@t`.
 
+use task::limits::Interrupted;
+
 use crate::encode::builder::Builder;
 use crate::encode::designs::global;
 use crate::encode::formula::{Family, Formula};
-use crate::limits::Interrupted;
 use crate::sat::Lit;
 
 /// Each function in use has exactly one design, and one that suits.

@@ -6,12 +6,13 @@
 //!
 //! [1] A. Haas: The case for domain-specific frame axioms, The Frame Problem in AI, 1987.
 
+use task::number::dense;
+use task::task::{Fact, VariableId};
+
 use crate::encode::builder::Builder;
 use crate::encode::conditional::Fires;
 use crate::encode::formula::{Family, Formula};
-use crate::number::dense;
 use crate::sat::Lit;
-use crate::task::{Fact, VariableId};
 
 /// Every variable has exactly one value before the step.
 pub(super) fn domain(builder: &mut Builder<'_>, step: usize) {

@@ -11,18 +11,19 @@
 //!
 //! \[1\] J. Rintanen: Symmetry reduction for SAT representations of transition systems, ICAPS 2003.
 
-use crate::context::Context;
+use task::context::Context;
+use task::lifted::ObjectId;
+use task::limits::Interrupted;
+use task::task::exchange::{Exchange, exchanges};
+use task::task::{Argument, OperatorId, SlotId, Task};
+
 use crate::encode::builder::Builder;
 use crate::encode::equal_designs::equal_designs;
 use crate::encode::formula::{Family, Formula, Meaning};
-use crate::lifted::ObjectId;
-use crate::limits::Interrupted;
 use crate::sat::Lit;
-use crate::task::exchange::{Exchange, exchanges};
-use crate::task::{Argument, OperatorId, SlotId, Task};
 
 /// What of a task is equal.
-pub(crate) struct Symmetry {
+pub struct Symmetry {
     /// Designs of a slot that are equal to an earlier one.
     designs: Vec<(SlotId, u32)>,
     /// For pairs of equal objects: the operators that use the first, and those that use only the second.

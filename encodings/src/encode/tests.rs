@@ -4,17 +4,17 @@ use std::cell::OnceCell;
 use std::fmt::Write as _;
 
 use insta::assert_snapshot;
+use search::bounds::Bounds;
+use task::context::Context;
+use task::ground::{GroundConfig, ground};
+use task::limits::Limits;
+use task::task::{Argument, Task};
 
-use crate::bounds::Bounds;
-use crate::context::Context;
 use crate::encode::builder::Builder;
 use crate::encode::conditional::Fires;
 use crate::encode::formula::{Family, Formula, Meaning};
 use crate::encode::{CostLimit, Counting, Encoding, Plans, Semantics, operators, state};
-use crate::ground::{GroundConfig, ground};
-use crate::limits::Limits;
 use crate::sat::Lit;
-use crate::task::{Argument, Task};
 use pddl::{Source, read};
 
 const DOMAIN: &str = "(define (domain d)

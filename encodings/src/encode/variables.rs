@@ -2,12 +2,13 @@
 //!
 //! A value that no sequence of allowed operators can produce by a step gets no variable there.
 
-use crate::context::Context;
+use task::context::Context;
+use task::limits::Interrupted;
+use task::number::dense;
+use task::task::{Fact, Literal, OperatorId, Task};
+
 use crate::encode::formula::{Formula, Meaning};
-use crate::limits::Interrupted;
-use crate::number::dense;
 use crate::sat::Lit;
-use crate::task::{Fact, Literal, OperatorId, Task};
 
 /// What stands for operators, values and designs.
 #[derive(Default)]

@@ -14,10 +14,10 @@ use std::cell::Cell;
 use std::io;
 use std::rc::Rc;
 
+use task::limits::Limits;
+use task::number::dense;
 use varisat::ExtendFormula as _;
 
-use crate::limits::Limits;
-use crate::number::dense;
 use crate::sat::solver::{Answer, Lit, Solver};
 
 /// A Varisat solver.
@@ -115,7 +115,7 @@ fn translate(literal: Lit) -> varisat::Lit {
 }
 
 /// Refutes clauses over variables numbered from 1, or finds that they have a model; the proof is in DRAT.
-pub(crate) fn refute_with_proof(
+pub fn refute_with_proof(
     clauses: impl Iterator<Item = impl Iterator<Item = i32>>,
     proof: Box<dyn io::Write>,
     limits: &Limits,
