@@ -2,7 +2,7 @@
 
 use std::cell::OnceCell;
 
-use metaplan_encodings::encode::{CostLimit, Counting, Encoding, Plans, Semantics};
+use metaplan_encodings::encode::{CostEncoding, CostLimit, Encoding, PlanConstraints, StepSemantics};
 use metaplan_encodings::sat::{Answer, Backend};
 use pddl::{Source, read};
 use search::bounds::Bounds;
@@ -30,16 +30,16 @@ fn is_solvable(
     bounds: &Bounds,
     steps: usize,
     limit: Int,
-    semantics: Semantics,
+    semantics: StepSemantics,
     backend: &Backend,
 ) -> bool {
     let window =
         bounds.window(Context::new(task, &Limits::none()), Some(limit), Some(steps)).expect("no limit");
-    let cost = CostLimit { limit, bounds, counting: Counting::Sum };
+    let cost = CostLimit { limit, bounds, counting: CostEncoding::Sum };
     let limits = Limits::none();
     let encoding = Encoding::new(
         Context::new(task, &limits),
-        Plans { allowed: &window.allowed, cost: Some(cost), semantics, most: usize::MAX },
+        PlanConstraints { allowed: &window.allowed, cost: Some(cost), semantics, max_clauses: usize::MAX },
         &OnceCell::new(),
     )
     .expect("no limit");
@@ -83,7 +83,8 @@ fn check(seed: u64, backend: &Backend) {
     );
     for bounds in [&bounds, &Bounds::trivial(Context::new(&task, &Limits::none())).expect("no limit")] {
         for (steps, cost) in costs.iter().enumerate() {
-            let solvable = |limit| is_solvable(&task, bounds, steps, limit, Semantics::Sequential, backend);
+            let solvable =
+                |limit| is_solvable(&task, bounds, steps, limit, StepSemantics::Sequential, backend);
             let context = || format!("seed {seed}, {backend:?}, {steps} steps: {mission:?}");
             match cost {
                 Some(cost) => {
@@ -126,14 +127,15 @@ fn check_all(text: (String, String), backend: &Backend) -> (bool, bool) {
     for bounds in [&bounds, &Bounds::trivial(Context::new(&task, &Limits::none())).expect("no limit")] {
         for (steps, cost) in costs.iter().enumerate() {
             let context = |semantics| format!("{backend:?}, {steps} steps, {semantics:?}, {cost:?}: {text}");
-            for semantics in [Semantics::Sequential, Semantics::ForAllStep, Semantics::ExistsStep] {
+            for semantics in [StepSemantics::Sequential, StepSemantics::ForAllStep, StepSemantics::ExistsStep]
+            {
                 let solvable = |limit| is_solvable(&task, bounds, steps, limit, semantics, backend);
                 if let Some(cost) = cost {
                     assert!(solvable(*cost), "{}", context(semantics));
                 }
                 let below = cost.unwrap_or(MUCH) - 1;
                 match (semantics, optimum) {
-                    (Semantics::Sequential, _) => assert!(!solvable(below), "{}", context(semantics)),
+                    (StepSemantics::Sequential, _) => assert!(!solvable(below), "{}", context(semantics)),
                     (_, Some(optimum)) => {
                         assert!(!solvable(optimum - 1), "{}", context(semantics));
                         together |= below >= optimum && solvable(below);
@@ -147,7 +149,12 @@ fn check_all(text: (String, String), backend: &Backend) -> (bool, bool) {
     let limits = Limits::none();
     let encoding = Encoding::new(
         Context::new(&task, &limits),
-        Plans { allowed: &allowed, cost: None, semantics: Semantics::Sequential, most: usize::MAX },
+        PlanConstraints {
+            allowed: &allowed,
+            cost: None,
+            semantics: StepSemantics::Sequential,
+            max_clauses: usize::MAX,
+        },
         &OnceCell::new(),
     );
     let counts = encoding.expect("no limit").formula.counts();

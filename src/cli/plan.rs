@@ -11,7 +11,7 @@ use metaplan::mission::{Mission, btcpp_text, plan_lines, popf_text};
 use metaplan::planner::{Planned, PlannedFront, Planner};
 use metaplan::report::Positions;
 use metaplan::visible::visible;
-use planner::{Backend, Config, Limits, Plan, Semantics, Solution, Status};
+use planner::{Backend, Config, Limits, Plan, Solution, Status, StepSemantics};
 
 use crate::cli::alternatives;
 use crate::cli::common::{Common, Exit, Failure, Format};
@@ -142,7 +142,7 @@ impl From<StrategyName> for planner::Strategy {
     }
 }
 
-impl From<Encoding> for Semantics {
+impl From<Encoding> for StepSemantics {
     fn from(encoding: Encoding) -> Self {
         match encoding {
             Encoding::Sequential => Self::Sequential,
@@ -158,7 +158,7 @@ fn configuration(arguments: &Arguments, limits: Limits) -> Config {
         .with_horizon(arguments.horizon)
         .with_engine(arguments.engine.into())
         .with_confirmation(arguments.confirm)
-        .with_semantics(arguments.encoding.map(Semantics::from))
+        .with_semantics(arguments.encoding.map(StepSemantics::from))
         .with_strategy(arguments.strategy.into())
         .with_backend(arguments.solver.clone())
         .with_limits(limits)

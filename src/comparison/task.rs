@@ -11,7 +11,7 @@ use num_rational::BigRational;
 use num_traits::{One, Zero};
 use pddl::ast::{InitialElement, Name, Problem};
 use pddl::validate::{PlanStep, advance};
-use planner::{Limits, Situation as TaskState, Step, Task, Transition};
+use planner::{Limits, Step, Task, TaskState, Transition};
 
 use crate::comparison::coadaptation::{
     Arc, Coadaptation, Configuration, Facts, Loss, Roles, Switch, Traversal, components, fits,

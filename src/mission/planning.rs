@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use num_rational::BigRational;
 use pddl::ast::{Domain, Metric, Name, Problem};
 use pddl::{Diagnostic, Severity};
-use planner::{Concurrent, ExactTask, GroundConfig, Limits, Plan, Replanner, Task};
+use planner::{ExactTask, GroundConfig, Limits, Plan, Replanner, Task, TemporalTask};
 
 use ::mission::Mission;
 
@@ -47,7 +47,7 @@ pub trait Planning {
         objectives: &[Metric],
         separation: &BigRational,
         limits: &Limits,
-    ) -> Result<Concurrent, Errors>;
+    ) -> Result<TemporalTask, Errors>;
 
     /// The plan with the arguments that the domain's file gives its actions: without the designs that the knowledge base has
     /// added to a plain domain. The configuration of each step has them.
@@ -81,7 +81,7 @@ impl Planning for Mission {
         objectives: &[Metric],
         separation: &BigRational,
         limits: &Limits,
-    ) -> Result<Concurrent, Errors> {
+    ) -> Result<TemporalTask, Errors> {
         let (domain, problem) = self.narrowed(problem);
         planner::ground_concurrent(&domain, &problem, &config(self, objectives, limits), separation)
             .map_err(|errors| messages(self, &errors))

@@ -16,7 +16,7 @@ use num_traits::Zero as _;
 use pddl::Source;
 use pddl::ast::{Name, Problem};
 use pddl::validate::{Options, PlanStep, PlanText, Verdict, validate};
-use planner::{Config, Exact, Limits, Plan, Solution, Status, Thresholds, Unbounded};
+use planner::{Config, Exact, Limits, MetricUnbounded, Plan, Solution, Status, Thresholds};
 
 use crate::certify::{self, Planned};
 
@@ -401,8 +401,8 @@ fn check_claim(case: &Case, solved: &Solved, tally: &mut Tally) {
     let solution = &solved.solution;
     let cost = solution.plan.as_ref().map(|plan| rational(&plan.cost));
     tally.count(match (solution.status, solution.unbounded) {
-        (Status::Feasible, Some(Unbounded::Proved)) => "planner: no best value, proved",
-        (Status::Feasible, Some(Unbounded::Suspected)) => "planner: no best value, suspected",
+        (Status::Feasible, Some(MetricUnbounded::Proved)) => "planner: no best value, proved",
+        (Status::Feasible, Some(MetricUnbounded::Suspected)) => "planner: no best value, suspected",
         (Status::Optimal, _) => "planner: optimal",
         (Status::Feasible, None) => "planner: feasible",
         (Status::Unsolvable, _) => "planner: no plan",
@@ -423,7 +423,7 @@ fn check_claim(case: &Case, solved: &Solved, tally: &mut Tally) {
         {
             Some("false: optimal")
         }
-        (Status::Feasible, Truth::Best(best, _)) if solution.unbounded == Some(Unbounded::Proved) => {
+        (Status::Feasible, Truth::Best(best, _)) if solution.unbounded == Some(MetricUnbounded::Proved) => {
             let _ = best;
             Some("false: no best value")
         }

@@ -20,7 +20,7 @@ const FORBIDDEN: [(&str, &[&str]); 14] = [
     ("certificate/src", &["ontology::", "rules::", "planner::", "varisat", "std::fs", "std::time"]),
     ("mission/src", &["planner::", "varisat", "oxrdf", "horned", "std::time"]),
     ("verify/src", &["planner::", "varisat", "oxrdf", "horned"]),
-    ("encodings/src", &["ontology::", "oxrdf", "horned", "pddl::"]),
+    ("encodings/src", &["ontology::", "oxrdf", "horned"]),
     (
         "crates/task/src",
         &["ontology::", "search::", "encodings::", "planner::", "varisat", "oxrdf", "std::fs"],

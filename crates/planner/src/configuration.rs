@@ -44,7 +44,7 @@ pub struct DesignChoice {
 
 /// A choice for each function, if it can be served.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Chosen {
+pub struct Assignment {
     /// The position of the design in the function's list.
     pub designs: Vec<Option<usize>>,
     /// The sum of the utilities.
@@ -54,7 +54,7 @@ pub struct Chosen {
 }
 
 /// The best choice for functions, each with its designs in the order of preference among equals, under budgets.
-pub fn configure(functions: &[Vec<DesignChoice>], budgets: &[BigRational], limits: &Limits) -> Chosen {
+pub fn configure(functions: &[Vec<DesignChoice>], budgets: &[BigRational], limits: &Limits) -> Assignment {
     let problem = Problem::new(functions, budgets);
     let (prices, known) = problem.prices();
     let (designs, optimal) = match problem.search(&prices, &known, limits) {
@@ -63,7 +63,7 @@ pub fn configure(functions: &[Vec<DesignChoice>], budgets: &[BigRational], limit
     };
     let chosen = functions.iter().zip(&designs).filter_map(|(own, at)| at.and_then(|at| own.get(at)));
     let utility = chosen.map(|design| &design.utility).sum();
-    Chosen { designs, utility, optimal }
+    Assignment { designs, utility, optimal }
 }
 
 /// A design in integers.
@@ -107,7 +107,7 @@ impl Label {
 }
 
 /// A price for each budget, as a fraction of 2^`PRICE_BITS`, and what functions are worth at most at these prices.
-struct Prices {
+struct LagrangeMultipliers {
     each: Vec<BigInt>,
     /// For each function, of it and those after it; one more entry for none.
     after: Vec<BigInt>,
@@ -200,7 +200,7 @@ impl Problem {
 
     /// Good prices, and the best choice that was met on the way.
     #[expect(clippy::cast_possible_truncation, reason = "rounding is meant; bounds hold for whatever prices")]
-    fn prices(&self) -> (Prices, Label) {
+    fn prices(&self) -> (LagrangeMultipliers, Label) {
         let float = |number: &BigInt| number.to_f64().unwrap_or(f64::MAX);
         let budgets: Vec<f64> = self.budgets.iter().map(float).collect();
         let mut known = self.greedy(|item| float(&item.worth));
@@ -252,11 +252,11 @@ impl Problem {
             after.push(sum);
         }
         after.reverse();
-        (Prices { each, after }, known)
+        (LagrangeMultipliers { each, after }, known)
     }
 
     /// At most so much is a choice worth that begins like this, as a fraction of 2^`PRICE_BITS`.
-    fn bound(&self, label: &Label, from: usize, prices: &Prices) -> BigInt {
+    fn bound(&self, label: &Label, from: usize, prices: &LagrangeMultipliers) -> BigInt {
         let left = self.budgets.iter().zip(&label.spent).map(|(budget, spent)| budget - spent);
         let paid: BigInt = left.zip(&prices.each).map(|(left, price)| left * price).sum();
         (&label.worth << PRICE_BITS) + paid + prices.after.get(from).cloned().unwrap_or_default()
@@ -265,7 +265,7 @@ impl Problem {
     /// The best choice, where one is known.
     fn search(
         &self,
-        prices: &Prices,
+        prices: &LagrangeMultipliers,
         known: &Label,
         limits: &Limits,
     ) -> Result<Vec<Option<usize>>, Interrupted> {
@@ -471,7 +471,10 @@ mod tests {
         };
         let functions = vec![vec![item(9, 5), item(1, 1)], vec![item(9, 5), item(2, 1)]];
         let chosen = configure(&functions, &[number(6)], &Limits::none().with_time(Duration::ZERO));
-        assert_eq!(chosen, Chosen { designs: vec![Some(0), Some(1)], utility: number(11), optimal: false });
+        assert_eq!(
+            chosen,
+            Assignment { designs: vec![Some(0), Some(1)], utility: number(11), optimal: false }
+        );
         let chosen = configure(&functions, &[number(6)], &Limits::none());
         assert_eq!((chosen.designs, chosen.optimal), (vec![Some(0), Some(1)], true));
     }

@@ -1,6 +1,6 @@
 //! Overlapping actions whose durations or effects the state decides, and durations that are bounded: what is planned, and what is claimed of it.
 
-use metaplan_planner::{GroundConfig, Limits, Part, Status, ground_concurrent, optimize_concurrent};
+use metaplan_planner::{GroundConfig, Limits, PlannerPart, Status, ground_concurrent, optimize_concurrent};
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use pddl::validate::{Options, PlanText, validate};
@@ -174,7 +174,7 @@ fn what_a_search_does_is_counted_and_dated() {
     };
     let (solution, heard) = tower(3);
     let statistics = &solution.statistics;
-    assert_eq!((solution.status, statistics.found_by), (Status::Optimal, Some(Part::Search)));
+    assert_eq!((solution.status, statistics.found_by), (Status::Optimal, Some(PlannerPart::Search)));
     assert!(0 < statistics.expanded && statistics.expanded <= statistics.generated, "{statistics:?}");
     assert!(0 < statistics.evaluated && statistics.evaluated <= statistics.generated + 1, "{statistics:?}");
     let known = statistics.history.iter().filter(|moment| moment.cost.is_some()).count();
@@ -188,6 +188,6 @@ fn what_a_search_does_is_counted_and_dated() {
     assert!(statistics.history.iter().all(|moment| moment.time <= statistics.search));
     // In as little room the search for a plan soon finds what A* does not.
     let (solution, _) = tower(18);
-    assert_eq!(solution.statistics.found_by, Some(Part::Satisficing));
+    assert_eq!(solution.statistics.found_by, Some(PlannerPart::Satisficing));
     assert!(solution.statistics.history.iter().any(|moment| moment.cost.is_some()));
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::Command;
 
 use metaplan_planner::{
-    Config, GroundConfig, Limits, Query, Replanned, Replanner, Solution, Status, alternatives, ground,
+    Config, GroundConfig, Limits, Query, ReplanOutcome, Replanner, Solution, Status, alternatives, ground,
     optimize,
 };
 use num_rational::BigRational;
@@ -103,7 +103,7 @@ fn from_scratch(domain: &Domain, problem: &Problem) -> Solution {
     optimize(&task, &Config::default(), &mut |_| {})
 }
 
-fn live(replanner: &mut Replanner, domain: &Domain, problem: &Problem) -> Replanned {
+fn live(replanner: &mut Replanner, domain: &Domain, problem: &Problem) -> ReplanOutcome {
     live_with(replanner, domain, problem, None)
 }
 
@@ -112,7 +112,7 @@ fn live_with(
     domain: &Domain,
     problem: &Problem,
     old: Option<&Named>,
-) -> Replanned {
+) -> ReplanOutcome {
     let zero = BigRational::default();
     let metric = metric_after(domain, problem, &zero).expect("a metric");
     let limits = Limits::none();
@@ -127,7 +127,7 @@ fn live_with(
     let mut told = Vec::new();
     let found = replanner.plan_aloud(&query, &mut |progress| told.push(progress));
     // What is told on the way is true in the end.
-    if let Replanned::Optimal { metric, .. } = &found {
+    if let ReplanOutcome::Optimal { metric, .. } = &found {
         for progress in told {
             let dearest = progress.metric.as_ref();
             assert!(progress.bound <= *metric, "{progress:?}, {metric}");
@@ -143,9 +143,9 @@ fn new(domain: &Domain, problem: &Problem) -> Replanner {
 }
 
 /// Both answers are the same plan, or none.
-fn compare(expected: &Solution, found: &Replanned, context: &dyn Fn() -> String) {
+fn compare(expected: &Solution, found: &ReplanOutcome, context: &dyn Fn() -> String) {
     match (&expected.plan, found) {
-        (Some(plan), Replanned::Optimal { steps, metric, .. }) => {
+        (Some(plan), ReplanOutcome::Optimal { steps, metric, .. }) => {
             assert_eq!(expected.status, Status::Optimal, "{}", context());
             let names = |steps: &[metaplan_planner::Step]| {
                 let name = |step: &metaplan_planner::Step| (step.action.clone(), step.arguments.clone());
@@ -155,7 +155,7 @@ fn compare(expected: &Solution, found: &Replanned, context: &dyn Fn() -> String)
             let cost = plan.cost.to_rational();
             assert_eq!(cost, *metric, "{}", context());
         }
-        (None, Replanned::Unsolvable) => assert_eq!(expected.status, Status::Unsolvable, "{}", context()),
+        (None, ReplanOutcome::Unsolvable) => assert_eq!(expected.status, Status::Unsolvable, "{}", context()),
         _ => panic!("{:?} and {found:?}: {}", expected.status, context()),
     }
 }
@@ -171,7 +171,7 @@ fn check(seed: u64, changes: usize) -> usize {
     let mut old = None;
     for number in 0..changes {
         let mut found = live(&mut replanner, &domain, &problem);
-        if found == Replanned::Misfit {
+        if found == ReplanOutcome::Misfit {
             misfits += 1;
             replanner = new(&domain, &problem);
             found = live(&mut replanner, &domain, &problem);
@@ -181,7 +181,7 @@ fn check(seed: u64, changes: usize) -> usize {
         // A plan that is known is none the worse.
         let again = live_with(&mut replanner, &domain, &problem, old.as_ref());
         assert_eq!(again, found, "{}", context());
-        if let Replanned::Optimal { steps, .. } = &found {
+        if let ReplanOutcome::Optimal { steps, .. } = &found {
             old = Some(named(steps));
         }
         possible.happen(&mut problem, &mut random);
@@ -216,14 +216,14 @@ fn check_close(seed: u64) {
     let mut random = Random(seed ^ 0xc105e);
     let possible = Changes::of(&problem, "at", "waypoint", "design");
     let mut replanner = new(&domain, &problem);
-    let Replanned::Optimal { steps: old, .. } = live(&mut replanner, &domain, &problem) else { return };
+    let ReplanOutcome::Optimal { steps: old, .. } = live(&mut replanner, &domain, &problem) else { return };
     let old = named(&old);
     possible.happen(&mut problem, &mut random);
     let metric = metric_after(&domain, &problem, &BigRational::default()).expect("a metric");
     let limits = Limits::none();
     let query =
         Query { problem: &problem, first: &[], metric, old: Some(&old), stay_close: true, limits: &limits };
-    let Replanned::Optimal { steps, metric, .. } = replanner.plan(&query) else { return };
+    let ReplanOutcome::Optimal { steps, metric, .. } = replanner.plan(&query) else { return };
     let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
     let solution = optimize(&task, &Config::default(), &mut |_| {});
     let others = alternatives(&task, &solution, 200, &Config::default());
@@ -260,7 +260,7 @@ fn plans_stay_close_to_the_old_one() {
       (:goal (at c)) (:metric minimize (total-cost)))";
     let (domain, mut problem) = parse(domain, problem);
     let mut replanner = new(&domain, &problem);
-    let Replanned::Optimal { steps: old, .. } = live(&mut replanner, &domain, &problem) else {
+    let ReplanOutcome::Optimal { steps: old, .. } = live(&mut replanner, &domain, &problem) else {
         panic!("no plan")
     };
     let old = named(&old);
@@ -276,7 +276,7 @@ fn plans_stay_close_to_the_old_one() {
             stay_close: true,
             limits: &limits,
         };
-        let Replanned::Optimal { steps, .. } = replanner.plan(&query) else { panic!("no plan") };
+        let ReplanOutcome::Optimal { steps, .. } = replanner.plan(&query) else { panic!("no plan") };
         named(&steps)
     };
     assert_ne!(plan(&mut replanner, None), old);
@@ -311,13 +311,13 @@ fn the_old_plan_serves_when_time_is_up() {
         replanner.plan(&Query { problem, first: &[], metric, old, stay_close: false, limits: &limits })
     };
     let found = ask(&mut replanner, &problem, Some(&old));
-    let Replanned::Feasible { first: None, steps, metric } = found else { panic!("{found:?}") };
+    let ReplanOutcome::Feasible { first: None, steps, metric } = found else { panic!("{found:?}") };
     assert_eq!((named(&steps), metric), (old.clone(), BigRational::from_integer(14.into())));
     // Where it is not a plan any more, it does not serve.
     problem.init.push(InitialElement::Fact(atom("on s3")));
-    assert_eq!(ask(&mut replanner, &problem, Some(&old)), Replanned::Unknown);
+    assert_eq!(ask(&mut replanner, &problem, Some(&old)), ReplanOutcome::Unknown);
     assert!(
-        matches!(live(&mut replanner, &domain, &problem), Replanned::Optimal { steps, .. } if steps.len() == 13)
+        matches!(live(&mut replanner, &domain, &problem), ReplanOutcome::Optimal { steps, .. } if steps.len() == 13)
     );
 }
 
@@ -334,7 +334,7 @@ fn check_blocking(seed: u64) -> bool {
     let limits = Limits::none();
     let query =
         Query { problem: &problem, first: &[], metric, old: None, stay_close: false, limits: &limits };
-    if replanner.plan(&query) != Replanned::Unsolvable {
+    if replanner.plan(&query) != ReplanOutcome::Unsolvable {
         return false;
     }
     let blocking = replanner.blocking(&query).expect("an answer");
@@ -426,12 +426,12 @@ fn live_planning_beside_planning_anew() {
             anew.push(used() - before);
             let before = used();
             let mut found = live_with(&mut replanner, &domain, &problem, old.as_ref());
-            if found == Replanned::Misfit {
+            if found == ReplanOutcome::Misfit {
                 replanner = new(&domain, &problem);
                 found = live(&mut replanner, &domain, &problem);
             }
             kept.push(used() - before);
-            if let Replanned::Optimal { steps, .. } = &found {
+            if let ReplanOutcome::Optimal { steps, .. } = &found {
                 old = Some(named(steps));
             }
             compare(&expected, &found, &|| format!("{waypoints} places, change {number}"));
@@ -477,7 +477,7 @@ fn a_state_that_breaks_what_the_mission_excludes_is_planned_for_anew() {
         let (tree, base) = parse(&domain, &problem("(c)", goal));
         let mut replanner = new(&tree, &base);
         let (tree, both) = parse(&domain, &problem("(c) (b)", goal));
-        assert_eq!(live(&mut replanner, &tree, &both), Replanned::Misfit, "{goal}");
+        assert_eq!(live(&mut replanner, &tree, &both), ReplanOutcome::Misfit, "{goal}");
         let anew = from_scratch(&tree, &both);
         assert_eq!(anew.plan.map(|plan| plan.steps.len()), Some(steps), "{goal}");
     }

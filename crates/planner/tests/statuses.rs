@@ -1,7 +1,7 @@
 //! What is claimed of tasks at the edges: nothing to do, nothing that helps, free cycles, metrics without a best value.
 
 use metaplan_planner::{
-    Backend, Config, GroundConfig, Proof, Semantics, Status, Unbounded, ground, optimize,
+    Backend, Config, GroundConfig, MetricUnbounded, Proof, Status, StepSemantics, ground, optimize,
 };
 use pddl::{Source, read};
 
@@ -25,7 +25,7 @@ fn check(name: &str, init: &str, goal: &str, metric: &str, expected: (Status, Op
         read(&Source::new("domain", DOMAIN), &Source::new("problem", problem)).expect("PDDL");
     let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
     for backend in Backend::BUILT_IN {
-        let semantics = [Semantics::Sequential, Semantics::ForAllStep, Semantics::ExistsStep];
+        let semantics = [StepSemantics::Sequential, StepSemantics::ForAllStep, StepSemantics::ExistsStep];
         for semantics in semantics.into_iter().map(Some).chain([None]) {
             let backend: Backend = backend.parse().expect("a solver");
             let solution = optimize(
@@ -84,7 +84,9 @@ fn a_metric_without_a_best_value_is_read_with_bounds() {
         "(:action flip",
         "(:action wave :parameters () :precondition () :effect (increase (reward) 1)) (:action flip",
     );
-    for (domain, expected) in [(DOMAIN, Unbounded::Suspected), (waving.as_str(), Unbounded::Proved)] {
+    for (domain, expected) in
+        [(DOMAIN, MetricUnbounded::Suspected), (waving.as_str(), MetricUnbounded::Proved)]
+    {
         let (domain, problem, _) =
             read(&Source::new("domain", domain), &Source::new("problem", problem.as_str())).expect("PDDL");
         let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");

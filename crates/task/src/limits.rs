@@ -1,6 +1,6 @@
 //! When a long search has to stop: a deadline, and a flag that Ctrl-C sets.
 //!
-//! What takes long goes through its items by [`Limits::watch`], or beats a [`Pulse`] each time round. Both yield [`Interrupted`] when
+//! What takes long goes through its items by [`Limits::watch`], or beats a [`LimitPoll`] each time round. Both yield [`Interrupted`] when
 //! a limit is reached, which has to be handed on (`?`): a function that was cut short has no result that could be taken for an
 //! answer. Where to stop is thus seen at each loop, and that the callers stop, too, is checked by the compiler.
 
@@ -28,7 +28,7 @@ pub struct Limits {
 const GRACE: Duration = Duration::from_millis(120);
 
 /// What a search may store, in bytes, unless it is told.
-const ROOM: usize = 1 << 31;
+const DEFAULT_MEMORY: usize = 1 << 31;
 
 impl Limits {
     /// No limit but the flag.
@@ -96,7 +96,7 @@ impl Limits {
 
     /// How many bytes a search may store.
     pub fn room(&self) -> usize {
-        self.room.unwrap_or(ROOM)
+        self.room.unwrap_or(DEFAULT_MEMORY)
     }
 
     /// The flag that stops the run when it is set.
@@ -113,13 +113,13 @@ impl Limits {
     }
 
     /// Each item, as long as no limit is reached; then the error, and nothing more.
-    pub fn watch<I: IntoIterator>(&self, items: I) -> Watched<'_, I::IntoIter> {
-        Watched { items: items.into_iter(), pulse: self.pulse(), is_over: false }
+    pub fn watch<I: IntoIterator>(&self, items: I) -> LimitedIter<'_, I::IntoIter> {
+        LimitedIter { items: items.into_iter(), pulse: self.pulse(), is_over: false }
     }
 
     /// For loops that go through nothing that could be watched.
-    pub fn pulse(&self) -> Pulse<'_> {
-        Pulse { limits: self, left: 0, stride: 1, last: None }
+    pub fn pulse(&self) -> LimitPoll<'_> {
+        LimitPoll { limits: self, left: 0, stride: 1, last: None }
     }
 
     /// Whether the run has to stop.
@@ -144,7 +144,7 @@ pub struct Interrupted;
 /// Looks at the limits every so many beats: often where a beat takes long, seldom where looking would take longer than
 /// what lies between.
 #[derive(Debug)]
-pub struct Pulse<'a> {
+pub struct LimitPoll<'a> {
     limits: &'a Limits,
     /// Beats until the clock is looked at again.
     left: u32,
@@ -155,9 +155,9 @@ pub struct Pulse<'a> {
 /// Beats between two looks at the clock, at most.
 const LONGEST_STRIDE: u32 = 1 << 14;
 /// The time between two looks at the clock that is aimed at.
-const BETWEEN: Duration = Duration::from_millis(2);
+const POLL_INTERVAL: Duration = Duration::from_millis(2);
 
-impl Pulse<'_> {
+impl LimitPoll<'_> {
     /// An error once a limit is reached.
     ///
     /// # Errors
@@ -179,8 +179,8 @@ impl Pulse<'_> {
             return Err(Interrupted);
         }
         self.stride = match self.last.map(|last| now.duration_since(last)) {
-            Some(passed) if passed > BETWEEN => (self.stride / 4).max(1),
-            Some(passed) if passed < BETWEEN / 4 => (self.stride * 2).min(LONGEST_STRIDE),
+            Some(passed) if passed > POLL_INTERVAL => (self.stride / 4).max(1),
+            Some(passed) if passed < POLL_INTERVAL / 4 => (self.stride * 2).min(LONGEST_STRIDE),
             _ => self.stride,
         };
         self.last = Some(now);
@@ -191,13 +191,13 @@ impl Pulse<'_> {
 
 /// Items under limits; see [`Limits::watch`].
 #[derive(Debug)]
-pub struct Watched<'a, I> {
+pub struct LimitedIter<'a, I> {
     items: I,
-    pulse: Pulse<'a>,
+    pulse: LimitPoll<'a>,
     is_over: bool,
 }
 
-impl<I: Iterator> Iterator for Watched<'_, I> {
+impl<I: Iterator> Iterator for LimitedIter<'_, I> {
     type Item = Result<I::Item, Interrupted>;
 
     fn next(&mut self) -> Option<Self::Item> {

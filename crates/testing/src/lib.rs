@@ -129,7 +129,7 @@ pub fn ground_text((domain, problem): (String, String)) -> Task {
 pub fn successors(task: &Task, state: &State) -> Vec<(State, Int)> {
     let mut all = Vec::new();
     for operator in &task.operators {
-        for choice in operator.choices().filter(|choice| operator.applicable(state, choice)) {
+        for choice in operator.admitted_combinations().filter(|choice| operator.applicable(state, choice)) {
             let next = task.successor(operator, state, &choice).expect("small numbers");
             all.push((next, operator.cost_of(&choice)));
         }

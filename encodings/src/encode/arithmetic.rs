@@ -2,7 +2,7 @@
 
 use task::number::{Int, dense};
 
-use crate::encode::formula::{Family, Formula, Meaning};
+use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::sat::Lit;
 
 /// Bits of a number, the lowest first; the last one is the sign.
@@ -26,7 +26,7 @@ pub struct Arithmetic<'f> {
 impl Arithmetic<'_> {
     fn bit(&mut self) -> Lit {
         let bit = dense(self.formula.variables());
-        self.formula.fresh(Meaning::Bit { bit })
+        self.formula.fresh(VariableMeaning::Bit { bit })
     }
 
     pub(crate) fn constant(value: Int, width: usize) -> Bits {
@@ -212,7 +212,7 @@ mod tests {
     }
 
     fn free(formula: &mut Formula, bits: usize) -> Bits {
-        (0..bits).map(|bit| formula.fresh(Meaning::Bit { bit: bit as u32 })).collect()
+        (0..bits).map(|bit| formula.fresh(VariableMeaning::Bit { bit: bit as u32 })).collect()
     }
 
     fn fix(formula: &mut Formula, bits: &Bits, value: Int) {

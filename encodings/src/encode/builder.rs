@@ -11,7 +11,7 @@ use task::limits::{Interrupted, Limits};
 use task::number::dense;
 use task::task::{Operator, OperatorId, Task};
 
-use crate::encode::formula::{Family, Formula, Meaning};
+use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::variables::Variables;
 use crate::sat::Lit;
 
@@ -57,7 +57,8 @@ impl<'a> Builder<'a> {
         if let Some(known) = self.groups.get(&key) {
             return *known;
         }
-        let group = self.formula.fresh(Meaning::Group { group: dense(self.groups.len()), step: dense(step) });
+        let group =
+            self.formula.fresh(VariableMeaning::Group { group: dense(self.groups.len()), step: dense(step) });
         for (_, literal) in &present {
             self.formula.add(family, [!*literal, group]);
         }

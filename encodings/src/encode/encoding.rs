@@ -10,12 +10,12 @@ use task::task::Task;
 
 use crate::encode::axioms::axioms;
 use crate::encode::builder::Builder;
-use crate::encode::conditional::Fires;
+use crate::encode::conditional::FiredEffects;
 use crate::encode::cost::{Cost, CostLimit};
-use crate::encode::designs::global;
+use crate::encode::designs::task_slot;
 use crate::encode::formula::Formula;
 use crate::encode::goal::goal;
-use crate::encode::interference::{Interference, Semantics};
+use crate::encode::interference::{Interference, StepSemantics};
 use crate::encode::numeric::numeric;
 use crate::encode::operators::{conditions, effects, sequence};
 use crate::encode::selection::selection;
@@ -25,15 +25,15 @@ use crate::encode::variables::Variables;
 use crate::sat::{Lit, Solver};
 
 /// Which plans a formula is about.
-pub struct Plans<'a> {
+pub struct PlanConstraints<'a> {
     /// For each step, whether each operator can be there; there are no more steps.
     pub allowed: &'a [Vec<bool>],
     /// What they cost at most, if that matters.
     pub cost: Option<CostLimit<'a>>,
     /// How many operators stand at a step.
-    pub semantics: Semantics,
+    pub semantics: StepSemantics,
     /// A formula that comes to more clauses is not finished.
-    pub most: usize,
+    pub max_clauses: usize,
 }
 
 /// A formula and what its variables mean.
@@ -47,7 +47,11 @@ pub struct Encoding<'a> {
 impl<'a> Encoding<'a> {
     /// Encodes plans; of those that differ by exchanging what is equal only some. What is equal is found out once for a task, and
     /// kept in `symmetry`. None if a limit was reached meanwhile, if there are too many clauses, or if numbers are too large for a formula.
-    pub fn new(context: Context<'a>, plans: Plans<'_>, symmetry: &OnceCell<Symmetry>) -> Option<Self> {
+    pub fn new(
+        context: Context<'a>,
+        plans: PlanConstraints<'_>,
+        symmetry: &OnceCell<Symmetry>,
+    ) -> Option<Self> {
         let (mut builder, cost) = build(context, plans)?;
         if builder.variables.horizon() > 0 {
             if symmetry.get().is_none() {
@@ -59,7 +63,7 @@ impl<'a> Encoding<'a> {
     }
 
     /// The same with all plans.
-    pub fn with_equals(context: Context<'a>, plans: Plans<'_>) -> Option<Self> {
+    pub fn with_equals(context: Context<'a>, plans: PlanConstraints<'_>) -> Option<Self> {
         let (builder, cost) = build(context, plans)?;
         Some(Self::of(builder, cost))
     }
@@ -93,14 +97,14 @@ impl<'a> Encoding<'a> {
             None => self.variables.operator(at, step.operator).unwrap_or(!Formula::truth()),
             Some(slot) => {
                 let slots = &self.task.operators[step.operator.index()].slots;
-                let (slot, design) = global(slots, slot, step.choice[slot as usize]);
+                let (slot, design) = task_slot(slots, slot, step.choice[slot as usize]);
                 self.variables.designs[at][slot][design]
             }
         }
     }
 
     /// The clause that excludes exactly one plan.
-    pub fn other_than(&self, plan: &[GroundStep]) -> Vec<Lit> {
+    pub fn blocking_clause(&self, plan: &[GroundStep]) -> Vec<Lit> {
         let longer = self.variables.busy.get(plan.len()).copied();
         let choices = plan.iter().enumerate().flat_map(|(at, step)| {
             let slots = (0..dense(step.choice.len())).map(Some);
@@ -132,8 +136,8 @@ impl<'a> Encoding<'a> {
 }
 
 /// All families of clauses but that of symmetries. None if a limit was reached meanwhile, or if numbers do not fit.
-fn build<'a>(context: Context<'a>, plans: Plans<'_>) -> Option<(Builder<'a>, Option<Cost>)> {
-    let Plans { allowed, cost, semantics, most } = plans;
+fn build<'a>(context: Context<'a>, plans: PlanConstraints<'_>) -> Option<(Builder<'a>, Option<Cost>)> {
+    let PlanConstraints { allowed, cost, semantics, max_clauses: most } = plans;
     let potential = cost.as_ref().and_then(|cost| cost.bounds.projections.first());
     let interference = Interference::new(context, semantics, potential).ok()?;
     let mut builder = Builder::new(context, allowed, most).ok()?;
@@ -169,7 +173,7 @@ fn at_step(
     builder.check()?;
     conditions(builder, step);
     builder.check()?;
-    let fires = Fires::new(builder, step);
+    let fires = FiredEffects::new(builder, step);
     builder.check()?;
     effects(builder, step, &fires);
     builder.check()?;

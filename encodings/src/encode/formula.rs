@@ -80,7 +80,7 @@ impl Family {
 
 /// What a variable of the formula stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Meaning {
+pub enum VariableMeaning {
     /// The constant true.
     True,
     /// The operator is executed at the step.
@@ -116,7 +116,7 @@ pub enum Meaning {
 /// A formula in conjunctive normal form.
 #[derive(Default)]
 pub struct Formula {
-    meanings: Vec<Meaning>,
+    meanings: Vec<VariableMeaning>,
     literals: Vec<Lit>,
     /// End of each clause in `literals`, and its family.
     clauses: Vec<(u32, Family)>,
@@ -128,7 +128,7 @@ impl Formula {
     /// An empty formula with the constant true.
     pub(crate) fn new() -> Self {
         let mut formula = Self::default();
-        let truth = formula.fresh(Meaning::True);
+        let truth = formula.fresh(VariableMeaning::True);
         formula.literals.push(truth);
         formula.clauses.push((1, Family::Domain));
         formula
@@ -139,7 +139,7 @@ impl Formula {
         Lit::TRUE
     }
 
-    pub fn fresh(&mut self, meaning: Meaning) -> Lit {
+    pub fn fresh(&mut self, meaning: VariableMeaning) -> Lit {
         let literal = Lit::positive(dense(self.meanings.len()));
         self.meanings.push(meaning);
         self.last.extend([0, 0]);
@@ -173,7 +173,7 @@ impl Formula {
 
     /// A literal that is true if one of the given ones is; itself one of them where that is enough. One
     /// direction only.
-    pub(crate) fn any(&mut self, family: Family, meaning: Meaning, literals: &[Lit]) -> Lit {
+    pub(crate) fn any(&mut self, family: Family, meaning: VariableMeaning, literals: &[Lit]) -> Lit {
         match literals {
             [] => !Self::truth(),
             [only] => *only,
@@ -188,7 +188,7 @@ impl Formula {
     }
 
     /// A literal that is true exactly if all premises are.
-    pub(crate) fn equivalent(&mut self, meaning: Meaning, premises: &[Lit], family: Family) -> Lit {
+    pub(crate) fn equivalent(&mut self, meaning: VariableMeaning, premises: &[Lit], family: Family) -> Lit {
         let premises: Vec<_> = premises.iter().copied().filter(|l| *l != Self::truth()).collect();
         match premises[..] {
             [] => Self::truth(),
@@ -217,12 +217,12 @@ impl Formula {
             }
             return;
         }
-        let mut before = self.fresh(Meaning::Ladder);
+        let mut before = self.fresh(VariableMeaning::Ladder);
         self.add(family, [!literals[0], before]);
         for (position, literal) in literals.iter().enumerate().skip(1) {
             self.add(family, [!before, !*literal]);
             if position + 1 < literals.len() {
-                let next = self.fresh(Meaning::Ladder);
+                let next = self.fresh(VariableMeaning::Ladder);
                 self.add(family, [!before, next]);
                 self.add(family, [!*literal, next]);
                 before = next;
@@ -260,7 +260,7 @@ impl Formula {
     }
 
     #[cfg(test)]
-    pub(crate) fn meaning(&self, variable: u32) -> Meaning {
+    pub(crate) fn meaning(&self, variable: u32) -> VariableMeaning {
         self.meanings[variable as usize]
     }
 }

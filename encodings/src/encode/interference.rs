@@ -24,13 +24,13 @@ use task::task::{Condition, OperatorId, Task, VariableId};
 use task::words;
 
 use crate::encode::builder::Builder;
-use crate::encode::formula::{Family, Formula, Meaning};
+use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::sat::Lit;
 
 /// How many operators can stand at one step of a formula.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Semantics {
+pub enum StepSemantics {
     /// One.
     Sequential,
     /// Several that can be executed in any order.
@@ -40,7 +40,7 @@ pub enum Semantics {
 }
 
 words! {
-    Semantics, "semantics": Sequential = "sequential", ForAllStep = "for-all-step", ExistsStep = "exists-step"
+    StepSemantics, "semantics": Sequential = "sequential", ForAllStep = "for-all-step", ExistsStep = "exists-step"
 }
 
 /// What must not happen at the same step, for all steps alike.
@@ -75,11 +75,11 @@ impl Interference {
     /// The interferences of a task; none if operators stand alone. Costs are reduced by the potential.
     pub(super) fn new(
         context: Context<'_>,
-        semantics: Semantics,
+        semantics: StepSemantics,
         potential: Option<&Projection>,
     ) -> Result<Option<Self>, Interrupted> {
         let Context { task, limits } = context;
-        if semantics == Semantics::Sequential {
+        if semantics == StepSemantics::Sequential {
             return Ok(None);
         }
         let support = Support::new(task);
@@ -134,7 +134,7 @@ impl Interference {
         for uses in &variables {
             uses.conflicts(&mut conflicts, limits)?;
         }
-        Ok(Some(Self { both_orders: semantics == Semantics::ForAllStep, exclusions, conflicts, classes }))
+        Ok(Some(Self { both_orders: semantics == StepSemantics::ForAllStep, exclusions, conflicts, classes }))
     }
 
     /// Operators of the same class never stand at the same step; those without one may stand with any.
@@ -273,7 +273,7 @@ fn ladder(formula: &mut Formula, chain: &[(Lit, (bool, bool))]) {
             if erased == !Formula::truth() {
                 erased = *literal;
             } else {
-                let longer = formula.fresh(Meaning::Ladder);
+                let longer = formula.fresh(VariableMeaning::Ladder);
                 formula.add(Family::Interference, [!erased, longer]);
                 formula.add(Family::Interference, [!*literal, longer]);
                 erased = longer;

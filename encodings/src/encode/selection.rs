@@ -7,7 +7,7 @@
 use task::limits::Interrupted;
 
 use crate::encode::builder::Builder;
-use crate::encode::designs::global;
+use crate::encode::designs::task_slot;
 use crate::encode::formula::{Family, Formula};
 use crate::sat::Lit;
 
@@ -44,7 +44,7 @@ fn forbidden(builder: &mut Builder<'_>, step: usize) -> Result<(), Interrupted> 
         let rules = operator.forbidden.iter().flat_map(|rule| {
             rule.combinations.iter().map(|combination| {
                 let pairs = rule.slots.iter().zip(combination);
-                pairs.map(|(slot, design)| global(&operator.slots, *slot, *design)).collect::<Vec<_>>()
+                pairs.map(|(slot, design)| task_slot(&operator.slots, *slot, *design)).collect::<Vec<_>>()
             })
         });
         rules.collect()

@@ -10,7 +10,7 @@ use task::number::dense;
 use task::task::{Fact, VariableId};
 
 use crate::encode::builder::Builder;
-use crate::encode::conditional::Fires;
+use crate::encode::conditional::FiredEffects;
 use crate::encode::formula::{Family, Formula};
 use crate::sat::Lit;
 
@@ -32,7 +32,7 @@ pub(super) fn domain(builder: &mut Builder<'_>, step: usize) {
     clippy::arithmetic_side_effects,
     reason = "steps are fewer than the horizon, whose formula is in memory"
 )]
-pub(super) fn frame(builder: &mut Builder<'_>, step: usize, fires: &Fires) {
+pub(super) fn frame(builder: &mut Builder<'_>, step: usize, fires: &FiredEffects) {
     let mut producers: Vec<Vec<Vec<Lit>>> =
         builder.task.variables.iter().map(|variable| vec![Vec::new(); variable.values.len()]).collect();
     for (id, literal) in &builder.variables.operators[step] {

@@ -105,7 +105,7 @@ impl Varisat {
 fn start(limits: &Limits, budget: u64, conflicts: &Rc<Cell<u64>>) -> varisat::Solver<'static> {
     let mut solver = varisat::Solver::new();
     let (limits, conflicts) = (limits.clone(), Rc::clone(conflicts));
-    let sink = CountingSink { limits, budget, conflicts, steps: Steps::default() };
+    let sink = BudgetSink { limits, budget, conflicts, steps: Steps::default() };
     solver.write_proof(sink, varisat::ProofFormat::Varisat);
     solver
 }
@@ -244,14 +244,14 @@ impl Steps {
 }
 
 /// Takes a proof in Varisat's format, counts the clauses that are learnt, and fails when a limit or the budget is reached.
-struct CountingSink {
+struct BudgetSink {
     limits: Limits,
     budget: u64,
     conflicts: Rc<Cell<u64>>,
     steps: Steps,
 }
 
-impl io::Write for CountingSink {
+impl io::Write for BudgetSink {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if self.limits.reached() || self.conflicts.get() > self.budget {
             return Err(io::Error::other("limit reached"));

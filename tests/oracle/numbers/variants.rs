@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use fastrand::Rng;
 use metaplan::mission::Planning as _;
 use planner::{
-    Backend, Config, Engine, Limits, Semantics, Solution, Status, Strategy, Thresholds, Unbounded,
+    Backend, Config, Engine, Limits, MetricUnbounded, Solution, Status, StepSemantics, Strategy, Thresholds,
 };
 
 use crate::judge::{Case, Mode, Tally, plan_lines, project_verdict, rational, read, steps_of};
@@ -21,7 +21,7 @@ use super::truth::{Known, fewest_steps, within};
 const LIMIT: Duration = Duration::from_millis(500);
 
 fn config(rng: &mut Rng) -> Config {
-    let semantics = [Semantics::Sequential, Semantics::ForAllStep, Semantics::ExistsStep];
+    let semantics = [StepSemantics::Sequential, StepSemantics::ForAllStep, StepSemantics::ExistsStep];
     Config::default()
         .with_engine(one(rng, &[Engine::Auto, Engine::Sat, Engine::Search]))
         .with_confirmation(rng.bool())
@@ -89,7 +89,7 @@ fn check(puzzle: &Puzzle, case: &Case, solution: &Solution, said: &str, tally: &
     let wrong = match (solution.status, &puzzle.explored.known) {
         (Status::Optimal, Known::Best((best, _))) => cost.as_ref() != Some(best),
         (Status::Optimal, Known::Open(Some((found, _)))) => worse(found),
-        (Status::Feasible, Known::Best(_)) => solution.unbounded == Some(Unbounded::Proved),
+        (Status::Feasible, Known::Best(_)) => solution.unbounded == Some(MetricUnbounded::Proved),
         (Status::Unsolvable, known) => !matches!(known, Known::NoPlan | Known::Open(None)),
         (Status::Optimal, Known::NoBest(_))
         | (Status::Optimal | Status::Feasible, Known::NoPlan)

@@ -10,7 +10,7 @@
 //!
 //! [1] J. Marques-Silva, M. Janota, I. Lynce: On computing backbones of propositional theories, ECAI 2010.
 
-use encodings::encode::{CostLimit, Counting, Encoding, Meaning, Plans, Semantics};
+use encodings::encode::{CostEncoding, CostLimit, Encoding, PlanConstraints, StepSemantics, VariableMeaning};
 use encodings::sat::{Answer, Backend, Lit, Solver};
 use search::bounds::Bounds;
 use task::context::Context;
@@ -40,9 +40,13 @@ pub(super) fn by_formula(
     } else {
         bounds.window(context, Some(first.cost), Some(first.steps.len())).ok()?.allowed
     };
-    let cost = CostLimit { limit: first.cost, bounds, counting: Counting::Sum };
-    let plans =
-        Plans { allowed: &allowed, cost: Some(cost), semantics: Semantics::Sequential, most: usize::MAX };
+    let cost = CostLimit { limit: first.cost, bounds, counting: CostEncoding::Sum };
+    let plans = PlanConstraints {
+        allowed: &allowed,
+        cost: Some(cost),
+        semantics: StepSemantics::Sequential,
+        max_clauses: usize::MAX,
+    };
     let encoding = Encoding::with_equals(context, plans)?;
     let mut solver = config.backend.start(&config.limits, u64::MAX);
     for clause in config.limits.watch(encoding.formula.clauses()) {
@@ -56,7 +60,7 @@ pub(super) fn by_formula(
     let mut plans = vec![plan(&first.steps)];
     let mut exhausted = false;
     // Literal that excludes the known plans while it is assumed.
-    let others = run.encoding.formula.fresh(Meaning::Others);
+    let others = run.encoding.formula.fresh(VariableMeaning::Others);
     while plans.len() <= most && !exhausted {
         if let Some(known) = found.last() {
             run.exclude(known, others);
@@ -90,7 +94,7 @@ struct Run<'a> {
 impl Run<'_> {
     /// Adds a clause that excludes a plan if `literal` holds.
     fn exclude(&mut self, plan: &[GroundStep], literal: Lit) {
-        let mut clause = self.encoding.other_than(plan);
+        let mut clause = self.encoding.blocking_clause(plan);
         clause.push(!literal);
         self.solver.add_clause(&clause);
     }
@@ -115,7 +119,7 @@ impl Run<'_> {
             choices.retain(|choice| self.shares(first, plan, *choice));
         }
         while !choices.is_empty() {
-            let other = self.encoding.formula.fresh(Meaning::Others);
+            let other = self.encoding.formula.fresh(VariableMeaning::Others);
             let differs =
                 choices.iter().map(|choice| !self.encoding.choice(first, (choice.step, choice.slot)));
             let clause: Vec<_> = differs.chain([!other]).collect();

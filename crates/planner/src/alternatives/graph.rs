@@ -20,9 +20,9 @@ use std::collections::BinaryHeap;
 use rustc_hash::FxHashMap;
 
 use search::bounds::Bounds;
-use search::search::generator::OperatorIndex;
-use search::search::successors::{Priced, undominated};
-use search::search::{Asked, directions, is_monotone};
+use search::search::design_combinations::{CostedCombinations, pareto_optimal_combinations};
+use search::search::successor_generator::SuccessorGenerator;
+use search::search::{Polarity, directions, is_monotone};
 use task::context::Context;
 use task::limits::Interrupted;
 use task::number::{Int, dense};
@@ -93,7 +93,7 @@ struct Labels {
     places: FxHashMap<Place, Vec<u32>>,
     /// Positions of the numbers that are compared, with their directions. All other numbers are part of the
     /// [`Place`].
-    compared: Vec<(usize, Asked)>,
+    compared: Vec<(usize, Polarity)>,
     basic: usize,
 }
 
@@ -118,7 +118,7 @@ impl Labels {
         Self::new(task, Vec::new())
     }
 
-    fn new(task: &Task, compared: Vec<(usize, Asked)>) -> Self {
+    fn new(task: &Task, compared: Vec<(usize, Polarity)>) -> Self {
         Self { all: Vec::new(), places: FxHashMap::default(), compared, basic: task.basic }
     }
 
@@ -169,13 +169,13 @@ impl Labels {
 }
 
 /// Combinations of designs of an operator, with their costs. `None` if there are too many.
-type Choices = OnceCell<Option<Priced<Int>>>;
+type Choices = OnceCell<Option<CostedCombinations<Int>>>;
 
 struct Search<'a> {
     context: Context<'a>,
     bounds: &'a Bounds,
     cost: Int,
-    index: OperatorIndex,
+    index: SuccessorGenerator,
     monotone: bool,
     /// By operator: the undominated combinations, and all combinations.
     best: Vec<Choices>,
@@ -268,7 +268,7 @@ impl<'a> Search<'a> {
             return None;
         }
         let choices = || task.operators.iter().map(|_| OnceCell::new()).collect();
-        let (index, monotone) = (OperatorIndex::new(task), is_monotone(task));
+        let (index, monotone) = (SuccessorGenerator::new(task), is_monotone(task));
         Some(Self { context, bounds, cost, index, monotone, best: choices(), all: choices() })
     }
 
@@ -323,7 +323,7 @@ impl<'a> Search<'a> {
         Some((growth.labels, graph))
     }
 
-    fn choices(&self, id: OperatorId, is_exact: bool) -> Result<&Priced<Int>, Stopped> {
+    fn choices(&self, id: OperatorId, is_exact: bool) -> Result<&CostedCombinations<Int>, Stopped> {
         let Context { task, limits } = self.context;
         let operator = &task.operators[id.index()];
         let cell = if is_exact { &self.all[id.index()] } else { &self.best[id.index()] };
@@ -332,12 +332,13 @@ impl<'a> Search<'a> {
                 let count = operator.sizes().into_iter().try_fold(1_usize, usize::checked_mul);
                 let priced = |choice: Vec<u32>| (operator.cost_of(&choice), choice);
                 count.filter(|count| *count <= MAX_CHOICES).map(|_| {
-                    let mut all: Vec<(Int, Vec<u32>)> = operator.choices().map(priced).collect();
+                    let mut all: Vec<(Int, Vec<u32>)> =
+                        operator.admitted_combinations().map(priced).collect();
                     all.sort();
                     all.into_iter().map(|(cost, choice)| (choice, cost)).collect()
                 })
             } else {
-                undominated(operator, self.monotone, false, limits)?
+                pareto_optimal_combinations(operator, self.monotone, false, limits)?
             };
             // The cell is empty, so that this does not fail.
             let _ = cell.set(own);

@@ -23,7 +23,7 @@ fn all(task: &Task, state: &State, left: Int, path: &mut Vec<GroundStep>, found:
         found.push(path.clone());
     }
     for (operator, id) in task.operators.iter().zip((0..).map(task::task::OperatorId)) {
-        for choice in operator.choices().filter(|choice| operator.applicable(state, choice)) {
+        for choice in operator.admitted_combinations().filter(|choice| operator.applicable(state, choice)) {
             let cost = operator.cost_of(&choice);
             if cost <= left {
                 let next = task.successor(operator, state, &choice).expect("small numbers");

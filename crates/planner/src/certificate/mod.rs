@@ -6,8 +6,8 @@
 //!
 //! [1] M. Heule, W. Hunt, N. Wetzler: Trimming while checking clausal proofs, FMCAD 2013 (DRUP).
 
+mod integer_scaling;
 mod refute;
-mod scales;
 mod trim;
 mod write;
 

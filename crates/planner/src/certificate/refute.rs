@@ -12,7 +12,7 @@ use crate::certificate::trim;
 /// After learning so many clauses, a solver gives up on a formula…
 const CONFLICT_LIMIT: u64 = 20_000;
 /// … whose numbers have at most so many bits; after fewer in proportion if they have more, as each costs more.
-const NARROW: usize = 32;
+const REFERENCE_WIDTH: usize = 32;
 
 /// Where the parts of a refutation go.
 pub struct Outputs<'o> {
@@ -47,7 +47,7 @@ pub fn refute(
     let failed = |error: std::io::Error| format!("it cannot be written: {error}");
     formula.write_dimacs(outputs.formula).map_err(failed)?;
     formula.write_legend(outputs.legend).map_err(failed)?;
-    let conflicts = CONFLICT_LIMIT * NARROW as u64 / formula.widest().max(NARROW) as u64;
+    let conflicts = CONFLICT_LIMIT * REFERENCE_WIDTH as u64 / formula.widest().max(REFERENCE_WIDTH) as u64;
     let numbers = formula.clauses().map(|clause| clause.iter().map(|literal| literal.number()));
     match refute_with_proof(numbers, outputs.draft, limits, conflicts) {
         Answer::Unsatisfiable => {}

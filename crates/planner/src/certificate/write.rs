@@ -17,9 +17,9 @@ use certificate::format::{
 use num_traits::One;
 use rustc_hash::FxHashMap;
 use search::bounds::{Bounds, Projection};
-use search::search::{Estimate, closed_labels};
+use search::search::{Heuristic, closed_labels};
 
-use crate::certificate::scales::{Scales, scaled, whole};
+use crate::certificate::integer_scaling::{Scales, scaled, whole};
 use crate::exact::{ExactTask, RoundedBounds};
 
 /// A certificate of an optimal plan, or of there being none: two JSON documents.
@@ -61,7 +61,7 @@ pub fn certify_exact(task: &ExactTask, solution: &Solution, limits: &Limits) -> 
 }
 
 /// Makes a certificate with some bounds, and the factors that go with them; `plain` are those of them in integers.
-fn certified<N: TaskNumber, E: Estimate<N>>(
+fn certified<N: TaskNumber, E: Heuristic<N>>(
     context: Context<'_, N>,
     (solution, cost): (&Solution, Option<N>),
     scales: &Scales,
@@ -145,7 +145,7 @@ struct Writer<'w, N> {
     scales: &'w Scales,
     tables: Pool<(Arc<[N]>, Integer), Vec<Integer>>,
     uses: Pool<Arc<[task::SlotUse]>, Uses>,
-    exclusions: Pool<Arc<[task::Forbidden]>, Vec<Exclusion>>,
+    exclusions: Pool<Arc<[task::ForbiddenCombinations]>, Vec<Exclusion>>,
 }
 
 fn model<N: TaskNumber>(task: &Task<N>, scales: &Scales) -> Model {
@@ -200,7 +200,7 @@ fn literal(literal: &task::Literal) -> ((u32, u32), bool) {
 impl<N: TaskNumber> Writer<'_, N> {
     fn operator(&mut self, operator: &task::Operator<N>) -> Operator {
         let scales = self.scales;
-        let exclusion = |rule: &task::Forbidden| Exclusion {
+        let exclusion = |rule: &task::ForbiddenCombinations| Exclusion {
             slots: rule.slots.to_vec(),
             combinations: rule.combinations.iter().map(|combination| combination.to_vec()).collect(),
         };

@@ -4,7 +4,7 @@
 //! longer than any machine integer. The search needs no integers: it adds and compares. Its estimates are those of the same
 //! task without numbers, whose costs are rounded down to integers, so that no plan is cheaper than estimated.
 
-mod integral;
+mod integer_scaling;
 
 use std::time::Instant;
 
@@ -13,20 +13,20 @@ use num_integer::Integer;
 use num_rational::BigRational;
 use num_traits::{One, ToPrimitive, Zero};
 use search::bounds::Bounds;
-use search::search::{Estimate, Found, search_states};
+use search::search::{Heuristic, SearchOutcome, search_states};
 use task::context::Context;
 use task::error::Errors;
 use task::ground::{Generality, GroundConfig, ground_for};
 use task::limits::Interrupted;
 use task::number::{Int, Rational, dense};
 use task::plan::ground::GroundPlan;
-use task::plan::solution::{Proof, Solution, Statistics, Status, Unbounded};
+use task::plan::solution::{MetricUnbounded, Proof, Solution, Statistics, Status};
 use task::plan::{Plan, decode, metric};
 use task::task::quantity::{Linear, NumericId, Quantity};
 use task::task::timing::Timing;
 use task::task::{Condition, NumericEffect, Objective, Operator, State, Task};
 
-use crate::exact::integral::Integral;
+use crate::exact::integer_scaling::Integral;
 use crate::optimize::{Config, can_repeat_reward};
 use pddl::ast::{Domain, Problem};
 
@@ -82,16 +82,16 @@ fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
     let too_long =
         |plan: &GroundPlan<Rational>| config.horizon.is_some_and(|horizon| plan.steps.len() > horizon);
     match (any, config.horizon) {
-        (Explored::Known(solution), _) => *solution,
-        (Explored::Optimal(plan), _) if !too_long(&plan) => {
+        (ExactOutcome::Known(solution), _) => *solution,
+        (ExactOutcome::Optimal(plan), _) if !too_long(&plan) => {
             let lower = Some(metric(task, &plan.cost));
             let solution = answer(Status::Optimal, Some(show(&plan)), Some(Proof::Search));
             Solution { lower_bound: lower, ..solution }
         }
-        (Explored::Optimal(plan), Some(horizon)) => within(context, horizon, &plan.cost),
-        (Explored::Unknown(_, lower), Some(horizon)) => within(context, horizon, &lower),
-        (Explored::Optimal(plan), None) => answer(Status::Feasible, Some(show(&plan)), None),
-        (Explored::Unknown(plan, lower), None) => {
+        (ExactOutcome::Optimal(plan), Some(horizon)) => within(context, horizon, &plan.cost),
+        (ExactOutcome::Unknown(_, lower), Some(horizon)) => within(context, horizon, &lower),
+        (ExactOutcome::Optimal(plan), None) => answer(Status::Feasible, Some(show(&plan)), None),
+        (ExactOutcome::Unknown(plan, lower), None) => {
             let status = if plan.is_some() { Status::Feasible } else { Status::Unknown };
             let lower = Some(metric(task, &lower));
             Solution { lower_bound: lower, ..answer(status, plan.as_ref().map(show), None) }
@@ -103,9 +103,11 @@ fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
 fn within(context: Context<'_, Rational>, horizon: usize, lower: &Rational) -> Solution {
     let shorter = with_horizon(context.task, horizon);
     let (status, plan, proof) = match explore(Context { task: &shorter, ..context }) {
-        Explored::Optimal(plan) | Explored::Unknown(Some(plan), _) => (Status::Feasible, Some(plan), None),
-        Explored::Known(solution) => (Status::UnsolvableWithinHorizon, None, solution.proof),
-        Explored::Unknown(None, _) => (Status::Unknown, None, None),
+        ExactOutcome::Optimal(plan) | ExactOutcome::Unknown(Some(plan), _) => {
+            (Status::Feasible, Some(plan), None)
+        }
+        ExactOutcome::Known(solution) => (Status::UnsolvableWithinHorizon, None, solution.proof),
+        ExactOutcome::Unknown(None, _) => (Status::Unknown, None, None),
     };
     let show = |plan: &GroundPlan<Rational>| decode(context, plan);
     let solution = answer(status, plan.as_ref().map(show), proof);
@@ -119,9 +121,9 @@ fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
     let context = Context::new(task, &config.limits);
     let by_steps = with_costs(task.clone(), |_| Quantity::constant(Rational::one()));
     let steps = match explore(Context { task: &by_steps, ..context }) {
-        Explored::Optimal(plan) => plan.steps.len(),
-        Explored::Known(solution) => return nothing(*solution),
-        Explored::Unknown(..) => return unknown(),
+        ExactOutcome::Optimal(plan) => plan.steps.len(),
+        ExactOutcome::Known(solution) => return nothing(*solution),
+        ExactOutcome::Unknown(..) => return unknown(),
     };
     if config.horizon.is_some_and(|horizon| steps > horizon) {
         let solution = answer(Status::UnsolvableWithinHorizon, None, Some(Proof::Search));
@@ -135,22 +137,22 @@ fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
         cost
     });
     let (plan, proof) = match explore(Context { task: &shifted, ..context }) {
-        Explored::Optimal(plan) => (plan, Some(Proof::Search)),
-        Explored::Unknown(Some(plan), _) => (plan, None),
-        Explored::Known(_) | Explored::Unknown(None, _) => return unknown(),
+        ExactOutcome::Optimal(plan) => (plan, Some(Proof::Search)),
+        ExactOutcome::Unknown(Some(plan), _) => (plan, None),
+        ExactOutcome::Known(_) | ExactOutcome::Unknown(None, _) => return unknown(),
     };
     let shift = least * &Rational::from_big(BigRational::from_integer(steps.into()));
     let plan = GroundPlan { cost: plan.cost + &shift, ..plan };
     let proved = can_repeat_reward(context, &plan.steps);
     Solution {
         horizon: steps,
-        unbounded: Some(if proved { Unbounded::Proved } else { Unbounded::Suspected }),
+        unbounded: Some(if proved { MetricUnbounded::Proved } else { MetricUnbounded::Suspected }),
         ..nothing(answer(Status::Feasible, Some(decode(context, &plan)), proof))
     }
 }
 
 /// What a search came to.
-enum Explored {
+enum ExactOutcome {
     Optimal(GroundPlan<Rational>),
     /// There is no plan.
     Known(Box<Solution>),
@@ -158,24 +160,24 @@ enum Explored {
     Unknown(Option<GroundPlan<Rational>>, Rational),
 }
 
-fn explore(context: Context<'_, Rational>) -> Explored {
+fn explore(context: Context<'_, Rational>) -> ExactOutcome {
     let limits = context.limits;
     let prepared = Integral::of(context)
         .and_then(|integral| Ok((RoundedBounds::new(Context::new(&integral.task, limits))?, integral)));
     let Ok((bounds, Integral { task, cost_scale })) = prepared else {
-        return Explored::Unknown(None, Rational::zero());
+        return ExactOutcome::Unknown(None, Rational::zero());
     };
     let unscaled = |cost: Rational| cost / cost_scale.clone();
     let original = |plan: GroundPlan<Rational>| GroundPlan { cost: unscaled(plan.cost), ..plan };
-    let none = |proof| Explored::Known(Box::new(answer(Status::Unsolvable, None, Some(proof))));
+    let none = |proof| ExactOutcome::Known(Box::new(answer(Status::Unsolvable, None, Some(proof))));
     let Some(lower) = bounds.estimate(&task.initial) else {
         let reason = "no path leads to the goal in a projection of the task to one or two of its variables";
         return none(Proof::Relaxation(reason.into()));
     };
     match search_states(Context::new(&task, limits), &bounds, STATE_LIMIT) {
-        Found::Optimal(plan) => Explored::Optimal(original(plan)),
-        Found::None => none(Proof::Search),
-        Found::Unknown(plan) => Explored::Unknown(plan.map(original), unscaled(lower)),
+        SearchOutcome::Optimal(plan) => ExactOutcome::Optimal(original(plan)),
+        SearchOutcome::None => none(Proof::Search),
+        SearchOutcome::Unknown(plan) => ExactOutcome::Unknown(plan.map(original), unscaled(lower)),
     }
 }
 
@@ -275,7 +277,7 @@ impl RoundedBounds {
     }
 }
 
-impl Estimate<Rational> for RoundedBounds {
+impl Heuristic<Rational> for RoundedBounds {
     fn estimate(&self, state: &State<Rational>) -> Option<Rational> {
         let rounded = self.bounds.estimate(&without_numbers(state))?;
         Some(Rational::from_integer(rounded) * &self.unit)

@@ -4,10 +4,10 @@ use task::plan::solution::{Improvement, Proof, Solution, Status};
 use task::task::Task;
 use tracing::info_span;
 
-use crate::optimize::bounded::bounded_reading;
 use crate::optimize::config::Config;
-use crate::optimize::run::Run;
+use crate::optimize::optimizer_run::Run;
 use crate::optimize::solve::solve;
+use crate::optimize::unbounded_metric::shortest_then_best;
 
 /// Finds a cheapest plan; `report` hears of every improvement.
 ///
@@ -55,7 +55,7 @@ fn cheapest(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement)) -
         return run.finish(Status::Unsolvable, None, None, 0, Some(Proof::Relaxation(reason.clone())));
     }
     if task.operators.iter().any(|operator| operator.cost.minimum() < 0) {
-        return bounded_reading(run);
+        return shortest_then_best(run);
     }
     solve(run)
 }

@@ -1,6 +1,6 @@
 //! What the user asks of the optimizer.
 
-use encodings::encode::Semantics;
+use encodings::encode::StepSemantics;
 use encodings::sat::Backend;
 use task::limits::Limits;
 use task::words;
@@ -52,7 +52,7 @@ pub struct Config {
     pub confirm: bool,
     /// How many operators stand at a step of the formulas; with a horizon, which counts actions, always one. If not
     /// given, several while a first plan is looked for, and one for the proof that there is no cheaper one.
-    pub semantics: Option<Semantics>,
+    pub semantics: Option<StepSemantics>,
     /// How the SAT solver is made to find a cheapest plan.
     pub strategy: Strategy,
     /// The SAT solver.
@@ -103,7 +103,7 @@ impl Config {
 
     /// How many operators stand at a step of the formulas; `None` for what suits.
     #[must_use]
-    pub fn with_semantics(self, semantics: impl Into<Option<Semantics>>) -> Self {
+    pub fn with_semantics(self, semantics: impl Into<Option<StepSemantics>>) -> Self {
         Self { semantics: semantics.into(), ..self }
     }
 

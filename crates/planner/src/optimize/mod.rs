@@ -6,23 +6,23 @@
 //! one, by one of two strategies. Only then is the answer called optimal. Where no step bound exists (free cycles), the search's own
 //! exhaustion may serve; otherwise the answer is a plan that is not proved optimal.
 
-mod allowance;
-mod bounded;
 mod cheapest;
 mod config;
-mod confirm;
-mod cores;
-mod first;
+mod core_guided;
+mod horizon_schedule;
+mod linear_search;
 mod objectives;
+mod optimizer_run;
 mod portfolio;
 mod prover;
-mod run;
+mod sat_budget;
+mod sat_confirmation;
 mod solve;
 #[cfg(test)]
 mod tests;
-mod tighten;
+mod unbounded_metric;
 
-pub use bounded::can_repeat_reward;
 pub use cheapest::optimize;
 pub use config::{Config, Engine, Strategy};
 pub use objectives::{Front, Point, lexicographic, pareto};
+pub use unbounded_metric::can_repeat_reward;

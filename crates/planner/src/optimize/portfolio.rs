@@ -7,39 +7,39 @@
 use std::time::Instant;
 
 use search::bounds::Bounds;
-use search::satisfice::{Advance, Satisficer};
-use search::search::{Duo, Found, Prepared, Space, ties};
+use search::satisfice::{Satisficer, StepResult};
+use search::search::{InterleavedSearch, SearchOutcome, SearchProblem, SearchTask, plan_tiebreak};
 use task::number::Int;
 use task::plan::ground::GroundPlan;
-use task::plan::solution::{Part, Proof, Solution, Statistics, Status};
+use task::plan::solution::{PlannerPart, Proof, Solution, Statistics, Status};
 use tracing::field::Empty;
 use tracing::{Span, info_span};
 
-use crate::optimize::allowance::Allowance;
 use crate::optimize::config::Engine;
-use crate::optimize::confirm::{conclude, proved_by_bound, proved_by_search};
-use crate::optimize::first::{First, FirstPlan};
-use crate::optimize::prover::{Prover, Proving};
-use crate::optimize::run::{Best, Run};
+use crate::optimize::horizon_schedule::{FirstPlanOutcome, HorizonSchedule};
+use crate::optimize::optimizer_run::{Best, Run};
+use crate::optimize::prover::{Prover, ProverOutcome};
+use crate::optimize::sat_budget::SatBudget;
+use crate::optimize::sat_confirmation::{into_solution, proved_by_bound, proved_by_search};
 
 /// For each state that the exact search stores in a round: how many nodes and propositions the search for some plan goes through, and how
 /// many clauses a formula has at most.
-const NODES: usize = 200;
-const CLAUSES: usize = 50;
+const RELAXATION_WORK_PER_STATE: usize = 200;
+const CLAUSES_PER_STATE: usize = 50;
 /// For each conflict of the SAT solver, how many states the exact search stores.
-const STATES: u64 = 4;
+const STATES_PER_CONFLICT: u64 = 4;
 /// The allowances of formulas and of the search for some plan are halved so often at most.
-const LEAST: u32 = 3;
+const MAX_BACKOFF: u32 = 3;
 /// A plan that costs more than this ratio times the lower bound is likely to have better ones that are easier to find than a proof.
-const NEAR: (Int, Int) = (3, 2);
+const NEAR_OPTIMAL_RATIO: (Int, Int) = (3, 2);
 
 /// What is left to be tried, and what is known.
 struct Portfolio<'r, 'a> {
     run: Run<'a>,
     bounds: &'r Bounds,
-    exact: Option<Duo<'r, Int, Bounds>>,
+    exact: Option<InterleavedSearch<'r, Int, Bounds>>,
     satisficer: Option<Satisficer<'a, Int>>,
-    first: Option<FirstPlan>,
+    first: Option<HorizonSchedule>,
     prover: Option<Prover>,
     best: Option<GroundPlan>,
     lower: Int,
@@ -68,14 +68,15 @@ enum Ending {
 pub(super) fn solve(run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
     let started = Instant::now();
     let context = run.context();
-    let Ok(prepared) = Prepared::new(context) else {
+    let Ok(prepared) = SearchTask::new(context) else {
         return run.finish(Status::Unknown, None, Some(lower), 0, None);
     };
-    let space = prepared.as_ref().map(|prepared| Space { context, bounds, prepared, orbits: None });
-    let exact = space.map(|space| Duo::new(space, &context.task.initial).patient());
+    let space = prepared.as_ref().map(|prepared| SearchProblem { context, bounds, prepared, orbits: None });
+    let exact =
+        space.map(|space| InterleavedSearch::new(space, &context.task.initial).continue_without_forecast());
     let is_sat = run.config.engine != Engine::Search;
     let mut portfolio = Portfolio {
-        first: is_sat.then(|| FirstPlan::new(&run)),
+        first: is_sat.then(|| HorizonSchedule::new(&run)),
         prover: is_sat.then(Prover::default),
         run,
         bounds,
@@ -84,7 +85,7 @@ pub(super) fn solve(run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
         best: None,
         lower,
         reason: Proof::Bound,
-        share: LEAST,
+        share: MAX_BACKOFF,
         satisficer_share: 0,
     };
     let ending = portfolio.rounds();
@@ -107,7 +108,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
             let work = unit.saturating_mul(1_usize.checked_shl(round.min(20)).unwrap_or(1));
             stored = stored.saturating_add(work);
             let turns: [fn(&mut Self, usize, usize) -> Turn; 3] =
-                [Self::satisfice, |own, _, stored| own.search_exactly(stored), Self::ask];
+                [Self::satisfice, |own, _, stored| own.search_exactly(stored), Self::sat_turn];
             for turn in turns {
                 if self.run.config.limits.reached() {
                     return Ending::Over;
@@ -130,7 +131,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         let span = info_span!("search", expanded = Empty, generated = Empty).entered();
         let cost = best.as_ref().map(|plan| plan.cost);
         if let Some(cost) = cost {
-            exact.know(&cost);
+            exact.set_upper_bound(&cost);
         }
         let before = exact.figures();
         let found = exact.run(stored, &mut |_, bound| {
@@ -142,16 +143,16 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         exact.figures().add_to(before, &mut run.statistics);
         record(&span, &run.statistics);
         match found {
-            Some(Found::Optimal(plan)) => Some(Ending::Exact(plan)),
-            Some(Found::None) if self.best.is_none() => Some(Ending::Unsolvable),
-            Some(Found::None) => Some(Ending::Over),
-            Some(Found::Unknown(plan)) => {
+            Some(SearchOutcome::Optimal(plan)) => Some(Ending::Exact(plan)),
+            Some(SearchOutcome::None) if self.best.is_none() => Some(Ending::Unsolvable),
+            Some(SearchOutcome::None) => Some(Ending::Over),
+            Some(SearchOutcome::Unknown(plan)) => {
                 self.exact = None;
-                plan.and_then(|plan| self.improve(plan, Part::Search)).or_else(|| self.meets())
+                plan.and_then(|plan| self.improve(plan, PlannerPart::Search)).or_else(|| self.meets())
             }
             None => {
                 let plan = exact.best_plan();
-                plan.and_then(|plan| self.improve(plan, Part::Search)).or_else(|| self.meets())
+                plan.and_then(|plan| self.improve(plan, PlannerPart::Search)).or_else(|| self.meets())
             }
         }
     }
@@ -159,28 +160,30 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
     fn satisfice(&mut self, work: usize, _: usize) -> Turn {
         let satisficer = self.satisficer.as_mut()?;
         let span = info_span!("satisfice", expanded = Empty, generated = Empty).entered();
-        let nodes = work.saturating_mul(NODES) as u64;
+        let nodes = work.saturating_mul(RELAXATION_WORK_PER_STATE) as u64;
         let limit = self.best.as_ref().map(|plan| plan.cost);
         // A plan is worth more than a better one, and who finds none has less the next time, as long as there is hope for a proof.
-        let has_hope = self.exact.as_ref().is_some_and(Duo::has_hope);
-        let is_near = |cost: Int| cost.saturating_mul(NEAR.1) <= self.lower.saturating_mul(NEAR.0);
+        let has_hope = self.exact.as_ref().is_some_and(InterleavedSearch::may_finish);
+        let is_near = |cost: Int| {
+            cost.saturating_mul(NEAR_OPTIMAL_RATIO.1) <= self.lower.saturating_mul(NEAR_OPTIMAL_RATIO.0)
+        };
         let (twice, halved) = match limit {
             None => (1, 0),
             Some(cost) => (0, if has_hope && is_near(cost) { self.satisficer_share } else { 0 }),
         };
-        self.satisficer_share = self.satisficer_share.saturating_add(1).min(LEAST);
+        self.satisficer_share = self.satisficer_share.saturating_add(1).min(MAX_BACKOFF);
         let before = satisficer.figures;
         let advance = satisficer.run(limit.as_ref(), (nodes << twice >> halved).max(1));
         satisficer.figures.add_to(before, &mut self.run.statistics);
         record(&span, &self.run.statistics);
         match advance {
-            Ok(Advance::Plan(plan)) => {
+            Ok(StepResult::Plan(plan)) => {
                 self.satisficer_share = 0;
-                self.improve(plan, Part::Satisficing)
+                self.improve(plan, PlannerPart::Satisficing)
             }
-            Ok(Advance::Unsolvable) => Some(Ending::Unsolvable),
-            Ok(Advance::Paused) => None,
-            Ok(Advance::Ended) => {
+            Ok(StepResult::Unsolvable) => Some(Ending::Unsolvable),
+            Ok(StepResult::Paused) => None,
+            Ok(StepResult::Ended) => {
                 self.run.statistics.restarts = satisficer.restarts();
                 self.satisficer = None;
                 None
@@ -189,29 +192,30 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         }
     }
 
-    fn ask(&mut self, work: usize, _: usize) -> Turn {
+    fn sat_turn(&mut self, work: usize, _: usize) -> Turn {
         let alone = self.exact.is_none() && self.satisficer.is_none();
         let before = (self.lower, self.best.as_ref().map(|plan| plan.cost));
         let share = self.share;
-        let allowance = Allowance {
-            clauses: CLAUSES.saturating_mul(work).checked_shr(share).unwrap_or(0),
-            conflicts: (work as u64 / STATES).checked_shr(share).unwrap_or(0).max(1),
+        let allowance = SatBudget {
+            clauses: CLAUSES_PER_STATE.saturating_mul(work).checked_shr(share).unwrap_or(0),
+            conflicts: (work as u64 / STATES_PER_CONFLICT).checked_shr(share).unwrap_or(0).max(1),
         };
-        let allowance = if alone { Allowance::UNLIMITED } else { allowance };
+        let allowance = if alone { SatBudget::UNLIMITED } else { allowance };
         let turn = self.ask_for(allowance);
         // Who achieves nothing has less the next time, and who does has more.
         let achieved = before != (self.lower, self.best.as_ref().map(|plan| plan.cost));
-        self.share = if achieved { share.saturating_sub(1) } else { share.saturating_add(1).min(LEAST) };
+        self.share =
+            if achieved { share.saturating_sub(1) } else { share.saturating_add(1).min(MAX_BACKOFF) };
         turn
     }
 
-    fn ask_for(&mut self, allowance: Allowance) -> Turn {
+    fn ask_for(&mut self, allowance: SatBudget) -> Turn {
         match &self.best {
             None => match self.first.as_mut()?.advance(&mut self.run, self.bounds, allowance) {
-                First::Plan(plan) => self.improve(plan, Part::Sat),
-                First::Refuted(solution) => Some(Ending::Refuted(solution)),
-                First::Paused => None,
-                First::Over => {
+                FirstPlanOutcome::Plan(plan) => self.improve(plan, PlannerPart::Sat),
+                FirstPlanOutcome::Refuted(solution) => Some(Ending::Refuted(solution)),
+                FirstPlanOutcome::Paused => None,
+                FirstPlanOutcome::Over => {
                     self.first = None;
                     None
                 }
@@ -224,13 +228,13 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
                     (self.lower, self.reason) = (best.lower, Proof::Sat { step_bound });
                 }
                 if best.plan.cost < plan.cost {
-                    self.run.statistics.found_by = Some(Part::Sat);
+                    self.run.statistics.found_by = Some(PlannerPart::Sat);
                     self.best = Some(best.plan);
                 }
                 match proving {
-                    Proving::Proved(proof) => Some(Ending::Proved(proof)),
-                    Proving::Paused => None,
-                    Proving::Over => {
+                    ProverOutcome::Proved(proof) => Some(Ending::Proved(proof)),
+                    ProverOutcome::Paused => None,
+                    ProverOutcome::Over => {
                         self.prover = None;
                         None
                     }
@@ -240,7 +244,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
     }
 
     /// Takes note of a plan if it is better than what is known.
-    fn improve(&mut self, plan: GroundPlan, part: Part) -> Turn {
+    fn improve(&mut self, plan: GroundPlan, part: PlannerPart) -> Turn {
         if self.best.as_ref().is_none_or(|best| plan.cost < best.cost) {
             self.run.statistics.found_by = Some(part);
             let horizon = plan.steps.len();
@@ -271,8 +275,8 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         let Self { mut run, bounds, best, lower, .. } = self;
         match (ending, best) {
             (Ending::Exact(plan), _) => {
-                run.statistics.found_by.get_or_insert(Part::Search);
-                let plan = ties::choose(run.context(), bounds, plan);
+                run.statistics.found_by.get_or_insert(PlannerPart::Search);
+                let plan = plan_tiebreak::select_canonical_plan(run.context(), bounds, plan);
                 proved_by_search(run, bounds, plan, lower)
             }
             (Ending::Unsolvable, _) => run.finish(Status::Unsolvable, None, None, 0, Some(Proof::Search)),
@@ -282,10 +286,10 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
                 match proof {
                     Proof::Bound => proved_by_bound(run, &best),
                     Proof::Search => proved_by_search(run, bounds, best.plan, lower),
-                    proof => conclude(run, &best, 0, Some(proof)),
+                    proof => into_solution(run, &best, 0, Some(proof)),
                 }
             }
-            (Ending::Over, Some(plan)) => conclude(run, &Best { plan, lower }, 0, None),
+            (Ending::Over, Some(plan)) => into_solution(run, &Best { plan, lower }, 0, None),
             (Ending::Over | Ending::Proved(_), None) => {
                 run.finish(Status::Unknown, None, Some(lower), 0, None)
             }

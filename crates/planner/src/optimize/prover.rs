@@ -2,16 +2,16 @@
 
 use std::time::Instant;
 
-use encodings::encode::{CostLimit, Counting, Semantics};
+use encodings::encode::{CostEncoding, CostLimit, StepSemantics};
 use search::bounds::Bounds;
 use task::number::Int;
 use task::plan::solution::Proof;
 
-use crate::optimize::allowance::{Allowance, FORMULA_LIMIT};
 use crate::optimize::config::Strategy;
-use crate::optimize::cores::raise;
-use crate::optimize::run::{Best, Extent, Run, Tightened};
-use crate::optimize::tighten::tighten;
+use crate::optimize::core_guided::raise;
+use crate::optimize::linear_search::linear_search_down;
+use crate::optimize::optimizer_run::{Best, FormulaScope, Run, StrategyOutcome};
+use crate::optimize::sat_budget::{FORMULA_LIMIT, SatBudget};
 
 /// The first formula is for plans within this part of the gap between the lower bound and the best plan known; each further one
 /// for twice as much of it.
@@ -28,7 +28,7 @@ pub(super) struct Prover {
 }
 
 /// What formulas have come to.
-pub(super) enum Proving {
+pub(super) enum ProverOutcome {
     /// The best plan is a cheapest one.
     Proved(Proof),
     /// The allowance is used up.
@@ -44,17 +44,17 @@ impl Prover {
         run: &mut Run<'_>,
         bounds: &Bounds,
         best: &mut Best,
-        allowance: Allowance,
-    ) -> Proving {
+        allowance: SatBudget,
+    ) -> ProverOutcome {
         loop {
             let steps = best.plan.steps.len();
             if run.config.limits.reached() || steps.saturating_mul(run.task.operators.len()) > FORMULA_LIMIT {
-                return Proving::Over;
+                return ProverOutcome::Over;
             }
             let gap = best.plan.cost.saturating_sub(best.lower);
             let stage = *self.stage.get_or_insert(gap / STAGES);
             let limit = best.plan.below().min(best.lower.saturating_add(stage));
-            let Ok(extent) = run.extent(bounds, limit, best) else { return Proving::Over };
+            let Ok(extent) = run.extent(bounds, limit, best) else { return ProverOutcome::Over };
             self.horizon = self.horizon.max(extent.allowed.len());
             if extent.step_bound.is_none() && stage < Int::MAX {
                 // That there is no such plan would prove nothing.
@@ -62,24 +62,26 @@ impl Prover {
                 continue;
             }
             if extent.size() > FORMULA_LIMIT {
-                return Proving::Over;
+                return ProverOutcome::Over;
             }
             if extent.size() > allowance.clauses {
-                return Proving::Paused;
+                return ProverOutcome::Paused;
             }
             match (within(run, bounds, &extent, best, allowance), extent.step_bound) {
-                (Tightened::Exhausted, Some(step_bound)) => {
+                (StrategyOutcome::Exhausted, Some(step_bound)) => {
                     best.lower = best.plan.cost.min(limit.saturating_add(1));
                     self.step_bound = step_bound;
                     if best.lower == best.plan.cost {
-                        return Proving::Proved(Proof::Sat { step_bound });
+                        return ProverOutcome::Proved(Proof::Sat { step_bound });
                     }
                     run.announce(best, self.horizon);
                     self.stage = Some(stage.saturating_mul(2).max(1));
                 }
-                (Tightened::Exhausted, None) => return Proving::Over,
-                (Tightened::Interrupted, _) if run.config.limits.reached() => return Proving::Over,
-                (Tightened::Interrupted, _) => return Proving::Paused,
+                (StrategyOutcome::Exhausted, None) => return ProverOutcome::Over,
+                (StrategyOutcome::Interrupted, _) if run.config.limits.reached() => {
+                    return ProverOutcome::Over;
+                }
+                (StrategyOutcome::Interrupted, _) => return ProverOutcome::Paused,
             }
         }
     }
@@ -89,23 +91,23 @@ impl Prover {
 pub(super) fn within(
     run: &mut Run<'_>,
     bounds: &Bounds,
-    extent: &Extent,
+    extent: &FormulaScope,
     best: &mut Best,
-    allowance: Allowance,
-) -> Tightened {
+    allowance: SatBudget,
+) -> StrategyOutcome {
     let is_unlimited = allowance.conflicts == u64::MAX;
     let cores = is_unlimited && extent.step_bound.is_some() && run.config.strategy == Strategy::Cores;
     let started = Instant::now();
-    let counting = if cores { Counting::Apart } else { Counting::Sum };
+    let counting = if cores { CostEncoding::Apart } else { CostEncoding::Sum };
     let cost = CostLimit { limit: extent.limit, bounds, counting };
-    let semantics = run.semantics(Semantics::Sequential);
+    let semantics = run.semantics(StepSemantics::Sequential);
     let encoding = run.encoding(&extent.allowed, Some(cost), semantics, allowance.clauses);
     run.statistics.encode = run.statistics.encode.saturating_add(started.elapsed());
-    let Some(encoding) = encoding else { return Tightened::Interrupted };
+    let Some(encoding) = encoding else { return StrategyOutcome::Interrupted };
     if cores {
         raise(run, encoding, extent.limit, best)
     } else {
         let conflicts = allowance.conflicts(encoding.formula.clause_count());
-        tighten(run, encoding, best, conflicts)
+        linear_search_down(run, encoding, best, conflicts)
     }
 }

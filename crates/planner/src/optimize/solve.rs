@@ -3,18 +3,18 @@
 use std::time::Instant;
 
 use search::bounds::Bounds;
-use search::search::ties;
-use search::search::{Found, search};
+use search::search::plan_tiebreak;
+use search::search::{SearchOutcome, search};
 use task::number::Int;
-use task::plan::solution::{Part, Proof, Solution, Status};
+use task::plan::solution::{PlannerPart, Proof, Solution, Status};
 
-use crate::optimize::allowance::Allowance;
 use crate::optimize::config::Engine;
-use crate::optimize::confirm::{conclude, proved_by_bound, proved_by_search};
-use crate::optimize::first::first_plan;
+use crate::optimize::horizon_schedule::first_plan;
+use crate::optimize::optimizer_run::{Best, Run};
 use crate::optimize::portfolio;
-use crate::optimize::prover::{Prover, Proving};
-use crate::optimize::run::{Best, Run};
+use crate::optimize::prover::{Prover, ProverOutcome};
+use crate::optimize::sat_budget::SatBudget;
+use crate::optimize::sat_confirmation::{into_solution, proved_by_bound, proved_by_search};
 
 /// A cheapest plan where no action earns anything.
 pub(super) fn solve(mut run: Run<'_>) -> Solution {
@@ -40,15 +40,15 @@ fn solve_within(mut run: Run<'_>, bounds: &Bounds, lower: Int, horizon: usize) -
     let found = search(run.context(), bounds);
     run.statistics.search = run.statistics.search.saturating_add(started.elapsed());
     match found {
-        Found::None => run.finish(Status::Unsolvable, None, None, 0, Some(Proof::Search)),
-        Found::Optimal(plan) if plan.steps.len() <= horizon => {
-            let plan = ties::choose(run.context(), bounds, plan);
+        SearchOutcome::None => run.finish(Status::Unsolvable, None, None, 0, Some(Proof::Search)),
+        SearchOutcome::Optimal(plan) if plan.steps.len() <= horizon => {
+            let plan = plan_tiebreak::select_canonical_plan(run.context(), bounds, plan);
             proved_by_search(run, bounds, plan, lower)
         }
-        Found::Unknown(Some(plan)) if plan.steps.len() <= horizon => {
+        SearchOutcome::Unknown(Some(plan)) if plan.steps.len() <= horizon => {
             improve(run, bounds, Best { plan, lower })
         }
-        Found::Optimal(_) | Found::Unknown(_) => solve_by_formulas(run, bounds, lower),
+        SearchOutcome::Optimal(_) | SearchOutcome::Unknown(_) => solve_by_formulas(run, bounds, lower),
     }
 }
 
@@ -56,7 +56,7 @@ fn solve_within(mut run: Run<'_>, bounds: &Bounds, lower: Int, horizon: usize) -
 fn solve_by_formulas(mut run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
     match first_plan(&mut run, bounds) {
         Ok(plan) => {
-            run.statistics.found_by = Some(Part::Sat);
+            run.statistics.found_by = Some(PlannerPart::Sat);
             improve(run, bounds, Best { plan, lower })
         }
         Err(solution) => *solution,
@@ -70,9 +70,9 @@ fn improve(mut run: Run<'_>, bounds: &Bounds, mut best: Best) -> Solution {
         return proved_by_bound(run, &best);
     }
     let mut prover = Prover::default();
-    let proof = match prover.advance(&mut run, bounds, &mut best, Allowance::UNLIMITED) {
-        Proving::Proved(proof) => Some(proof),
-        Proving::Paused | Proving::Over => None,
+    let proof = match prover.advance(&mut run, bounds, &mut best, SatBudget::UNLIMITED) {
+        ProverOutcome::Proved(proof) => Some(proof),
+        ProverOutcome::Paused | ProverOutcome::Over => None,
     };
-    conclude(run, &best, prover.horizon, proof)
+    into_solution(run, &best, prover.horizon, proof)
 }

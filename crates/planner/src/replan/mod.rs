@@ -1,8 +1,8 @@
 //! Planning again and again for one mission, from what does not change: the live planner of an adaptation loop.
 //!
 //! What is available and the state are assumptions here, not facts \[1\]: the mission is ground once, with every design available and
-//! without conclusions from numbers. A problem is then a state of that task, see [`layout`], and a set of available
-//! designs is a part of its operators, see [`mask`]. What depends on that set alone (operators, projections with their costs to
+//! without conclusions from numbers. A problem is then a state of that task, see [`state_mapping`], and a set of available
+//! designs is a part of its operators, see [`restrict_designs`]. What depends on that set alone (operators, projections with their costs to
 //! go, designs that none dominates) is kept for the sets that were met last, since components that fail also recover. What is
 //! left for each problem is the search, whose estimates are exact in projections, and the choice among equal plans. Its answers are
 //! those of grounding and optimizing anew, only that nothing is proved a second time by SAT.
@@ -15,21 +15,21 @@
 //!
 //! - \[1\] N. Eén, N. Sörensson: Temporal induction by incremental SAT solving, ENTCS 89(4), 2003.
 
-mod base;
-mod layout;
-mod mask;
 mod query;
+mod replan_cache;
+mod restrict_designs;
 mod solve;
+mod state_mapping;
 mod usage;
 
 use std::fmt;
 use std::sync::Arc;
 
-use base::{Base, Set};
-use layout::{Layout, Situation};
 use pddl::TypeHierarchy;
 use pddl::ast::{Atom, Domain, Identifier, InitialElement, Name, Problem, Span, Term};
+use replan_cache::{AvailabilityContext, GroundBase};
 use search::search::STATE_LIMIT;
+use state_mapping::{Layout, ReplanState};
 use task::compile::is_needed;
 use task::ground::{Generality, GroundConfig, ground_for};
 use task::lifted::ObjectId;
@@ -37,12 +37,12 @@ use task::limits::{Interrupted, Limits};
 use task::number::Int;
 use usage::Usage;
 
-pub use query::{First, Progress, Query, Replanned};
+pub use query::{FirstStep, Progress, Query, ReplanOutcome};
 
 /// Numbers of the initial state have at most so many decimals, as a power of ten.
 const PRECISION: Int = 1_000_000;
 /// For so many sets of available designs what was found out about them is kept.
-const SETS: usize = 8;
+const MAX_CACHED_SETS: usize = 8;
 
 /// The search for what blocks a mission stores at most so many states each time: its answer is a help, and should not take longer
 /// than the plan.
@@ -51,9 +51,9 @@ const BLOCKING_STATES: usize = 5_000;
 /// Plans for problems of one domain that differ in their state and in what is available.
 #[derive(Clone)]
 pub struct Replanner {
-    base: Arc<Base>,
+    base: Arc<GroundBase>,
     /// The sets of available designs met last, the latest at the end.
-    sets: Vec<(Vec<Vec<ObjectId>>, Arc<Set>)>,
+    sets: Vec<(Vec<Vec<ObjectId>>, Arc<AvailabilityContext>)>,
 }
 
 impl Replanner {
@@ -82,25 +82,25 @@ impl Replanner {
             return None;
         }
         let layout = Layout::new(Usage::of(domain, problem), available, problem, &task);
-        Some(Self { base: Arc::new(Base { task, layout, requirements }), sets: Vec::new() })
+        Some(Self { base: Arc::new(GroundBase { task, layout, requirements }), sets: Vec::new() })
     }
 
     /// A best plan for a problem.
-    pub fn plan(&mut self, query: &Query<'_>) -> Replanned {
+    pub fn plan(&mut self, query: &Query<'_>) -> ReplanOutcome {
         self.plan_aloud(query, &mut |_| {})
     }
 
     /// As [`Replanner::plan`], telling on the way how far the search is.
-    pub fn plan_aloud(&mut self, query: &Query<'_>, report: &mut dyn FnMut(Progress)) -> Replanned {
+    pub fn plan_aloud(&mut self, query: &Query<'_>, report: &mut dyn FnMut(Progress)) -> ReplanOutcome {
         let base = self.base.clone();
         let Some(situation) = base.layout.situation(&base.task, query.problem) else {
-            return Replanned::Misfit;
+            return ReplanOutcome::Misfit;
         };
         let Ok(set) = self.set(&situation.available, query.limits) else {
             let Ok(task) = base.masked(&situation.available, &Limits::none()) else {
-                return Replanned::Unknown;
+                return ReplanOutcome::Unknown;
             };
-            return solve::keep_old(&base, &task, &situation, query);
+            return solve::reuse_previous_plan(&base, &task, &situation, query);
         };
         solve::solve(&base, &set, &situation, query, STATE_LIMIT, report)
     }
@@ -125,12 +125,12 @@ impl Replanner {
                 all[predicate].iter().filter(is_open).copied().collect()
             };
             let available: Vec<Vec<ObjectId>> = (0..all.len()).map(open).collect();
-            let situation = Situation { available, ..situation.clone() };
+            let situation = ReplanState { available, ..situation.clone() };
             let set = base.restrict(&situation.available, query.limits).ok()?;
             match solve::solve(&base, &set, &situation, query, BLOCKING_STATES, &mut |_| {}) {
-                Replanned::Optimal { .. } => Some(true),
-                Replanned::Unsolvable => Some(false),
-                Replanned::Feasible { .. } | Replanned::Misfit | Replanned::Unknown => None,
+                ReplanOutcome::Optimal { .. } => Some(true),
+                ReplanOutcome::Unsolvable => Some(false),
+                ReplanOutcome::Feasible { .. } | ReplanOutcome::Misfit | ReplanOutcome::Unknown => None,
             }
         };
         if !is_solvable(&[])? {
@@ -150,12 +150,16 @@ impl Replanner {
     }
 
     /// What is known of a set of available designs, or is found out now. What was cut short by a limit is not kept.
-    fn set(&mut self, available: &[Vec<ObjectId>], limits: &Limits) -> Result<Arc<Set>, Interrupted> {
+    fn set(
+        &mut self,
+        available: &[Vec<ObjectId>],
+        limits: &Limits,
+    ) -> Result<Arc<AvailabilityContext>, Interrupted> {
         let found = match self.sets.iter().position(|(known, _)| known == available) {
             Some(position) => self.sets.remove(position).1,
             None => Arc::new(self.base.restrict(available, limits)?),
         };
-        if self.sets.len() >= SETS {
+        if self.sets.len() >= MAX_CACHED_SETS {
             self.sets.remove(0);
         }
         self.sets.push((available.to_vec(), found.clone()));

@@ -10,7 +10,7 @@ use task::plan::Step;
 /// A step that a plan may begin with, whatever the operators of the task are: what is left of an action under way, with one
 /// of the configurations that it can go on with.
 #[derive(Debug, Clone)]
-pub struct First {
+pub struct FirstStep {
     /// The function and the design chosen for it.
     pub configuration: Vec<(String, String)>,
     /// All arguments; of plans that are as good the one whose arguments are declared first is chosen.
@@ -27,7 +27,7 @@ pub struct Query<'a> {
     /// With what is available now; of the same domain, and checked.
     pub problem: &'a Problem,
     /// If there are any, plans begin with one of them.
-    pub first: &'a [First],
+    pub first: &'a [FirstStep],
     /// The metric of the mission if it ended now; without a metric, 0.
     pub metric: BigRational,
     /// The plan at hand: names and arguments of its actions after the first step. If it is one still, nothing dearer is looked at.
@@ -40,7 +40,7 @@ pub struct Query<'a> {
 
 /// What planning has come to.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Replanned {
+pub enum ReplanOutcome {
     /// A plan; none has a better metric: proved.
     Optimal {
         /// Which of the first steps it begins with, if there were any.

@@ -6,8 +6,8 @@
 
 use num_rational::BigRational;
 use rustc_hash::FxHashSet;
-use search::search::ties;
-use search::search::{Found, Space, search_from};
+use search::search::plan_tiebreak;
+use search::search::{SearchOutcome, SearchProblem, search_from};
 use task::context::Context;
 use task::lifted::ObjectId;
 use task::number::{Int, dense};
@@ -15,9 +15,9 @@ use task::plan::ground::{GroundPlan, GroundStep, replay_from};
 use task::plan::{decode, resolve};
 use task::task::{State, Task};
 
-use crate::replan::base::{Base, Set};
-use crate::replan::layout::Situation;
-use crate::replan::query::{First, Progress, Query, Replanned};
+use crate::replan::query::{FirstStep, Progress, Query, ReplanOutcome};
+use crate::replan::replan_cache::{AvailabilityContext, GroundBase};
+use crate::replan::state_mapping::ReplanState;
 
 /// Where a plan may begin.
 struct Start {
@@ -33,19 +33,19 @@ struct Start {
 
 /// Plans for a situation; no search stores more than so many states.
 pub(super) fn solve(
-    base: &Base,
-    set: &Set,
-    situation: &Situation,
+    base: &GroundBase,
+    set: &AvailabilityContext,
+    situation: &ReplanState,
     query: &Query<'_>,
     most: usize,
     report: &mut dyn FnMut(Progress),
-) -> Replanned {
+) -> ReplanOutcome {
     if base.task.unreachable.is_some() {
-        return Replanned::Unsolvable;
+        return ReplanOutcome::Unsolvable;
     }
-    let Some(prepared) = &set.prepared else { return Replanned::Unknown };
+    let Some(prepared) = &set.prepared else { return ReplanOutcome::Unknown };
     let context = Context::new(&set.task, query.limits);
-    let Some(starts) = starts(base, situation, query) else { return Replanned::Misfit };
+    let Some(starts) = starts(base, situation, query) else { return ReplanOutcome::Misfit };
     let scale = |cost: Int| BigRational::new(cost.into(), set.task.objective.scale.into());
     let promise = |start: Start| Some((&start.own + scale(set.bounds.estimate(&start.state)?), start));
     let mut open: Vec<(BigRational, Start)> = starts.into_iter().filter_map(promise).collect();
@@ -76,19 +76,19 @@ pub(super) fn solve(
                 report(Progress { metric: cost.map(signed), bound: signed(bound) });
             }
         };
-        let space = Space { context, bounds: &set.bounds, prepared, orbits: None };
+        let space = SearchProblem { context, bounds: &set.bounds, prepared, orbits: None };
         let found = search_from(&space, &start.state, limit, most, &mut hear);
         let plan = match found {
-            Found::Optimal(plan) => plan,
-            Found::None => continue,
-            Found::Unknown(plan) if query.limits.reached() => {
+            SearchOutcome::Optimal(plan) => plan,
+            SearchOutcome::None => continue,
+            SearchOutcome::Unknown(plan) if query.limits.reached() => {
                 let cut_short = plan.map(|plan| Candidate::new(&set.task, &start, plan));
                 let ended = winners.into_iter().map(|(start, plan)| Candidate::new(&set.task, &start, plan));
                 let all = known.into_iter().chain(cut_short).chain(ended);
                 let least = all.min_by(|left, right| left.value.cmp(&right.value));
-                return least.map_or(Replanned::Unknown, |least| least.feasible(context));
+                return least.map_or(ReplanOutcome::Unknown, |least| least.feasible(context));
             }
-            Found::Unknown(_) => return Replanned::Unknown,
+            SearchOutcome::Unknown(_) => return ReplanOutcome::Unknown,
         };
         let value = (&start.own + scale(plan.cost), plan.steps.len());
         match &best {
@@ -101,23 +101,28 @@ pub(super) fn solve(
         }
         winners.push((start, plan));
     }
-    let Some((value, _)) = best else { return Replanned::Unsolvable };
+    let Some((value, _)) = best else { return ReplanOutcome::Unsolvable };
     let metric = if set.task.objective.maximize { -value } else { value };
     let close_to = if query.stay_close { old.into_iter().flatten().collect() } else { FxHashSet::default() };
     let (first, plan) = choose(set, query, &close_to, winners);
-    Replanned::Optimal { first, steps: decode(context, &plan).steps, metric }
+    ReplanOutcome::Optimal { first, steps: decode(context, &plan).steps, metric }
 }
 
 /// The old plan, where it still is one: all that can be said without time to search.
-pub(super) fn keep_old(base: &Base, task: &Task, situation: &Situation, query: &Query<'_>) -> Replanned {
-    let Some(starts) = starts(base, situation, query) else { return Replanned::Misfit };
+pub(super) fn reuse_previous_plan(
+    base: &GroundBase,
+    task: &Task,
+    situation: &ReplanState,
+    query: &Query<'_>,
+) -> ReplanOutcome {
+    let Some(starts) = starts(base, situation, query) else { return ReplanOutcome::Misfit };
     let old: Vec<Option<GroundStep>> =
         query.old.iter().copied().flatten().map(|step| find(task, step)).collect();
     let known = starts.iter().filter_map(|start| {
         old_plan(task, &start.state, query, &old).map(|plan| Candidate::new(task, start, plan))
     });
     let least = known.min_by(|left, right| left.value.cmp(&right.value));
-    least.map_or(Replanned::Unknown, |least| least.feasible(Context::new(task, query.limits)))
+    least.map_or(ReplanOutcome::Unknown, |least| least.feasible(Context::new(task, query.limits)))
 }
 
 /// The old plan, if it is one from a state on.
@@ -143,21 +148,21 @@ impl Candidate {
         Self { first: start.first, value: (&start.own + cost, plan.steps.len()), plan }
     }
 
-    fn feasible(self, context: Context<'_>) -> Replanned {
+    fn feasible(self, context: Context<'_>) -> ReplanOutcome {
         let metric = if context.task.objective.maximize { -self.value.0 } else { self.value.0 };
-        Replanned::Feasible { first: self.first, steps: decode(context, &self.plan).steps, metric }
+        ReplanOutcome::Feasible { first: self.first, steps: decode(context, &self.plan).steps, metric }
     }
 }
 
 /// Where plans may begin; none if the task is not good for that.
-fn starts(base: &Base, situation: &Situation, query: &Query<'_>) -> Option<Vec<Start>> {
+fn starts(base: &GroundBase, situation: &ReplanState, query: &Query<'_>) -> Option<Vec<Start>> {
     let sign = |metric: &BigRational| if base.task.objective.maximize { -metric } else { metric.clone() };
     if query.first.is_empty() {
         let (designs, arguments) = (Vec::new(), Vec::new());
         let (state, own) = (situation.state.clone(), sign(&query.metric));
         return Some(vec![Start { first: None, state, designs, arguments, own }]);
     }
-    let start = |(index, first): (usize, &First)| {
+    let start = |(index, first): (usize, &FirstStep)| {
         let pair = |(function, design): &(String, String)| {
             Some((base.layout.object(function)?, base.layout.object(design)?))
         };
@@ -174,7 +179,7 @@ fn starts(base: &Base, situation: &Situation, query: &Query<'_>) -> Option<Vec<S
 
 /// The chosen one among equal plans, and the first step that it begins with.
 fn choose(
-    set: &Set,
+    set: &AvailabilityContext,
     query: &Query<'_>,
     close_to: &FxHashSet<GroundStep>,
     mut winners: Vec<(Start, GroundPlan)>,
@@ -186,8 +191,9 @@ fn choose(
     for (start, plan) in winners {
         // One that comes later in order has to have fewer changes.
         let Some(limit) = most else { break };
-        let beginning = ties::Beginning { state: &start.state, designs: &start.designs, close_to };
-        let (plan, changes) = ties::choose_from((context, &set.bounds, &set.ties), plan, limit, &beginning);
+        let beginning = plan_tiebreak::PlanPrefix { state: &start.state, designs: &start.designs, close_to };
+        let (plan, changes) =
+            plan_tiebreak::choose_from((context, &set.bounds, &set.ties), plan, limit, &beginning);
         most = match changes {
             Some(changes) => fewer(changes),
             None => most,
@@ -201,7 +207,7 @@ fn choose(
 
 /// The most changes that are fewer than these.
 #[expect(clippy::arithmetic_side_effects, reason = "those that are 0 are told apart")]
-fn fewer((departures, reconfigurations): ties::Changes) -> Option<ties::Changes> {
+fn fewer((departures, reconfigurations): plan_tiebreak::Changes) -> Option<plan_tiebreak::Changes> {
     match (departures, reconfigurations) {
         (0, 0) => None,
         (departures, 0) => Some((departures - 1, usize::MAX)),

@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use metaplan_planner::{GroundConfig, Situation, ground};
+use metaplan_planner::{GroundConfig, TaskState, ground};
 use pddl::ast::{Domain, Problem};
 
 use crate::ground_semantics::interpret::{State, choices};
@@ -78,7 +78,7 @@ fn is_small(state: &State) -> bool {
 
 struct Pair {
     lifted: State,
-    ground: Situation,
+    ground: TaskState,
     /// How many actions led here; nothing where some of them are not in the ground task, so that their costs are unknown.
     steps: Option<usize>,
 }

@@ -7,16 +7,16 @@
 //!
 //! [1] S. Edelkamp: Planning with pattern databases, ECP 2001.
 
-mod cut;
-mod partition;
-mod projection;
-mod relaxed;
+mod cost_partitioning;
+mod delete_relaxation;
+mod lm_cut;
+mod pattern_database;
 mod resources;
 
-pub use cut::LandmarkCut;
-pub use projection::Projection;
+pub use lm_cut::LandmarkCut;
+pub use pattern_database::Projection;
 
-use partition::Partition;
+use cost_partitioning::CostPartitioning;
 use resources::Resource;
 
 use smallvec::SmallVec;
@@ -35,19 +35,19 @@ const STATE_LIMIT: usize = 20_000;
 /// How many projections to pairs of variables are tried.
 const PAIR_LIMIT: usize = 40;
 /// Beyond the best few, projections cost more time than they save steps.
-const KEPT: usize = 12;
+const MAX_PROJECTIONS: usize = 12;
 
 /// Projections of a task, the one with the highest estimate of the initial state first.
 pub struct Bounds {
     pub projections: Vec<Projection>,
     resources: Vec<Resource>,
     /// Sums of shares, and the projections that only these use.
-    partitions: Vec<Partition>,
+    partitions: Vec<CostPartitioning>,
     further: Vec<Projection>,
 }
 
 /// What is known of plans whose cost stays below some limit.
-pub struct Window {
+pub struct ReachableWindow {
     /// No such plan has more steps; none if projections do not tell.
     pub steps: Option<usize>,
     /// For each step, whether each operator can be there.
@@ -63,8 +63,8 @@ impl Bounds {
         let _span = info_span!("bounds").entered();
         let mut bounds = Self::of_projections(context)?;
         bounds.projections.append(&mut bounds.further);
-        bounds.partitions = partition::partitions(context, &bounds.projections)?;
-        let kept = bounds.projections.len().min(KEPT);
+        bounds.partitions = cost_partitioning::saturated_cost_partitionings(context, &bounds.projections)?;
+        let kept = bounds.projections.len().min(MAX_PROJECTIONS);
         bounds.further = bounds.projections.split_off(kept);
         if bounds.partitions.is_empty() {
             bounds.further.clear();
@@ -102,7 +102,7 @@ impl Bounds {
             projections.push(Projection::new(context, pattern)?);
         }
         projections.sort_by_key(|projection| std::cmp::Reverse(projection.estimate(&task.initial)));
-        let further = projections.split_off(projections.len().min(KEPT));
+        let further = projections.split_off(projections.len().min(MAX_PROJECTIONS));
         let resources = resources::resources(context, &projections)?;
         Ok(Self { projections, resources, partitions: Vec::new(), further })
     }
@@ -127,12 +127,12 @@ impl Bounds {
             let mut states: SmallVec<[u32; 16]> = SmallVec::new();
             for projection in self.projections.iter().chain(&self.further) {
                 let own = projection.state(state);
-                best = best.max(projection.to_go(own)?);
+                best = best.max(projection.goal_distance(own)?);
                 states.push(own);
             }
             best = self.partitions.iter().map(|partition| partition.estimate(&states)).fold(best, Int::max);
         }
-        let enough = |resource: &Resource| resource.suffices(state, &self.projections);
+        let enough = |resource: &Resource| resource.has_enough_resources(state, &self.projections);
         self.resources.iter().all(enough).then_some(best)
     }
 
@@ -154,7 +154,7 @@ impl Bounds {
         context: Context<'_>,
         limit: Option<Int>,
         horizon: Option<usize>,
-    ) -> Result<Window, Interrupted> {
+    ) -> Result<ReachableWindow, Interrupted> {
         let mut steps: Option<usize> = None;
         if let Some(limit) = limit {
             for projection in &self.projections {
@@ -171,6 +171,6 @@ impl Bounds {
         for projection in &self.projections {
             projection.restrict(limit, &mut allowed, context.limits)?;
         }
-        Ok(Window { steps, allowed })
+        Ok(ReachableWindow { steps, allowed })
     }
 }

@@ -13,7 +13,7 @@ use task::number::Int;
 use task::task::quantity::NumericId;
 use task::task::{Operator, State};
 
-use crate::bounds::projection::Projection;
+use crate::bounds::pattern_database::Projection;
 
 /// A resource, and what each abstract state needs of it, by projection.
 pub(super) struct Resource {
@@ -25,7 +25,7 @@ pub(super) struct Resource {
 impl Resource {
     /// Whether a state has enough to reach the goal or a replenishment, as far as projections tell. Where nothing is
     /// needed, a value below 0 does no harm.
-    pub(super) fn suffices(&self, state: &State, projections: &[Projection]) -> bool {
+    pub(super) fn has_enough_resources(&self, state: &State, projections: &[Projection]) -> bool {
         let own = state.numbers[self.variable.index()];
         self.needs.iter().all(|(projection, needs)| {
             needs[projections[*projection].state(state) as usize].is_some_and(|need| need == 0 || need <= own)
@@ -53,7 +53,8 @@ pub(super) fn resources(
         let left = left.map(|comparison| -comparison.quantity.constant).fold(0, Int::max);
         let mut needs = Vec::new();
         for (projection, position) in projections.iter().zip(0..) {
-            let anywhere = |operator: usize| used[operator].is_none() && !projection.touches(operator);
+            let anywhere =
+                |operator: usize| used[operator].is_none() && !projection.affects_pattern(operator);
             if !(0..used.len()).any(anywhere) {
                 needs.push((position, projection.needs(&used, left, limits)?));
             }

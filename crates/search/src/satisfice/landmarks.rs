@@ -13,14 +13,14 @@ use task::number::dense;
 use task::task::number::TaskNumber;
 use task::task::{Fact, Task};
 
-use crate::satisfice::relaxation::{NO_OPERATOR, Proposition, Relaxation};
+use crate::satisfice::delete_relaxation::{NO_OPERATOR, Proposition, Relaxation};
 
 /// Disjunctions of more facts are not looked for.
-const WIDEST: usize = 4;
+const MAX_DISJUNCTION: usize = 4;
 /// No more landmarks than these.
-const MOST: usize = 500;
+const MAX_LANDMARKS: usize = 500;
 /// Propositions times landmarks, at most.
-const EFFORT: usize = 400_000_000;
+const MAX_WORK: usize = 400_000_000;
 
 /// A landmark: one of its propositions.
 #[derive(Debug, Clone)]
@@ -39,7 +39,7 @@ pub(super) struct Landmarks {
     pub(super) all: Vec<Landmark>,
 }
 
-struct Finder<'a, N> {
+struct LandmarkFactory<'a, N> {
     task: &'a Task<N>,
     relaxation: &'a Relaxation<N>,
     adders: Vec<Vec<u32>>,
@@ -75,7 +75,7 @@ impl Landmarks {
                 exclusive.entry(relaxation.fact(*fact)).or_default().push(number);
             }
         }
-        let mut finder = Finder {
+        let mut finder = LandmarkFactory {
             task,
             relaxation,
             adders,
@@ -92,14 +92,14 @@ impl Landmarks {
     }
 }
 
-impl<N: TaskNumber> Finder<'_, N> {
+impl<N: TaskNumber> LandmarkFactory<'_, N> {
     fn find(&mut self, limits: &Limits) -> Result<(), Interrupted> {
         for goal in &self.relaxation.goals {
             self.add(vec![*goal], true);
         }
-        let most =
-            EFFORT.checked_div(self.relaxation.propositions.saturating_add(self.relaxation.operators.len()));
-        let most = most.unwrap_or(MOST).min(MOST);
+        let most = MAX_WORK
+            .checked_div(self.relaxation.propositions.saturating_add(self.relaxation.operators.len()));
+        let most = most.unwrap_or(MAX_LANDMARKS).min(MAX_LANDMARKS);
         let mut next: u32 = 0;
         while (next as usize) < self.all.len() {
             limits.check()?;
@@ -189,14 +189,15 @@ impl<N: TaskNumber> Finder<'_, N> {
                         facts.extend(own.get(name)?);
                         facts.sort_unstable();
                         facts.dedup();
-                        (facts.len() <= WIDEST).then_some((name, facts))
+                        (facts.len() <= MAX_DISJUNCTION).then_some((name, facts))
                     })
                     .collect(),
             });
         }
         let mut sets: Vec<Vec<Proposition>> = sets.into_iter().flatten().map(|(_, facts)| facts).collect();
         sets.retain(|facts| {
-            (2..=WIDEST).contains(&facts.len()) && !facts.iter().any(|fact| self.initial[*fact as usize])
+            (2..=MAX_DISJUNCTION).contains(&facts.len())
+                && !facts.iter().any(|fact| self.initial[*fact as usize])
         });
         sets.sort();
         for facts in sets {

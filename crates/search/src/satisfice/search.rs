@@ -7,22 +7,22 @@
 //! - \[1\] M. Helmert: The Fast Downward planning system, JAIR 26, 2006, section 5.
 //! - \[2\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 6.
 
-use task::limits::{Interrupted, Limits, Pulse};
+use task::limits::{Interrupted, LimitPoll, Limits};
 use task::plan::ground::{GroundPlan, GroundStep, cost};
 use task::task::number::TaskNumber;
 use task::task::{OperatorId, State};
 
-use crate::satisfice::known::{Known, USELESS};
-use crate::satisfice::open::Open;
+use crate::satisfice::alternating_open_list::AlternatingOpenList;
+use crate::satisfice::search_context::{SearchContext, USELESS_OPERATOR_COST};
 use crate::satisfice::store::Store;
-use crate::search::Figures;
+use crate::search::SearchStatistics;
 
 /// What it takes to make the next state and to see whether it is new, in nodes and propositions of a relaxed task.
-const STEP_WORK: u64 = 200;
+const GENERATION_COST: u64 = 200;
 
 /// How states are ordered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Weight {
+pub(super) enum HeuristicWeight {
     /// By estimates alone.
     Greedy,
     /// By the cost so far and so many times the estimate.
@@ -50,7 +50,7 @@ pub(super) enum Outcome<N> {
 
 /// A search that can be gone on with.
 pub(super) struct Search<N> {
-    weight: Weight,
+    weight: HeuristicWeight,
     prices: Vec<u32>,
     /// What a step costs on average.
     mean: u32,
@@ -58,7 +58,7 @@ pub(super) struct Search<N> {
     nodes: Vec<Node<N>>,
     /// Which landmarks were reached, so many words for each state.
     reached: Vec<u64>,
-    open: Open<u64>,
+    open: AlternatingOpenList<u64>,
     /// The best value by each estimate.
     best: [u32; 2],
     /// Whether states were left out because their numbers do not fit, or because they are too dear.
@@ -66,9 +66,9 @@ pub(super) struct Search<N> {
 }
 
 impl<N: TaskNumber> Search<N> {
-    pub(super) fn new(known: &mut Known<'_, N>, weight: Weight, prices: Vec<u32>) -> Self {
+    pub(super) fn new(known: &mut SearchContext<'_, N>, weight: HeuristicWeight, prices: Vec<u32>) -> Self {
         let estimates = if known.status.is_empty() { 1 } else { 2 };
-        let useful = prices.iter().filter(|price| **price < USELESS);
+        let useful = prices.iter().filter(|price| **price < USELESS_OPERATOR_COST);
         let sum: u64 = useful.clone().map(|price| u64::from(*price)).sum();
         let mean = sum.checked_div(useful.count() as u64).unwrap_or(1);
         let mut search = Self {
@@ -78,7 +78,7 @@ impl<N: TaskNumber> Search<N> {
             store: Store::new(known.task),
             nodes: Vec::new(),
             reached: Vec::new(),
-            open: Open::new([false, true].repeat(estimates)),
+            open: AlternatingOpenList::new([false, true].repeat(estimates)),
             best: [u32::MAX; 2],
             incomplete: false,
         };
@@ -99,21 +99,21 @@ impl<N: TaskNumber> Search<N> {
     /// Looks for a plan that costs less than `limit` until so much work is done, in nodes and propositions.
     pub(super) fn run(
         &mut self,
-        known: &mut Known<'_, N>,
+        known: &mut SearchContext<'_, N>,
         limit: Option<&N>,
         mut work: u64,
         limits: &Limits,
-        figures: &mut Figures,
+        figures: &mut SearchStatistics,
     ) -> Result<Outcome<N>, Interrupted> {
-        let mut pulse: Pulse<'_> = limits.pulse();
+        let mut pulse: LimitPoll<'_> = limits.pulse();
         let look = known.size();
         while work > 0 {
             pulse.beat()?;
             let Some((parent, step)) = self.open.pop() else { return Ok(Outcome::Exhausted) };
-            work = work.saturating_sub(STEP_WORK);
+            work = work.saturating_sub(GENERATION_COST);
             figures.generated = figures.generated.saturating_add(1);
             let (operator, choice, cost) = known.step(step);
-            if known.pairs.as_ref().is_some_and(|pairs| pairs.is_useless(operator)) {
+            if known.pairs.as_ref().is_some_and(|pairs| pairs.is_operator_useless(operator)) {
                 continue;
             }
             let (total, price) = {
@@ -134,11 +134,11 @@ impl<N: TaskNumber> Search<N> {
                 self.incomplete = true;
                 continue;
             };
-            if known.pairs.as_ref().is_some_and(|pairs| pairs.is_dead(&before.values, &state.values)) {
+            if known.pairs.as_ref().is_some_and(|pairs| pairs.is_dead_end(&before.values, &state.values)) {
                 continue;
             }
             let (id, is_new) = self.store.insert(&state);
-            if !is_new && (self.weight == Weight::Greedy || total >= self.nodes[id as usize].cost) {
+            if !is_new && (self.weight == HeuristicWeight::Greedy || total >= self.nodes[id as usize].cost) {
                 continue;
             }
             let stride = known.status.stride();
@@ -169,9 +169,9 @@ impl<N: TaskNumber> Search<N> {
     }
 
     /// Estimates a state and notes its steps.
-    fn look(&mut self, known: &mut Known<'_, N>, id: u32, state: &State<N>, reached: &[u64]) {
+    fn look(&mut self, known: &mut SearchContext<'_, N>, id: u32, state: &State<N>, reached: &[u64]) {
         let Some(relaxed) = known.explorer.estimate(&known.relaxation, &self.prices, state) else { return };
-        let left = known.status.left(reached);
+        let left = known.status.remaining(reached);
         let mut progress = false;
         for (best, value) in self.best.iter_mut().zip([relaxed, left]) {
             if value < *best {
@@ -182,11 +182,11 @@ impl<N: TaskNumber> Search<N> {
         if progress {
             self.open.boost();
         }
-        known.status.want(reached);
+        known.status.request_landmark(reached);
         let (steps, preferred) = known.steps(state);
         let value = |estimate: u32| match self.weight {
-            Weight::Greedy => estimate.into(),
-            Weight::Times(weight) => {
+            HeuristicWeight::Greedy => estimate.into(),
+            HeuristicWeight::Times(weight) => {
                 weight.saturating_mul(estimate.into()).saturating_add(self.nodes[id as usize].price)
             }
         };
@@ -195,7 +195,7 @@ impl<N: TaskNumber> Search<N> {
         self.open.push(id, [relaxed, relaxed, landmarks, landmarks], &steps, &preferred);
     }
 
-    fn plan(&self, known: &Known<'_, N>, goal: u32) -> GroundPlan<N> {
+    fn plan(&self, known: &SearchContext<'_, N>, goal: u32) -> GroundPlan<N> {
         let mut steps = Vec::new();
         let mut at = goal;
         while at != 0 {

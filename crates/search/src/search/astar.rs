@@ -13,30 +13,30 @@
 use std::sync::Arc;
 
 use task::context::Context;
-use task::limits::{Interrupted, Limits, Pulse};
+use task::limits::{Interrupted, LimitPoll, Limits};
 use task::number::Int;
 use task::plan::ground::GroundPlan;
 use task::task::number::TaskNumber;
 use task::task::{Fact, OperatorId, State, Task};
 
-use crate::search::estimate::{Estimate, Sharper};
-use crate::search::figures::Figures;
-use crate::search::open::Open;
-use crate::search::orbits::Orbits;
-use crate::search::prepared::Prepared;
-use crate::search::store::{NONE, Origin, Store};
-use crate::search::stubborn::Choosing;
+use crate::search::heuristic::{Heuristic, LazyHeuristic};
+use crate::search::open_list::OpenList;
+use crate::search::search_task::SearchTask;
+use crate::search::state_registry::{NONE, ParentLink, StateRegistry};
+use crate::search::statistics::SearchStatistics;
+use crate::search::stubborn_sets::StubbornSetPruning;
+use crate::search::symmetry::Orbits;
 
 /// What it takes to take a state and to see what can be done in it, in steps of a computer…
-const NODE_WORK: u64 = 2_000;
+const EXPANSION_COST: u64 = 2_000;
 /// … and to make a state after it, and to look it up.
-const STATE_WORK: u64 = 600;
+const GENERATION_COST: u64 = 600;
 /// What it takes to see which other operators an operator makes worth looking at, too.
-const CHOICE_WORK: u64 = 10;
+const STUBBORN_SET_COST: u64 = 10;
 
 /// What the search found.
 #[derive(Debug)]
-pub enum Found<N = Int> {
+pub enum SearchOutcome<N = Int> {
     /// A cheapest plan.
     Optimal(GroundPlan<N>),
     /// There is no plan: every reachable state was visited, or is dominated by one that was.
@@ -46,17 +46,17 @@ pub enum Found<N = Int> {
 }
 
 /// What a search goes through, and by which estimates.
-pub struct Space<'a, N, E> {
+pub struct SearchProblem<'a, N, E> {
     pub context: Context<'a, N>,
     pub bounds: &'a E,
-    pub prepared: &'a Prepared<N>,
+    pub prepared: &'a SearchTask<N>,
     /// Set if states that interchangeable objects tell apart count as one.
     pub orbits: Option<Arc<Orbits>>,
 }
 
 /// Which node comes first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Order {
+pub enum OpenListOrder {
     /// That with the least sum of cost and estimate, then with the fewest steps in all: the plan has fewest steps of the cheapest.
     Fewest,
     /// Of equal sums that with the fewest steps to go: the plan is cheapest.
@@ -67,7 +67,7 @@ pub enum Order {
 
 /// What becomes of a search that cannot come to the end with the memory that there is, if it goes on as it did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Patience {
+pub(super) enum OutOfMemoryPolicy {
     /// It ends.
     None,
     /// It would go on.
@@ -77,7 +77,7 @@ pub(super) enum Patience {
 }
 
 /// The cost and the steps that count, and then what is further.
-type Key<N> = (N, u32, u32);
+type NodeKey<N> = (N, u32, u32);
 
 /// What is further comes first.
 fn later(steps: u32) -> u32 {
@@ -85,20 +85,20 @@ fn later(steps: u32) -> u32 {
 }
 
 /// A search that can be gone on with.
-pub struct Search<'a, N, E> {
+pub struct AStar<'a, N, E> {
     task: &'a Task<N>,
     limits: &'a Limits,
     bounds: &'a E,
-    prepared: &'a Prepared<N>,
-    pub(super) store: Store<N>,
-    open: Open<Key<N>>,
+    prepared: &'a SearchTask<N>,
+    pub(super) store: StateRegistry<N>,
+    open: OpenList<NodeKey<N>>,
     /// Whether states were left out because their numbers do not fit.
-    incomplete: bool,
-    order: Order,
+    states_dropped: bool,
+    order: OpenListOrder,
     /// Looked at, too, when a state is to be expanded.
-    pub(super) sharper: Option<Box<dyn Sharper<N>>>,
+    pub(super) lazy_heuristic: Option<Box<dyn LazyHeuristic<N>>>,
     /// Set if not all operators are applied that can be.
-    pub(super) choosing: Option<Choosing>,
+    pub(super) pruning: Option<StubbornSetPruning>,
     /// What it took so far apart from that, in steps of a computer.
     own_work: u64,
     /// Among how many searches memory is divided.
@@ -106,118 +106,136 @@ pub struct Search<'a, N, E> {
     /// The lower bound so far.
     bound: Option<N>,
     is_interrupted: bool,
-    pub(super) patience: Patience,
+    pub(super) patience: OutOfMemoryPolicy,
     /// The best goal state so far.
     best: Option<u32>,
     /// What a known plan costs, if there is one: nothing dearer is looked at.
     limit: Option<N>,
     /// Whether that plan is none of this search.
-    is_told: bool,
+    incumbent_is_external: bool,
     /// How many steps it has, if that counts: nothing as dear with as many is looked at.
     fewest: Option<u32>,
     /// Number of stored states at which the search first compares its progress with its memory.
     first_look: usize,
     /// How far the search was whenever the number of its states had doubled.
     progress: Vec<N>,
-    pub(crate) figures: Figures,
+    pub(crate) statistics: SearchStatistics,
     /// The state that is expanded, and the one that it leads to.
     state: State<N>,
     next: State<N>,
 }
 
 /// Hears, while a search goes on, what the best plan so far costs, if there is one, and what none costs less than.
-pub type Hear<'a, N> = &'a mut dyn FnMut(Option<&N>, &N);
+pub type ProgressCallback<'a, N> = &'a mut dyn FnMut(Option<&N>, &N);
 
-impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
-    pub(super) fn new(space: &Space<'a, N, E>, initial: &State<N>, order: Order, limit: Option<N>) -> Self {
-        let Space { context: Context { task, limits }, bounds, prepared, ref orbits } = *space;
-        let mut search = Search {
+impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
+    pub(super) fn new(
+        space: &SearchProblem<'a, N, E>,
+        initial: &State<N>,
+        order: OpenListOrder,
+        limit: Option<N>,
+    ) -> Self {
+        let SearchProblem { context: Context { task, limits }, bounds, prepared, ref orbits } = *space;
+        let mut search = AStar {
             task,
             limits,
             bounds,
             prepared,
-            store: Store::new(task, orbits.clone(), limits.thresholds().front),
-            open: Open::new(),
-            incomplete: false,
+            store: StateRegistry::new(task, orbits.clone(), limits.thresholds().front),
+            open: OpenList::new(),
+            states_dropped: false,
             order,
-            sharper: None,
-            choosing: None,
+            lazy_heuristic: None,
+            pruning: None,
             own_work: 0,
             sharing: 1,
             bound: None,
             is_interrupted: false,
-            patience: Patience::None,
+            patience: OutOfMemoryPolicy::None,
             best: None,
             limit,
-            is_told: false,
+            incumbent_is_external: false,
             fewest: None,
             first_look: limits.thresholds().progress.max(1),
             progress: Vec::new(),
-            figures: Figures::default(),
+            statistics: SearchStatistics::default(),
             state: initial.clone(),
             next: initial.clone(),
         };
-        search.push(N::zero(), &N::zero(), Origin { parent: NONE, step: NONE, steps: 0 });
+        search.push(N::zero(), &N::zero(), ParentLink { parent: NONE, step: NONE, steps: 0 });
         search
     }
 
     /// None if there are more states than `most` before anything is known; it may be called again.
-    pub(super) fn run(&mut self, most: usize, hear: Hear<'_, N>) -> Option<Found<N>> {
-        self.go_on(most, u64::MAX, hear)
+    pub(super) fn run_until_states(
+        &mut self,
+        most: usize,
+        hear: ProgressCallback<'_, N>,
+    ) -> Option<SearchOutcome<N>> {
+        self.resume(most, u64::MAX, hear)
     }
 
     /// None if there was more work than that before anything is known; it may be called again.
-    pub(super) fn run_until(&mut self, work: u64, hear: Hear<'_, N>) -> Option<Found<N>> {
-        let found = self.go_on(usize::MAX, work, hear);
-        if found.is_none() && !self.has_room() { Some(Found::Unknown(self.best_plan())) } else { found }
+    pub(super) fn run_for_work(
+        &mut self,
+        work: u64,
+        hear: ProgressCallback<'_, N>,
+    ) -> Option<SearchOutcome<N>> {
+        let found = self.resume(usize::MAX, work, hear);
+        if found.is_none() && !self.has_memory() {
+            Some(SearchOutcome::Unknown(self.best_plan()))
+        } else {
+            found
+        }
     }
 
-    fn go_on(&mut self, most: usize, work: u64, hear: Hear<'_, N>) -> Option<Found<N>> {
+    fn resume(&mut self, most: usize, work: u64, hear: ProgressCallback<'_, N>) -> Option<SearchOutcome<N>> {
         let mut pulse = self.limits.pulse();
         let mut told: Option<(Option<N>, N)> = None;
-        while self.store.len() <= most && self.has_room() && self.work() <= work {
-            let Some((key, id)) = self.open.pop() else { return Some(self.ended()) };
+        while self.store.len() <= most && self.has_memory() && self.work() <= work {
+            let Some((key, id)) = self.open.pop() else { return Some(self.outcome_when_exhausted()) };
             if self.store.is_dominated(id) {
                 continue;
             }
             let (total, least, _) = &key;
-            if self.is_enough(total, *least) {
-                return Some(self.ended());
+            if self.can_stop_at(total, *least) {
+                return Some(self.outcome_when_exhausted());
             }
             let is_told = |(limit, bound): &(Option<N>, N)| *limit == self.limit && *bound == *total;
-            if !self.incomplete && !told.as_ref().is_some_and(is_told) {
+            if !self.states_dropped && !told.as_ref().is_some_and(is_told) {
                 hear(self.limit.as_ref(), total);
                 told = Some((self.limit.clone(), total.clone()));
             }
             if self.bound.as_ref().is_none_or(|bound| bound < total) {
                 self.bound = Some(total.clone());
             }
-            if self.is_met() {
-                return Some(Found::Unknown(None));
+            if self.proves_upper_bound() {
+                return Some(SearchOutcome::Unknown(None));
             }
             if self.store.len() >> self.progress.len() >= self.first_look {
                 self.progress.extend(self.bound.clone());
-                let is_hopeful = self.is_hopeful();
-                if self.patience != Patience::None {
-                    self.patience = if is_hopeful { Patience::Some } else { Patience::Needed };
+                let is_hopeful = self.expects_to_finish();
+                if self.patience != OutOfMemoryPolicy::None {
+                    self.patience =
+                        if is_hopeful { OutOfMemoryPolicy::Some } else { OutOfMemoryPolicy::Needed };
                 } else if !is_hopeful {
-                    return Some(Found::Unknown(self.best_plan()));
+                    return Some(SearchOutcome::Unknown(self.best_plan()));
                 }
             }
             self.store.unpack(id, &mut self.state);
-            let Some((total, ..)) = self.sharpened(id, key) else { continue };
+            let Some((total, ..)) = self.reevaluate(id, key) else { continue };
             if self.expand(id, &total, &mut pulse).is_err() {
                 self.is_interrupted = true;
-                return Some(Found::Unknown(self.best_plan()));
+                return Some(SearchOutcome::Unknown(self.best_plan()));
             }
         }
         None
     }
 
     /// Looks closer at the state that is to be expanded; none if it has to wait, or to go.
-    fn sharpened(&mut self, id: u32, key: Key<N>) -> Option<Key<N>> {
-        let Some(sharper) = &mut self.sharper else { return Some(key) };
-        if !self.store.look_closer(id) {
+    fn reevaluate(&mut self, id: u32, key: NodeKey<N>) -> Option<NodeKey<N>> {
+        let Some(sharper) = &mut self.lazy_heuristic else { return Some(key) };
+        if !self.store.mark_reevaluated(id) {
             return Some(key);
         }
         let estimate = sharper.estimate(&self.state)?;
@@ -228,8 +246,8 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
         let steps = self.store.origin(id).steps;
         let to_go = self.prepared.steps_at_least(&estimate);
         let least = steps.saturating_add(to_go);
-        if !self.is_beyond(&total) && !self.is_no_better(&total, least) {
-            let rank = if self.order == Order::Nearest { to_go } else { key.1.max(least) };
+        if !self.exceeds_upper_bound(&total) && !self.is_dominated_by_incumbent(&total, least) {
+            let rank = if self.order == OpenListOrder::Nearest { to_go } else { key.1.max(least) };
             self.open.push((total, rank, key.2), id);
         }
         None
@@ -237,43 +255,43 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
 
     /// What it took so far, in steps of a computer.
     pub(super) fn work(&self) -> u64 {
-        self.own_work.saturating_add(self.sharper.as_ref().map_or(0, |sharper| sharper.work()))
+        self.own_work.saturating_add(self.lazy_heuristic.as_ref().map_or(0, |sharper| sharper.work()))
     }
 
     /// Whether nothing that comes with such a cost and so many steps, or later, is better than the plan that is known.
-    fn is_enough(&self, cost: &N, steps: u32) -> bool {
-        if self.order == Order::Greedy {
+    fn can_stop_at(&self, cost: &N, steps: u32) -> bool {
+        if self.order == OpenListOrder::Greedy {
             return self.best.is_some();
         }
         let (Some(limit), Some(fewest)) = (&self.limit, self.fewest) else { return false };
-        (limit, if self.order == Order::Nearest { 0 } else { fewest }) <= (cost, steps)
+        (limit, if self.order == OpenListOrder::Nearest { 0 } else { fewest }) <= (cost, steps)
     }
 
     /// What a known plan costs.
-    pub(super) fn limit(&self) -> Option<&N> {
+    pub(super) fn upper_bound(&self) -> Option<&N> {
         self.limit.as_ref()
     }
 
     /// A plan that costs this much is known; one as cheap is looked for all the same.
-    pub(super) fn limit_to(&mut self, cost: &N) {
+    pub(super) fn set_upper_bound_inclusive(&mut self, cost: &N) {
         if self.limit.as_ref().is_none_or(|limit| cost < limit) {
             self.limit = Some(cost.clone());
         }
     }
 
     /// A plan that costs this much is known: nothing dearer is looked at, and it ends once no plan can be cheaper.
-    pub(crate) fn know(&mut self, cost: N) {
+    pub(crate) fn set_upper_bound(&mut self, cost: N) {
         if self.limit.as_ref().is_none_or(|limit| cost < *limit) {
             self.limit = Some(cost);
             self.fewest = None;
             self.best = None;
-            self.is_told = true;
+            self.incumbent_is_external = true;
         }
     }
 
     /// Whether no plan costs less than the one that it was told of.
-    pub(super) fn is_met(&self) -> bool {
-        self.is_told && self.limit == self.bound
+    pub(super) fn proves_upper_bound(&self) -> bool {
+        self.incumbent_is_external && self.limit == self.bound
     }
 
     /// Whether a limit of time ended it.
@@ -282,7 +300,7 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
     }
 
     /// Memory is divided among so many searches.
-    pub(super) fn share_room(&mut self, count: usize) {
+    pub(super) fn set_memory_share(&mut self, count: usize) {
         self.sharing = count.max(1);
     }
 
@@ -293,7 +311,7 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
 
     /// What that may be once there are twice as many states so many times, if it goes on as it did.
     #[expect(clippy::arithmetic_side_effects, reason = "sums of costs that fit")]
-    pub(super) fn bound_after_doubling(&self, times: u32) -> Option<N> {
+    pub(super) fn forecast_lower_bound(&self, times: u32) -> Option<N> {
         let [.., before, now] = &self.progress[..] else { return None };
         let step = now.clone() + -before.clone();
         (0..times).try_fold(self.bound.clone()?, |bound, _| bound.plus(&step))
@@ -304,7 +322,7 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
     }
 
     /// Whether memory is left.
-    fn has_room(&self) -> bool {
+    fn has_memory(&self) -> bool {
         self.store.bytes().saturating_add(self.open.bytes()) <= self.room()
     }
 
@@ -314,7 +332,7 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
         clippy::arithmetic_side_effects,
         reason = "sums of costs that fit, and less than what is limited by memory"
     )]
-    fn is_hopeful(&self) -> bool {
+    fn expects_to_finish(&self) -> bool {
         let (Some(limit), [.., before, now]) = (&self.limit, &self.progress[..]) else { return true };
         let (step, left) = (now.clone() + -before.clone(), limit.clone() + -now.clone());
         // Where costs do not grow, states say nothing of what is left.
@@ -328,11 +346,13 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
     }
 
     /// The answer if nothing that is left can be better.
-    fn ended(&self) -> Found<N> {
+    fn outcome_when_exhausted(&self) -> SearchOutcome<N> {
         match self.best_plan() {
-            plan if self.incomplete || self.order == Order::Greedy => Found::Unknown(plan),
-            Some(plan) => Found::Optimal(plan),
-            None => Found::None,
+            plan if self.states_dropped || self.order == OpenListOrder::Greedy => {
+                SearchOutcome::Unknown(plan)
+            }
+            Some(plan) => SearchOutcome::Optimal(plan),
+            None => SearchOutcome::None,
         }
     }
 
@@ -343,11 +363,11 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
     /// The operators whose propositional condition holds in the state, ascending; those that are enough.
     fn applicable(&mut self) -> Vec<OperatorId> {
         let mut applicable = self.prepared.index.applicable(self.task, &self.state);
-        if let Some(choosing) = &mut self.choosing {
-            let size = choosing.choose(self.task, &self.state.values, &mut applicable);
-            self.own_work = self.own_work.saturating_add(size.saturating_mul(CHOICE_WORK));
-            if choosing.is_idle() {
-                self.choosing = None;
+        if let Some(choosing) = &mut self.pruning {
+            let size = choosing.prune_operators(self.task, &self.state.values, &mut applicable);
+            self.own_work = self.own_work.saturating_add(size.saturating_mul(STUBBORN_SET_COST));
+            if choosing.prunes_too_little() {
+                self.pruning = None;
             }
         }
         applicable
@@ -359,28 +379,28 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
         clippy::arithmetic_side_effects,
         reason = "steps are fewer than nodes, combinations are numbered"
     )]
-    fn expand(&mut self, id: u32, total: &N, pulse: &mut Pulse<'_>) -> Result<(), Interrupted> {
+    fn expand(&mut self, id: u32, total: &N, pulse: &mut LimitPoll<'_>) -> Result<(), Interrupted> {
         let (task, prepared) = (self.task, self.prepared);
-        task.close(&mut self.state);
-        self.own_work += NODE_WORK;
+        task.evaluate_axioms(&mut self.state);
+        self.own_work += EXPANSION_COST;
         let cost = self.store.cost(id).clone();
         let steps = self.store.origin(id).steps + 1;
-        self.figures.expanded += 1;
+        self.statistics.expanded += 1;
         for operator_id in self.applicable() {
             let operator = &task.operators[operator_id.index()];
             let sizes = operator.sizes();
             let first = prepared.numbers[operator_id.index()];
             for ((choice, step), number) in prepared.choices[operator_id.index()].iter().zip(first..) {
                 pulse.beat()?;
-                self.own_work += STATE_WORK;
+                self.own_work += GENERATION_COST;
                 if operator.condition.holds_numerically(&self.state.numbers, choice, &sizes) {
                     self.next.clone_from(&self.state);
                     let applied = operator.apply(&self.state, choice, &mut self.next);
                     match (applied, cost.plus(step)) {
                         (Some(()), Some(cost)) => {
-                            self.push(cost, total, Origin { parent: id, step: number, steps });
+                            self.push(cost, total, ParentLink { parent: id, step: number, steps });
                         }
-                        _ => self.incomplete = true,
+                        _ => self.states_dropped = true,
                     }
                 }
             }
@@ -390,21 +410,21 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
 
     /// Adds the next state, whose derived variables have no values yet, unless it is no good. No plan through it costs less than
     /// `through`, as one through the state before does.
-    fn push(&mut self, cost: N, through: &N, origin: Origin) {
-        self.figures.generated = self.figures.generated.saturating_add(1);
-        if self.is_beyond(&cost) {
+    fn push(&mut self, cost: N, through: &N, origin: ParentLink) {
+        self.statistics.generated = self.statistics.generated.saturating_add(1);
+        if self.exceeds_upper_bound(&cost) {
             return;
         }
         let Some(vacancy) = self.store.look_up(&self.next, &cost, origin.steps) else { return };
-        self.figures.evaluated = self.figures.evaluated.saturating_add(1);
+        self.statistics.evaluated = self.statistics.evaluated.saturating_add(1);
         let Some(estimate) = self.bounds.estimate(&self.next) else { return };
         let Some(total) = cost.plus(&estimate).filter(N::is_moderate) else {
-            self.incomplete = true;
+            self.states_dropped = true;
             return;
         };
-        let total = if self.order == Order::Greedy { total } else { total.max(through.clone()) };
+        let total = if self.order == OpenListOrder::Greedy { total } else { total.max(through.clone()) };
         let least = origin.steps.saturating_add(self.prepared.steps_at_least(&estimate));
-        if self.is_beyond(&total) || self.is_no_better(&total, least) {
+        if self.exceeds_upper_bound(&total) || self.is_dominated_by_incumbent(&total, least) {
             return;
         }
         let id = self.store.insert(&vacancy, origin);
@@ -412,22 +432,22 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
             self.best = Some(id);
             self.fewest = Some(origin.steps);
             self.limit = Some(cost);
-            self.is_told = false;
+            self.incumbent_is_external = false;
         }
         let key = match self.order {
-            Order::Greedy => (estimate, 0, 0),
-            Order::Nearest => (total, least.saturating_sub(origin.steps), later(origin.steps)),
-            Order::Fewest => (total, least, later(origin.steps)),
+            OpenListOrder::Greedy => (estimate, 0, 0),
+            OpenListOrder::Nearest => (total, least.saturating_sub(origin.steps), later(origin.steps)),
+            OpenListOrder::Fewest => (total, least, later(origin.steps)),
         };
         self.open.push(key, id);
     }
 
-    fn is_beyond(&self, cost: &N) -> bool {
+    fn exceeds_upper_bound(&self, cost: &N) -> bool {
         self.limit.as_ref().is_some_and(|limit| cost > limit)
     }
 
     /// Whether a known plan is no worse than one with this cost and so many steps.
-    fn is_no_better(&self, cost: &N, steps: u32) -> bool {
+    fn is_dominated_by_incumbent(&self, cost: &N, steps: u32) -> bool {
         let (Some(limit), Some(fewest)) = (&self.limit, self.fewest) else { return false };
         (limit, fewest) <= (cost, steps)
     }
@@ -439,14 +459,14 @@ impl<'a, N: TaskNumber, E: Estimate<N>> Search<'a, N, E> {
         if !self.task.goal.facts.iter().filter(is_basic).all(|fact| fact.holds(values)) {
             return false;
         }
-        self.task.close(&mut self.next);
+        self.task.evaluate_axioms(&mut self.next);
         self.task.is_goal(&self.next)
     }
 
     fn plan(&self, goal: u32) -> GroundPlan<N> {
         let mut steps = Vec::new();
         let mut at = goal;
-        while let Origin { parent, step, .. } = self.store.origin(at)
+        while let ParentLink { parent, step, .. } = self.store.origin(at)
             && parent != NONE
         {
             steps.push(self.prepared.step(step));

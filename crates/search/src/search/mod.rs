@@ -1,25 +1,25 @@
 //! Search in the space of states: for a first plan, for a best one, and among equal ones.
 
 mod astar;
-mod directions;
-mod estimate;
-mod explore;
-mod figures;
-mod front;
-pub mod generator;
-mod open;
-mod orbits;
-mod pairs;
-mod prepared;
-mod store;
-mod stubborn;
-pub mod successors;
-pub mod ties;
+pub mod design_combinations;
+mod h2_mutexes;
+mod heuristic;
+mod monotonicity;
+mod open_list;
+mod pareto_front;
+pub mod plan_tiebreak;
+mod search_driver;
+mod search_task;
+mod state_registry;
+mod statistics;
+mod stubborn_sets;
+pub mod successor_generator;
+mod symmetry;
 
-pub use astar::{Found, Space};
-pub use directions::{Asked, directions, is_monotone};
-pub use estimate::Estimate;
-pub use explore::{Duo, STATE_LIMIT, closed_labels, search, search_from, search_states};
-pub use figures::Figures;
-pub use pairs::Pairs;
-pub use prepared::Prepared;
+pub use astar::{SearchOutcome, SearchProblem};
+pub use h2_mutexes::MutexPairs;
+pub use heuristic::Heuristic;
+pub use monotonicity::{Polarity, directions, is_monotone};
+pub use search_driver::{InterleavedSearch, STATE_LIMIT, closed_labels, search, search_from, search_states};
+pub use search_task::SearchTask;
+pub use statistics::SearchStatistics;

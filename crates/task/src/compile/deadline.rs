@@ -3,8 +3,8 @@
 use num_rational::BigRational;
 use pddl::ast::{ActionBody, Condition, Domain, Effect, Problem};
 
-use super::additions::{declare, hidden};
-use super::terms::{all, flag, holds, not};
+use super::simplify::{all, flag, holds, not};
+use super::syntax_edits::{declare, hidden};
 
 /// After each state with one condition there is, so much later at most, one with another condition.
 #[derive(Debug, Clone)]

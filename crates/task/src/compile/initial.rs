@@ -10,8 +10,8 @@ use pddl::ast::{
 
 use crate::error::{Error, File};
 
-use super::additions::unsupported;
 use super::instances::{Binding, Objects, term};
+use super::syntax_edits::unsupported;
 
 type Key = (Name, Vec<Name>);
 

@@ -4,7 +4,7 @@ use crate::limits::Limits;
 use pddl::TypeHierarchy;
 use pddl::ast::{Atom, Condition, Domain, Expression, Name, Problem, Term, TypeExpression, TypedName};
 
-use super::terms::identifier;
+use super::simplify::identifier;
 
 /// The objects of a task, each with the types of its declarations.
 pub(super) struct Objects<'t> {

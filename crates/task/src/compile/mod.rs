@@ -2,7 +2,7 @@
 //!
 //! Each instance of a constraint gets atoms that remember what its automaton has to, and each action effects on them: a condition on
 //! the state *after* the action is regressed to the state before it (`regress`), so that no state is added to plans. What has to hold
-//! becomes a condition of actions and of the goal. Preferences are judged after the plan, by actions that are not shown (`judge`):
+//! becomes a condition of actions and of the goal. Preferences are judged after the plan, by actions that are not shown (`preferences`):
 //! each either is met, or costs what the metric says (A. Gerevini et al.: Deterministic planning in the fifth international planning
 //! competition, Artificial Intelligence 173, 2009; regression after L. Bonassi et al.: On planning with qualitative
 //! state-trajectory constraints in PDDL3 by compiling them away, ICAPS 2021; preferences after E. Keyder, H. Geffner: Soft goals can be
@@ -10,30 +10,30 @@
 //!
 //! Names that are made up have a space, so that no file can mean them.
 
-mod additions;
-mod course;
 mod deadline;
 mod initial;
 mod instances;
-mod judge;
-mod monitor;
+mod preferences;
 mod regress;
-mod terms;
+mod semantics;
+mod simplify;
+mod syntax_edits;
 mod timed;
+mod trajectory_monitors;
 use std::borrow::Cow;
 
 use crate::error::{Errors, File};
 use crate::limits::Limits;
 use pddl::ast::{Constraint, Domain, Expression, InitialElement, Metric, Name, Problem, Term};
 
-use additions::unsupported;
-pub use course::Course;
 pub use deadline::Deadline;
 use instances::Objects;
-use monitor::Monitors;
+pub use semantics::PlanSemantics;
+use syntax_edits::unsupported;
+use trajectory_monitors::Monitors;
 
 /// A task without preferences and constraints.
-pub struct Compiled<'t> {
+pub struct CompiledTask<'t> {
     pub domain: Cow<'t, Domain>,
     pub problem: Cow<'t, Problem>,
     pub objectives: Cow<'t, [Metric]>,
@@ -56,7 +56,7 @@ pub fn is_hidden(action: &str) -> bool {
 
 /// Whether an action of that name judges an instance of a preference violated.
 pub fn is_violation(action: &str) -> bool {
-    is_hidden(action) && action.ends_with(judge::VIOLATION)
+    is_hidden(action) && action.ends_with(preferences::VIOLATION)
 }
 
 /// Compiles preferences and constraints away. Preferences that no objective asks for are dropped.
@@ -67,12 +67,12 @@ pub fn compile<'t>(
     domain: &'t Domain,
     problem: &'t Problem,
     objectives: &'t [Metric],
-    course: Course<'_>,
+    course: PlanSemantics<'_>,
     limits: &Limits,
-) -> Result<Compiled<'t>, Errors> {
+) -> Result<CompiledTask<'t>, Errors> {
     if !is_needed(domain, problem) {
         let (domain, problem) = (Cow::Borrowed(domain), Cow::Borrowed(problem));
-        return Ok(Compiled {
+        return Ok(CompiledTask {
             domain,
             problem,
             objectives: Cow::Borrowed(objectives),
@@ -86,7 +86,7 @@ pub fn compile<'t>(
     let mut errors = Vec::new();
     for (file, constraint) in constraints(domain, problem) {
         if constraint.preference.as_ref().is_none_or(|name| asked.contains(&name.name)) {
-            errors.extend(monitors.watch(file, constraint).err());
+            errors.extend(monitors.add_constraint(file, constraint).err());
         }
     }
     for preference in domain.actions.iter().flat_map(|action| &action.preferences) {
@@ -96,7 +96,7 @@ pub fn compile<'t>(
         }
     }
     let has_events = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
-    if has_events && !asked.is_empty() && matches!(course, Course::Sequence) {
+    if has_events && !asked.is_empty() && matches!(course, PlanSemantics::Sequence) {
         errors.push(unsupported(
             "a preference beside timed initial literals",
             "a plan that waits for a literal after its last action would be judged too late",
@@ -119,13 +119,13 @@ pub fn compile<'t>(
         // What an action prefers, it reads.
         let mut preferences = task.0.actions.iter().flat_map(|action| &action.preferences);
         is_exact &= !preferences.any(|own| asked.contains(&own.name.name));
-        judge::install(&mut task.0, &mut task.1, (wanted, &asked), course);
+        preferences::install(&mut task.0, &mut task.1, (wanted, &asked), course);
     }
     for action in &mut task.0.actions {
         action.preferences.clear();
     }
     let (domain, problem) = (Cow::Owned(task.0), Cow::Owned(task.1));
-    Ok(Compiled { domain, problem, objectives: Cow::Owned(objectives), deadlines, is_exact })
+    Ok(CompiledTask { domain, problem, objectives: Cow::Owned(objectives), deadlines, is_exact })
 }
 
 fn constraints<'t>(
@@ -171,7 +171,7 @@ fn asked(objectives: &[Metric]) -> Vec<Name> {
 /// Gives the number of violations of each preference a function of its own.
 fn name_violations(expression: &mut Expression) {
     if let Some(name) = violation(expression).cloned() {
-        *expression = Expression::Fluent(judge::count(&name));
+        *expression = Expression::Fluent(preferences::count(&name));
     } else if let Expression::Operation(_, operands, _) = expression {
         operands.iter_mut().for_each(name_violations);
     }

@@ -5,10 +5,10 @@ use pddl::ast::{
     Term, TypedName,
 };
 
-use super::terms::{all, any, equal, exists, falsity, is_false, not};
+use super::simplify::{all, any, equal, exists, falsity, is_false, not};
 
 /// How many ways a comparison may turn out, by which of its functions change.
-const WAYS: usize = 64;
+const MAX_CASES: usize = 64;
 
 /// What one happening of an action changes.
 pub(super) struct Happening {
@@ -26,7 +26,7 @@ struct Change {
 type Way = (Condition, Vec<(Atom, Expression)>);
 
 /// A condition that cannot be regressed.
-pub(super) struct TooHard(pub(super) &'static str);
+pub(super) struct NotRegressable(pub(super) &'static str);
 
 impl Happening {
     /// What an action changes at a time; an instantaneous one does everything at its start.
@@ -113,7 +113,7 @@ impl Happening {
     }
 
     /// The condition in terms of the state before.
-    pub(super) fn regress(&self, condition: &Condition) -> Result<Condition, TooHard> {
+    pub(super) fn regress(&self, condition: &Condition) -> Result<Condition, NotRegressable> {
         let each =
             |parts: &[Condition]| parts.iter().map(|part| self.regress(part)).collect::<Result<Vec<_>, _>>();
         Ok(match condition {
@@ -163,10 +163,10 @@ impl Happening {
     }
 
     /// Every way in which functions can change: when it is so, and what stands for each function then.
-    fn ways(&self, functions: &[Atom]) -> Result<Vec<Way>, TooHard> {
-        let mut ways = vec![(super::terms::truth(), Vec::new())];
+    fn ways(&self, functions: &[Atom]) -> Result<Vec<Way>, NotRegressable> {
+        let mut ways = vec![(super::simplify::truth(), Vec::new())];
         for function in functions {
-            let mut values = vec![(super::terms::truth(), Expression::Fluent(function.clone()))];
+            let mut values = vec![(super::simplify::truth(), Expression::Fluent(function.clone()))];
             for change in &self.changes {
                 let Effect::Assign(kind, target, by, _) = &change.effect else { continue };
                 let hits =
@@ -175,7 +175,7 @@ impl Happening {
                     continue;
                 }
                 if !change.bound.is_empty() {
-                    return Err(TooHard("a number that an effect changes for all objects"));
+                    return Err(NotRegressable("a number that an effect changes for all objects"));
                 }
                 let mut more = Vec::new();
                 for (condition, value) in values {
@@ -193,8 +193,8 @@ impl Happening {
                 })
             });
             ways = longer.collect();
-            if ways.len() > WAYS {
-                return Err(TooHard("a comparison of many functions that one action changes"));
+            if ways.len() > MAX_CASES {
+                return Err(NotRegressable("a comparison of many functions that one action changes"));
             }
         }
         Ok(ways)

@@ -9,18 +9,18 @@ use pddl::ast::{Condition, Effect, Span};
 
 use crate::error::{Error, File};
 
-use super::additions::unsupported;
-use super::course::Course;
 use super::deadline::{Deadline, LOOKED_AT};
-use super::monitor::{Addition, Monitors, decided};
-use super::terms::{all, any, flag, holds, not, truth};
+use super::semantics::PlanSemantics;
+use super::simplify::{all, any, flag, holds, not, truth};
+use super::syntax_edits::unsupported;
+use super::trajectory_monitors::{Addition, Monitors, decided};
 
 impl Monitors<'_> {
     /// How far apart happenings are that interfere.
     fn separation(&self, place: (File, Span)) -> Result<BigRational, Error> {
         match self.course {
-            Course::Overlapping(separation) => Ok(separation.clone()),
-            Course::Sequence => Err(unsupported(
+            PlanSemantics::Overlapping(separation) => Ok(separation.clone()),
+            PlanSemantics::Sequence => Err(unsupported(
                 "a constraint on the times of states (`within`, `always-within`, `hold-during`, `hold-after`)",
                 "`--concurrent`, or constraints on the order of states; `validate` judges those on times, too",
                 place,

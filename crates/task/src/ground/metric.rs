@@ -12,7 +12,7 @@ use num_traits::{One, Zero};
 use crate::error::{Error, Errors, Place};
 use crate::ground::config::Generality;
 use crate::ground::evaluate::expression::ground;
-use crate::ground::vocabulary::failure::Failure;
+use crate::ground::vocabulary::eval_error::Failure;
 use crate::ground::vocabulary::operator::GroundOperator;
 use crate::ground::vocabulary::task::{GroundObjective, GroundTask};
 use crate::ground::vocabulary::world::World;
@@ -61,7 +61,7 @@ fn attach(task: &mut GroundTask<'_>, metric: &Metric, generality: &Generality) -
         .collect();
     let offset = initial.into_iter().fold(linear.quantity.constant.clone(), |sum, value| sum + value);
     task.objectives.push(GroundObjective { offset, maximize, rest });
-    let mut scaled = Scaled::default();
+    let mut scaled = ScaledQuantities::default();
     for operator in limits.watch(&mut task.operators) {
         let operator = operator?;
         operator.costs.push(cost(operator, &linear, &time, &mut scaled));
@@ -180,11 +180,11 @@ fn multiply(
 
 /// Quantities times the factors of a metric; what operators share, they share afterwards.
 #[derive(Default)]
-struct Scaled {
+struct ScaledQuantities {
     by_factor: BTreeMap<Rational, TableMap<Rational>>,
 }
 
-impl Scaled {
+impl ScaledQuantities {
     fn times(&mut self, quantity: &Quantity<Rational>, factor: &Rational) -> Quantity<Rational> {
         if factor.is_one() {
             return quantity.clone();
@@ -203,7 +203,7 @@ fn cost(
     operator: &GroundOperator,
     metric: &Linear<Rational>,
     time: &Rational,
-    scaled: &mut Scaled,
+    scaled: &mut ScaledQuantities,
 ) -> Quantity<Rational> {
     let mut total = scaled.times(&operator.duration, time);
     for (variable, factor) in &metric.coefficients {

@@ -8,33 +8,33 @@
 //!
 //! | pass | from | to |
 //! |---|---|---|
-//! | `reach` | `Lifted`, slots | `Reached`: instances of schemas, atoms that can hold |
+//! | `relaxed_reachability` | `Lifted`, slots | `RelaxedReachability`: instances of schemas, atoms that can hold |
 //! | `instantiate` | the `World` of these | `GroundTask`: operators, rules and a goal over atoms |
 //! | `derived` | derived atoms that are decided, or have one rule | truth values, and the body of the rule in their place |
 //! | `metric` | metrics | the costs of operators, and objectives |
 //! | `prune` | operators, rules | those that can matter; or why the goal is out of reach |
-//! | `finish` | `GroundTask` | `Task`: variables for atoms, integers for rationals |
+//! | `finalize` | `GroundTask` | `Task`: variables for atoms, integers for rationals |
 //!
 //! [1] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009.
 
 mod config;
 mod derived;
 pub mod evaluate;
-mod finish;
+mod finalize;
 mod instantiate;
 mod metric;
 mod prune;
-mod reach;
+mod relaxed_reachability;
 #[cfg(test)]
 mod tests;
 pub mod vocabulary;
 
-use crate::compile::{Course, compile};
+use crate::compile::{PlanSemantics, compile};
 use crate::error::{Error, Errors};
 use crate::lifted::Lifted;
 use crate::lifted::configuration::{SlotParameter, design_parameters, slot_parameters};
 use crate::limits::Limits;
-use crate::normalize::{events, normalize, partial, zero};
+use crate::normalize::{events, normalize, undefined_fluents, zero_duration};
 use crate::task::Task;
 use crate::task::number::TaskNumber;
 use pddl::ast::{Domain, Problem};
@@ -43,7 +43,7 @@ use tracing::info_span;
 
 pub use config::Generality;
 pub use config::GroundConfig;
-use vocabulary::reached::Reached;
+use vocabulary::reached::RelaxedReachability;
 use vocabulary::world::World;
 
 /// Grounds a domain and a problem that have passed `pddl::check`.
@@ -85,15 +85,15 @@ pub fn ground_for<N: TaskNumber>(
     generality: &Generality,
 ) -> Result<Task<N>, Errors> {
     let GroundConfig { objectives, limits, .. } = config;
-    let plain =
-        info_span!("compile").in_scope(|| compile(domain, problem, objectives, Course::Sequence, limits))?;
+    let plain = info_span!("compile")
+        .in_scope(|| compile(domain, problem, objectives, PlanSemantics::Sequence, limits))?;
     let lifted =
         || info_span!("normalize").in_scope(|| normalize(&plain.domain, &plain.problem, &plain.objectives));
     let found = ground_normal(lifted()?, config, generality);
     match found {
         Err(errors) if generality.numbers.is_none() && errors.iter().any(Error::is_value_missing) => {
             let mut lifted = lifted()?;
-            partial::guard(&mut lifted);
+            undefined_fluents::guard(&mut lifted);
             ground_normal(lifted, config, generality)
         }
         found => found,
@@ -106,7 +106,7 @@ fn ground_normal<N: TaskNumber>(
     config: &GroundConfig,
     generality: &Generality,
 ) -> Result<Task<N>, Errors> {
-    zero::split(&mut lifted)?;
+    zero_duration::split(&mut lifted)?;
     events::begin(&mut lifted);
     let designs: Vec<_> =
         lifted.schemas.iter().map(|schema| design_parameters(&lifted, schema, &config.solves)).collect();
@@ -129,9 +129,9 @@ pub fn ground_lifted<N: TaskNumber>(
     slots: &[Vec<SlotParameter>],
     generality: &Generality,
     limits: &Limits,
-) -> Result<(Task<N>, Reached), Errors> {
+) -> Result<(Task<N>, RelaxedReachability), Errors> {
     let span = info_span!("ground", operators = Empty, variables = Empty).entered();
-    let reached = info_span!("reach").in_scope(|| reach::reach(lifted, slots, limits))?;
+    let reached = info_span!("reach").in_scope(|| relaxed_reachability::reach(lifted, slots, limits))?;
     let world = World::new(lifted, &reached, limits);
     let instantiate = info_span!("instantiate", operators = Empty).entered();
     let mut ground = instantiate::instantiate(world, designs, slots)?;
@@ -143,7 +143,7 @@ pub fn ground_lifted<N: TaskNumber>(
         return Err(vec![Error::Interrupted].into());
     }
     let unreachable = info_span!("prune").in_scope(|| prune::prune(&mut ground, generality))?;
-    let task = info_span!("finish").in_scope(|| finish::finish(ground, unreachable, generality))?;
+    let task = info_span!("finish").in_scope(|| finalize::finish(ground, unreachable, generality))?;
     span.record("operators", task.operators.len()).record("variables", task.variables.len());
     Ok((task, reached))
 }

@@ -1,9 +1,9 @@
 //! Each pass of grounding by itself: what it gets, and what it hands on.
 
-use crate::ground::vocabulary::reached::Reached;
+use crate::ground::vocabulary::reached::RelaxedReachability;
 use crate::ground::vocabulary::task::GroundTask;
 use crate::ground::vocabulary::world::World;
-use crate::ground::{Generality, derived, finish, instantiate, metric, prune, reach};
+use crate::ground::{Generality, derived, finalize, instantiate, metric, prune, relaxed_reachability};
 use crate::lifted::configuration::SlotParameter;
 use crate::lifted::{Lifted, Rational};
 use crate::limits::Limits;
@@ -38,8 +38,8 @@ fn none(lifted: &Lifted) -> Vec<Vec<SlotParameter>> {
     vec![Vec::new(); lifted.schemas.len()]
 }
 
-fn reached(lifted: &Lifted) -> Reached {
-    reach::reach(lifted, &none(lifted), &Limits::none()).expect("no limit")
+fn reached(lifted: &Lifted) -> RelaxedReachability {
+    relaxed_reachability::reach(lifted, &none(lifted), &Limits::none()).expect("no limit")
 }
 
 /// How many operators each schema has.
@@ -117,7 +117,7 @@ fn prune_drops_what_numbers_rule_out_and_finish_makes_variables() {
         assert!(task.axioms.is_empty());
         let expected = [("go", 2), ("light", 1), ("jump", 0), ("fly", 0)];
         assert_eq!(counts(lifted, &task), expected.map(|(name, count)| (name.to_owned(), count)));
-        let task: Task = finish::finish(task, None, &generality).expect("integers");
+        let task: Task = finalize::finish(task, None, &generality).expect("integers");
         let mut values: Vec<Vec<&str>> =
             task.variables.iter().map(|own| own.values.iter().map(String::as_str).collect()).collect();
         values.sort();

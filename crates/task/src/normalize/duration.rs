@@ -15,7 +15,7 @@ use pddl::ast::{self, Comparison, Direction, Name, Span};
 pub const CHOSEN: &str = "chosen duration of ";
 
 /// Whether the metrics reward time; nothing if that cannot be told from the metrics alone, or if they disagree.
-pub(super) fn is_rewarded(metrics: &[Metric]) -> Option<bool> {
+pub(super) fn rewards_time(metrics: &[Metric]) -> Option<bool> {
     let zero = Rational::from_integer(0);
     let mut rewards = Vec::new();
     for metric in metrics {

@@ -10,8 +10,8 @@ pub mod events;
 mod fluents;
 mod initial;
 mod names;
-pub mod partial;
-pub mod zero;
+pub mod undefined_fluents;
+pub mod zero_duration;
 
 use crate::error::{Errors, File, Place};
 use crate::lifted::{Axiom, Formula, Lifted, Metric, Schema};
@@ -62,7 +62,7 @@ fn named(
         .collect();
     let has_events = problem.init.iter().any(|element| matches!(element, ast::InitialElement::Timed(..)));
     // What happens by itself may be worth waiting for, in the midst of an action, too.
-    let longest = if has_events { None } else { duration::is_rewarded(&metrics) };
+    let longest = if has_events { None } else { duration::rewards_time(&metrics) };
     let schemas = domain.actions.iter().zip(0..);
     let schemas = schemas.map(|(action, index)| schema(&mut names, longest, action, index)).collect();
     let axioms = domain.derived.iter().map(|axiom| self::axiom(&mut names, axiom)).collect();

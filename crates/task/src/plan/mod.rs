@@ -1,12 +1,12 @@
 //! Plans: over the ground task, in names, and as answers with their proof.
 
-pub mod earliest;
 pub mod ground;
-mod names;
+mod named_plan;
+pub mod reschedule;
 pub mod solution;
 mod text;
 pub mod transitions;
 mod verdict;
 
-pub use names::{Exact, NotANumber, Plan, Step};
-pub use names::{arguments, decode, measured, metric, resolve};
+pub use named_plan::{Exact, NotANumber, Plan, Step};
+pub use named_plan::{arguments, decode, measured, metric, resolve};

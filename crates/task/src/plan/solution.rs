@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use crate::plan::ground::GroundPlan;
-use crate::plan::names::{Exact, Plan};
+use crate::plan::named_plan::{Exact, Plan};
 use crate::words;
 
 /// How good the answer is.
@@ -68,18 +68,18 @@ impl Improvement {
 
 /// A metric that has no best value, or none that is known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Unbounded {
+pub enum MetricUnbounded {
     /// An action that improves the metric can be repeated for ever in a state that the plan passes.
     Proved,
     /// Actions improve the metric; that they can be repeated for ever is not shown.
     Suspected,
 }
 
-words! { Unbounded, "reason": Proved = "proved", Suspected = "suspected" }
+words! { MetricUnbounded, "reason": Proved = "proved", Suspected = "suspected" }
 
 /// A part of the planner.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
+pub enum PlannerPart {
     /// A\* with lower bounds.
     Search,
     /// Search by relaxed plans and landmarks, for a plan soon.
@@ -88,7 +88,7 @@ pub enum Part {
     Sat,
 }
 
-words! { Part, "part of the planner": Search = "search", Satisficing = "satisficing", Sat = "sat" }
+words! { PlannerPart, "part of the planner": Search = "search", Satisficing = "satisficing", Sat = "sat" }
 
 /// What was known at some time of a run.
 #[derive(Debug, Clone)]
@@ -123,7 +123,7 @@ pub struct Statistics {
     /// The program by whose word alone a formula has no model, if the answer rests on that: its refutation was not checked.
     pub unchecked: Option<String>,
     /// What found the plan.
-    pub found_by: Option<Part>,
+    pub found_by: Option<PlannerPart>,
     /// States whose successors were looked at, by all searches.
     pub expanded: u64,
     /// Successors that these have.
@@ -157,7 +157,7 @@ pub struct Solution {
     /// The reason for the status.
     pub proof: Option<Proof>,
     /// Set if the metric has no best value: the plan has fewest steps, and of those the best metric.
-    pub unbounded: Option<Unbounded>,
+    pub unbounded: Option<MetricUnbounded>,
     /// Figures.
     pub statistics: Statistics,
 }

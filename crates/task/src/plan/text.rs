@@ -7,7 +7,7 @@ use std::fmt;
 
 use num_rational::BigRational;
 
-use crate::plan::names::{Exact, Plan, Step};
+use crate::plan::named_plan::{Exact, Plan, Step};
 
 /// Decimals of times that have no finite number of them.
 const DECIMALS: u32 = 12;

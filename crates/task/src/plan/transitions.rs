@@ -6,19 +6,19 @@ use crate::context::Context;
 use crate::limits::Limits;
 use crate::number::Int;
 use crate::plan::ground::{GroundPlan, GroundStep};
-use crate::plan::names::{Exact, Step, decode, metric, rest};
+use crate::plan::named_plan::{Exact, Step, decode, metric, rest};
 use crate::task::number::TaskNumber as _;
 use crate::task::{OperatorId, State, Task};
 
 /// A state of a task, with what was paid on the way to it.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub struct Situation {
+pub struct TaskState {
     state: State,
     /// In the task's integer unit.
     cost: Int,
 }
 
-impl Situation {
+impl TaskState {
     /// The same state with nothing paid so far, for those to whom only states matter.
     #[must_use]
     pub fn unpaid(mut self) -> Self {
@@ -35,13 +35,13 @@ pub struct Transition {
     /// All arguments in the order of the schema's parameters, designs among them.
     pub arguments: Vec<String>,
     /// The state after it.
-    pub after: Situation,
+    pub after: TaskState,
 }
 
 impl Task {
     /// The state before any action.
-    pub fn start(&self) -> Situation {
-        Situation { state: self.initial.clone(), cost: 0 }
+    pub fn start(&self) -> TaskState {
+        TaskState { state: self.initial.clone(), cost: 0 }
     }
 
     /// The atoms that the task keeps track of, as `(predicate objects)`: those that can change and that matter.
@@ -58,7 +58,7 @@ impl Task {
     /// All actions with their arguments, whether or not they can be executed.
     pub fn actions(&self) -> impl Iterator<Item = (String, Vec<String>)> {
         let steps = self.ids().flat_map(move |id| {
-            self.operators[id.index()].choices().filter_map(move |choice| self.step(id, choice))
+            self.operators[id.index()].admitted_combinations().filter_map(move |choice| self.step(id, choice))
         });
         steps.map(|step| (step.action, step.arguments))
     }
@@ -79,7 +79,7 @@ impl Task {
 
     /// The atoms of [`Task::atoms`] that hold.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
-    pub fn holding(&self, situation: &Situation) -> Vec<&str> {
+    pub fn holding(&self, situation: &TaskState) -> Vec<&str> {
         let values = self.variables.iter().zip(&situation.state.values);
         values
             .filter(|(variable, value)| **value as usize + 1 < variable.values.len())
@@ -94,24 +94,25 @@ impl Task {
     }
 
     /// Whether the goal holds.
-    pub fn reaches_goal(&self, situation: &Situation) -> bool {
+    pub fn reaches_goal(&self, situation: &TaskState) -> bool {
         self.unreachable.is_none() && self.is_goal(&situation.state)
     }
 
     /// The metric of a plan that leads here.
-    pub fn metric(&self, situation: &Situation) -> Exact {
+    pub fn metric(&self, situation: &TaskState) -> Exact {
         metric(self, &(situation.cost.to_rational() + rest(self, &situation.state)))
     }
 
     /// Everything that can be done; none if numbers grow too large for it.
-    pub fn transitions(&self, situation: &Situation) -> Option<Vec<Transition>> {
-        let Situation { state, cost } = situation;
+    pub fn transitions(&self, situation: &TaskState) -> Option<Vec<Transition>> {
+        let TaskState { state, cost } = situation;
         let mut found = Vec::new();
         for id in self.ids() {
             let operator = &self.operators[id.index()];
-            for choice in operator.choices().filter(|choice| operator.applicable(state, choice)) {
+            for choice in operator.admitted_combinations().filter(|choice| operator.applicable(state, choice))
+            {
                 let cost = cost.checked_add(operator.cost.at(&choice, &operator.sizes()))?;
-                let after = Situation { state: self.successor(operator, state, &choice)?, cost };
+                let after = TaskState { state: self.successor(operator, state, &choice)?, cost };
                 let Some(Step { action, arguments, .. }) = self.step(id, choice) else { continue };
                 found.push(Transition { action, arguments, after });
             }

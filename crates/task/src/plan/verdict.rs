@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::plan::solution::{Proof, Solution, Status, Unbounded};
+use crate::plan::solution::{MetricUnbounded, Proof, Solution, Status};
 
 impl Solution {
     /// What is claimed, and whether it is proved: a sentence without a full stop; two lines where the metric has no best value.
@@ -36,10 +36,10 @@ fn verdict(solution: &Solution) -> String {
         }
         (Status::Feasible, proof, Some(unbounded)) => {
             let why = match unbounded {
-                Unbounded::Proved => {
+                MetricUnbounded::Proved => {
                     "the metric has no best value: an action that improves it can be repeated for ever"
                 }
-                Unbounded::Suspected => "the metric may have no best value: actions improve it",
+                MetricUnbounded::Suspected => "the metric may have no best value: actions improve it",
             };
             let reading = if proof.is_some() { "proved best" } else { "best found" };
             format!(

@@ -80,7 +80,7 @@ pub struct SlotUse {
 
 /// Combinations of designs that an operator must not run with.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub struct Forbidden {
+pub struct ForbiddenCombinations {
     /// Positions in the operator's slot list.
     pub slots: SlotSet,
     /// Each an index into `SlotUse::designs` for every slot of `slots`.
@@ -131,7 +131,7 @@ pub struct Operator<N = Int> {
     /// Each function that the action requires, with the argument that is its design.
     pub configuration: Vec<(ObjectId, Argument)>,
     pub slots: Arc<[SlotUse]>,
-    pub forbidden: Arc<[Forbidden]>,
+    pub forbidden: Arc<[ForbiddenCombinations]>,
     pub condition: Condition<N>,
     /// At most one value for each variable, ascending by variable.
     pub effects: Vec<Fact>,
@@ -239,7 +239,7 @@ impl<N> Operator<N> {
     }
 
     /// All admitted combinations of designs, in lexicographic order.
-    pub fn choices(&self) -> Choices<'_, N> {
+    pub fn admitted_combinations(&self) -> Choices<'_, N> {
         let empty = self.slots.iter().any(|slot| slot.designs.is_empty());
         Choices { operator: self, sizes: self.sizes(), next: (!empty).then(|| vec![0; self.slots.len()]) }
     }
@@ -392,13 +392,13 @@ impl<N: TaskNumber> Task<N> {
     pub fn successor(&self, operator: &Operator<N>, state: &State<N>, choice: &[u32]) -> Option<State<N>> {
         let mut next = state.clone();
         operator.apply(state, choice, &mut next)?;
-        self.close(&mut next);
+        self.evaluate_axioms(&mut next);
         Some(next)
     }
 
     /// Gives the derived variables their values: the least fixpoint of the rules, layer by layer.
     #[expect(clippy::arithmetic_side_effects, reason = "every variable has a value")]
-    pub fn close(&self, state: &mut State<N>) {
+    pub fn evaluate_axioms(&self, state: &mut State<N>) {
         if self.axioms.is_empty() {
             return;
         }

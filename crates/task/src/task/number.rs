@@ -10,7 +10,7 @@ use crate::task::quantity::{Number, Quantity, Table};
 pub const QUANTITY_LIMIT: Int = 1 << 123;
 
 /// Quantities with so many numbers are below [`QUANTITY_LIMIT`] by [`LIMIT`] alone.
-const FEW: usize = 32;
+const SMALL_QUANTITY: usize = 32;
 
 /// Rationals of a task may take this many bits; a state with longer ones is left out, and the search knows that it is not complete
 /// then.
@@ -100,7 +100,8 @@ impl TaskNumber for Int {
         let greatest = |table: &Table<Int>| table.values.iter().map(|value| value.unsigned_abs()).max();
         let mut all = quantity.tables.iter().filter_map(greatest);
         let mut sum = || all.try_fold(quantity.constant.unsigned_abs(), u128::checked_add);
-        quantity.tables.len() < FEW || sum().is_some_and(|sum| sum <= QUANTITY_LIMIT.unsigned_abs())
+        quantity.tables.len() < SMALL_QUANTITY
+            || sum().is_some_and(|sum| sum <= QUANTITY_LIMIT.unsigned_abs())
     }
 
     fn compare<'n>(

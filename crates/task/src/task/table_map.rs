@@ -9,13 +9,13 @@ use crate::number::Rational;
 use crate::task::quantity::{Quantity, Table};
 
 /// The values of a table, and what they are mapped to.
-type Mapped<M> = (Arc<[Rational]>, Arc<[M]>);
+type MappedTable<M> = (Arc<[Rational]>, Arc<[M]>);
 
 /// Maps numbers of quantities; tables that operators share stay shared.
 #[derive(Debug)]
 pub struct TableMap<M> {
     /// By where a table lies; it is kept, so that nothing else can come to lie there.
-    done: FxHashMap<*const Rational, Mapped<M>>,
+    done: FxHashMap<*const Rational, MappedTable<M>>,
 }
 
 impl<M> Default for TableMap<M> {

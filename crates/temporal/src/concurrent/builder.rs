@@ -5,7 +5,7 @@ use task::context::Context;
 use task::error::{Error, Errors};
 use task::ground::evaluate::reads::Reads;
 use task::ground::vocabulary::atom::{AtomId, Binding};
-use task::ground::vocabulary::reached::Reached;
+use task::ground::vocabulary::reached::RelaxedReachability;
 use task::ground::vocabulary::world::World;
 use task::lifted::{Change, Effect, Expression, ObjectId, Rational};
 use task::limits::Limits;
@@ -13,11 +13,11 @@ use task::number::{Int, dense};
 use task::task::quantity::NumericId;
 use task::task::{Argument, Operator, OperatorId, Task};
 
-use crate::concurrent::access::{Designs, Keys, prune};
+use crate::concurrent::duration_fluents::{DURATION_PREFIX, FLEXIBLE_DURATION_PREFIX};
 use crate::concurrent::footprint::{Footprint, Footprints};
 use crate::concurrent::happening::{Happening, Instance, Role};
+use crate::concurrent::interference::{Designs, Keys, prune};
 use crate::concurrent::split::{Half, Split};
-use crate::concurrent::timer::{FREE, TIMER};
 use crate::concurrent::unit::{Divisors, Unit};
 
 /// The halves of an instance that the ground task has: several starts, and ends, where effects on numbers have conditions.
@@ -66,7 +66,7 @@ pub(super) struct Builder<'a> {
 }
 
 impl<'a> Builder<'a> {
-    pub(super) fn new(split: &'a Split, reached: &'a Reached, limits: &'a Limits) -> Self {
+    pub(super) fn new(split: &'a Split, reached: &'a RelaxedReachability, limits: &'a Limits) -> Self {
         let held = split.origins.iter().filter(|origin| origin.half == Half::OverAll);
         Self {
             footprints: Footprints::new(World::new(&split.lifted, reached, limits)),
@@ -290,7 +290,7 @@ impl<'a> Builder<'a> {
     }
 
     /// Whether happenings are kept apart that need not be in some states.
-    pub(super) fn supposes(&self) -> bool {
+    pub(super) fn assumes_conflicts(&self) -> bool {
         self.footprints.supposes
     }
 
@@ -357,7 +357,7 @@ fn timer(task: &Task, id: OperatorId) -> Option<NumericId> {
     let mut changed = task.operators[id.index()].numeric_effects.iter().map(|effect| effect.variable);
     changed.find(|number| {
         let name = &task.number_names[number.index()];
-        name.starts_with(TIMER) || name.starts_with(FREE)
+        name.starts_with(DURATION_PREFIX) || name.starts_with(FLEXIBLE_DURATION_PREFIX)
     })
 }
 

@@ -14,8 +14,8 @@ use task::ground::evaluate::expression::ground;
 use task::ground::evaluate::join::each_binding;
 use task::ground::evaluate::reads::{Reads, Slot, fits};
 use task::ground::vocabulary::atom::{AtomId, Binding, arguments};
-use task::ground::vocabulary::failure::Failure;
-use task::ground::vocabulary::residual::Residual;
+use task::ground::vocabulary::eval_error::Failure;
+use task::ground::vocabulary::partial_eval::Residual;
 use task::ground::vocabulary::world::World;
 use task::lifted::{Change, Effect, Expression, FunctionId, ObjectId, PredicateId, Rational};
 use task::number::dense;
@@ -145,8 +145,8 @@ impl<'a> Footprints<'a> {
     }
 
     /// An index of all that has been written so far.
-    pub(super) fn index(&self) -> Written {
-        let mut written = Written::default();
+    pub(super) fn index(&self) -> WriteIndex {
+        let mut written = WriteIndex::default();
         for (index, (predicate, arguments)) in self.world.atoms.keys().enumerate() {
             let entry = written.atoms.entry(*predicate).or_default();
             entry.push((arguments.clone(), AtomId(dense(index))));
@@ -171,13 +171,13 @@ type Rows<V> = Vec<(Box<[ObjectId]>, V)>;
 
 /// Atoms and numbers by their symbols.
 #[derive(Default)]
-pub(super) struct Written {
+pub(super) struct WriteIndex {
     atoms: FxHashMap<PredicateId, Rows<AtomId>>,
     numbers: FxHashMap<FunctionId, Rows<NumericId>>,
     exact: FxHashMap<(PredicateId, Vec<ObjectId>), AtomId>,
 }
 
-impl Written {
+impl WriteIndex {
     /// What of all that is written is read.
     pub(super) fn look_up(&self, reads: &Reads) -> (Vec<AtomId>, Vec<NumericId>) {
         let (mut atoms, mut numbers) = (Vec::new(), Vec::new());

@@ -13,19 +13,19 @@ use std::hash::{Hash, Hasher};
 
 use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
 use search::bounds::Bounds;
-use search::satisfice::open::Open;
-use search::search::Figures;
+use search::satisfice::alternating_open_list::AlternatingOpenList;
+use search::search::SearchStatistics;
 use smallvec::SmallVec;
 use task::limits::Limits;
 use task::number::{Int, dense, words};
 use task::task::OperatorId;
 
-use crate::concurrent::compile::Concurrent;
-use crate::concurrent::estimate::Estimate;
-use crate::concurrent::expansion::{Expansion, Nowhere, Situation};
-use crate::concurrent::guidance::{Guidance, Guide};
+use crate::concurrent::makespan_heuristic::Estimate;
+use crate::concurrent::relaxed_plan_heuristic::{HeuristicValue, RelaxedPlanHeuristic};
 use crate::concurrent::search::Sequence;
-use crate::concurrent::store::{Packed, Packing};
+use crate::concurrent::store::{PackedNode, Packing};
+use crate::concurrent::successors::{DeadEnd, Expansion, TemporalState};
+use crate::concurrent::temporal_task::TemporalTask;
 
 /// What a node takes besides its situation, about: itself, its places in queues, and that it was seen.
 const OVERHEAD: usize = size_of::<Node>() + 80;
@@ -47,15 +47,15 @@ pub(super) enum Mode {
 
 impl Mode {
     /// What follows a situation by a happening. Timed initial literals that come before it come first.
-    pub(super) fn happen(
+    pub(super) fn apply_happening(
         self,
-        concurrent: &Concurrent,
+        concurrent: &TemporalTask,
         expansion: &Expansion<'_>,
-        situation: &Situation,
+        situation: &TemporalState,
         operator: OperatorId,
         links: &mut Links,
-    ) -> Option<Situation> {
-        let mut waited: Option<Situation> = None;
+    ) -> Option<TemporalState> {
+        let mut waited: Option<TemporalState> = None;
         loop {
             let before = waited.as_ref().unwrap_or(situation);
             let together = before.clocks.unsettled();
@@ -69,20 +69,20 @@ impl Mode {
                     }
                     return Some(situation);
                 }
-                Err(Nowhere::TooLate) => {
+                Err(DeadEnd::TooLate) => {
                     let (_, event) = expansion.next_event(&before.clocks)?;
                     let next = expansion.step(before, event).ok()?;
                     links.push((event, together));
                     waited = Some(next);
                 }
-                Err(Nowhere::Impossible | Nowhere::Unfit) => return None,
+                Err(DeadEnd::Impossible | DeadEnd::Unfit) => return None,
             }
         }
     }
 }
 
 struct Node {
-    packed: Packed,
+    packed: PackedNode,
     parent: u32,
     /// What has happened since the parent.
     links: Links,
@@ -103,26 +103,26 @@ pub(super) enum Outcome {
 }
 
 pub(super) struct Greedy<'a> {
-    concurrent: &'a Concurrent,
+    concurrent: &'a TemporalTask,
     expansion: &'a Expansion<'a>,
     estimate: &'a Estimate,
     bounds: Option<&'a Bounds>,
-    guidance: Guidance<'a>,
+    guidance: RelaxedPlanHeuristic<'a>,
     packing: Packing<'a>,
     nodes: Vec<Node>,
     /// The node that was looked at last, unpacked.
-    latest: Option<(u32, Situation)>,
+    latest: Option<(u32, TemporalState)>,
     /// By a hash of what must agree: the least makespan with which it was reached.
     seen: FxHashMap<u64, Int>,
     /// About how many bytes the nodes take.
     bytes: usize,
     /// By what is left, preferred ones by that, and all again, what follows something new first.
-    open: Open<Value>,
+    open: AlternatingOpenList<Value>,
     /// The facts that have held, by how many goals were to go.
     known: Vec<FxHashSet<(u32, u32)>>,
     pub(super) mode: Mode,
     nearest: u64,
-    pub(super) figures: Figures,
+    pub(super) figures: SearchStatistics,
 }
 
 /// Two situations with one hash are taken for the same: this search claims nothing.
@@ -134,16 +134,16 @@ fn hash_of(key: &[u32]) -> u64 {
 
 impl<'a> Greedy<'a> {
     pub(super) fn new(
-        concurrent: &'a Concurrent,
+        concurrent: &'a TemporalTask,
         expansion: &'a Expansion<'a>,
         estimate: &'a Estimate,
         bounds: Option<&'a Bounds>,
-        guidance: Guidance<'a>,
+        guidance: RelaxedPlanHeuristic<'a>,
         mode: Mode,
     ) -> Self {
         let (nodes, seen) = (Vec::new(), FxHashMap::default());
         let (packing, latest) = (Packing::new(concurrent), None);
-        let open = Open::new([false, true, false]);
+        let open = AlternatingOpenList::new([false, true, false]);
         let bytes = 0;
         Self {
             bytes,
@@ -160,7 +160,7 @@ impl<'a> Greedy<'a> {
             known: Vec::new(),
             mode,
             nearest: u64::MAX,
-            figures: Figures::default(),
+            figures: SearchStatistics::default(),
         }
     }
 
@@ -197,25 +197,26 @@ impl<'a> Greedy<'a> {
     }
 
     /// What follows a node by a happening, or by a whole action; timed initial literals that come before it come first.
-    fn follow(&mut self, parent: u32, operator: OperatorId) -> Option<(Situation, Links)> {
+    fn follow(&mut self, parent: u32, operator: OperatorId) -> Option<(TemporalState, Links)> {
         let known = self.latest.take().filter(|(own, _)| *own == parent);
         let unpack = || (parent, self.packing.unpack(&self.nodes[parent as usize].packed));
         let (_, situation) = self.latest.insert(known.unwrap_or_else(unpack));
         let mut links = Links::new();
-        let next = self.mode.happen(self.concurrent, self.expansion, situation, operator, &mut links)?;
+        let next =
+            self.mode.apply_happening(self.concurrent, self.expansion, situation, operator, &mut links)?;
         let is_over = next.clocks.opens().is_empty();
         if self.mode != Mode::Sequential || is_over {
             return Some((next, links));
         }
         let end = self.concurrent.end_of(operator);
-        let next = self.mode.happen(self.concurrent, self.expansion, &next, end, &mut links)?;
+        let next = self.mode.apply_happening(self.concurrent, self.expansion, &next, end, &mut links)?;
         Some((next, links))
     }
 
     /// Evaluates a situation, and queues what can follow it.
     fn take_up(
         &mut self,
-        situation: &Situation,
+        situation: &TemporalState,
         parent: u32,
         links: Links,
         incumbent: &mut Option<Sequence>,
@@ -241,7 +242,7 @@ impl<'a> Greedy<'a> {
             return found;
         }
         self.figures.evaluated = self.figures.evaluated.saturating_add(1);
-        let Some(Guide { left, preferred }) = self.guidance.guide(situation) else { return found };
+        let Some(HeuristicValue { left, preferred }) = self.guidance.guide(situation) else { return found };
         if left < self.nearest {
             self.nearest = left;
             self.open.boost();
@@ -249,7 +250,7 @@ impl<'a> Greedy<'a> {
         let is_old = !self.has_news(situation);
         let id = dense(self.nodes.len());
         let candidates: Vec<u32> = self.expansion.candidates(situation).iter().map(|own| own.0).collect();
-        let own = Figures { expanded: 1, generated: candidates.len() as u64, evaluated: 0 };
+        let own = SearchStatistics { expanded: 1, generated: candidates.len() as u64, evaluated: 0 };
         self.figures = self.figures.plus(own);
         let is_preferred = |own: &u32| preferred.binary_search(&OperatorId(*own)).is_ok();
         let preferred: Vec<u32> = candidates.iter().copied().filter(is_preferred).collect();
@@ -262,15 +263,15 @@ impl<'a> Greedy<'a> {
     }
 
     /// A lower bound of the metric of plans that go on from here, and of their makespan. None if there is none.
-    fn value(&self, situation: &Situation) -> Option<(Int, Int)> {
-        let Situation { state, clocks, cost } = situation;
+    fn value(&self, situation: &TemporalState) -> Option<(Int, Int)> {
+        let TemporalState { state, clocks, cost } = situation;
         let makespan = self.estimate.left(state, clocks)?.makespan;
         let costs = self.bounds.map_or(Some(0), |bounds| bounds.estimate(state))?;
         Some((self.concurrent.measure.total(makespan, cost.checked_add(costs)?)?, makespan))
     }
 
     /// Whether a fact holds that has not held in a situation with as many goals to go.
-    fn has_news(&mut self, Situation { state, .. }: &Situation) -> bool {
+    fn has_news(&mut self, TemporalState { state, .. }: &TemporalState) -> bool {
         let task = &self.concurrent.task;
         let to_go = task.goal.facts.iter().filter(|fact| !fact.holds(&state.values)).count();
         if self.known.len() <= to_go {
@@ -281,8 +282,8 @@ impl<'a> Greedy<'a> {
         facts.fold(false, |news, (variable, value)| known.insert((variable, *value)) || news)
     }
 
-    fn is_new(&mut self, situation: &Situation, makespan: Int) -> bool {
-        let Situation { state, clocks, .. } = situation;
+    fn is_new(&mut self, situation: &TemporalState, makespan: Int) -> bool {
+        let TemporalState { state, clocks, .. } = situation;
         let mut key = state.values[..self.concurrent.task.basic].to_vec();
         // What is only measured makes no difference to what can follow.
         let rest = &self.concurrent.task.objective.rest;
@@ -307,7 +308,7 @@ impl<'a> Greedy<'a> {
     }
 
     /// The sequence that leads to a goal; none if its metric does not fit, or it does not keep what it has to.
-    fn sequence(&self, situation: &Situation, parent: u32, links: &Links) -> Option<Sequence> {
+    fn sequence(&self, situation: &TemporalState, parent: u32, links: &Links) -> Option<Sequence> {
         let value = self.concurrent.value(situation)?;
         let mut all: Vec<Link> = links.iter().rev().copied().collect();
         let mut at = parent as usize;
@@ -332,7 +333,7 @@ mod tests {
     use super::*;
     use crate::concurrent::ground_concurrent;
     use crate::concurrent::happening::Role;
-    use crate::concurrent::relaxed::Relaxed;
+    use crate::concurrent::temporal_relaxation::TemporalRelaxation;
     use task::ground::GroundConfig;
 
     /// Robots on three cells in a row and three beside them change places, and none enters a cell before it has been left.
@@ -355,8 +356,9 @@ mod tests {
         let concurrent =
             ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation).expect("a task");
         let (estimate, expansion) = (Estimate::new(&concurrent), Expansion::new(&concurrent));
-        let relaxed = Relaxed::new(&concurrent);
-        let mut greedy = Greedy::new(&concurrent, &expansion, &estimate, None, Guidance::new(&relaxed), mode);
+        let relaxed = TemporalRelaxation::new(&concurrent);
+        let mut greedy =
+            Greedy::new(&concurrent, &expansion, &estimate, None, RelaxedPlanHeuristic::new(&relaxed), mode);
         let mut incumbent = None;
         let outcome = greedy.run(&mut incumbent, &Limits::none(), 100_000);
         assert_eq!(outcome, Outcome::Found);

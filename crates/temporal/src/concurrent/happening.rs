@@ -3,7 +3,7 @@
 use task::number::Int;
 use task::task::{Fact, NumericId, OperatorId};
 
-use crate::concurrent::access::{Accesses, Designs};
+use crate::concurrent::interference::{Designs, InterferenceConstraints};
 
 /// What a happening is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -25,7 +25,7 @@ pub(super) enum Role {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Happening {
     pub(super) role: Role,
-    pub(super) accesses: Accesses,
+    pub(super) accesses: InterferenceConstraints,
     pub(super) designs: Designs,
     /// The atoms (even) and numbers (odd) that it writes, ascending.
     pub(super) writes: Vec<u32>,

@@ -3,45 +3,45 @@
 //! What a plan is, the definition at the head of [`validate`](pddl::validate) says. Besides, at any time each function that the
 //! running actions require has one design, and no duration is above 0 and below the *separation* (epsilon).
 //!
-//! `split` makes two schemas of a durative action, `compile` finds what each happening waits for, and `search` goes
-//! through all sequences of happenings that matter, with what is left of their simple temporal network in `clocks`.
+//! `split` makes two schemas of a durative action, `temporal_task` finds what each happening waits for, and `search` goes
+//! through all sequences of happenings that matter, with what is left of their simple temporal network in `simple_temporal_network`.
 
-mod access;
-mod answer;
+mod action_invariants;
 mod builder;
-mod chosen;
-mod clocks;
-mod compile;
-mod compress;
+mod compression_safe;
+mod conjunctions;
 mod deadline;
-mod estimate;
-mod expansion;
+mod duration_fluents;
+mod envelope_facts;
+mod flexible_durations;
 mod footprint;
 mod greedy;
-mod grows;
-mod guidance;
 mod happening;
-mod inside;
-mod irreplaceable;
-mod judge;
-mod kept;
-mod links;
+mod interference;
+mod interleave;
+mod makespan_heuristic;
 mod measure;
-mod record;
-mod relaxed;
-mod repeat;
+mod monotone_metric;
+mod plan_metric;
+mod relaxed_plan_heuristic;
+mod relevant_effects;
 mod rule;
 mod schedule;
 mod search;
+mod search_log;
+mod self_overlap;
+mod sequential_first;
+mod simple_temporal_network;
+mod solution;
+mod source_task;
 mod split;
 mod store;
-mod strict;
+mod strict_comparisons;
+mod successors;
+mod temporal_relaxation;
+mod temporal_task;
 mod time;
-mod timer;
-mod turns;
 mod unit;
-mod wanted;
-mod whole;
 
 use std::time::Instant;
 
@@ -51,24 +51,24 @@ use tracing::info_span;
 
 use ::search::bounds::Bounds;
 use pddl::ast::{self, ActionBody, Comparison, Direction, Domain, EffectTime, Problem, Span};
-use task::compile::{Compiled, Course, compile as compile_away, is_hidden};
+use task::compile::{CompiledTask, PlanSemantics, compile as compile_away, is_hidden};
 use task::context::Context;
 use task::error::{Error, Errors, File, Place};
 use task::ground::{Generality, GroundConfig, ground_lifted};
 use task::lifted::{Expression, Lifted, Metric, Rational};
 use task::limits::Limits;
-use task::normalize::{normalize, normalize_freely, partial};
+use task::normalize::{normalize, normalize_freely, undefined_fluents};
 use task::number::Int;
 use task::plan::solution::{Improvement, Proof, Solution, Status};
 
-pub use compile::Concurrent;
+pub use temporal_task::TemporalTask;
 
-use answer::{ended, in_names};
 use deadline::Deadline;
-use kept::Kept;
-use record::Record;
-use search::Ended;
-use turns::take_turns;
+use interleave::interleave_searches;
+use search::SearchEnd;
+use search_log::Record;
+use solution::{ended, in_names};
+use source_task::SourceTask;
 
 /// Where durations are chosen, what has to be more than a number is so much more: one part in so many.
 const PRECISION: Int = 1_000_000;
@@ -83,28 +83,28 @@ pub fn ground_concurrent(
     problem: &Problem,
     config: &GroundConfig,
     separation: &BigRational,
-) -> Result<Concurrent, Errors> {
+) -> Result<TemporalTask, Errors> {
     let overflow = || vec![Error::overflow("the separation")];
     if !separation.is_positive() {
         return Err(overflow().into());
     }
     let separation = Rational::from_big(separation.clone());
-    let own = Course::Overlapping(&separation.to_big());
+    let own = PlanSemantics::Overlapping(&separation.to_big());
     let GroundConfig { objectives, limits, .. } = config;
     let plain = info_span!("compile").in_scope(|| compile_away(domain, problem, objectives, own, limits))?;
-    let kept = Kept::new(domain, problem, config);
+    let kept = SourceTask::new(domain, problem, config);
     let config = config.clone().with_objectives(plain.objectives.to_vec());
     let mut task = ground_plain((&plain.domain, &plain.problem, &config, &separation))?;
     let shortest = task.shortest.take().map(|shortest| {
         let shortest = shortest.judged_by(&plain);
-        Box::new(Concurrent { kept: kept.clone(), ..shortest })
+        Box::new(TemporalTask { kept: kept.clone(), ..shortest })
     });
-    Ok(Concurrent { shortest, kept, ..task.judged_by(&plain) })
+    Ok(TemporalTask { shortest, kept, ..task.judged_by(&plain) })
 }
 
-impl Concurrent {
+impl TemporalTask {
     /// The same where constraints on trajectories were compiled away.
-    fn judged_by(self, plain: &Compiled<'_>) -> Self {
+    fn judged_by(self, plain: &CompiledTask<'_>) -> Self {
         Self {
             deadlines: plain.deadlines.iter().map(|own| Deadline::new(&self.task, own)).collect(),
             is_exact: self.is_exact && plain.is_exact,
@@ -115,7 +115,7 @@ impl Concurrent {
 }
 
 /// Grounds a task without constraints on trajectories.
-fn ground_plain(own: Files<'_>) -> Result<Concurrent, Errors> {
+fn ground_plain(own: Files<'_>) -> Result<TemporalTask, Errors> {
     let shortest = ground_with(own, &normalize);
     let is_judged = own.0.actions.iter().any(|action| is_hidden(action.identifier.name.as_str()));
     if shortest.is_ok() && (is_fixed(own.0) || is_judged) {
@@ -123,7 +123,7 @@ fn ground_plain(own: Files<'_>) -> Result<Concurrent, Errors> {
     }
     match (ground_with(own, &normalize_freely), shortest) {
         (Ok(mut free), shortest) => {
-            free.is_exact = free.is_exact && chosen::is_exact(&free);
+            free.is_exact = free.is_exact && flexible_durations::is_exact(&free);
             free.shortest = shortest.ok().map(Box::new);
             Ok(free)
         }
@@ -142,17 +142,17 @@ type Normalize = dyn Fn(&Domain, &Problem, &[ast::Metric]) -> Result<Lifted, Err
 fn ground_with(
     (domain, problem, config, separation): Files<'_>,
     normalize: &Normalize,
-) -> Result<Concurrent, Errors> {
+) -> Result<TemporalTask, Errors> {
     let lifted = || normalize(domain, problem, &config.objectives);
     let ground = |lifted| {
         let task = ground_normal(domain, lifted, config, separation)?;
         let is_open = task.instances.iter().any(|own| own.is_chosen);
-        if is_open { chosen::check(task) } else { Ok(task) }
+        if is_open { flexible_durations::check(task) } else { Ok(task) }
     };
     match ground(lifted()?) {
         Err(errors) if errors.iter().any(Error::is_value_missing) => {
             let mut lifted = lifted()?;
-            partial::guard(&mut lifted);
+            undefined_fluents::guard(&mut lifted);
             ground(lifted)
         }
         found => found,
@@ -165,7 +165,7 @@ fn ground_normal(
     mut lifted: Lifted,
     config: &GroundConfig,
     separation: &Rational,
-) -> Result<Concurrent, Errors> {
+) -> Result<TemporalTask, Errors> {
     let place = Place { file: File::Problem, span: Span::default() };
     let number = |number| Expression::Number(Rational::from_integer(number));
     let (weight, metric) = match lifted.metrics.first() {
@@ -182,7 +182,7 @@ fn ground_normal(
         ),
     };
     lifted.metrics = vec![metric];
-    let is_strict = strict::compares_strictly(&lifted);
+    let is_strict = strict_comparisons::compares_strictly(&lifted);
     let mut split = split::split(lifted, &config.solves, &|action| mentions_duration(domain, action));
     // Where durations are chosen, more than some number is this much more, at least.
     let is_chosen = split.chosen.contains(&true);
@@ -194,7 +194,7 @@ fn ground_normal(
         Generality { measures_ends: true, measures_rewards: true, precision, ..Generality::default() };
     let (task, reached) = ground_lifted(lifted, designs, &none, &generality, &config.limits)?;
     let _span = info_span!("happenings", operators = task.operators.len()).entered();
-    compile::compile(task, &split, &reached, separation, weight, &config.limits)
+    temporal_task::compile(task, &split, &reached, separation, weight, &config.limits)
 }
 
 /// Whether no action has a duration that could be another one.
@@ -244,7 +244,7 @@ fn measures(effect: &ast::Effect) -> bool {
 /// Finds a best plan whose actions overlap; of those, one with the least makespan if it is proved by search. `report` hears of every
 /// improvement.
 pub fn optimize_concurrent(
-    concurrent: &Concurrent,
+    concurrent: &TemporalTask,
     limits: &Limits,
     report: &mut dyn FnMut(Improvement),
 ) -> Solution {
@@ -254,7 +254,7 @@ pub fn optimize_concurrent(
         return ended(Status::Unsolvable, Some(Proof::Relaxation(reason.clone())), record);
     }
     if concurrent.instances.iter().any(|own| own.is_chosen) {
-        return chosen::optimize(concurrent, limits, record);
+        return flexible_durations::optimize(concurrent, limits, record);
     }
     let costs = task.operators.iter().any(|operator| operator.cost.constant > 0);
     let bounds = (costs || !task.initial.numbers.is_empty())
@@ -262,17 +262,19 @@ pub fn optimize_concurrent(
         .flatten();
     let span = info_span!("optimize", operators = task.operators.len());
     let (how, incumbent) =
-        span.in_scope(|| take_turns(concurrent, bounds.as_ref(), limits, &mut record, usize::MAX));
+        span.in_scope(|| interleave_searches(concurrent, bounds.as_ref(), limits, &mut record, usize::MAX));
     let plan = incumbent.as_ref().map(|sequence| in_names(concurrent, sequence));
     let (status, lower) = match (&how, &incumbent) {
-        (Ended::Exhausted, Some(incumbent)) => (Status::Optimal, Some(incumbent.value.0)),
-        (Ended::Exhausted, None) => (Status::Unsolvable, None),
-        (Ended::Stopped(lower), Some(incumbent)) => (Status::Feasible, Some(*lower.min(&incumbent.value.0))),
-        (Ended::Stopped(lower), None) => (Status::Unknown, Some(*lower)),
+        (SearchEnd::Exhausted, Some(incumbent)) => (Status::Optimal, Some(incumbent.value.0)),
+        (SearchEnd::Exhausted, None) => (Status::Unsolvable, None),
+        (SearchEnd::Stopped(lower), Some(incumbent)) => {
+            (Status::Feasible, Some(*lower.min(&incumbent.value.0)))
+        }
+        (SearchEnd::Stopped(lower), None) => (Status::Unknown, Some(*lower)),
     };
     let metric = |total| concurrent.measure.metric(&Rational::from_integer(total));
     let proved = || if concurrent.is_exact { Proof::Search } else { Proof::Bound };
-    let proof = matches!(how, Ended::Exhausted).then(proved);
+    let proof = matches!(how, SearchEnd::Exhausted).then(proved);
     let steps = plan.as_ref().filter(|_| proof.is_some()).map_or(0, |plan| plan.steps.len());
     Solution {
         horizon: steps,

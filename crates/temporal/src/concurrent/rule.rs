@@ -16,7 +16,7 @@ pub(super) struct Rule {
     pub(super) adds: Vec<Proposition>,
     /// All that it is sure to set.
     pub(super) sets: Vec<Proposition>,
-    pub(super) raises: Vec<Raise>,
+    pub(super) raises: Vec<NumericEffect>,
     pub(super) weight: u32,
     pub(super) origin: Option<OperatorId>,
 }
@@ -39,4 +39,4 @@ impl Rule {
 }
 
 /// A numeric condition by position, and how much a rule adds to it; none if that depends on the state.
-pub(super) type Raise = (u32, Option<Int>);
+pub(super) type NumericEffect = (u32, Option<Int>);

@@ -6,9 +6,9 @@ use rustc_hash::FxHashMap;
 use task::number::Int;
 use task::task::OperatorId;
 
-use crate::concurrent::clocks::Key;
-use crate::concurrent::compile::Concurrent;
 use crate::concurrent::happening::Role;
+use crate::concurrent::simple_temporal_network::Key;
+use crate::concurrent::temporal_task::TemporalTask;
 
 /// A lower bound: from a happening to another one, at least so much later.
 type Bound = (usize, usize, Int);
@@ -17,7 +17,7 @@ type Bound = (usize, usize, Int);
 /// the one before.
 #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
 pub(super) fn schedule(
-    concurrent: &Concurrent,
+    concurrent: &TemporalTask,
     sequence: &[OperatorId],
     together: &[bool],
     durations: &[Int],
@@ -42,7 +42,7 @@ pub(super) fn schedule(
 }
 
 /// How long the actions take that start in a sequence, by position; 0 for what starts none.
-pub(super) fn durations(concurrent: &Concurrent, sequence: &[OperatorId]) -> Vec<Int> {
+pub(super) fn durations(concurrent: &TemporalTask, sequence: &[OperatorId]) -> Vec<Int> {
     let mut state = concurrent.task.initial.clone();
     let mut durations = Vec::with_capacity(sequence.len());
     for id in sequence {
@@ -64,7 +64,7 @@ pub(super) fn durations(concurrent: &Concurrent, sequence: &[OperatorId]) -> Vec
     reason = "the first happening is together with none; durations are below 2^90"
 )]
 fn bounds(
-    concurrent: &Concurrent,
+    concurrent: &TemporalTask,
     sequence: &[OperatorId],
     (together, durations): (&[bool], &[Int]),
     times: &mut [Int],

@@ -11,17 +11,17 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use search::bounds::Bounds;
-use search::search::{Figures, is_monotone};
+use search::search::{SearchStatistics, is_monotone};
 use task::limits::Limits;
 use task::number::{GROWTH_LIMIT, Int, Rational};
-use task::plan::solution::Part;
+use task::plan::solution::PlannerPart;
 use task::task::OperatorId;
 
-use crate::concurrent::compile::Concurrent;
-use crate::concurrent::estimate::Estimate;
-use crate::concurrent::expansion::{Expansion, Nowhere, Situation};
-use crate::concurrent::record::Record;
+use crate::concurrent::makespan_heuristic::Estimate;
+use crate::concurrent::search_log::Record;
 use crate::concurrent::store::{Origin, Store};
+use crate::concurrent::successors::{DeadEnd, Expansion, TemporalState};
+use crate::concurrent::temporal_task::TemporalTask;
 
 /// So many comparisons of situations are as much work as looking at one.
 const COMPARED: usize = 4;
@@ -38,14 +38,14 @@ pub(super) struct Sequence {
 
 impl Sequence {
     /// Tells the record of a better plan, and of what none can get below.
-    pub(super) fn tell(&self, lower: Int, part: Part, record: &mut Record<'_>) {
+    pub(super) fn tell(&self, lower: Int, part: PlannerPart, record: &mut Record<'_>) {
         let [value, lower] = [self.value.0, lower].map(Rational::from_integer);
         record.improve(&value, self.happenings.len(), lower, part);
     }
 }
 
 /// How a search ended.
-pub(super) enum Ended {
+pub(super) enum SearchEnd {
     /// Nothing is left that could be better than the incumbent.
     Exhausted,
     /// At a limit: no plan that is not known has a lower metric than this, in integers.
@@ -56,7 +56,7 @@ pub(super) enum Ended {
 type Priority = (Int, Int, Int, u32, u32);
 
 pub(super) struct Search<'a> {
-    concurrent: &'a Concurrent,
+    concurrent: &'a TemporalTask,
     estimate: &'a Estimate,
     /// Lower bounds on costs, and on resources; none if nothing costs.
     bounds: Option<&'a Bounds>,
@@ -66,12 +66,12 @@ pub(super) struct Search<'a> {
     pub(super) incumbent: Option<Sequence>,
     /// What was left out because its numbers do not fit: no plan of it has a lower metric than this, in integers.
     left_out: Option<Int>,
-    figures: Figures,
+    figures: SearchStatistics,
 }
 
 impl<'a> Search<'a> {
     pub(super) fn new(
-        concurrent: &'a Concurrent,
+        concurrent: &'a TemporalTask,
         expansion: &'a Expansion<'a>,
         estimate: &'a Estimate,
         bounds: Option<&'a Bounds>,
@@ -89,15 +89,15 @@ impl<'a> Search<'a> {
             open: BinaryHeap::new(),
             incumbent: None,
             left_out: None,
-            figures: Figures::default(),
+            figures: SearchStatistics::default(),
         };
         // Costs and times are not negative.
         search.push(&expansion.root(), None, 0);
         search
     }
 
-    /// Searches until nothing better is left, `most` situations were looked at, or a limit is reached. It can go on then. `record` hears of each better plan and of what none can get below.
-    pub(super) fn run(&mut self, limits: &Limits, most: usize, record: &mut Record<'_>) -> Ended {
+    /// Searches until nothing better is left, `most` situations were looked at, or a limit is reached. It can go on then. `search_log` hears of each better plan and of what none can get below.
+    pub(super) fn run(&mut self, limits: &Limits, most: usize, record: &mut Record<'_>) -> SearchEnd {
         let before = self.figures;
         let ended = self.go_on(limits, most, record);
         self.figures.add_to(before, &mut record.statistics);
@@ -105,7 +105,7 @@ impl<'a> Search<'a> {
     }
 
     #[expect(clippy::arithmetic_side_effects, reason = "what was looked at is counted by 64 bits")]
-    fn go_on(&mut self, limits: &Limits, most: usize, record: &mut Record<'_>) -> Ended {
+    fn go_on(&mut self, limits: &Limits, most: usize, record: &mut Record<'_>) -> SearchEnd {
         let mut looked_at = 0;
         let mut pulse = limits.pulse();
         while let Some(Reverse(priority)) = self.open.pop() {
@@ -118,7 +118,7 @@ impl<'a> Search<'a> {
             if self.expansion.is_goal(&situation) {
                 match self.sequence(id, &situation) {
                     Some(sequence) if self.is_better(sequence.value) => {
-                        sequence.tell(self.known(value.0), Part::Search, record);
+                        sequence.tell(self.known(value.0), PlannerPart::Search, record);
                         self.incumbent = Some(sequence);
                     }
                     Some(_) => {}
@@ -131,18 +131,20 @@ impl<'a> Search<'a> {
             }
             if looked_at >= most || self.is_full(limits) || pulse.beat().is_err() {
                 self.open.push(Reverse(priority));
-                return Ended::Stopped(self.lower());
+                return SearchEnd::Stopped(self.lower());
             }
-            record.rise(Rational::from_integer(self.known(value.0)));
+            record.report_lower_bound(Rational::from_integer(self.known(value.0)));
             looked_at += self.expand(id, &situation, value.0);
         }
-        self.left_out.filter(|lower| self.may_be_better(*lower)).map_or(Ended::Exhausted, Ended::Stopped)
+        self.left_out
+            .filter(|lower| self.may_be_better(*lower))
+            .map_or(SearchEnd::Exhausted, SearchEnd::Stopped)
     }
 
     /// Whether something that was left out, of which nothing has a lower metric than this, may be better than the incumbent: as good, and over sooner, if
     /// the metric is not the time.
     fn may_be_better(&self, lower: Int) -> bool {
-        let Concurrent { task, measure, .. } = self.concurrent;
+        let TemporalTask { task, measure, .. } = self.concurrent;
         let is_time = || measure.time > 0 && task.operators.iter().all(|operator| operator.cost.is_zero());
         let value = self.incumbent.as_ref().map(|incumbent| incumbent.value.0);
         value.is_none_or(|value| lower < value || lower == value && !is_time())
@@ -183,7 +185,7 @@ impl<'a> Search<'a> {
         clippy::arithmetic_side_effects,
         reason = "a node is no deeper than twice as many as there are nodes; what is done is counted by 64 bits"
     )]
-    fn expand(&mut self, id: u32, situation: &Situation, lower: Int) -> usize {
+    fn expand(&mut self, id: u32, situation: &TemporalState, lower: Int) -> usize {
         let candidates = self.expansion.candidates(situation);
         let count = candidates.len();
         let compared = self.store.compared;
@@ -198,16 +200,16 @@ impl<'a> Search<'a> {
                     let origin = Origin { parent: id, operator, compressed, together, depth };
                     self.push(&next, Some(origin), lower);
                 }
-                Err(Nowhere::Impossible | Nowhere::TooLate) => {}
-                Err(Nowhere::Unfit) => self.leave_out(lower),
+                Err(DeadEnd::Impossible | DeadEnd::TooLate) => {}
+                Err(DeadEnd::Unfit) => self.leave_out(lower),
             }
         }
         count + 1 + (self.store.compared - compared) / COMPARED
     }
 
     /// Adds a situation, below a node in which no plan has a lower metric than `lower`.
-    fn push(&mut self, situation: &Situation, origin: Option<Origin>, lower: Int) {
-        let Situation { state, clocks, cost } = situation;
+    fn push(&mut self, situation: &TemporalState, origin: Option<Origin>, lower: Int) {
+        let TemporalState { state, clocks, cost } = situation;
         self.figures.evaluated = self.figures.evaluated.saturating_add(1);
         let Some(left) = self.estimate.left(state, clocks) else { return };
         let costs = match self.bounds {
@@ -234,7 +236,7 @@ impl<'a> Search<'a> {
     }
 
     /// The sequence that leads to a goal; none if its metric does not fit, or it does not keep what it has to.
-    fn sequence(&self, goal: u32, situation: &Situation) -> Option<Sequence> {
+    fn sequence(&self, goal: u32, situation: &TemporalState) -> Option<Sequence> {
         let value = self.concurrent.value(situation)?;
         let (mut happenings, mut together) = (Vec::new(), Vec::new());
         let mut at = goal;

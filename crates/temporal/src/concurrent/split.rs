@@ -16,7 +16,7 @@ use task::lifted::{
 };
 use task::number::dense;
 
-use crate::concurrent::timer::{Timer, depends_on_state};
+use crate::concurrent::duration_fluents::{Timer, depends_on_state};
 use pddl::ast::{Comparison, Name, Span};
 
 /// Which happening of a schema another schema stands for.
@@ -143,7 +143,7 @@ fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Ha
     let compare = |comparison| {
         Formula::Compare(comparison, duration.clone(), Expression::Number(zero.clone()), schema.place)
     };
-    let choice = timer.and_then(|timer| timer.raise(schema));
+    let choice = timer.and_then(|timer| timer.relaxed_increase(schema));
     let mut all = Vec::new();
     if choice.is_none() && known.is_none_or(|known| known == zero) {
         let condition =

@@ -10,9 +10,9 @@ use rustc_hash::FxHasher;
 use task::number::{Int, dense, words};
 use task::task::{OperatorId, State};
 
-use crate::concurrent::clocks::Clocks;
-use crate::concurrent::compile::Concurrent;
-use crate::concurrent::expansion::Situation;
+use crate::concurrent::simple_temporal_network::SimpleTemporalNetwork;
+use crate::concurrent::successors::TemporalState;
+use crate::concurrent::temporal_task::TemporalTask;
 
 /// Where a finite-domain variable lies among the words of a key.
 struct Field {
@@ -53,20 +53,20 @@ struct Place {
 
 /// How situations are packed.
 pub(super) struct Packing<'a> {
-    concurrent: &'a Concurrent,
+    concurrent: &'a TemporalTask,
     fields: Vec<Field>,
     width: usize,
 }
 
 /// A packed situation.
-pub(super) struct Packed {
+pub(super) struct PackedNode {
     values: Box<[u32]>,
     numbers: Box<[Int]>,
     clocks: Box<[u8]>,
     cost: Int,
 }
 
-impl Packed {
+impl PackedNode {
     /// About how many bytes it takes besides itself.
     pub(super) fn bytes(&self) -> usize {
         let values = size_of_val(&*self.values).saturating_add(size_of_val(&*self.numbers));
@@ -76,7 +76,7 @@ impl Packed {
 
 /// Packed situations.
 pub(super) struct Store<'a> {
-    concurrent: &'a Concurrent,
+    concurrent: &'a TemporalTask,
     packing: Packing<'a>,
     /// Whether more of a number is never worse.
     monotone: bool,
@@ -96,7 +96,7 @@ fn hash_of(key: &[u32]) -> u64 {
 
 #[expect(clippy::arithmetic_side_effects, reason = "the bits of values that are held in memory")]
 impl<'a> Packing<'a> {
-    pub(super) fn new(concurrent: &'a Concurrent) -> Self {
+    pub(super) fn new(concurrent: &'a TemporalTask) -> Self {
         let (mut word, mut used) = (0, 0);
         let mut fields = Vec::new();
         for variable in &concurrent.task.variables[..concurrent.task.basic] {
@@ -128,23 +128,27 @@ impl<'a> Packing<'a> {
             *value = (words[*word] >> shift) & mask;
         }
         let mut state = State { values, numbers: numbers.to_vec() };
-        task.close(&mut state);
+        task.evaluate_axioms(&mut state);
         state
     }
 
-    pub(super) fn pack(&self, Situation { state, clocks, cost }: &Situation) -> Packed {
+    pub(super) fn pack(&self, TemporalState { state, clocks, cost }: &TemporalState) -> PackedNode {
         let (values, numbers) = (self.values(state).into_boxed_slice(), state.numbers.clone());
-        Packed { values, numbers: numbers.into_boxed_slice(), clocks: clocks.pack(), cost: *cost }
+        PackedNode { values, numbers: numbers.into_boxed_slice(), clocks: clocks.pack(), cost: *cost }
     }
 
-    pub(super) fn unpack(&self, Packed { values, numbers, clocks, cost }: &Packed) -> Situation {
-        Situation { state: self.state(values, numbers), clocks: Clocks::unpack(clocks), cost: *cost }
+    pub(super) fn unpack(&self, PackedNode { values, numbers, clocks, cost }: &PackedNode) -> TemporalState {
+        TemporalState {
+            state: self.state(values, numbers),
+            clocks: SimpleTemporalNetwork::unpack(clocks),
+            cost: *cost,
+        }
     }
 }
 
 #[expect(clippy::arithmetic_side_effects, reason = "counts of what is held in memory")]
 impl<'a> Store<'a> {
-    pub(super) fn new(concurrent: &'a Concurrent, monotone: bool) -> Self {
+    pub(super) fn new(concurrent: &'a TemporalTask, monotone: bool) -> Self {
         let (places, table, nodes) = (Vec::new(), HashTable::new(), Vec::new());
         Self {
             concurrent,
@@ -172,7 +176,7 @@ impl<'a> Store<'a> {
     }
 
     /// Adds a situation; none if another one dominates it.
-    pub(super) fn add(&mut self, situation: &Situation, origin: Option<Origin>) -> Option<u32> {
+    pub(super) fn add(&mut self, situation: &TemporalState, origin: Option<Origin>) -> Option<u32> {
         let key = self.key(situation);
         let hash = hash_of(&key);
         let id = dense(self.nodes.len());
@@ -212,7 +216,7 @@ impl<'a> Store<'a> {
             self.table.insert_unique(hash, place, |place| hash_of(&places[*place as usize].key));
             place
         };
-        let Situation { state, clocks, cost } = situation;
+        let TemporalState { state, clocks, cost } = situation;
         let (numbers, packed) = (state.numbers.clone().into_boxed_slice(), clocks.pack());
         self.bytes += size_of::<Node>() + size_of_val(&*numbers) + packed.len();
         let latest = clocks.latest();
@@ -222,14 +226,14 @@ impl<'a> Store<'a> {
     }
 
     /// The situation of a node that is not dominated.
-    pub(super) fn situation(&self, id: u32) -> Situation {
+    pub(super) fn situation(&self, id: u32) -> TemporalState {
         let node = &self.nodes[id as usize];
         let state = self.packing.state(&self.places[node.place as usize].key, &node.numbers);
-        Situation { state, clocks: Clocks::unpack(&node.clocks), cost: node.cost }
+        TemporalState { state, clocks: SimpleTemporalNetwork::unpack(&node.clocks), cost: node.cost }
     }
 
     /// What must be equal where one situation dominates another one.
-    fn key(&self, Situation { state, clocks, .. }: &Situation) -> Vec<u32> {
+    fn key(&self, TemporalState { state, clocks, .. }: &TemporalState) -> Vec<u32> {
         let mut key = self.packing.values(state);
         clocks.signature(&mut key);
         if !self.monotone {
@@ -239,14 +243,14 @@ impl<'a> Store<'a> {
     }
 
     /// Whether a node is no worse than a situation of the same place.
-    fn dominates(&self, node: &Node, Situation { state, clocks, cost }: &Situation) -> bool {
+    fn dominates(&self, node: &Node, TemporalState { state, clocks, cost }: &TemporalState) -> bool {
         let (guards, separation) = (&self.concurrent.guards, self.concurrent.separation);
         node.cost <= *cost
             && node.latest <= clocks.latest()
             && node.numbers.iter().zip(&state.numbers).all(|(own, other)| own >= other)
             && {
-                let mut own = Clocks::unpack_head(&node.clocks);
-                own.clocks.heads_no_later(clocks) && {
+                let mut own = SimpleTemporalNetwork::unpack_head(&node.clocks);
+                own.clocks.dominates_ignoring_accesses(clocks) && {
                     own.finish();
                     own.clocks.accesses_no_later(clocks, guards, separation)
                 }
@@ -254,14 +258,14 @@ impl<'a> Store<'a> {
     }
 
     /// Whether a situation of the same place is no worse than a node.
-    fn is_worse(&self, node: &Node, Situation { state, clocks, cost }: &Situation) -> bool {
+    fn is_worse(&self, node: &Node, TemporalState { state, clocks, cost }: &TemporalState) -> bool {
         let (guards, separation) = (&self.concurrent.guards, self.concurrent.separation);
         node.cost >= *cost
             && node.latest >= clocks.latest()
             && node.numbers.iter().zip(&state.numbers).all(|(own, other)| own <= other)
             && {
-                let mut other = Clocks::unpack_head(&node.clocks);
-                clocks.heads_no_later(&other.clocks) && {
+                let mut other = SimpleTemporalNetwork::unpack_head(&node.clocks);
+                clocks.dominates_ignoring_accesses(&other.clocks) && {
                     other.finish();
                     clocks.accesses_no_later(&other.clocks, guards, separation)
                 }

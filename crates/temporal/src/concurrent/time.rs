@@ -4,22 +4,22 @@ use smallvec::SmallVec;
 use task::number::Int;
 
 /// A moment that can still be put off: the start of an action under way, by its position in the clocks.
-pub(super) type Float = u32;
+pub(super) type TimePoint = u32;
 
 /// The position of a float.
-pub(super) fn place(float: Float) -> usize {
+pub(super) fn place(float: TimePoint) -> usize {
     float as usize
 }
 
 /// The least time of a happening: at least `base`, and at least so long after each of some floats.
 #[derive(Debug, PartialEq, Eq, Default)]
-pub(super) struct Time {
+pub(super) struct TimeExpression {
     pub(super) base: Int,
     /// Ascending by float.
-    pub(super) lags: SmallVec<[(Float, Int); 1]>,
+    pub(super) lags: SmallVec<[(TimePoint, Int); 1]>,
 }
 
-impl Clone for Time {
+impl Clone for TimeExpression {
     /// Most times have no lags, and situations have many times.
     fn clone(&self) -> Self {
         let lags = if self.lags.is_empty() { SmallVec::new() } else { SmallVec::from_slice(&self.lags) };
@@ -27,12 +27,12 @@ impl Clone for Time {
     }
 }
 
-impl Time {
+impl TimeExpression {
     pub(super) fn constant(base: Int) -> Self {
         Self { base, lags: SmallVec::new() }
     }
 
-    pub(super) fn lag(&self, float: Float) -> Option<Int> {
+    pub(super) fn lag(&self, float: TimePoint) -> Option<Int> {
         self.lags.iter().find(|(own, _)| *own == float).map(|(_, lag)| *lag)
     }
 
@@ -44,14 +44,14 @@ impl Time {
 
     /// From now on not before `other` and so much more.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
-    pub(super) fn put_off(&mut self, other: &Self, by: Int) {
+    pub(super) fn delay_to(&mut self, other: &Self, by: Int) {
         self.base = self.base.max(other.base + by);
         for (float, lag) in &other.lags {
             self.put_off_after(*float, lag + by);
         }
     }
 
-    pub(super) fn put_off_after(&mut self, float: Float, by: Int) {
+    pub(super) fn put_off_after(&mut self, float: TimePoint, by: Int) {
         match self.lags.binary_search_by_key(&float, |(own, _)| *own) {
             Ok(position) => self.lags[position].1 = self.lags[position].1.max(by),
             Err(position) => self.lags.insert(position, (float, by)),
@@ -59,7 +59,7 @@ impl Time {
     }
 
     /// Takes a float out; returns how long after it this was.
-    pub(super) fn forget(&mut self, float: Float) -> Option<Int> {
+    pub(super) fn forget(&mut self, float: TimePoint) -> Option<Int> {
         let position = self.lags.iter().position(|(own, _)| *own == float)?;
         Some(self.lags.remove(position).1)
     }
@@ -72,7 +72,7 @@ impl Time {
     }
 
     /// Gives the floats other numbers.
-    pub(super) fn renumber(&mut self, numbers: &[Option<Float>]) {
+    pub(super) fn renumber(&mut self, numbers: &[Option<TimePoint>]) {
         self.lags.retain(|(float, _)| match numbers[place(*float)] {
             Some(number) => {
                 *float = number;

@@ -4,8 +4,8 @@ use crate::error::Error;
 use crate::ground::evaluate::expression::ground;
 use crate::ground::evaluate::join::{each_binding, guards_of_exists, guards_of_forall};
 use crate::ground::vocabulary::atom::{Binding, arguments};
-use crate::ground::vocabulary::failure::Failure;
-use crate::ground::vocabulary::residual::{Residual, compare, truth};
+use crate::ground::vocabulary::eval_error::Failure;
+use crate::ground::vocabulary::partial_eval::{Residual, compare, truth};
 use crate::ground::vocabulary::world::World;
 use crate::lifted::{Bound, Formula};
 

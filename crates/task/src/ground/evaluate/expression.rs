@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Place};
 use crate::ground::vocabulary::atom::{Binding, arguments};
-use crate::ground::vocabulary::failure::Failure;
+use crate::ground::vocabulary::eval_error::Failure;
 use crate::ground::vocabulary::world::World;
 use crate::lifted::{Expression, Rational};
 use crate::task::quantity::Linear;

@@ -3,11 +3,11 @@
 use crate::error::Error;
 use crate::ground::evaluate::expression::ground;
 use crate::ground::vocabulary::atom::Binding;
-use crate::ground::vocabulary::failure::Failure;
+use crate::ground::vocabulary::eval_error::Failure;
 use crate::ground::vocabulary::world::World;
 use crate::lifted::configuration::{SlotParameter, slots_of_expression};
 use crate::lifted::{Expression, ObjectId, Rational};
-use crate::limits::{Limits, Pulse};
+use crate::limits::{LimitPoll, Limits};
 use crate::task::quantity::{Linear, Quantity, SlotSet, Table};
 
 /// The open slots of the schema at hand with the designs that are left for each.
@@ -118,7 +118,7 @@ pub fn for_each_combination(
         slots: &Slots<'_>,
         binding: &mut Binding,
         chosen: &mut Vec<u32>,
-        pulse: &mut Pulse<'_>,
+        pulse: &mut LimitPoll<'_>,
         visit: &mut Visit<'_>,
     ) -> Result<(), Failure> {
         let Some((slot, rest)) = mentioned.split_first() else {

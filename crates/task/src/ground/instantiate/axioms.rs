@@ -3,7 +3,7 @@
 use crate::ground::evaluate::condition::residual;
 use crate::ground::evaluate::normal_form::Definitions;
 use crate::ground::vocabulary::atom::{AtomId, Binding};
-use crate::ground::vocabulary::failure::Failure;
+use crate::ground::vocabulary::eval_error::Failure;
 use crate::ground::vocabulary::world::World;
 use crate::number::dense;
 

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use crate::error::{Error, Place};
 use crate::ground::evaluate::reads::{Reads, matches};
 use crate::ground::vocabulary::atom::AtomId;
-use crate::ground::vocabulary::failure::Failure;
+use crate::ground::vocabulary::eval_error::Failure;
 use crate::ground::vocabulary::numbers::Numbers;
 use crate::ground::vocabulary::world::World;
 use crate::lifted::Rational;
-use crate::task::Forbidden;
+use crate::task::ForbiddenCombinations;
 use crate::task::quantity::{Linear, NumericId};
 use pddl::ast::Assignment;
 
@@ -23,13 +23,13 @@ pub(super) enum GroundChange {
         /// None if it is undefined: the operator does not exist where the change would be made.
         operand: Option<Linear<Rational>>,
         /// Combinations of designs for which it is undefined.
-        undefined: Arc<[Forbidden]>,
+        undefined: Arc<[ForbiddenCombinations]>,
         place: Place,
     },
 }
 
 impl GroundChange {
-    pub(super) fn undefined(&self) -> &[Forbidden] {
+    pub(super) fn undefined(&self) -> &[ForbiddenCombinations] {
         match self {
             Self::Atom(..) => &[],
             Self::Number { undefined, .. } => undefined,

@@ -9,25 +9,25 @@ use std::sync::Arc;
 use crate::ground::evaluate::condition::residual;
 use crate::ground::evaluate::expression::ground;
 use crate::ground::evaluate::slots::Slots;
-use crate::ground::instantiate::admit::admit_some;
-use crate::ground::instantiate::build::{Apart, Build};
-use crate::ground::instantiate::outline::{Outline, open_operand};
+use crate::ground::instantiate::design_constraints::admit_some;
+use crate::ground::instantiate::instance_builder::{Apart, Build};
+use crate::ground::instantiate::slot_split::{SplitSchema, open_operand};
 use crate::ground::vocabulary::atom::{Binding, arguments};
-use crate::ground::vocabulary::failure::{Failure, possible};
+use crate::ground::vocabulary::eval_error::{Failure, possible};
 use crate::ground::vocabulary::operator::GroundSlots;
-use crate::ground::vocabulary::residual::Residual;
+use crate::ground::vocabulary::partial_eval::Residual;
 use crate::ground::vocabulary::world::World;
 use crate::lifted::configuration::{SlotParameter, conjuncts};
 use crate::lifted::{Effect, ObjectId, Rational};
 use crate::number::dense;
-use crate::task::Forbidden;
+use crate::task::ForbiddenCombinations;
 use crate::task::quantity::{Linear, Quantity};
 
 /// What instances share that agree in the parameters of the key.
-pub(super) struct Frame<'a> {
+pub(super) struct SharedInstanceData<'a> {
     pub(super) designs: Slots<'a>,
     pub(super) slots: Arc<GroundSlots>,
-    pub(super) forbidden: Arc<[Forbidden]>,
+    pub(super) forbidden: Arc<[ForbiddenCombinations]>,
     /// What is left of the open conjuncts.
     pub(super) start: Vec<Residual>,
     pub(super) over_all: Vec<Residual>,
@@ -44,14 +44,14 @@ pub(super) enum Operand {
     Closed,
     Undefined,
     /// With the combinations of designs for which it is undefined, if the effect has a condition.
-    Open(Linear<Rational>, Arc<[Forbidden]>),
+    Open(Linear<Rational>, Arc<[ForbiddenCombinations]>),
 }
 
-impl<'a> Frame<'a> {
+impl<'a> SharedInstanceData<'a> {
     /// The frame of an instance; none if no combination of designs suits.
     pub(super) fn new(
         world: &mut World<'_>,
-        outline: &Outline<'a>,
+        outline: &SplitSchema<'a>,
         core: &Binding,
     ) -> Result<Option<Self>, Failure> {
         let mut binding = core.clone();
@@ -118,7 +118,7 @@ fn operands(build: &mut Build<'_, '_>, effects: &[Effect]) -> Result<Vec<Operand
 /// The candidates of one slot for which everything that depends on this slot alone is true and defined.
 fn suitable_designs(
     world: &mut World<'_>,
-    outline: &Outline<'_>,
+    outline: &SplitSchema<'_>,
     position: u32,
     binding: &mut Binding,
 ) -> Result<Vec<ObjectId>, Failure> {

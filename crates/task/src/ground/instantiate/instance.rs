@@ -4,25 +4,25 @@ use std::sync::Arc;
 
 use crate::ground::evaluate::normal_form::Definitions;
 use crate::ground::evaluate::reads::Reads;
-use crate::ground::instantiate::admit::{admit_some, forbid};
-use crate::ground::instantiate::build::Build;
-use crate::ground::instantiate::cases::{Middle, cases};
-use crate::ground::instantiate::frame::Frame;
-use crate::ground::instantiate::moment::{Moment, clashes};
-use crate::ground::instantiate::outline::Outline;
-use crate::ground::instantiate::passage::{Conflicts, Passage};
+use crate::ground::instantiate::conditional_effects::{Middle, cases};
+use crate::ground::instantiate::design_constraints::{admit_some, forbid};
+use crate::ground::instantiate::frame::SharedInstanceData;
+use crate::ground::instantiate::instance_builder::Build;
+use crate::ground::instantiate::simultaneous_effects::{SimultaneousEffects, clashes};
+use crate::ground::instantiate::slot_split::SplitSchema;
 use crate::ground::instantiate::timeline::Timeline;
+use crate::ground::instantiate::timeline_windows::{Conflicts, TimelineWindow};
 use crate::ground::vocabulary::atom::{Binding, arguments};
 use crate::ground::vocabulary::condition::GroundCondition;
-use crate::ground::vocabulary::failure::{Failure, possible};
+use crate::ground::vocabulary::eval_error::{Failure, possible};
 use crate::ground::vocabulary::numbers::Numbers;
 use crate::ground::vocabulary::operator::GroundOperator;
-use crate::ground::vocabulary::residual::Residual;
+use crate::ground::vocabulary::partial_eval::Residual;
 use crate::ground::vocabulary::world::World;
 use crate::lifted::configuration::SlotParameter;
 use crate::lifted::{Effect, Formula, Joint, Lifted, ObjectId, Schema, Term};
 use crate::task::timing::Timing;
-use crate::task::{Argument, Forbidden};
+use crate::task::{Argument, ForbiddenCombinations};
 
 /// What all instances are made with.
 pub(super) struct Instantiation<'a> {
@@ -41,18 +41,18 @@ impl<'a> Instantiation<'a> {
     /// The operators of one instance, one for each passage and case. `Failure::Undefined` says that it can never be applied.
     pub(super) fn operators(
         &mut self,
-        outline: &Outline<'_>,
-        frame: &Frame,
+        outline: &SplitSchema<'_>,
+        frame: &SharedInstanceData,
         core: &Binding,
     ) -> Result<Vec<GroundOperator>, Failure> {
         let Self { world, definitions, timeline } = self;
         let schema = outline.schema;
         let mut build = Build { world, binding: core.clone(), slots: &frame.designs, forbidden: Vec::new() };
         let mut before = build.conditions(&outline.start.closed, &frame.start)?;
-        let start = Moment::new(&mut build, &schema.start_effects, &frame.start_operands)?;
+        let start = SimultaneousEffects::new(&mut build, &schema.start_effects, &frame.start_operands)?;
         let over_all = build.conditions(&outline.over_all.closed, &frame.over_all)?;
         let at_end = build.conditions(&outline.at_end.closed, &frame.at_end)?;
-        let end = Moment::new(&mut build, &schema.end_effects, &frame.end_operands)?;
+        let end = SimultaneousEffects::new(&mut build, &schema.end_effects, &frame.end_operands)?;
         let Some(forbidden) = forbidden(&build, frame)? else { return Ok(Vec::new()) };
         let template = template(&build, outline, frame, forbidden);
         if let Some(joint) = &schema.joint {
@@ -70,7 +70,7 @@ impl<'a> Instantiation<'a> {
             return Ok(operators);
         };
         let conflicts = conflicts(world, timeline, schema, (&start, &end), core);
-        for passage in Passage::all(timeline, &frame.duration, &conflicts) {
+        for passage in TimelineWindow::all(timeline, &frame.duration, &conflicts) {
             let middle = Middle { passage: Some(&passage), ..untimed };
             let template = GroundOperator { timing: passage.0.timing(), ..template.clone() };
             for case in cases(schema, &before, &start, &middle, &end)? {
@@ -82,7 +82,10 @@ impl<'a> Instantiation<'a> {
 }
 
 /// The combinations of designs that an instance forbids beside those of its frame; none if no other is left.
-fn forbidden(build: &Build<'_, '_>, frame: &Frame) -> Result<Option<Arc<[Forbidden]>>, Failure> {
+fn forbidden(
+    build: &Build<'_, '_>,
+    frame: &SharedInstanceData,
+) -> Result<Option<Arc<[ForbiddenCombinations]>>, Failure> {
     if build.forbidden.is_empty() {
         return Ok(Some(frame.forbidden.clone()));
     }
@@ -99,9 +102,9 @@ fn forbidden(build: &Build<'_, '_>, frame: &Frame) -> Result<Option<Arc<[Forbidd
 /// What the operators of an instance have in common.
 fn template(
     build: &Build<'_, '_>,
-    outline: &Outline<'_>,
-    frame: &Frame,
-    forbidden: Arc<[Forbidden]>,
+    outline: &SplitSchema<'_>,
+    frame: &SharedInstanceData,
+    forbidden: Arc<[ForbiddenCombinations]>,
 ) -> GroundOperator {
     let arguments = build.arguments(outline.schema);
     GroundOperator {
@@ -139,15 +142,15 @@ fn joint_clashes(
     build: &mut Build<'_, '_>,
     schema: &Schema,
     joint: &Joint,
-    frame: &Frame,
+    frame: &SharedInstanceData,
 ) -> Result<Vec<Residual>, Failure> {
     let lifted = build.world.lifted;
     let (first, second) = schema.end_effects.split_at(joint.start_effects);
     let first_reads = reads(lifted, &joint.start, first, &build.binding);
     let second_reads = reads(lifted, &joint.end, second, &build.binding);
     let (own, others) = frame.end_operands.split_at(joint.start_effects);
-    let first = Moment::new(build, first, own)?;
-    let second = Moment::new(build, second, others)?;
+    let first = SimultaneousEffects::new(build, first, own)?;
+    let second = SimultaneousEffects::new(build, second, others)?;
     Ok(clashes(build.world, (&first_reads, &first), (&second_reads, &second)))
 }
 
@@ -156,7 +159,7 @@ fn conflicts(
     world: &World<'_>,
     timeline: &Timeline,
     schema: &Schema,
-    (start, end): (&Moment, &Moment),
+    (start, end): (&SimultaneousEffects, &SimultaneousEffects),
     binding: &Binding,
 ) -> Conflicts {
     let lifted = world.lifted;
@@ -165,7 +168,7 @@ fn conflicts(
     let is_instant = schema.duration.is_none() || schema.joint.is_some();
     if is_instant {
         later.condition(lifted, &schema.start_condition, binding);
-        Conflicts::new(world, timeline, (&later, end), (&at_start, &Moment::nothing()))
+        Conflicts::new(world, timeline, (&later, end), (&at_start, &SimultaneousEffects::nothing()))
     } else {
         Conflicts::new(world, timeline, (&at_start, start), (&later, end))
     }

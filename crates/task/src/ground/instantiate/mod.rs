@@ -7,20 +7,21 @@
 //! Conditional effects on atoms stay as they are. An instance whose numbers (cost among them) change under a
 //! condition becomes one operator for each case, and so does one whose start effects are conditional.
 //!
-//! A schema has an `outline`, instances that agree in what depends on designs a `frame`; what an instance changes is a `moment` at its
-//! start and one at its end, and with each `passage` through the `timeline` it has `cases`, which are its operators.
+//! `slot_split` separates the parts of a schema that mention its slots, and `frame` caches what instances with the same design dependencies share.
+//! `simultaneous_effects` are the effects of a start or an end. `timeline_windows` lists the ways in which an action lies between timed initial
+//! literals, and `conditional_effects` splits each into operators.
 
-mod admit;
 mod axioms;
-mod build;
-mod cases;
 mod change;
+mod conditional_effects;
+mod design_constraints;
 mod frame;
 mod instance;
-mod moment;
-mod outline;
-mod passage;
+mod instance_builder;
+mod simultaneous_effects;
+mod slot_split;
 mod timeline;
+mod timeline_windows;
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
 
@@ -29,15 +30,15 @@ use rustc_hash::FxHashMap;
 use crate::error::{Error, Errors};
 use crate::ground::evaluate::condition::residual;
 use crate::ground::instantiate::axioms::instantiate_axioms;
-use crate::ground::instantiate::frame::Frame;
+use crate::ground::instantiate::frame::SharedInstanceData;
 use crate::ground::instantiate::instance::Instantiation;
-use crate::ground::instantiate::outline::Outline;
+use crate::ground::instantiate::slot_split::SplitSchema;
 use crate::ground::instantiate::timeline::Timeline;
 use crate::ground::vocabulary::atom::Row;
 use crate::ground::vocabulary::condition::GroundCondition;
-use crate::ground::vocabulary::failure::Failure;
+use crate::ground::vocabulary::eval_error::Failure;
 use crate::ground::vocabulary::operator::GroundOperator;
-use crate::ground::vocabulary::residual::Residual;
+use crate::ground::vocabulary::partial_eval::Residual;
 use crate::ground::vocabulary::task::GroundTask;
 use crate::ground::vocabulary::world::World;
 use crate::lifted::Schema;
@@ -97,16 +98,18 @@ fn operators(
             errors.push(own_start(schema));
             continue;
         }
-        let outline = Outline::new(lifted, schema, designs, slots);
-        let mut frames: FxHashMap<Row, Option<Arc<Frame>>> = FxHashMap::default();
+        let outline = SplitSchema::new(lifted, schema, designs, slots);
+        let mut frames: FxHashMap<Row, Option<Arc<SharedInstanceData>>> = FxHashMap::default();
         for binding in instantiation.world.limits.watch(instances) {
             let binding = binding?;
             let frame = match frames.entry(outline.key(binding)) {
                 Entry::Occupied(known) => Ok(known.get().clone()),
-                Entry::Vacant(new) => match Frame::new(&mut instantiation.world, &outline, binding) {
-                    Ok(frame) => Ok(new.insert(frame.map(Arc::new)).clone()),
-                    Err(error) => Err(error),
-                },
+                Entry::Vacant(new) => {
+                    match SharedInstanceData::new(&mut instantiation.world, &outline, binding) {
+                        Ok(frame) => Ok(new.insert(frame.map(Arc::new)).clone()),
+                        Err(error) => Err(error),
+                    }
+                }
             };
             let cases = frame.and_then(|frame| match frame {
                 Some(frame) => instantiation.operators(&outline, &frame, binding),

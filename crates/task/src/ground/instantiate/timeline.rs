@@ -3,7 +3,7 @@
 //! The definition is that of `validate`: an action may start at any time, and waiting is free. The times of the events divide the plan
 //! into *phases*: phase i is the time from event i (included) to event i + 1 (excluded). What an action does depends on the phases of its start and its
 //! end alone, and on whether it ends at the very time of an event; an earlier start within them never hurts, because one can wait. So
-//! each instance becomes one operator for each such *passage* (see `passage`), which starts it as early as can be. A finite-domain variable is
+//! each instance becomes one operator for each such *passage* (see `timeline_windows`), which starts it as early as can be. A finite-domain variable is
 //! the phase, a numeric variable the clock. A wait leads to the next event.
 //!
 //! Where "later than" has no earliest time, the action starts a *moment* later: so short a time that no two times that
@@ -24,7 +24,7 @@ use crate::ground::vocabulary::atom::AtomId;
 use crate::ground::vocabulary::condition::GroundCondition;
 use crate::ground::vocabulary::numbers::Numbers;
 use crate::ground::vocabulary::operator::GroundOperator;
-use crate::ground::vocabulary::residual::{Residual, constant_comparison};
+use crate::ground::vocabulary::partial_eval::{Residual, constant_comparison};
 use crate::ground::vocabulary::world::World;
 use crate::lifted::{ObjectId, Rational};
 use crate::number::dense;

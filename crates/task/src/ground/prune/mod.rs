@@ -3,15 +3,15 @@
 //! Forwards: relaxed reachability once more, now over the operators that are left when everything static is
 //! decided, and the intervals of numbers. Backwards: effects on atoms that no condition reads, then operators that do nothing at all.
 
-mod backward;
 mod forward;
 mod intervals;
+mod relevance;
 
 use crate::ground::config::Generality;
 use crate::ground::derived::simplify;
-use crate::ground::prune::backward::{backward, drop_unread_numerics};
 use crate::ground::prune::forward::forward;
 use crate::ground::prune::intervals::{goal_can_hold, prune_by_numbers};
+use crate::ground::prune::relevance::{backward, drop_unread_numerics};
 use crate::ground::vocabulary::atom::{AtomId, arguments};
 use crate::ground::vocabulary::task::GroundTask;
 use crate::lifted::Formula;

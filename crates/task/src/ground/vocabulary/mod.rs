@@ -3,10 +3,10 @@
 pub mod atom;
 pub mod axiom;
 pub mod condition;
-pub mod failure;
+pub mod eval_error;
 pub mod numbers;
 pub mod operator;
+pub mod partial_eval;
 pub mod reached;
-pub mod residual;
 pub mod task;
 pub mod world;

@@ -8,7 +8,7 @@ use crate::ground::vocabulary::numbers::Numbers;
 use crate::lifted::{ObjectId, Rational};
 use crate::task::quantity::Quantity;
 use crate::task::timing::Timing;
-use crate::task::{Argument, Forbidden};
+use crate::task::{Argument, ForbiddenCombinations};
 
 /// The function and the designs that suit an operator, for each slot.
 pub type GroundSlots = [(ObjectId, Vec<ObjectId>)];
@@ -19,7 +19,7 @@ pub struct GroundOperator {
     pub(crate) schema: u32,
     pub(crate) arguments: Vec<Argument>,
     pub(crate) slots: Arc<GroundSlots>,
-    pub(crate) forbidden: Arc<[Forbidden]>,
+    pub(crate) forbidden: Arc<[ForbiddenCombinations]>,
     /// Each function that the action requires, with the argument that is its design.
     pub(crate) configuration: Vec<(ObjectId, Argument)>,
     pub(crate) condition: GroundCondition,

@@ -5,7 +5,7 @@ use crate::lifted::{Arguments, PredicateId};
 
 /// What can be if nothing is ever deleted.
 #[derive(Default)]
-pub struct Reached {
+pub struct RelaxedReachability {
     /// For each schema the bindings of its parameters apart from slots, ascending.
     pub(crate) instances: Vec<Vec<Binding>>,
     /// The fluent atoms that can become true.

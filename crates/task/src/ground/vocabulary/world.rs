@@ -8,8 +8,8 @@ use rustc_hash::{FxBuildHasher, FxHashMap};
 
 use crate::error::{Error, Place};
 use crate::ground::vocabulary::atom::{AtomId, AtomSet, Binding, Key};
-use crate::ground::vocabulary::failure::Failure;
-use crate::ground::vocabulary::reached::Reached;
+use crate::ground::vocabulary::eval_error::Failure;
+use crate::ground::vocabulary::reached::RelaxedReachability;
 use crate::lifted::{Arguments, Function, FunctionId, Lifted, ObjectId, PredicateId, Rational, Term};
 use crate::limits::{Interrupted, Limits};
 use crate::number::dense;
@@ -28,7 +28,7 @@ type Rows = FxHashMap<Arguments, Vec<Arguments>>;
 pub struct World<'a> {
     pub(crate) lifted: &'a Lifted,
     pub(crate) limits: &'a Limits,
-    pub(crate) reached: &'a Reached,
+    pub(crate) reached: &'a RelaxedReachability,
     facts: AtomSet,
     values: IndexMap<(FunctionId, Arguments), Rational, FxBuildHasher>,
     pub atoms: AtomIndex<PredicateId>,
@@ -40,7 +40,7 @@ pub struct World<'a> {
 }
 
 impl<'a> World<'a> {
-    pub fn new(lifted: &'a Lifted, reached: &'a Reached, limits: &'a Limits) -> Self {
+    pub fn new(lifted: &'a Lifted, reached: &'a RelaxedReachability, limits: &'a Limits) -> Self {
         Self {
             lifted,
             limits,
