@@ -4,9 +4,9 @@ use std::hint::black_box;
 use std::path::Path;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use encodings::{Config, Limits, Status, optimize};
 use metaplan::mission::Planning as _;
 use metaplan::setup::Setup;
+use planner::{Config, Limits, Status, optimize};
 
 fn plan(scenario: Option<&str>) {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");

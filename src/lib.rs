@@ -1,6 +1,6 @@
 //! Metaplan adapts a robot's task plan and its software architecture together.
 //!
-//! This facade joins the libraries: [`ontology`] (what the robot is), [`rules`] (what follows) and [`encodings`] (what to
+//! This facade joins the libraries: [`ontology`] (what the robot is), [`rules`] (what follows) and `metaplan-planner` (what to
 //! do about it); and `metaplan-probabilistic`, model checking of decision processes, which [`comparison`] brings to a mission.
 //! `metaplan-mission` joins OWL and PDDL, [`mission`] plans with both, and `metaplan-verify` checks what is claimed of plans. Order lives
 //! here, not logic.
@@ -8,7 +8,7 @@
 pub use ::{probabilistic, verify};
 pub use ::mission::{Errors, Message, file, knowledge, message, visible};
 pub use ::verify::measure;
-pub use {encodings, ontology, pddl, picture, rules};
+pub use {ontology, pddl, picture, rules};
 
 pub mod answers;
 pub mod certificate;

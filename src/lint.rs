@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use encodings::Limits;
 use pddl::ast::Problem;
+use planner::Limits;
 
 use crate::message::Message;
 use crate::mission::{Mission, Planning as _, numbers};

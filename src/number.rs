@@ -52,7 +52,7 @@ pub(crate) fn to_json(value: &BigRational) -> Value {
 }
 
 /// An exact number of the planner as a number of JSON; a fraction that is not a decimal, rounded to a double.
-pub(crate) fn exact_to_json(value: &encodings::Exact) -> Value {
+pub(crate) fn exact_to_json(value: &planner::Exact) -> Value {
     value.to_string().parse::<serde_json::Number>().map_or_else(|_| value.to_f64().into(), Value::Number)
 }
 
@@ -62,7 +62,7 @@ pub(crate) fn to_f64(value: &BigRational) -> f64 {
 }
 
 /// An exact number of the planner.
-pub(crate) fn of_plan(value: &encodings::Exact) -> BigRational {
+pub(crate) fn of_plan(value: &planner::Exact) -> BigRational {
     value.to_rational()
 }
 

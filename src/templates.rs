@@ -3,8 +3,8 @@
 use std::io;
 use std::path::Path;
 
-use encodings::shipped;
 use ontology::kb;
+use planner::shipped;
 
 use crate::file::create_directory;
 

@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 use serde::Deserialize;
 
 /// What is copied of the workspace.
-const PARTS: [&str; 24] = [
+const PARTS: [&str; 25] = [
     "Cargo.toml",
     "Cargo.lock",
     "README.md",
@@ -27,6 +27,7 @@ const PARTS: [&str; 24] = [
     "ontology",
     "rules",
     "encodings",
+    "crates",
     "pddl",
     "certificate",
     "mission",
@@ -186,7 +187,7 @@ fn compiled(home: &Path, tests: Tests) -> PathBuf {
     let (target, name): (&[&str], _) = match tests {
         Tests::Oracle => (&["--test", "oracle"], "oracle"),
         Tests::Planta => (&["--test", "planta"], "planta"),
-        Tests::Unit => (&["--package", "metaplan-encodings", "--lib"], "metaplan_encodings"),
+        Tests::Unit => (&["--package", "metaplan-search", "--lib"], "metaplan_search"),
     };
     let output = Command::new(env!("CARGO"))
         .args(["test", "--release", "--offline", "--no-run", "--message-format", "json-render-diagnostics"])
@@ -246,7 +247,8 @@ fn every_member_is_copied() {
     let members = manifest["workspace"]["members"].as_array().expect("members");
     for member in members {
         let name = member.as_str().expect("a name");
-        assert!(PARTS.contains(&name), "`{name}` is a member of the workspace, and not copied");
+        let is_copied = PARTS.iter().any(|part| Path::new(name).starts_with(part));
+        assert!(is_copied, "`{name}` is a member of the workspace, and not copied");
     }
 }
 

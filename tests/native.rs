@@ -1,21 +1,18 @@
 //! Plain domains whose actions get their designs from the knowledge base: the same optimum as in the explicit form.
 
-#[path = "../encodings/tests/random/mod.rs"]
-mod random;
-
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use encodings::{Config, Limits, Status, lexicographic};
 use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
 use metaplan::message::Errors;
 use metaplan::mission::{Bindings, Mission, Planning as _};
 use metaplan::setup::Setup;
 use ontology::ReadOptions;
 use pddl::Source;
-use random::Random;
+use planner::{Config, Limits, Status, lexicographic};
 use rules::Limits as StepLimits;
+use testing::random::Random;
 
 /// The status and cost of a mission's best plan, and its configurations by step.
 type Answer = (Status, Option<String>, Vec<Vec<(String, String)>>);

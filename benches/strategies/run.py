@@ -7,7 +7,7 @@ Each run is a process of its own. Results as CSV, a line for each run, and a tab
 
   run.py PROGRAM --shared ../shared --strategies tighten,cores --solvers varisat,batsat --limit 60 > results.csv
 
-PROGRAM is `target/release/examples/formulas` (cargo build --release -p metaplan-encodings --example formulas).
+PROGRAM is `target/release/examples/formulas` (cargo build --release -p metaplan-planner --example formulas).
 """
 import argparse, collections, csv, math, os, random, resource, subprocess, sys, tempfile
 

@@ -9,13 +9,13 @@ use metaplan::answers::{
     ChangesAnswer, CompareAnswer, ComparisonAnswer, DesignAnswer, PlanAnswer, VerdictAnswer,
 };
 use metaplan::comparison::{self, Coadaptation, Compared, NoResult, Risk, Tasked};
-use metaplan::encodings::{Config, Exact, Limits, Plan, Solution, Step};
 use metaplan::file::source;
 use metaplan::knowledge::{COADAPTATION, Knowledge, Sources};
 use metaplan::mapek::Loop;
 use metaplan::message::{Errors, Message};
 use metaplan::mission::{self as missions, Bindings, Names, read_plan};
 use metaplan::pddl::{Source, validate};
+use metaplan::planner::{Config, Exact, Limits, Plan, Solution, Step};
 use metaplan::planner::{Planned as Found, Planner, consistent};
 use metaplan::report::{Positions, Seen};
 use metaplan::setup::Setup;
@@ -410,7 +410,7 @@ fn planned(setup: &Arc<Setup>, wanted: Wanted, on_improvement: Option<&Py<PyAny>
     let mission = &setup.mission;
     consistent(mission.knowledge())?;
     let raised: Mutex<Option<PyErr>> = Mutex::default();
-    let tell = |better: &metaplan::encodings::Improvement| {
+    let tell = |better: &metaplan::planner::Improvement| {
         let Some(listener) = on_improvement else { return ControlFlow::Continue(()) };
         let (cost, bound) = (better.cost.to_string(), better.lower_bound.to_string());
         let heard = Python::attach(|py| {

@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
-use encodings::{
-    Alternatives, Exact, Front, Moment, Part, Plan, Point, Proof, Solution, Statistics, Step, Unbounded,
+use planner::{
+    Alternatives, Exact, Front, MetricUnbounded, Moment, Plan, PlannerPart, Point, Proof, Solution,
+    Statistics, Step,
 };
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -247,7 +248,7 @@ impl PlanAnswer {
             lower_bound: solution.lower_bound.as_ref().map(exact_to_json),
             horizon: solution.horizon,
             proof: solution.proof.as_ref().map(|proof| ProofPart::of(proof, statistics)),
-            unbounded: solution.unbounded.map(Unbounded::as_str),
+            unbounded: solution.unbounded.map(MetricUnbounded::as_str),
             steps: solution.plan.as_ref().map(steps).unwrap_or_default(),
             statistics: StatisticsPart::of(statistics, preparation),
             objectives: None,
@@ -384,7 +385,7 @@ impl StatisticsPart {
             families: families.map(|(family, count)| ((*family).to_owned(), (*count).into())).collect(),
             conflicts: statistics.conflicts,
             solver_calls: statistics.calls,
-            found_by: statistics.found_by.map(Part::as_str),
+            found_by: statistics.found_by.map(PlannerPart::as_str),
             expanded: statistics.expanded,
             generated: statistics.generated,
             evaluated: statistics.evaluated,

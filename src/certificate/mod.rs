@@ -8,12 +8,12 @@ use std::io::{BufRead, BufReader, BufWriter};
 use std::path::Path;
 
 use certificate::{Faithful, StepBound, check, witness};
-use encodings::{
-    Certificate, ExactTask, Limits, RefutationOutputs, Solution, Status, Task, certify, certify_exact, refute,
-};
 use num_rational::BigRational;
 use pddl::ast::Problem;
 use pddl::{print_domain, print_problem};
+use planner::{
+    Certificate, ExactTask, Limits, RefutationOutputs, Solution, Status, Task, certify, certify_exact, refute,
+};
 
 pub use ::verify::{Claim, Verification, VerifiedPart, Verifier};
 

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use encodings::Alternatives;
 use metaplan::planner::Planned;
+use planner::Alternatives;
 
 use crate::cli::plan_text::steps_text;
 

@@ -4,8 +4,8 @@ use std::io::IsTerminal;
 use std::path::PathBuf;
 
 use clap::{Args, ColorChoice, ValueEnum};
-use encodings::Limits;
 use metaplan::message::{Errors, Message};
+use planner::Limits;
 use probabilistic::{Diagnostic, Error};
 
 /// Exit statuses; `docs/reference/statuses.md` lists them.

@@ -9,11 +9,11 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use encodings::Limits;
 use metaplan::answers::{CompareAnswer, ComparisonAnswer, Pair, Row, begun_rows, rows};
 use metaplan::comparison::{Candidate, Comparison, Costs};
 use metaplan::message::Message;
 use metaplan::report::comparison_sheet;
+use planner::Limits;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::compare_table::{as_text, costs_text, csv};

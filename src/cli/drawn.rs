@@ -4,11 +4,11 @@ use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use encodings::Solution;
 use metaplan::mission::Mission;
 use metaplan::picture::Sheet;
 use metaplan::report::timeline_picture;
 use metaplan::visible::visible;
+use planner::Solution;
 
 use crate::cli::common::Failure;
 use crate::cli::output;

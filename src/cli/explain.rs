@@ -4,7 +4,6 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use clap::Args;
-use encodings::Limits;
 use metaplan::answers::{ChangesAnswer, CodeAnswer, DesignAnswer};
 use metaplan::codes::{self, Code};
 use metaplan::explain::{
@@ -14,6 +13,7 @@ use metaplan::explain::{
 use metaplan::message::{Errors, Message, did_you_mean};
 use metaplan::mission::Mission;
 use num_rational::BigRational;
+use planner::Limits;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::limits::TimeLimit;

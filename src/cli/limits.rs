@@ -13,8 +13,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use encodings::Limits;
 use metaplan::message::Message;
+use planner::Limits;
 use verify::memory;
 
 use crate::cli::common::{Common, Exit, Failure};

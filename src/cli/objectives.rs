@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use encodings::{Exact, Front, Status};
+use planner::{Exact, Front, Status};
 
 use crate::cli::plan_answer::answer_text;
 use crate::cli::plan_text::steps_text;

@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use clap::{Args, ValueEnum};
-use encodings::{Backend, Config, Limits, Plan, Semantics, Solution, Status};
 use metaplan::message::Message;
 use metaplan::mission::numbers::MissingValue;
 use metaplan::mission::{Mission, btcpp_text, plan_lines, popf_text};
 use metaplan::planner::{Planned, PlannedFront, Planner};
 use metaplan::report::Positions;
 use metaplan::visible::visible;
+use planner::{Backend, Config, Limits, Plan, Solution, Status, StepSemantics};
 
 use crate::cli::alternatives;
 use crate::cli::common::{Common, Exit, Failure, Format};
@@ -122,7 +122,7 @@ enum EngineName {
     Search,
 }
 
-impl From<EngineName> for encodings::Engine {
+impl From<EngineName> for planner::Engine {
     fn from(engine: EngineName) -> Self {
         match engine {
             EngineName::Auto => Self::Auto,
@@ -132,7 +132,7 @@ impl From<EngineName> for encodings::Engine {
     }
 }
 
-impl From<StrategyName> for encodings::Strategy {
+impl From<StrategyName> for planner::Strategy {
     fn from(strategy: StrategyName) -> Self {
         match strategy {
             StrategyName::Auto => Self::Auto,
@@ -142,7 +142,7 @@ impl From<StrategyName> for encodings::Strategy {
     }
 }
 
-impl From<Encoding> for Semantics {
+impl From<Encoding> for StepSemantics {
     fn from(encoding: Encoding) -> Self {
         match encoding {
             Encoding::Sequential => Self::Sequential,
@@ -158,7 +158,7 @@ fn configuration(arguments: &Arguments, limits: Limits) -> Config {
         .with_horizon(arguments.horizon)
         .with_engine(arguments.engine.into())
         .with_confirmation(arguments.confirm)
-        .with_semantics(arguments.encoding.map(Semantics::from))
+        .with_semantics(arguments.encoding.map(StepSemantics::from))
         .with_strategy(arguments.strategy.into())
         .with_backend(arguments.solver.clone())
         .with_limits(limits)

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use encodings::{Part, Solution, Status};
 use metaplan::answers::{Preparation, milliseconds};
+use planner::{PlannerPart, Solution, Status};
 
 use crate::cli::output::counted;
 use crate::cli::plan_text::steps_text;
@@ -38,9 +38,9 @@ pub(super) fn statistics_text(solution: &Solution, preparation: &Preparation) ->
         statistics.families.iter().map(|(family, count)| format!("{family} {count}")).collect();
     let mut text = String::new();
     let found_by = match statistics.found_by {
-        Some(Part::Search) => "plan by search; ",
-        Some(Part::Satisficing) => "plan by relaxed plans and landmarks; ",
-        Some(Part::Sat) => "plan by the SAT solver; ",
+        Some(PlannerPart::Search) => "plan by search; ",
+        Some(PlannerPart::Satisficing) => "plan by relaxed plans and landmarks; ",
+        Some(PlannerPart::Sat) => "plan by the SAT solver; ",
         None => "",
     };
     let _ = writeln!(

@@ -2,7 +2,7 @@
 
 use clap::ValueEnum;
 
-use encodings::{Plan, Step};
+use planner::{Plan, Step};
 
 use crate::cli::output;
 

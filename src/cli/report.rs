@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
-use encodings::{Limits, Solution, Status};
 use metaplan::certificate::{Verification, Verifier};
 use metaplan::journal::JournalReport;
 use metaplan::message::Message;
@@ -15,6 +14,7 @@ use metaplan::report::{Cost, Positions, changes, log_picture};
 use metaplan::setup::Setup;
 use metaplan::visible::visible;
 use num_rational::BigRational;
+use planner::{Limits, Solution, Status};
 
 use crate::cli::common::{Common, Exit, Failure, Format};
 use crate::cli::concurrent::Overlap;

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use encodings::Limits;
 use metaplan::answers::{LogLine, SimulateAnswer, accomplished_cost, beside_joint, runs_of, sample};
 use metaplan::mapek::{Answer, Observation};
 use metaplan::message::Message;
@@ -13,6 +12,7 @@ use metaplan::mission::TimeUnit;
 use metaplan::report::simulation_sheet;
 use metaplan::setup::Setup;
 use metaplan::simulate::{Ending, Experiment, Run, SUAVE_COLUMNS, Sample, Strategy};
+use planner::Limits;
 use serde_json::Value;
 
 use crate::cli::common::{Common, Exit, Failure, Format};

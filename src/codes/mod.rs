@@ -25,7 +25,7 @@ pub fn all() -> Vec<Code> {
         pddl::CODES,
         ::mission::CODES,
         ::verify::CODES,
-        encodings::CODES,
+        planner::CODES,
         probabilistic::CODES,
         own::CODES,
         ros::CODES,

@@ -2,8 +2,8 @@
 
 use std::time::Instant;
 
-use encodings::{Limits, Step};
 use pddl::ast::Problem;
+use planner::{Limits, Step};
 
 use crate::comparison::coadaptation::{Coadaptation, Roles};
 use crate::comparison::compare::{Comparison, Config, Listener, compare};
@@ -74,7 +74,7 @@ fn solve(
     let problem = problem(mission)?;
     let task = mission.ground(&problem, &[], &Limits::none())?;
     let ground = started.elapsed();
-    let solution = encodings::optimize(&task, &encodings::Config::default(), &mut |_| {});
+    let solution = planner::optimize(&task, &planner::Config::default(), &mut |_| {});
     let actions = solution.plan.and_then(|plan| actions(&plan.steps));
     let statistics = &solution.statistics;
     let (build, solve) = (ground + statistics.encode, statistics.search + statistics.solve);

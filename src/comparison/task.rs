@@ -7,11 +7,11 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use encodings::{Limits, Situation as TaskState, Step, Task, Transition};
 use num_rational::BigRational;
 use num_traits::{One, Zero};
 use pddl::ast::{InitialElement, Name, Problem};
 use pddl::validate::{PlanStep, advance};
+use planner::{Limits, Step, Task, TaskState, Transition};
 
 use crate::comparison::coadaptation::{
     Arc, Coadaptation, Configuration, Facts, Loss, Roles, Switch, Traversal, components, fits,

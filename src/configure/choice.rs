@@ -2,10 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use encodings::{DesignChoice, Limits, configure};
 use num_rational::BigRational;
 use num_traits::Zero as _;
 use ontology::runtime::{Missed, Objective, Rejection};
+use planner::{DesignChoice, Limits, configure};
 
 use crate::knowledge::Knowledge;
 use crate::mapek::ruled_out;

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use encodings::Limits;
 use num_rational::BigRational;
 use num_traits::Signed as _;
 use ontology::runtime::{NewObjective, Objective};
+use planner::Limits;
 use rules::Literal;
 
 use crate::configure::choice::{Choice, Configuration, Wishes, Worth, choose};

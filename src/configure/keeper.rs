@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
-use encodings::Limits;
+use planner::Limits;
 use serde::Serialize;
 
 use crate::configure::choice::{Choice, Verdict, current};

@@ -7,10 +7,10 @@
 //!
 //! \[1\] R. Reiter: A theory of diagnosis from first principles, Artificial Intelligence 32, 1987.
 
-use encodings::Limits;
 use num_rational::BigRational;
 use ontology::tomasys::change::Status as Component;
 use ontology::tomasys::{FunctionDesign, Requirement};
+use planner::Limits;
 use std::cmp::Ordering;
 
 use crate::explain::parts::{Alteration, BestPlan, Change, Repair, Target};

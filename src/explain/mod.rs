@@ -13,9 +13,9 @@ mod thresholds;
 
 use std::collections::BTreeSet;
 
-use encodings::Limits;
 use ontology::tomasys::FunctionDesign;
 use ontology::vocab::local_name;
+use planner::Limits;
 
 use crate::mapek::PlannedStep;
 use crate::message::{Errors, Message};
@@ -84,7 +84,7 @@ pub fn availability(mission: &Mission, name: &str) -> Result<Availability, Error
 ///
 /// ```
 /// use std::path::Path;
-/// use metaplan::{encodings::Limits, explain, setup::Setup};
+/// use metaplan::{planner::Limits, explain, setup::Setup};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let mut mission = Setup::read(Path::new("missions/ugv.toml"))?.mission;

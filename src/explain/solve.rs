@@ -1,6 +1,6 @@
 //! The best plan for a mission as it is, or with other designs.
 
-use encodings::{Config, Limits, Status, optimize};
+use planner::{Config, Limits, Status, optimize};
 
 use crate::explain::parts::BestPlan;
 use crate::mapek::PlannedStep;

@@ -1,8 +1,8 @@
 //! The smallest changes of measurements and of values of the problem that lead to another plan.
 
-use encodings::Limits;
 use num_bigint::BigInt;
 use num_rational::BigRational;
+use planner::Limits;
 
 use crate::explain::parts::{Alteration, BestPlan, Change, Target, little};
 use crate::explain::solve::best;

@@ -19,7 +19,7 @@ pub(crate) struct Outcome {
     pub proved: bool,
     /// Why there is no plan.
     pub because: String,
-    /// Designs that are not available, by which alone there is none, if that is known; see [`encodings::Replanner::blocking`].
+    /// Designs that are not available, by which alone there is none, if that is known; see [`planner::Replanner::blocking`].
     pub blocking: Vec<String>,
 }
 

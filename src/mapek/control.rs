@@ -3,7 +3,7 @@
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
 
-use encodings::Limits;
+use planner::Limits;
 use serde_json::Value;
 use tracing::info_span;
 

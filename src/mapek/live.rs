@@ -3,9 +3,9 @@
 //! The live planner knows the mission's own domain only. What is left of an action under way is a step that comes first: its
 //! configurations are tried one by one on the domain in which that action is shortened, see [`super::resume`].
 
-use encodings::{First, Limits, Progress, Query, Replanned, Replanner};
 use num_rational::BigRational;
 use pddl::validate::advance_each;
+use planner::{FirstStep, Limits, Progress, Query, ReplanOutcome, Replanner};
 
 use crate::mapek::ask::{Ask, Outcome};
 use crate::mapek::resume::{GATE, resume};
@@ -39,7 +39,7 @@ impl Live {
         if ask.running.is_some() && first.is_empty() {
             return Some(none(Vec::new()));
         }
-        let (steps, first): (Vec<PlannedStep>, Vec<First>) = first.into_iter().unzip();
+        let (steps, first): (Vec<PlannedStep>, Vec<FirstStep>) = first.into_iter().unzip();
         let old: Option<Vec<(String, Vec<String>)>> = ask
             .old
             .map(|plan| plan.iter().map(|step| (step.action.clone(), step.arguments.clone())).collect());
@@ -56,23 +56,23 @@ impl Live {
             watch.improve(cost, progress.bound - &metric);
         };
         let mut answer = self.ask(ask, &query, false, &mut report)?;
-        if answer == Replanned::Misfit {
+        if answer == ReplanOutcome::Misfit {
             answer = self.ask(ask, &query, true, &mut report)?;
         }
-        let proved = matches!(answer, Replanned::Optimal { .. });
+        let proved = matches!(answer, ReplanOutcome::Optimal { .. });
         match answer {
-            Replanned::Optimal { first: begins, steps: rest, metric }
-            | Replanned::Feasible { first: begins, steps: rest, metric } => {
+            ReplanOutcome::Optimal { first: begins, steps: rest, metric }
+            | ReplanOutcome::Feasible { first: begins, steps: rest, metric } => {
                 let begins = begins.and_then(|index| steps.into_iter().nth(index));
                 let rest = rest.iter().map(|step| PlannedStep::new(ask.mission, step));
                 let steps = begins.into_iter().chain(rest).collect();
                 Some(Outcome { steps: Some(steps), cost: metric, proved, ..none(Vec::new()) })
             }
-            Replanned::Unsolvable if ask.running.is_none() => {
+            ReplanOutcome::Unsolvable if ask.running.is_none() => {
                 let Self::Ready(replanner) = self else { return None };
                 Some(none(replanner.blocking(&query).unwrap_or_default()))
             }
-            Replanned::Unsolvable => Some(none(Vec::new())),
+            ReplanOutcome::Unsolvable => Some(none(Vec::new())),
             _ => None,
         }
     }
@@ -83,7 +83,7 @@ impl Live {
         query: &Query<'_>,
         anew: bool,
         report: &mut dyn FnMut(Progress),
-    ) -> Option<Replanned> {
+    ) -> Option<ReplanOutcome> {
         if anew || matches!(self, Self::Untried) {
             let made = replanner(ask.mission, ask.problem, query.limits);
             *self = made.map_or(Self::Unsuited, Self::Ready);
@@ -107,7 +107,7 @@ fn none(blocking: Vec<String>) -> Outcome {
 }
 
 /// What is left of the action under way, with each configuration that it can go on with; none if those are too many, or unknown.
-pub(super) fn first_steps(ask: &Ask<'_>) -> Option<Vec<(PlannedStep, First)>> {
+pub(super) fn first_steps(ask: &Ask<'_>) -> Option<Vec<(PlannedStep, FirstStep)>> {
     let running = ask.running?;
     let mut steps = vec![running.step.clone()];
     for (function, _) in &running.step.configuration {
@@ -132,7 +132,7 @@ pub(super) fn first_steps(ask: &Ask<'_>) -> Option<Vec<(PlannedStep, First)>> {
         step.duration.clone_from(&change.duration);
         step.cost = &metric - &before;
         let (configuration, arguments) = (step.configuration.clone(), step.arguments.clone());
-        first.push((step, First { configuration, arguments, change, metric }));
+        first.push((step, FirstStep { configuration, arguments, change, metric }));
     }
     Some(first)
 }

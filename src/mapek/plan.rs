@@ -7,7 +7,7 @@ use std::borrow::Cow;
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use encodings::{Config, Limits, Status, optimize};
+use planner::{Config, Limits, Status, optimize};
 
 use crate::mapek::ask::{Ask, Outcome};
 use crate::mapek::live::Live;
@@ -107,7 +107,7 @@ pub(super) fn from_scratch(ask: &Ask<'_>, limits: Limits, watch: &Watch) -> Outc
         }
     };
     let config = Config::default().with_limits(limits);
-    let mut report = |better: encodings::Improvement| {
+    let mut report = |better: planner::Improvement| {
         watch.improve(Some(number::of_plan(&better.cost)), number::of_plan(&better.lower_bound));
     };
     let solution = optimize(&task, &config, &mut report);

@@ -69,7 +69,7 @@ impl JsonSchema for PlannedStep {
 
 impl PlannedStep {
     /// A step of a plan for a mission.
-    pub(crate) fn new(mission: &Mission, step: &encodings::Step) -> Self {
+    pub(crate) fn new(mission: &Mission, step: &planner::Step) -> Self {
         Self {
             action: step.action.clone(),
             arguments: step.arguments.clone(),

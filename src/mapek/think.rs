@@ -7,7 +7,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use encodings::Limits;
+use planner::Limits;
 
 use crate::mapek::answer::Answer;
 use crate::mapek::ask::Outcome;

@@ -9,8 +9,8 @@
 
 use std::fmt;
 
-use encodings::{Config, Status, optimize};
 use pddl::ast::Problem;
+use planner::{Config, Status, optimize};
 
 use ::mission::Mission;
 

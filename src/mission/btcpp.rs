@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 
 use ::mission::Mission;
-use encodings::{Plan, Step};
+use planner::{Plan, Step};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
 

@@ -2,10 +2,10 @@
 
 use ::mission::Mission;
 use ::verify::measure::measure;
-use encodings::{Limits, Plan};
 use num_rational::BigRational;
 use pddl::ast::{Name, Problem};
 use pddl::validate::{Interrupted, Options, PlanStep, PlanText, Verdict, validate_within};
+use planner::{Limits, Plan};
 
 /// How the validator is to read a plan.
 #[derive(Debug, Clone)]

@@ -5,8 +5,8 @@
 //! plan neighborhood graph search, ICAPS 2010).
 
 use ::mission::Mission;
-use encodings::{Limits, Plan};
 use pddl::ast::Problem;
+use planner::{Limits, Plan};
 
 use crate::mission::confirm::Reading;
 
@@ -39,9 +39,9 @@ pub fn lean(
 
 #[cfg(test)]
 mod tests {
-    use encodings::{Exact, Limits, Plan, Step};
     use num_rational::BigRational;
     use pddl::Source;
+    use planner::{Exact, Limits, Plan, Step};
 
     use super::lean;
 

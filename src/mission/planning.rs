@@ -2,10 +2,10 @@
 
 use std::borrow::Cow;
 
-use encodings::{Concurrent, ExactTask, GroundConfig, Limits, Plan, Replanner, Task};
 use num_rational::BigRational;
 use pddl::ast::{Domain, Metric, Name, Problem};
 use pddl::{Diagnostic, Severity};
+use planner::{ExactTask, GroundConfig, Limits, Plan, Replanner, Task, TemporalTask};
 
 use ::mission::Mission;
 
@@ -47,7 +47,7 @@ pub trait Planning {
         objectives: &[Metric],
         separation: &BigRational,
         limits: &Limits,
-    ) -> Result<Concurrent, Errors>;
+    ) -> Result<TemporalTask, Errors>;
 
     /// The plan with the arguments that the domain's file gives its actions: without the designs that the knowledge base has
     /// added to a plain domain. The configuration of each step has them.
@@ -71,7 +71,7 @@ impl Planning for Mission {
         limits: &Limits,
     ) -> Result<ExactTask, Errors> {
         let (domain, problem) = self.narrowed(problem);
-        encodings::ground_exact(&domain, &problem, &config(self, objectives, limits))
+        planner::ground_exact(&domain, &problem, &config(self, objectives, limits))
             .map_err(|errors| messages(self, &errors))
     }
 
@@ -81,9 +81,9 @@ impl Planning for Mission {
         objectives: &[Metric],
         separation: &BigRational,
         limits: &Limits,
-    ) -> Result<Concurrent, Errors> {
+    ) -> Result<TemporalTask, Errors> {
         let (domain, problem) = self.narrowed(problem);
-        encodings::ground_concurrent(&domain, &problem, &config(self, objectives, limits), separation)
+        planner::ground_concurrent(&domain, &problem, &config(self, objectives, limits), separation)
             .map_err(|errors| messages(self, &errors))
     }
 
@@ -109,7 +109,7 @@ pub(crate) fn ground_with(
     limits: &Limits,
 ) -> Result<Task, Errors> {
     let (domain, problem) = narrowed(mission, domain, problem);
-    encodings::ground(&domain, &problem, &config(mission, objectives, limits))
+    planner::ground(&domain, &problem, &config(mission, objectives, limits))
         .map_err(|errors| messages(mission, &errors))
 }
 
@@ -136,11 +136,11 @@ fn config(mission: &Mission, objectives: &[Metric], limits: &Limits) -> GroundCo
 }
 
 /// Errors of grounding and encoding, with the source lines that they are about.
-fn messages(mission: &Mission, errors: &[encodings::Error]) -> Errors {
+fn messages(mission: &Mission, errors: &[planner::Error]) -> Errors {
     let (domain, problem) = (mission.domain_source(), mission.problem_source());
-    let message = |error: &encodings::Error| match error.place() {
+    let message = |error: &planner::Error| match error.place() {
         Some(place) => {
-            let source = if place.file == encodings::File::Domain { domain } else { problem };
+            let source = if place.file == planner::File::Domain { domain } else { problem };
             let diagnostic =
                 Diagnostic::new(source, place.span, Severity::Error, error.code(), error.to_string());
             Message::from_pddl(&[diagnostic], &[domain, problem]).swap_remove(0)

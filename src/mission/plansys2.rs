@@ -6,9 +6,9 @@
 use std::fmt::Write as _;
 
 use ::mission::Mission;
-use encodings::{Exact, Limits, Plan, Step};
 use num_rational::BigRational;
 use pddl::ast::Problem;
+use planner::{Exact, Limits, Plan, Step};
 
 use crate::mission::confirm::{Reading, verdict_of};
 

@@ -10,9 +10,9 @@ use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use encodings::{Alternatives, Config, Improvement, Limits, Point, Solution, Status, Task};
 use num_rational::BigRational;
 use pddl::ast::Problem;
+use planner::Task;
 
 use crate::answers::Preparation;
 use crate::knowledge::Knowledge;
@@ -22,6 +22,10 @@ use crate::mission::{Mission, Planning as _, Reading, Unconfirmed, blocking, con
 use crate::planner::objectives::{Objectives, fault, unconfirmed};
 use crate::planner::planned::Ground;
 pub use crate::planner::planned::{Planned, PlannedFront};
+pub use ::planner::{
+    Alternatives, Backend, Config, Engine, Exact, Improvement, Limits, Plan, Point, Proof, Solution,
+    Statistics, Status, Step, Strategy,
+};
 
 /// Callback that receives a short description of the work after the best plan is proved.
 type Stage<'a> = dyn FnMut(&str) + 'a;
@@ -34,8 +38,7 @@ type Report<'a> = dyn FnMut(&Improvement) -> ControlFlow<()> + 'a;
 /// ```
 /// use std::path::Path;
 /// use std::time::Duration;
-/// use metaplan::encodings::Status;
-/// use metaplan::planner::Planner;
+/// use metaplan::planner::{Planner, Status};
 /// use metaplan::setup::Setup;
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -181,7 +184,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         let task = self.mission.ground(&self.problem, &objectives.metrics, &self.config.limits)?;
         let preparation = Preparation { ground: began.elapsed(), ..Preparation::default() };
         let config = self.config.clone();
-        let front = encodings::pareto(&task, &config, &mut self.hear());
+        let front = planner::pareto(&task, &config, &mut self.hear());
         let reading = Reading::sequential(task.is_timed());
         for point in &front.points {
             objectives.confirm(self.mission, &self.problem, point, &reading, &config.limits)?;
@@ -199,7 +202,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         let limits = self.config.limits.clone();
         let task = self.mission.ground_concurrent(&self.problem, &objectives.metrics, separation, &limits)?;
         let ground = began.elapsed();
-        let mut solution = encodings::optimize_concurrent(&task, &limits, &mut self.hear());
+        let mut solution = planner::optimize_concurrent(&task, &limits, &mut self.hear());
         let reading = Reading::concurrent(separation);
         if let Some(plan) = solution.plan.take() {
             let mut problem = self.problem.clone();
@@ -221,7 +224,7 @@ impl<'m, 'r> Planner<'m, 'r> {
             Err(refused) => return Err(refused),
         };
         let ground = began.elapsed();
-        let point = encodings::lexicographic(&task, &config, &mut self.hear());
+        let point = planner::lexicographic(&task, &config, &mut self.hear());
         let reading = Reading::sequential(task.is_timed());
         let others = match self.alternatives {
             Some(most) => {
@@ -247,7 +250,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         let began = Instant::now();
         let task = self.mission.ground_exact(&self.problem, &objectives.metrics, &self.config.limits)?;
         let ground = began.elapsed();
-        let point = valued(encodings::optimize_exact(&task, &self.config), &objectives);
+        let point = valued(planner::optimize_exact(&task, &self.config), &objectives);
         let reading = Reading::sequential(task.is_timed());
         let mut planned = self.planned(point, objectives, Ground::Exact(task), reading, ground)?;
         planned.too_large = refused.into_vec();
@@ -256,7 +259,7 @@ impl<'m, 'r> Planner<'m, 'r> {
 
     /// Further plans; each is executed by the validator as the first one is.
     fn others(&self, task: &Task, solution: &Solution, most: usize) -> Result<Option<Alternatives>, Errors> {
-        let Some(mut found) = encodings::alternatives(task, solution, most, &self.config) else {
+        let Some(mut found) = planner::alternatives(task, solution, most, &self.config) else {
             return Ok(None);
         };
         let reading = Reading::sequential(task.is_timed());

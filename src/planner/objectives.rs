@@ -1,7 +1,7 @@
 //! What plans are measured by, and that they are.
 
-use encodings::{Limits, Point};
 use pddl::ast::{Metric, Problem};
+use planner::{Limits, Point};
 
 use crate::message::{Errors, Message};
 use crate::mission::{Mission, Reading, Unconfirmed, confirm};

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use encodings::{Alternatives, Exact, ExactTask, Front, Limits, Plan, Solution, Task};
 use pddl::ast::Problem;
+use planner::{Alternatives, Exact, ExactTask, Front, Limits, Plan, Solution, Task};
 
 use crate::answers::{Objective, ParetoAnswer, PlanAnswer, Preparation};
 use crate::certificate::{self, Contents};

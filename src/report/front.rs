@@ -1,7 +1,7 @@
 //! A front of two objectives to what is drawn of it.
 
-use encodings::{Front, Status};
 use picture::{Part, Points, Sheet};
+use planner::{Front, Status};
 
 use crate::report::plan::plan_picture;
 use crate::report::seen::Seen;

@@ -6,12 +6,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use encodings::Plan;
 use pddl::ast::{
     Action, ActionBody, Atom, Condition, Domain, Effect, InitialElement, Name, Problem, Term, TypeExpression,
     TypedName,
 };
 use picture::{Map, Place, Step};
+use planner::Plan;
 
 use crate::report::seen::Scene;
 

@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use encodings::Plan;
 use num_rational::BigRational;
 use pddl::ast::Name;
 use pddl::validate::{Course, CourseMoment, NumberBound, PlanStep, PlanText, course, metric_after};
 use picture::{Axis, Bound, Curve, Step};
+use planner::Plan;
 
 use crate::number;
 use crate::report::seen::Scene;

@@ -1,8 +1,8 @@
 //! What a loop is about to do, as a part of a page.
 
-use encodings::{Plan, Step};
 use num_rational::BigRational;
 use pddl::ast::Condition;
+use planner::{Plan, Step};
 
 use crate::mapek::{Outlook, PlannedStep};
 use crate::mission::Mission;

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use encodings::{Exact, Plan, Solution, Status, Step};
 use picture::Axis;
+use planner::{Exact, Plan, Solution, Status, Step};
 
 use crate::mission::Mission;
 use crate::report::designs::designs;

@@ -17,7 +17,7 @@ mod world;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
-use encodings::Limits;
+use planner::Limits;
 
 use crate::mapek::{Answer, Command, Event, Loop, Observation, Settings};
 use crate::message::{Errors, Message};
@@ -36,7 +36,7 @@ use world::World;
 ///
 /// ```
 /// use std::path::Path;
-/// use metaplan::{encodings::Limits, setup::Setup, simulate::Strategy};
+/// use metaplan::{planner::Limits, setup::Setup, simulate::Strategy};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let experiment = Setup::read(Path::new("missions/ugv.toml"))?.experiment("kinect_at_wp2")?;

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use encodings::Limits;
+use planner::Limits;
 use serde_json::Value;
 
 use super::results::Line;

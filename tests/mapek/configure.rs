@@ -5,13 +5,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-use encodings::Limits;
 use metaplan::configure::{Configurator, Goal, Keeper, KeeperAnswer, Service, Wishes, Worth};
 use metaplan::knowledge::{Knowledge, RobotReport, Sources};
 use metaplan::mapek::{Answer, Observation};
 use num_rational::BigRational;
 use ontology::ReadOptions;
 use ontology::tomasys::change::Status;
+use planner::Limits;
 use rules::{Delta, Fact};
 use serde_json::Value;
 

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use metaplan::encodings::Limits;
+use metaplan::planner::Limits;
 use metaplan::setup::Setup;
 use metaplan::simulate::{Disturbance, Experiment, RandomFailure, Run, Simulation, Strategy};
 

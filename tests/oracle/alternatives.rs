@@ -6,9 +6,9 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use encodings::{Config, Engine, Limits, Status, Thresholds};
 use fastrand::Rng;
 use metaplan::mission::Planning as _;
+use planner::{Config, Engine, Limits, Status, Thresholds};
 
 use crate::judge::{read, setting};
 
@@ -168,14 +168,14 @@ fn check(seed: u64) -> Option<bool> {
     let ground = mission.ground(&filled, &[], &limits).expect("a ground task");
     let config = Config::default().with_limits(limits);
     let config = if seed.is_multiple_of(3) { config.with_engine(Engine::Sat) } else { config };
-    let solution = encodings::optimize(&ground, &config, &mut |_| {});
+    let solution = planner::optimize(&ground, &config, &mut |_| {});
     if solution.status != Status::Optimal {
         return None;
     }
-    let numbers = |plan: &encodings::Plan| -> Vec<usize> {
+    let numbers = |plan: &planner::Plan| -> Vec<usize> {
         plan.steps.iter().map(|step| step.action[1..].parse().expect("a number")).collect()
     };
-    let found = encodings::alternatives(&ground, &solution, 30, &config)?;
+    let found = planner::alternatives(&ground, &solution, 30, &config)?;
     let plan = solution.plan.as_ref().expect("an optimal plan");
     let (first, cost) = (numbers(plan), plan.cost.to_string().parse().expect("a small number"));
     let known: BTreeSet<Vec<usize>> = found.plans.iter().map(numbers).chain([first.clone()]).collect();

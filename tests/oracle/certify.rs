@@ -1,9 +1,9 @@
 //! Certifies what the planner claims, and has the certificate verified.
 
-use encodings::{ExactTask, Limits, Solution, Status, Task};
 use metaplan::certificate::{self, Contents, Ground};
 use metaplan::mission::Mission;
 use pddl::ast::{InitialElement, Problem};
+use planner::{ExactTask, Limits, Solution, Status, Task};
 
 use crate::judge::{Case, Tally, Truth, compare, plan_lines, rational, steps_of};
 

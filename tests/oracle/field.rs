@@ -5,10 +5,10 @@
 
 use std::time::Duration;
 
-use encodings::{Config, Limits, Status};
 use metaplan::mission::Planning as _;
 use num_bigint::BigInt;
 use num_rational::BigRational;
+use planner::{Config, Limits, Status};
 
 use crate::judge::{Case, Mode, Step, Tally, Truth, judge, read};
 
@@ -417,7 +417,7 @@ fn n3_doublings() {
     let limits = Limits::none().with_time(Duration::from_secs(20));
     if let Ok(task) = mission.ground(&problem, &[], &limits) {
         let config = Config::default().with_horizon(75).with_limits(limits);
-        let solution = encodings::optimize(&task, &config, &mut |_| {});
+        let solution = planner::optimize(&task, &config, &mut |_| {});
         assert!(!matches!(solution.status, Status::UnsolvableWithinHorizon | Status::Unsolvable));
     }
 }

@@ -8,7 +8,6 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use encodings::{Config, Exact, Limits, Plan, Solution, Status, Thresholds, Unbounded};
 use metaplan::Errors;
 use metaplan::measure::measure;
 use metaplan::mission::{Bindings, Mission, Planning as _};
@@ -17,6 +16,7 @@ use num_traits::Zero as _;
 use pddl::Source;
 use pddl::ast::{Name, Problem};
 use pddl::validate::{Options, PlanStep, PlanText, Verdict, validate};
+use planner::{Config, Exact, Limits, MetricUnbounded, Plan, Solution, Status, Thresholds};
 
 use crate::certify::{self, Planned};
 
@@ -216,7 +216,7 @@ fn plan(
                     Err(messages) => refused(messages),
                     Ok(task) => {
                         let config = Config::default().with_limits(limits.clone());
-                        let solution = encodings::optimize_exact(&task, &config);
+                        let solution = planner::optimize_exact(&task, &config);
                         let (timed, task) =
                             (task.is_timed(), is_certified.then(|| Planned::Exact(Box::new(task))));
                         Answer::Solved(Box::new(Solved { solution, timed, task }))
@@ -226,7 +226,7 @@ fn plan(
             Err(messages) => refused(messages),
             Ok(task) => {
                 let config = config(name, limits.clone(), thresholds);
-                let point = encodings::lexicographic(&task, &config, &mut |_| {});
+                let point = planner::lexicographic(&task, &config, &mut |_| {});
                 let timed = task.is_timed();
                 let task = is_certified.then(|| Planned::Integers(Box::new(task)));
                 Answer::Solved(Box::new(Solved { solution: point.solution, timed, task }))
@@ -235,7 +235,7 @@ fn plan(
         Mode::Concurrent(separation) => match mission.ground_concurrent(problem, &[], separation, limits) {
             Err(messages) => refused(messages),
             Ok(task) => {
-                let solution = encodings::optimize_concurrent(&task, limits, &mut |_| {});
+                let solution = planner::optimize_concurrent(&task, limits, &mut |_| {});
                 Answer::Solved(Box::new(Solved { solution, timed: true, task: None }))
             }
         },
@@ -401,8 +401,8 @@ fn check_claim(case: &Case, solved: &Solved, tally: &mut Tally) {
     let solution = &solved.solution;
     let cost = solution.plan.as_ref().map(|plan| rational(&plan.cost));
     tally.count(match (solution.status, solution.unbounded) {
-        (Status::Feasible, Some(Unbounded::Proved)) => "planner: no best value, proved",
-        (Status::Feasible, Some(Unbounded::Suspected)) => "planner: no best value, suspected",
+        (Status::Feasible, Some(MetricUnbounded::Proved)) => "planner: no best value, proved",
+        (Status::Feasible, Some(MetricUnbounded::Suspected)) => "planner: no best value, suspected",
         (Status::Optimal, _) => "planner: optimal",
         (Status::Feasible, None) => "planner: feasible",
         (Status::Unsolvable, _) => "planner: no plan",
@@ -423,7 +423,7 @@ fn check_claim(case: &Case, solved: &Solved, tally: &mut Tally) {
         {
             Some("false: optimal")
         }
-        (Status::Feasible, Truth::Best(best, _)) if solution.unbounded == Some(Unbounded::Proved) => {
+        (Status::Feasible, Truth::Best(best, _)) if solution.unbounded == Some(MetricUnbounded::Proved) => {
             let _ = best;
             Some("false: no best value")
         }

@@ -18,6 +18,4 @@ mod front;
 mod judge;
 mod magnify;
 mod numbers;
-#[path = "../../encodings/tests/random/mod.rs"]
-mod random;
 mod temporal;

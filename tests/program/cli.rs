@@ -336,7 +336,7 @@ fn numbers_of_any_size_are_planned_with() {
 #[test]
 fn every_solver_proves_the_same() {
     let cheapest = metaplan(&["plan", "missions/ugv.toml"]);
-    for solver in encodings::Backend::BUILT_IN {
+    for solver in planner::Backend::BUILT_IN {
         let answer = metaplan(&["plan", "missions/ugv.toml", "--solver", solver]);
         assert_eq!((answer.status, &answer.stdout), (0, &cheapest.stdout), "{solver}");
     }

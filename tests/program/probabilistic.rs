@@ -127,11 +127,11 @@ fn least_time(mission: &Coadaptation, risk: Risk) -> Option<BigRational> {
 /// The planner's optimum; none if there is proved to be no plan.
 fn planned(mission: &Mission) -> Option<f64> {
     let (problem, _) = mission.filled().expect("filled");
-    let task = mission.ground(&problem, &[], &encodings::Limits::none()).expect("ground");
-    let solution = encodings::optimize(&task, &encodings::Config::default(), &mut |_| {});
+    let task = mission.ground(&problem, &[], &planner::Limits::none()).expect("ground");
+    let solution = planner::optimize(&task, &planner::Config::default(), &mut |_| {});
     match solution.status {
-        encodings::Status::Optimal => solution.plan.map(|plan| plan.cost.to_f64()),
-        encodings::Status::Unsolvable => None,
+        planner::Status::Optimal => solution.plan.map(|plan| plan.cost.to_f64()),
+        planner::Status::Unsolvable => None,
         other => panic!("{other:?}"),
     }
 }

@@ -6,7 +6,7 @@ use metaplan::codes::{self, Code};
 
 /// The crates that have a table, and the letters of codes.
 const TABLES: [&str; 10] =
-    ["rules", "ontology", "pddl", "encodings", "probabilistic", "mission", "verify", "src", "ros", "fleet"];
+    ["rules", "ontology", "pddl", "task", "probabilistic", "mission", "verify", "src", "ros", "fleet"];
 const LETTERS: &str = "EMNOPQR";
 
 /// The codes that stand in a text as words, outside of comments and tests.
@@ -20,7 +20,7 @@ fn given(text: &str) -> BTreeSet<String> {
 
 /// The crate that a file belongs to, if it has a table.
 fn owner(path: &str) -> Option<&'static str> {
-    let folder = path.split('/').next().unwrap_or_default();
+    let folder = path.trim_start_matches("crates/").split('/').next().unwrap_or_default();
     TABLES.into_iter().find(|table| *table == folder)
 }
 

@@ -4,8 +4,19 @@ use std::collections::BTreeSet;
 use std::process::Command;
 
 /// Packages that plan, decide or search, which nothing that has to be believed is linked with.
-const PLANNERS: [&str; 7] =
-    ["metaplan", "metaplan-encodings", "metaplan-probabilistic", "batsat", "cadical", "rustsat", "varisat"];
+const PLANNERS: [&str; 11] = [
+    "metaplan",
+    "metaplan-task",
+    "metaplan-search",
+    "metaplan-temporal",
+    "metaplan-encodings",
+    "metaplan-planner",
+    "metaplan-probabilistic",
+    "batsat",
+    "cadical",
+    "rustsat",
+    "varisat",
+];
 
 /// What reasons, or reads knowledge. The checker of plans has nothing of it. Who checks derivations, too, is linked with the rule engine for
 /// its replay, and with OWL for its reading.

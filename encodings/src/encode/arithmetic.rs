@@ -1,15 +1,16 @@
 //! Binary numbers in clauses: two's complement, ripple-carry addition, constants folded.
 
-use crate::encode::formula::{Family, Formula, Meaning};
-use crate::number::{Int, dense};
+use task::number::{Int, dense};
+
+use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::sat::Lit;
 
 /// Bits of a number, the lowest first; the last one is the sign.
-pub(crate) type Bits = Vec<Lit>;
+pub type Bits = Vec<Lit>;
 
 /// How many bits a number needs, sign included.
 #[expect(clippy::arithmetic_side_effects, reason = "a number has at most 128 leading zeros")]
-pub(crate) fn width(low: Int, high: Int) -> usize {
+pub fn width(low: Int, high: Int) -> usize {
     let bits = |number: Int| {
         129 - if number < 0 { (!number).leading_zeros() } else { number.leading_zeros() } as usize
     };
@@ -17,7 +18,7 @@ pub(crate) fn width(low: Int, high: Int) -> usize {
 }
 
 /// Builds numbers for one family of clauses.
-pub(crate) struct Arithmetic<'f> {
+pub struct Arithmetic<'f> {
     pub(crate) formula: &'f mut Formula,
     pub(crate) family: Family,
 }
@@ -25,7 +26,7 @@ pub(crate) struct Arithmetic<'f> {
 impl Arithmetic<'_> {
     fn bit(&mut self) -> Lit {
         let bit = dense(self.formula.variables());
-        self.formula.fresh(Meaning::Bit { bit })
+        self.formula.fresh(VariableMeaning::Bit { bit })
     }
 
     pub(crate) fn constant(value: Int, width: usize) -> Bits {
@@ -197,8 +198,8 @@ impl Arithmetic<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::limits::Limits;
     use crate::sat::{Answer, Backend};
+    use task::limits::Limits;
 
     /// Whether the formula has an assignment in which the bits read as the value.
     fn can_be(formula: &Formula, bits: &Bits, value: Int) -> bool {
@@ -211,7 +212,7 @@ mod tests {
     }
 
     fn free(formula: &mut Formula, bits: usize) -> Bits {
-        (0..bits).map(|bit| formula.fresh(Meaning::Bit { bit: bit as u32 })).collect()
+        (0..bits).map(|bit| formula.fresh(VariableMeaning::Bit { bit: bit as u32 })).collect()
     }
 
     fn fix(formula: &mut Formula, bits: &Bits, value: Int) {

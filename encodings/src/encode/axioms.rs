@@ -10,13 +10,14 @@
 
 use std::collections::BTreeMap;
 
+use task::number::dense;
+use task::task::{Layer, VariableId};
+
 use crate::encode::arithmetic::Bits;
 use crate::encode::builder::Builder;
-use crate::encode::formula::{Family, Formula, Meaning};
+use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::numeric::is_at_least_zero;
-use crate::number::dense;
 use crate::sat::Lit;
-use crate::task::{Layer, VariableId};
 
 /// What derived variables hold before a step; `numbers` are the numeric variables then. None if numbers do not fit.
 pub(super) fn axioms(builder: &mut Builder<'_>, step: usize, numbers: &[Bits]) -> Option<()> {
@@ -33,7 +34,7 @@ pub(super) fn axioms(builder: &mut Builder<'_>, step: usize, numbers: &[Bits]) -
             for comparison in &rule.body.comparisons {
                 premises.push(is_at_least_zero(&mut builder.formula, comparison, numbers, Family::Axiom)?);
             }
-            let meaning = Meaning::Body { layer: index, rule: position, step: dense(step) };
+            let meaning = VariableMeaning::Body { layer: index, rule: position, step: dense(step) };
             let body = builder.formula.equivalent(meaning, &premises, Family::Axiom);
             let own = rule.body.facts.iter().filter(|fact| fact.value == 0).map(|fact| fact.variable);
             let own = own.filter(|variable| heads.contains(variable)).collect();
@@ -67,7 +68,11 @@ fn levels(
     for variable in bodies.keys() {
         let literals: Vec<_> = (1..rounds)
             .map(|rounds| {
-                builder.formula.fresh(Meaning::Later { variable: variable.0, rounds, step: dense(step) })
+                builder.formula.fresh(VariableMeaning::Later {
+                    variable: variable.0,
+                    rounds,
+                    step: dense(step),
+                })
             })
             .collect();
         for pair in literals.windows(2) {
@@ -84,7 +89,7 @@ fn levels(
                 supports.push(*body);
                 continue;
             }
-            let support = builder.formula.fresh(Meaning::Ladder);
+            let support = builder.formula.fresh(VariableMeaning::Ladder);
             builder.formula.add(Family::Axiom, [!support, *body]);
             for below in own {
                 // In one round nothing of the layer can have come before.

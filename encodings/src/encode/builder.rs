@@ -6,14 +6,14 @@
 use std::collections::BTreeMap;
 
 use rustc_hash::FxHashMap;
+use task::context::Context;
+use task::limits::{Interrupted, Limits};
+use task::number::dense;
+use task::task::{Operator, OperatorId, Task};
 
-use crate::context::Context;
-use crate::encode::formula::{Family, Formula, Meaning};
+use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::variables::Variables;
-use crate::limits::{Interrupted, Limits};
-use crate::number::dense;
 use crate::sat::Lit;
-use crate::task::{Operator, OperatorId, Task};
 
 /// A task, when to stop, its formula as far as it goes, and what stands for what in it.
 pub(super) struct Builder<'a> {
@@ -37,7 +37,7 @@ impl<'a> Builder<'a> {
 
     /// An error once a limit is reached, or if there are too many clauses.
     pub(super) fn check(&self) -> Result<(), Interrupted> {
-        if self.formula.len() > self.most { Err(Interrupted) } else { self.limits.check() }
+        if self.formula.clause_count() > self.most { Err(Interrupted) } else { self.limits.check() }
     }
 
     /// The variable of a group of operators at a step; members that cannot be at the step are left out.
@@ -57,7 +57,8 @@ impl<'a> Builder<'a> {
         if let Some(known) = self.groups.get(&key) {
             return *known;
         }
-        let group = self.formula.fresh(Meaning::Group { group: dense(self.groups.len()), step: dense(step) });
+        let group =
+            self.formula.fresh(VariableMeaning::Group { group: dense(self.groups.len()), step: dense(step) });
         for (_, literal) in &present {
             self.formula.add(family, [!*literal, group]);
         }

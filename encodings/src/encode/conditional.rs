@@ -3,14 +3,15 @@
 //! - `f@t ↔ o@t ∧ ⋀ l@t` for an effect of operator o whose condition is the literals l;
 //! - `f@t → e@t+1` for each fact that it sets, unless an effect after it sets the variable to something else.
 
+use task::number::dense;
+use task::task::{Fact, OperatorId};
+
 use crate::encode::builder::Builder;
-use crate::encode::formula::{Family, Formula, Meaning};
-use crate::number::dense;
+use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::sat::Lit;
-use crate::task::{Fact, OperatorId};
 
 /// A conditional effect at a step.
-pub(super) struct Fired<'a> {
+pub(super) struct ConditionalEffectVar<'a> {
     operator: OperatorId,
     position: usize,
     /// Whether it takes place.
@@ -19,9 +20,9 @@ pub(super) struct Fired<'a> {
 }
 
 /// The conditional effects of the operators at a step.
-pub(super) struct Fires<'a>(Vec<Fired<'a>>);
+pub(super) struct FiredEffects<'a>(Vec<ConditionalEffectVar<'a>>);
 
-impl<'a> Fires<'a> {
+impl<'a> FiredEffects<'a> {
     /// Makes the variables of the conditional effects at a step, and clauses for what they set.
     #[expect(
         clippy::arithmetic_side_effects,
@@ -37,15 +38,16 @@ impl<'a> Fires<'a> {
                 let literal = if premises.contains(&!Formula::truth()) {
                     !Formula::truth()
                 } else {
-                    let meaning = Meaning::Fires { operator: id.0, effect: position, step: dense(step) };
+                    let meaning =
+                        VariableMeaning::Fires { operator: id.0, effect: position, step: dense(step) };
                     builder.formula.equivalent(meaning, &premises, Family::Conditional)
                 };
                 let position = position as usize;
-                all.push(Fired { operator: *id, position, literal, effects: &effect.effects });
+                all.push(ConditionalEffectVar { operator: *id, position, literal, effects: &effect.effects });
             }
         }
         let fires = Self(all);
-        for Fired { operator, position, literal, effects } in fires.iter() {
+        for ConditionalEffectVar { operator, position, literal, effects } in fires.iter() {
             for effect in *effects {
                 let fact = builder.variables.fact(*effect, step + 1);
                 let others = fires.prevailing(*operator, position + 1, *effect);
@@ -55,7 +57,7 @@ impl<'a> Fires<'a> {
         fires
     }
 
-    pub(super) fn iter(&self) -> impl Iterator<Item = &Fired<'a>> {
+    pub(super) fn iter(&self) -> impl Iterator<Item = &ConditionalEffectVar<'a>> {
         self.0.iter()
     }
 

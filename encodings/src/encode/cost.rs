@@ -10,29 +10,30 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::bounds::Bounds;
+use search::bounds::Bounds;
+use task::number::{Int, dense};
+use task::task::{Operator, OperatorId};
+
 use crate::encode::arithmetic::{Arithmetic, Bits, width};
 use crate::encode::builder::Builder;
 use crate::encode::designs::combinations;
-use crate::encode::formula::{Family, Formula, Meaning};
+use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::interference::Interference;
-use crate::number::{Int, dense};
 use crate::sat::Lit;
-use crate::task::{Operator, OperatorId};
 
 /// More amounts than this at one step, and the sum is binary.
 const AMOUNT_LIMIT: usize = 1_000;
 
 /// The cost limit of an encoding: only plans with cost at most `limit` count, by the estimates of `bounds`.
-pub(crate) struct CostLimit<'a> {
-    pub(crate) limit: Int,
-    pub(crate) bounds: &'a Bounds,
-    pub(crate) counting: Counting,
+pub struct CostLimit<'a> {
+    pub limit: Int,
+    pub bounds: &'a Bounds,
+    pub counting: CostEncoding,
 }
 
 /// What an encoding makes of the costs of steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Counting {
+pub enum CostEncoding {
     /// Their sum, which the limit holds down.
     Sum,
     /// Literals with weights, which the solver is to keep false. Only what exceeds the limit by itself is excluded.
@@ -88,7 +89,7 @@ impl Cost {
         }
         let mut sum = Sum { builder, cost, interference, gap };
         let sources = sum.sources()?;
-        let spent = if cost.counting == Counting::Apart {
+        let spent = if cost.counting == CostEncoding::Apart {
             Spent::Apart(sources.iter().flat_map(|source| sum.apart(source)).collect())
         } else if amounts_fit(&sources, gap) {
             Spent::Order(sum.in_order(&sources)?)
@@ -213,7 +214,8 @@ impl Sum<'_, '_> {
                     self.builder.variables.values[step + 1][variable.index()][value as usize]
                 }));
             }
-            let to_go = (potential.to_go(transition.source), potential.to_go(transition.target));
+            let to_go =
+                (potential.goal_distance(transition.source), potential.goal_distance(transition.target));
             if let (Some(before), Some(after)) = to_go {
                 alive.push((here, least + after - before));
             } else {
@@ -255,7 +257,7 @@ impl Sum<'_, '_> {
             next_amounts(&spent.keys().copied().collect(), increments.keys().copied(), self.gap);
         let mut after: BTreeMap<Int, Lit> = BTreeMap::new();
         for amount in amounts {
-            let literal = self.builder.formula.fresh(Meaning::CostAtLeast {
+            let literal = self.builder.formula.fresh(VariableMeaning::CostAtLeast {
                 amount,
                 step: source.step + 1,
                 stage: source.stage,
@@ -285,7 +287,8 @@ impl Sum<'_, '_> {
                 !Formula::truth()
             } else {
                 let formula = &mut self.builder.formula;
-                let meaning = Meaning::Increment { amount: *amount, step: source.step, stage: source.stage };
+                let meaning =
+                    VariableMeaning::Increment { amount: *amount, step: source.step, stage: source.stage };
                 *increments.entry(*amount).or_insert_with(|| formula.fresh(meaning))
             };
             self.builder

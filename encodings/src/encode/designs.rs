@@ -1,10 +1,10 @@
 //! The designs of operators in the task's numbering.
 
-use crate::number::dense;
-use crate::task::{Operator, SlotUse};
+use task::number::dense;
+use task::task::{Operator, SlotUse};
 
 /// Slot and design in the task's numbering, from positions in an operator.
-pub(super) fn global(slots: &[SlotUse], slot: u32, design: u32) -> (usize, usize) {
+pub(super) fn task_slot(slots: &[SlotUse], slot: u32, design: u32) -> (usize, usize) {
     let usage = &slots[slot as usize];
     (usage.slot.index(), usage.designs[design as usize] as usize)
 }
@@ -19,7 +19,7 @@ pub(super) fn combinations(operator: &Operator, slots: &[u32]) -> Vec<Vec<(usize
             .flat_map(|known: &Vec<(usize, usize)>| {
                 designs.clone().map(move |design| {
                     let mut longer = known.clone();
-                    longer.push(global(&operator.slots, *slot, design));
+                    longer.push(task_slot(&operator.slots, *slot, design));
                     longer
                 })
             })

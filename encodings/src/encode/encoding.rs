@@ -2,43 +2,44 @@
 
 use std::cell::OnceCell;
 
-use crate::context::Context;
+use task::context::Context;
+use task::limits::Interrupted;
+use task::number::{Int, dense};
+use task::plan::ground::GroundStep;
+use task::task::Task;
+
 use crate::encode::axioms::axioms;
 use crate::encode::builder::Builder;
-use crate::encode::conditional::Fires;
+use crate::encode::conditional::FiredEffects;
 use crate::encode::cost::{Cost, CostLimit};
-use crate::encode::designs::global;
+use crate::encode::designs::task_slot;
 use crate::encode::formula::Formula;
 use crate::encode::goal::goal;
-use crate::encode::interference::{Interference, Semantics};
+use crate::encode::interference::{Interference, StepSemantics};
 use crate::encode::numeric::numeric;
 use crate::encode::operators::{conditions, effects, sequence};
 use crate::encode::selection::selection;
 use crate::encode::state::{domain, frame};
 use crate::encode::symmetry::Symmetry;
 use crate::encode::variables::Variables;
-use crate::limits::Interrupted;
-use crate::number::{Int, dense};
-use crate::plan::ground::GroundStep;
 use crate::sat::{Lit, Solver};
-use crate::task::Task;
 
 /// Which plans a formula is about.
-pub(crate) struct Plans<'a> {
+pub struct PlanConstraints<'a> {
     /// For each step, whether each operator can be there; there are no more steps.
-    pub(crate) allowed: &'a [Vec<bool>],
+    pub allowed: &'a [Vec<bool>],
     /// What they cost at most, if that matters.
-    pub(crate) cost: Option<CostLimit<'a>>,
+    pub cost: Option<CostLimit<'a>>,
     /// How many operators stand at a step.
-    pub(crate) semantics: Semantics,
+    pub semantics: StepSemantics,
     /// A formula that comes to more clauses is not finished.
-    pub(crate) most: usize,
+    pub max_clauses: usize,
 }
 
 /// A formula and what its variables mean.
-pub(crate) struct Encoding<'a> {
+pub struct Encoding<'a> {
     pub(super) task: &'a Task,
-    pub(crate) formula: Formula,
+    pub formula: Formula,
     variables: Variables,
     cost: Option<Cost>,
 }
@@ -46,7 +47,11 @@ pub(crate) struct Encoding<'a> {
 impl<'a> Encoding<'a> {
     /// Encodes plans; of those that differ by exchanging what is equal only some. What is equal is found out once for a task, and
     /// kept in `symmetry`. None if a limit was reached meanwhile, if there are too many clauses, or if numbers are too large for a formula.
-    pub(crate) fn new(context: Context<'a>, plans: Plans<'_>, symmetry: &OnceCell<Symmetry>) -> Option<Self> {
+    pub fn new(
+        context: Context<'a>,
+        plans: PlanConstraints<'_>,
+        symmetry: &OnceCell<Symmetry>,
+    ) -> Option<Self> {
         let (mut builder, cost) = build(context, plans)?;
         if builder.variables.horizon() > 0 {
             if symmetry.get().is_none() {
@@ -58,7 +63,7 @@ impl<'a> Encoding<'a> {
     }
 
     /// The same with all plans.
-    pub(crate) fn with_equals(context: Context<'a>, plans: Plans<'_>) -> Option<Self> {
+    pub fn with_equals(context: Context<'a>, plans: PlanConstraints<'_>) -> Option<Self> {
         let (builder, cost) = build(context, plans)?;
         Some(Self::of(builder, cost))
     }
@@ -69,37 +74,37 @@ impl<'a> Encoding<'a> {
     }
 
     /// From now on only plans with cost at most `limit`, which must not be above the limit of the encoding.
-    pub(crate) fn tighten(&mut self, limit: Int) {
+    pub fn tighten(&mut self, limit: Int) {
         if let Some(cost) = &self.cost {
             cost.at_most(&mut self.formula, limit);
         }
     }
 
     /// So many steps can be executed.
-    pub(crate) fn horizon(&self) -> usize {
+    pub fn horizon(&self) -> usize {
         self.variables.horizon()
     }
 
     /// What every plan costs at least, and literals each of which adds its weight if it is true.
-    pub(crate) fn payments(&self) -> (Int, &[(Lit, Int)]) {
+    pub fn payments(&self) -> (Int, &[(Lit, Int)]) {
         self.cost.as_ref().map_or((0, &[]), Cost::payments)
     }
 
     /// The variable of an operator of a plan at its step, or that of the design of one of its slots.
-    pub(crate) fn choice(&self, plan: &[GroundStep], (at, slot): (usize, Option<u32>)) -> Lit {
+    pub fn choice(&self, plan: &[GroundStep], (at, slot): (usize, Option<u32>)) -> Lit {
         let step = &plan[at];
         match slot {
             None => self.variables.operator(at, step.operator).unwrap_or(!Formula::truth()),
             Some(slot) => {
                 let slots = &self.task.operators[step.operator.index()].slots;
-                let (slot, design) = global(slots, slot, step.choice[slot as usize]);
+                let (slot, design) = task_slot(slots, slot, step.choice[slot as usize]);
                 self.variables.designs[at][slot][design]
             }
         }
     }
 
     /// The clause that excludes exactly one plan.
-    pub(crate) fn other_than(&self, plan: &[GroundStep]) -> Vec<Lit> {
+    pub fn blocking_clause(&self, plan: &[GroundStep]) -> Vec<Lit> {
         let longer = self.variables.busy.get(plan.len()).copied();
         let choices = plan.iter().enumerate().flat_map(|(at, step)| {
             let slots = (0..dense(step.choice.len())).map(Some);
@@ -109,7 +114,7 @@ impl<'a> Encoding<'a> {
     }
 
     /// The plan of the assignment that the solver found.
-    pub(crate) fn decode(&self, solver: &dyn Solver) -> Vec<GroundStep> {
+    pub fn decode(&self, solver: &dyn Solver) -> Vec<GroundStep> {
         let holds = |literal: Lit| {
             literal == Formula::truth() || solver.value(literal.variable()) == literal.is_positive()
         };
@@ -131,8 +136,8 @@ impl<'a> Encoding<'a> {
 }
 
 /// All families of clauses but that of symmetries. None if a limit was reached meanwhile, or if numbers do not fit.
-fn build<'a>(context: Context<'a>, plans: Plans<'_>) -> Option<(Builder<'a>, Option<Cost>)> {
-    let Plans { allowed, cost, semantics, most } = plans;
+fn build<'a>(context: Context<'a>, plans: PlanConstraints<'_>) -> Option<(Builder<'a>, Option<Cost>)> {
+    let PlanConstraints { allowed, cost, semantics, max_clauses: most } = plans;
     let potential = cost.as_ref().and_then(|cost| cost.bounds.projections.first());
     let interference = Interference::new(context, semantics, potential).ok()?;
     let mut builder = Builder::new(context, allowed, most).ok()?;
@@ -168,7 +173,7 @@ fn at_step(
     builder.check()?;
     conditions(builder, step);
     builder.check()?;
-    let fires = Fires::new(builder, step);
+    let fires = FiredEffects::new(builder, step);
     builder.check()?;
     effects(builder, step, &fires);
     builder.check()?;

@@ -2,12 +2,13 @@
 
 use std::fmt;
 
-use crate::number::{Int, dense};
+use task::number::{Int, dense};
+
 use crate::sat::Lit;
 
 /// What a clause is for. The documentation of each family stands in the file that writes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(crate) enum Family {
+pub enum Family {
     /// State variables have exactly one value.
     Domain,
     /// At most one operator a step, none after the last.
@@ -79,7 +80,7 @@ impl Family {
 
 /// What a variable of the formula stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum Meaning {
+pub enum VariableMeaning {
     /// The constant true.
     True,
     /// The operator is executed at the step.
@@ -114,8 +115,8 @@ pub(crate) enum Meaning {
 
 /// A formula in conjunctive normal form.
 #[derive(Default)]
-pub(crate) struct Formula {
-    meanings: Vec<Meaning>,
+pub struct Formula {
+    meanings: Vec<VariableMeaning>,
     literals: Vec<Lit>,
     /// End of each clause in `literals`, and its family.
     clauses: Vec<(u32, Family)>,
@@ -127,7 +128,7 @@ impl Formula {
     /// An empty formula with the constant true.
     pub(crate) fn new() -> Self {
         let mut formula = Self::default();
-        let truth = formula.fresh(Meaning::True);
+        let truth = formula.fresh(VariableMeaning::True);
         formula.literals.push(truth);
         formula.clauses.push((1, Family::Domain));
         formula
@@ -138,7 +139,7 @@ impl Formula {
         Lit::TRUE
     }
 
-    pub(crate) fn fresh(&mut self, meaning: Meaning) -> Lit {
+    pub fn fresh(&mut self, meaning: VariableMeaning) -> Lit {
         let literal = Lit::positive(dense(self.meanings.len()));
         self.meanings.push(meaning);
         self.last.extend([0, 0]);
@@ -147,7 +148,7 @@ impl Formula {
 
     /// Adds a clause; one that is true for constants' sake is dropped, false constants are left out.
     #[expect(clippy::arithmetic_side_effects, reason = "clauses are held in memory")]
-    pub(crate) fn add(&mut self, family: Family, clause: impl IntoIterator<Item = Lit>) {
+    pub fn add(&mut self, family: Family, clause: impl IntoIterator<Item = Lit>) {
         let start = self.literals.len();
         let number = dense(self.clauses.len() + 1);
         for literal in clause {
@@ -172,7 +173,7 @@ impl Formula {
 
     /// A literal that is true if one of the given ones is; itself one of them where that is enough. One
     /// direction only.
-    pub(crate) fn any(&mut self, family: Family, meaning: Meaning, literals: &[Lit]) -> Lit {
+    pub(crate) fn any(&mut self, family: Family, meaning: VariableMeaning, literals: &[Lit]) -> Lit {
         match literals {
             [] => !Self::truth(),
             [only] => *only,
@@ -187,7 +188,7 @@ impl Formula {
     }
 
     /// A literal that is true exactly if all premises are.
-    pub(crate) fn equivalent(&mut self, meaning: Meaning, premises: &[Lit], family: Family) -> Lit {
+    pub(crate) fn equivalent(&mut self, meaning: VariableMeaning, premises: &[Lit], family: Family) -> Lit {
         let premises: Vec<_> = premises.iter().copied().filter(|l| *l != Self::truth()).collect();
         match premises[..] {
             [] => Self::truth(),
@@ -216,12 +217,12 @@ impl Formula {
             }
             return;
         }
-        let mut before = self.fresh(Meaning::Ladder);
+        let mut before = self.fresh(VariableMeaning::Ladder);
         self.add(family, [!literals[0], before]);
         for (position, literal) in literals.iter().enumerate().skip(1) {
             self.add(family, [!before, !*literal]);
             if position + 1 < literals.len() {
-                let next = self.fresh(Meaning::Ladder);
+                let next = self.fresh(VariableMeaning::Ladder);
                 self.add(family, [!before, next]);
                 self.add(family, [!*literal, next]);
                 before = next;
@@ -229,22 +230,22 @@ impl Formula {
         }
     }
 
-    pub(crate) fn variables(&self) -> usize {
+    pub fn variables(&self) -> usize {
         self.meanings.len()
     }
 
-    pub(crate) fn len(&self) -> usize {
+    pub fn clause_count(&self) -> usize {
         self.clauses.len()
     }
 
     /// All clauses in the order in which they were added.
-    pub(crate) fn clauses(&self) -> impl Iterator<Item = (Family, &[Lit])> {
+    pub fn clauses(&self) -> impl Iterator<Item = (Family, &[Lit])> {
         self.clauses_from(0)
     }
 
     /// The clauses after so many others.
     #[expect(clippy::arithmetic_side_effects, reason = "the first clause is told apart")]
-    pub(crate) fn clauses_from(&self, start: usize) -> impl Iterator<Item = (Family, &[Lit])> {
+    pub fn clauses_from(&self, start: usize) -> impl Iterator<Item = (Family, &[Lit])> {
         (start..self.clauses.len()).map(|index| {
             let start = if index == 0 { 0 } else { self.clauses[index - 1].0 as usize };
             let (end, family) = self.clauses[index];
@@ -253,19 +254,19 @@ impl Formula {
     }
 
     /// How many clauses each family has.
-    pub(crate) fn counts(&self) -> Vec<(&'static str, usize)> {
+    pub fn counts(&self) -> Vec<(&'static str, usize)> {
         let count = |family| self.clauses.iter().filter(|(_, own)| *own == family).count();
         Family::ALL.iter().map(|family| (family.name(), count(*family))).collect()
     }
 
     #[cfg(test)]
-    pub(crate) fn meaning(&self, variable: u32) -> Meaning {
+    pub(crate) fn meaning(&self, variable: u32) -> VariableMeaning {
         self.meanings[variable as usize]
     }
 }
 
 impl fmt::Debug for Formula {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Formula({} variables, {} clauses)", self.variables(), self.len())
+        write!(f, "Formula({} variables, {} clauses)", self.variables(), self.clause_count())
     }
 }

@@ -16,21 +16,21 @@
 //! \[2\] J. Rintanen, K. Heljanko, I. Niemelä: Planning as satisfiability: parallel plans and algorithms for plan search,
 //! Artificial Intelligence 170(12-13), 2006.
 
-use crate::words::words;
+use search::bounds::Projection;
 use std::collections::BTreeMap;
+use task::context::Context;
+use task::limits::{Interrupted, Limits};
+use task::task::{Condition, OperatorId, Task, VariableId};
+use task::words;
 
-use crate::bounds::Projection;
-use crate::context::Context;
 use crate::encode::builder::Builder;
-use crate::encode::formula::{Family, Formula, Meaning};
-use crate::limits::{Interrupted, Limits};
+use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::sat::Lit;
-use crate::task::{Condition, OperatorId, Task, VariableId};
 
 /// How many operators can stand at one step of a formula.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Semantics {
+pub enum StepSemantics {
     /// One.
     Sequential,
     /// Several that can be executed in any order.
@@ -40,7 +40,7 @@ pub enum Semantics {
 }
 
 words! {
-    Semantics, "semantics": Sequential = "sequential", ForAllStep = "for-all-step", ExistsStep = "exists-step"
+    StepSemantics, "semantics": Sequential = "sequential", ForAllStep = "for-all-step", ExistsStep = "exists-step"
 }
 
 /// What must not happen at the same step, for all steps alike.
@@ -75,11 +75,11 @@ impl Interference {
     /// The interferences of a task; none if operators stand alone. Costs are reduced by the potential.
     pub(super) fn new(
         context: Context<'_>,
-        semantics: Semantics,
+        semantics: StepSemantics,
         potential: Option<&Projection>,
     ) -> Result<Option<Self>, Interrupted> {
         let Context { task, limits } = context;
-        if semantics == Semantics::Sequential {
+        if semantics == StepSemantics::Sequential {
             return Ok(None);
         }
         let support = Support::new(task);
@@ -134,7 +134,7 @@ impl Interference {
         for uses in &variables {
             uses.conflicts(&mut conflicts, limits)?;
         }
-        Ok(Some(Self { both_orders: semantics == Semantics::ForAllStep, exclusions, conflicts, classes }))
+        Ok(Some(Self { both_orders: semantics == StepSemantics::ForAllStep, exclusions, conflicts, classes }))
     }
 
     /// Operators of the same class never stand at the same step; those without one may stand with any.
@@ -273,7 +273,7 @@ fn ladder(formula: &mut Formula, chain: &[(Lit, (bool, bool))]) {
             if erased == !Formula::truth() {
                 erased = *literal;
             } else {
-                let longer = formula.fresh(Meaning::Ladder);
+                let longer = formula.fresh(VariableMeaning::Ladder);
                 formula.add(Family::Interference, [!erased, longer]);
                 formula.add(Family::Interference, [!*literal, longer]);
                 erased = longer;

@@ -8,14 +8,15 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use task::number::{GROWTH_LIMIT, Int, dense};
+use task::task::quantity::{Linear, Quantity};
+use task::task::{NumericId, Operator, OperatorId};
+
 use crate::encode::arithmetic::{Arithmetic, Bits, width};
 use crate::encode::builder::Builder;
 use crate::encode::designs::combinations;
-use crate::encode::formula::{Family, Formula, Meaning};
-use crate::number::{GROWTH_LIMIT, Int, dense};
+use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::sat::Lit;
-use crate::task::quantity::{Linear, Quantity};
-use crate::task::{NumericId, Operator, OperatorId};
 
 /// Conjunctions, each with the number that it stands for.
 type Premises = Vec<(Vec<Lit>, Int)>;
@@ -125,14 +126,14 @@ impl Transition<'_, '_> {
         let base: Bits = (0..length)
             .map(|_| {
                 let bit = dense(self.builder.formula.variables());
-                self.builder.formula.fresh(Meaning::Bit { bit })
+                self.builder.formula.fresh(VariableMeaning::Bit { bit })
             })
             .collect();
         for (group, bits) in options {
             Arithmetic { formula: &mut self.builder.formula, family: Family::Numeric }
                 .equal_if(group, &base, &bits);
         }
-        let unchanged = self.builder.formula.fresh(Meaning::Ladder);
+        let unchanged = self.builder.formula.fresh(VariableMeaning::Ladder);
         self.builder.formula.add(Family::Numeric, changing.into_iter().chain([unchanged]));
         Arithmetic { formula: &mut self.builder.formula, family: Family::Numeric }
             .equal_if(unchanged, &base, current);
@@ -183,7 +184,7 @@ impl Transition<'_, '_> {
         }
         let mut sum = self.add_source(base, &own, active, width);
         for (groups, premises) in by_slots.into_values() {
-            let meaning = Meaning::Ladder;
+            let meaning = VariableMeaning::Ladder;
             let any = self.builder.formula.any(Family::Numeric, meaning, &groups);
             if let [_, _, ..] = groups[..] {
                 self.builder.formula.add(Family::Numeric, groups.iter().copied().chain([!any]));

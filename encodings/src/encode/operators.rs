@@ -4,10 +4,11 @@
 //! - condition: `o@t → p@t` for each fact, `o@t → ⋁ l@t` for each clause;
 //! - effect: `o@t → e@t+1`, unless a conditional effect of the operator prevails.
 
+use task::number::dense;
+
 use crate::encode::builder::Builder;
-use crate::encode::conditional::Fires;
-use crate::encode::formula::{Family, Formula, Meaning};
-use crate::number::dense;
+use crate::encode::conditional::FiredEffects;
+use crate::encode::formula::{Family, Formula, VariableMeaning};
 
 /// One operator at most if it is to stand alone, and none after an idle step.
 pub(super) fn sequence(builder: &mut Builder<'_>, step: usize, is_alone: bool) {
@@ -16,7 +17,7 @@ pub(super) fn sequence(builder: &mut Builder<'_>, step: usize, is_alone: bool) {
         [] => !Formula::truth(),
         [only] => only,
         _ => {
-            let busy = builder.formula.fresh(Meaning::Busy { step: dense(step) });
+            let busy = builder.formula.fresh(VariableMeaning::Busy { step: dense(step) });
             for literal in &literals {
                 builder.formula.add(Family::Sequence, [!*literal, busy]);
             }
@@ -54,7 +55,7 @@ pub(super) fn conditions(builder: &mut Builder<'_>, step: usize) {
     clippy::arithmetic_side_effects,
     reason = "steps are fewer than the horizon, whose formula is in memory"
 )]
-pub(super) fn effects(builder: &mut Builder<'_>, step: usize, fires: &Fires) {
+pub(super) fn effects(builder: &mut Builder<'_>, step: usize, fires: &FiredEffects) {
     for index in 0..builder.variables.operators[step].len() {
         let (id, literal) = builder.variables.operators[step][index];
         for effect in &builder.task.operators[id.index()].effects {

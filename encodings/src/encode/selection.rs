@@ -4,10 +4,11 @@
 //! slot, and `slot=d@t → ⋁ {g@t : d ∈ D}`, so that an idle slot stays empty. Combinations that only together do not
 //! suit are forbidden one by one: `¬g@t ∨ ¬slot=d@t ∨ ¬slot'=d'@t`.
 
+use task::limits::Interrupted;
+
 use crate::encode::builder::Builder;
-use crate::encode::designs::global;
+use crate::encode::designs::task_slot;
 use crate::encode::formula::{Family, Formula};
-use crate::limits::Interrupted;
 use crate::sat::Lit;
 
 /// Each function in use has exactly one design, and one that suits.
@@ -43,7 +44,7 @@ fn forbidden(builder: &mut Builder<'_>, step: usize) -> Result<(), Interrupted> 
         let rules = operator.forbidden.iter().flat_map(|rule| {
             rule.combinations.iter().map(|combination| {
                 let pairs = rule.slots.iter().zip(combination);
-                pairs.map(|(slot, design)| global(&operator.slots, *slot, *design)).collect::<Vec<_>>()
+                pairs.map(|(slot, design)| task_slot(&operator.slots, *slot, *design)).collect::<Vec<_>>()
             })
         });
         rules.collect()

@@ -6,12 +6,13 @@
 //!
 //! [1] A. Haas: The case for domain-specific frame axioms, The Frame Problem in AI, 1987.
 
+use task::number::dense;
+use task::task::{Fact, VariableId};
+
 use crate::encode::builder::Builder;
-use crate::encode::conditional::Fires;
+use crate::encode::conditional::FiredEffects;
 use crate::encode::formula::{Family, Formula};
-use crate::number::dense;
 use crate::sat::Lit;
-use crate::task::{Fact, VariableId};
 
 /// Every variable has exactly one value before the step.
 pub(super) fn domain(builder: &mut Builder<'_>, step: usize) {
@@ -31,7 +32,7 @@ pub(super) fn domain(builder: &mut Builder<'_>, step: usize) {
     clippy::arithmetic_side_effects,
     reason = "steps are fewer than the horizon, whose formula is in memory"
 )]
-pub(super) fn frame(builder: &mut Builder<'_>, step: usize, fires: &Fires) {
+pub(super) fn frame(builder: &mut Builder<'_>, step: usize, fires: &FiredEffects) {
     let mut producers: Vec<Vec<Vec<Lit>>> =
         builder.task.variables.iter().map(|variable| vec![Vec::new(); variable.values.len()]).collect();
     for (id, literal) in &builder.variables.operators[step] {

@@ -11,18 +11,19 @@
 //!
 //! \[1\] J. Rintanen: Symmetry reduction for SAT representations of transition systems, ICAPS 2003.
 
-use crate::context::Context;
+use task::context::Context;
+use task::lifted::ObjectId;
+use task::limits::Interrupted;
+use task::task::object_symmetry::{Exchange, symmetry_generators};
+use task::task::{Argument, OperatorId, SlotId, Task};
+
 use crate::encode::builder::Builder;
-use crate::encode::equal_designs::equal_designs;
-use crate::encode::formula::{Family, Formula, Meaning};
-use crate::lifted::ObjectId;
-use crate::limits::Interrupted;
+use crate::encode::formula::{Family, Formula, VariableMeaning};
+use crate::encode::interchangeable_designs::equal_designs;
 use crate::sat::Lit;
-use crate::task::exchange::{Exchange, exchanges};
-use crate::task::{Argument, OperatorId, SlotId, Task};
 
 /// What of a task is equal.
-pub(crate) struct Symmetry {
+pub struct Symmetry {
     /// Designs of a slot that are equal to an earlier one.
     designs: Vec<(SlotId, u32)>,
     /// For pairs of equal objects: the operators that use the first, and those that use only the second.
@@ -54,7 +55,7 @@ impl Symmetry {
             for step in builder.limits.watch(0..horizon) {
                 let step = step?;
                 let used = builder.group(step, first, Family::Symmetry);
-                let longer = builder.formula.fresh(Meaning::Ladder);
+                let longer = builder.formula.fresh(VariableMeaning::Ladder);
                 builder.formula.add(Family::Symmetry, [!longer, seen, used]);
                 seen = longer;
                 for id in only_second {
@@ -74,11 +75,13 @@ type Pairs = Vec<(Vec<OperatorId>, Vec<OperatorId>)>;
 /// Pairs of neighbours in classes of equal objects.
 fn equal_objects(context: Context<'_>) -> Result<Pairs, Interrupted> {
     let task = context.task;
-    let pairs = exchanges(context, true)?.into_iter().map(|Exchange { objects: (first, second), .. }| {
-        let (own, all) = (uses_of(task, first), uses_of(task, second));
-        let only = all.into_iter().filter(|id| own.binary_search(id).is_err()).collect();
-        (own, only)
-    });
+    let pairs = symmetry_generators(context, true)?.into_iter().map(
+        |Exchange { objects: (first, second), .. }| {
+            let (own, all) = (uses_of(task, first), uses_of(task, second));
+            let only = all.into_iter().filter(|id| own.binary_search(id).is_err()).collect();
+            (own, only)
+        },
+    );
     Ok(pairs.collect())
 }
 

@@ -4,17 +4,17 @@ use std::cell::OnceCell;
 use std::fmt::Write as _;
 
 use insta::assert_snapshot;
+use search::bounds::Bounds;
+use task::context::Context;
+use task::ground::{GroundConfig, ground};
+use task::limits::Limits;
+use task::task::{Argument, Task};
 
-use crate::bounds::Bounds;
-use crate::context::Context;
 use crate::encode::builder::Builder;
-use crate::encode::conditional::Fires;
-use crate::encode::formula::{Family, Formula, Meaning};
-use crate::encode::{CostLimit, Counting, Encoding, Plans, Semantics, operators, state};
-use crate::ground::{GroundConfig, ground};
-use crate::limits::Limits;
+use crate::encode::conditional::FiredEffects;
+use crate::encode::formula::{Family, Formula, VariableMeaning};
+use crate::encode::{CostEncoding, CostLimit, Encoding, PlanConstraints, StepSemantics, operators, state};
 use crate::sat::Lit;
-use crate::task::{Argument, Task};
 use pddl::{Source, read};
 
 const DOMAIN: &str = "(define (domain d)
@@ -38,10 +38,10 @@ fn task() -> Task {
     ground(&domain, &problem, &config).expect("a task")
 }
 
-fn name(task: &Task, meaning: Meaning) -> String {
+fn name(task: &Task, meaning: VariableMeaning) -> String {
     match meaning {
-        Meaning::True => "true".into(),
-        Meaning::Operator { operator, step } => {
+        VariableMeaning::True => "true".into(),
+        VariableMeaning::Operator { operator, step } => {
             let operator = &task.operators[operator as usize];
             let mut text = task.schema_names[operator.schema as usize].clone();
             for argument in &operator.arguments {
@@ -51,28 +51,28 @@ fn name(task: &Task, meaning: Meaning) -> String {
             }
             format!("({text})@{step}")
         }
-        Meaning::Fires { operator, effect, step } => format!("fires{effect} of {operator}@{step}"),
-        Meaning::Body { layer, rule, step } => format!("body{rule} of {layer}@{step}"),
-        Meaning::Later { variable, rounds, step } => format!("later{rounds} {variable}@{step}"),
-        Meaning::Busy { step } => format!("busy@{step}"),
-        Meaning::Value { variable, value, step } => {
+        VariableMeaning::Fires { operator, effect, step } => format!("fires{effect} of {operator}@{step}"),
+        VariableMeaning::Body { layer, rule, step } => format!("body{rule} of {layer}@{step}"),
+        VariableMeaning::Later { variable, rounds, step } => format!("later{rounds} {variable}@{step}"),
+        VariableMeaning::Busy { step } => format!("busy@{step}"),
+        VariableMeaning::Value { variable, value, step } => {
             let text = &task.variables[variable as usize].values[value as usize];
             format!(
                 "{text}{}@{step}",
                 if text.starts_with('(') { String::new() } else { format!(" {variable}") }
             )
         }
-        Meaning::Design { slot, design, step } => {
+        VariableMeaning::Design { slot, design, step } => {
             let design = task.slots[slot as usize].designs[design as usize];
             format!("slot{slot}={}@{step}", task.object_names[design.index()])
         }
-        Meaning::Group { group, step } => format!("group{group}@{step}"),
-        Meaning::CostAtLeast { amount, step, stage } => format!("spent≥{amount}@{step}.{stage}"),
-        Meaning::Increment { amount, step, stage } => format!("add≥{amount}@{step}.{stage}"),
-        Meaning::Bit { bit } => format!("bit{bit}"),
-        Meaning::Others => "others".into(),
-        Meaning::Paid => "paid".into(),
-        Meaning::Ladder => "ladder".into(),
+        VariableMeaning::Group { group, step } => format!("group{group}@{step}"),
+        VariableMeaning::CostAtLeast { amount, step, stage } => format!("spent≥{amount}@{step}.{stage}"),
+        VariableMeaning::Increment { amount, step, stage } => format!("add≥{amount}@{step}.{stage}"),
+        VariableMeaning::Bit { bit } => format!("bit{bit}"),
+        VariableMeaning::Others => "others".into(),
+        VariableMeaning::Paid => "paid".into(),
+        VariableMeaning::Ladder => "ladder".into(),
     }
 }
 
@@ -97,11 +97,16 @@ fn check(family: Family) -> String {
     let task = task();
     let bounds = Bounds::new(Context::new(&task, &Limits::none())).expect("no limit");
     let allowed = vec![vec![true; task.operators.len()]; 2];
-    let cost = CostLimit { limit: 6, bounds: &bounds, counting: Counting::Sum };
+    let cost = CostLimit { limit: 6, bounds: &bounds, counting: CostEncoding::Sum };
     let limits = Limits::none();
     let encoding = Encoding::new(
         Context::new(&task, &limits),
-        Plans { allowed: &allowed, cost: Some(cost), semantics: Semantics::Sequential, most: usize::MAX },
+        PlanConstraints {
+            allowed: &allowed,
+            cost: Some(cost),
+            semantics: StepSemantics::Sequential,
+            max_clauses: usize::MAX,
+        },
         &OnceCell::new(),
     )
     .expect("no limit");
@@ -119,7 +124,7 @@ const LAMPS: (&str, &str) = (
       (:goal (and (on a) (on b) (red a) (red b) (not (power)))))",
 );
 
-fn lamps(semantics: Semantics, family: Family) -> String {
+fn lamps(semantics: StepSemantics, family: Family) -> String {
     let (domain, problem, _) =
         read(&Source::new("domain", LAMPS.0), &Source::new("problem", LAMPS.1)).expect("PDDL");
     let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
@@ -127,7 +132,7 @@ fn lamps(semantics: Semantics, family: Family) -> String {
     let limits = Limits::none();
     let encoding = Encoding::new(
         Context::new(&task, &limits),
-        Plans { allowed: &allowed, cost: None, semantics, most: usize::MAX },
+        PlanConstraints { allowed: &allowed, cost: None, semantics, max_clauses: usize::MAX },
         &OnceCell::new(),
     )
     .expect("no limit");
@@ -136,18 +141,18 @@ fn lamps(semantics: Semantics, family: Family) -> String {
 
 #[test]
 fn interference_in_any_order() {
-    assert_snapshot!(lamps(Semantics::ForAllStep, Family::Interference));
+    assert_snapshot!(lamps(StepSemantics::ForAllStep, Family::Interference));
 }
 
 #[test]
 fn interference_in_some_order() {
-    assert_eq!(lamps(Semantics::Sequential, Family::Interference), "");
-    assert_snapshot!(lamps(Semantics::ExistsStep, Family::Interference));
+    assert_eq!(lamps(StepSemantics::Sequential, Family::Interference), "");
+    assert_snapshot!(lamps(StepSemantics::ExistsStep, Family::Interference));
 }
 
 #[test]
 fn symmetry_of_objects() {
-    assert_snapshot!(lamps(Semantics::Sequential, Family::Symmetry));
+    assert_snapshot!(lamps(StepSemantics::Sequential, Family::Symmetry));
 }
 
 #[test]
@@ -209,12 +214,12 @@ fn families_are_written_alone_as_among_the_others() {
     let sequence = |builder: &mut Builder<'_>, step| operators::sequence(builder, step, true);
     assert_eq!(alone(Family::Sequence, sequence), check(Family::Sequence));
     let effects = |builder: &mut Builder<'_>, step| {
-        let fires = Fires::new(builder, step);
+        let fires = FiredEffects::new(builder, step);
         operators::effects(builder, step, &fires);
     };
     assert_eq!(alone(Family::Effect, effects), check(Family::Effect));
     let frame = |builder: &mut Builder<'_>, step| {
-        let fires = Fires::new(builder, step);
+        let fires = FiredEffects::new(builder, step);
         state::frame(builder, step, &fires);
     };
     assert_eq!(alone(Family::Frame, frame), check(Family::Frame));

@@ -2,12 +2,13 @@
 //!
 //! A value that no sequence of allowed operators can produce by a step gets no variable there.
 
-use crate::context::Context;
-use crate::encode::formula::{Formula, Meaning};
-use crate::limits::Interrupted;
-use crate::number::dense;
+use task::context::Context;
+use task::limits::Interrupted;
+use task::number::dense;
+use task::task::{Fact, Literal, OperatorId, Task};
+
+use crate::encode::formula::{Formula, VariableMeaning};
 use crate::sat::Lit;
-use crate::task::{Fact, Literal, OperatorId, Task};
 
 /// What stands for operators, values and designs.
 #[derive(Default)]
@@ -54,7 +55,7 @@ impl Variables {
                 let (operator, id) = item?;
                 let is_possible = |fact: &Fact| possible[fact.variable.index()][fact.value as usize];
                 if allowed[id.index()] && operator.condition.facts.iter().all(is_possible) {
-                    let meaning = Meaning::Operator { operator: id.0, step: dense(step) };
+                    let meaning = VariableMeaning::Operator { operator: id.0, step: dense(step) };
                     present.push((id, formula.fresh(meaning)));
                 }
             }
@@ -107,7 +108,7 @@ fn values(formula: &mut Formula, possible: &[Vec<bool>], step: usize) -> Vec<Vec
                 (true, true) => Formula::truth(),
                 (true, false) => {
                     let (variable, value, step) = (dense(variable), dense(value), dense(step));
-                    formula.fresh(Meaning::Value { variable, value, step })
+                    formula.fresh(VariableMeaning::Value { variable, value, step })
                 }
             });
         }
@@ -128,7 +129,8 @@ fn designs(task: &Task, formula: &mut Formula, present: &[(OperatorId, Lit)], st
     for (slot, used) in used.into_iter().enumerate() {
         let mut literals = Vec::with_capacity(used.len());
         for (design, used) in used.into_iter().enumerate() {
-            let meaning = Meaning::Design { slot: dense(slot), design: dense(design), step: dense(step) };
+            let meaning =
+                VariableMeaning::Design { slot: dense(slot), design: dense(design), step: dense(step) };
             literals.push(if used { formula.fresh(meaning) } else { !Formula::truth() });
         }
         all.push(literals);

@@ -8,8 +8,8 @@
 use std::cell::Cell;
 
 use batsat::{Callbacks, ClauseKind, SolverInterface as _, lbool};
+use task::limits::Limits;
 
-use crate::limits::Limits;
 use crate::sat::solver::{Answer, Lit, Solver};
 
 /// How many decisions pass between two looks at the clock.

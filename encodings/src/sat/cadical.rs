@@ -4,7 +4,8 @@
 //!
 //! \[1\] A. Biere, T. Faller, K. Fazekas, M. Fleury, N. Froleyks, F. Pollitt: `CaDiCaL` 2.0, CAV 2024.
 
-use crate::limits::Limits;
+use task::limits::Limits;
+
 use crate::sat::solver::{Answer, Lit, Solver};
 
 /// A `CaDiCaL` solver.

@@ -8,18 +8,16 @@ mod batsat;
 mod cadical;
 mod program;
 mod solver;
-#[cfg(test)]
-pub(crate) mod tests;
 mod totalizer;
 mod varisat;
 
 use std::str::FromStr;
 
-use crate::limits::Limits;
 use program::Program;
-pub(crate) use solver::{Answer, Lit, Solver};
-pub(crate) use totalizer::Totalizer;
-pub(crate) use varisat::refute_with_proof;
+pub use solver::{Answer, Lit, Solver};
+use task::limits::Limits;
+pub use totalizer::Totalizer;
+pub use varisat::refute_with_proof;
 
 /// Which SAT solver decides the formulas.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -61,6 +59,11 @@ pub enum BackendError {
 }
 
 impl Backend {
+    /// Solvers that need no other program.
+    pub fn built_in() -> impl Iterator<Item = Self> {
+        Self::BUILT_IN.iter().filter_map(|name| name.parse().ok())
+    }
+
     /// The names of solvers that need no program.
     pub const BUILT_IN: &[&str] = &[
         "varisat",
@@ -70,7 +73,7 @@ impl Backend {
     ];
 
     /// A solver that gives up at a limit, or after learning `budget` clauses.
-    pub(crate) fn start(&self, limits: &Limits, budget: u64) -> Box<dyn Solver> {
+    pub fn start(&self, limits: &Limits, budget: u64) -> Box<dyn Solver> {
         match self {
             Self::Varisat => Box::new(varisat::Varisat::new(limits, budget)),
             Self::Batsat => Box::new(batsat::Batsat::new(limits, budget)),

@@ -14,7 +14,8 @@ use std::sync::mpsc;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::limits::Limits;
+use task::limits::Limits;
+
 use crate::sat::solver::{Answer, Lit, Solver};
 
 /// Time in place of a budget of conflicts.

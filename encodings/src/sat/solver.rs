@@ -2,7 +2,7 @@
 
 /// A literal: a variable, counted from 0, or its negation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(crate) struct Lit(u32);
+pub struct Lit(u32);
 
 impl Lit {
     /// The first variable, which formulas fix to true.
@@ -12,7 +12,7 @@ impl Lit {
         Self(variable << 1)
     }
 
-    pub(crate) fn new(variable: u32, positive: bool) -> Self {
+    pub fn new(variable: u32, positive: bool) -> Self {
         if positive { Self::positive(variable) } else { !Self::positive(variable) }
     }
 
@@ -30,11 +30,14 @@ impl Lit {
     }
 
     /// As in DIMACS files: variables count from 1, negation is the sign.
+    ///
+    /// # Panics
+    /// From 2^31 variables.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "fewer than 2^31 - 1 variables are held in memory with their clauses"
     )]
-    pub(crate) fn dimacs(self) -> i32 {
+    pub fn dimacs(self) -> i32 {
         let number = i32::try_from(self.variable()).expect("invariant: fewer than 2^31 variables") + 1;
         if self.is_positive() { number } else { -number }
     }
@@ -50,7 +53,7 @@ impl std::ops::Not for Lit {
 
 /// What a solver says of its clauses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Answer {
+pub enum Answer {
     Satisfiable,
     Unsatisfiable,
     /// A limit was reached; the solver is of no further use.
@@ -58,7 +61,7 @@ pub(crate) enum Answer {
 }
 
 /// A SAT solver for a formula that grows.
-pub(crate) trait Solver {
+pub trait Solver {
     /// Adds a clause; its variables need no declaration.
     fn add_clause(&mut self, clause: &[Lit]);
     /// Decides the clauses added so far together with the assumptions, which hold for this call only.

@@ -10,20 +10,20 @@ use rustsat::types::{Lit as TreeLit, Var};
 use crate::sat::solver::Lit;
 
 /// Counts literals.
-pub(crate) struct Totalizer {
+pub struct Totalizer {
     tree: Tree,
     literals: usize,
 }
 
 impl Totalizer {
-    pub(crate) fn new(literals: &[Lit]) -> Self {
+    pub fn new(literals: &[Lit]) -> Self {
         let inputs = literals.iter().map(|l| TreeLit::new(l.variable(), !l.is_positive()));
         Self { tree: inputs.collect(), literals: literals.len() }
     }
 
     /// A literal that is true if more than so many of the counted ones are; none if there are not more. `variables` are in use,
     /// and further ones are taken from there on; the clauses that define them go to `add`.
-    pub(crate) fn more_than(
+    pub fn more_than(
         &mut self,
         count: usize,
         variables: &mut u32,
@@ -49,8 +49,8 @@ impl Totalizer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::limits::Limits;
     use crate::sat::{Answer, Backend};
+    use task::limits::Limits;
 
     #[test]
     fn more_than_so_many_as_counted() {

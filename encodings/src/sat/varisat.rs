@@ -14,10 +14,10 @@ use std::cell::Cell;
 use std::io;
 use std::rc::Rc;
 
+use task::limits::Limits;
+use task::number::dense;
 use varisat::ExtendFormula as _;
 
-use crate::limits::Limits;
-use crate::number::dense;
 use crate::sat::solver::{Answer, Lit, Solver};
 
 /// A Varisat solver.
@@ -105,7 +105,7 @@ impl Varisat {
 fn start(limits: &Limits, budget: u64, conflicts: &Rc<Cell<u64>>) -> varisat::Solver<'static> {
     let mut solver = varisat::Solver::new();
     let (limits, conflicts) = (limits.clone(), Rc::clone(conflicts));
-    let sink = CountingSink { limits, budget, conflicts, steps: Steps::default() };
+    let sink = BudgetSink { limits, budget, conflicts, steps: Steps::default() };
     solver.write_proof(sink, varisat::ProofFormat::Varisat);
     solver
 }
@@ -115,7 +115,7 @@ fn translate(literal: Lit) -> varisat::Lit {
 }
 
 /// Refutes clauses over variables numbered from 1, or finds that they have a model; the proof is in DRAT.
-pub(crate) fn refute_with_proof(
+pub fn refute_with_proof(
     clauses: impl Iterator<Item = impl Iterator<Item = i32>>,
     proof: Box<dyn io::Write>,
     limits: &Limits,
@@ -244,14 +244,14 @@ impl Steps {
 }
 
 /// Takes a proof in Varisat's format, counts the clauses that are learnt, and fails when a limit or the budget is reached.
-struct CountingSink {
+struct BudgetSink {
     limits: Limits,
     budget: u64,
     conflicts: Rc<Cell<u64>>,
     steps: Steps,
 }
 
-impl io::Write for CountingSink {
+impl io::Write for BudgetSink {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if self.limits.reached() || self.conflicts.get() > self.budget {
             return Err(io::Error::other("limit reached"));

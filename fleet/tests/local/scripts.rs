@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::time::Duration;
 
-use metaplan::encodings::Limits;
 use metaplan::mapek::{Loop, Observation};
+use metaplan::planner::Limits;
 use metaplan::setup::Setup;
 use metaplan::simulate::Strategy;
 use serde_json::{Value, json};

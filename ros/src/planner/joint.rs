@@ -3,10 +3,10 @@
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use metaplan::encodings::Exact;
 use metaplan::mapek::{Event, Observation};
 use metaplan::message::Errors;
 use metaplan::mission::Mission;
+use metaplan::planner::Exact;
 
 use crate::diagnosed::Diagnosed;
 use crate::node::Node;

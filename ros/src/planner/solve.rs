@@ -8,10 +8,6 @@ use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::{Duration, Instant};
 
-use metaplan::encodings::{
-    Config, Exact, Limits, Plan, Solution, Status, Step, alternatives, optimize, optimize_concurrent,
-    optimize_exact,
-};
 use metaplan::message::{Errors, Message};
 use metaplan::mission::{
     Bindings, Mission, PlanLine, Planning as _, Reading, Unconfirmed, blocking, confirm, instant, plan_lines,
@@ -19,6 +15,10 @@ use metaplan::mission::{
 };
 use metaplan::pddl::ast::{ActionBody, Problem};
 use metaplan::pddl::{self, Source};
+use metaplan::planner::{
+    Config, Exact, Limits, Plan, Solution, Status, Step, alternatives, optimize, optimize_concurrent,
+    optimize_exact,
+};
 use serde_json::{Value, json};
 
 /// What is to be planned.

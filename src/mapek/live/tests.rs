@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use encodings::Limits;
+use planner::Limits;
 
 use crate::mapek::ask::Ask;
 use crate::mapek::plan::from_scratch;

@@ -4,9 +4,9 @@
 //! Of the two one is planned with the usual thresholds and one with [`Thresholds::NONE`], so that stubborn sets, pairs of facts, landmarks,
 //! trees of labels and all searches that take turns are reached by tasks that are small enough for brute force.
 //!
-//! Some tasks and oracles are those of the planner's own tests: `encodings/tests`.
+//! Some tasks and oracles are those of the planner's own tests: `crates/planner/tests`.
 
-#[path = "../../../encodings/tests/partial/model.rs"]
+#[path = "../../../crates/planner/tests/partial/model.rs"]
 #[allow(dead_code, reason = "the planner's own tests ask more of it")]
 mod partial;
 
@@ -17,17 +17,17 @@ mod robots;
 
 use std::time::Duration;
 
-use encodings::{Config, Limits, Status, Thresholds};
 use metaplan::mission::{Bindings, Mission, Planning as _};
 use num_rational::BigRational;
 use pddl::{Source, portable, print_domain, print_problem};
+use planner::{Config, Limits, Status, Thresholds};
 
 use crate::judge::{
     Failure, Mode, Step, Tally, Truth, compare, plan_lines, project_verdict, rational, setting, steps_of,
 };
-use crate::random::Random;
 use crate::temporal;
 use robots::{Form, Robot};
+use testing::random::Random;
 
 /// A mission and what brute force knows of it.
 pub struct Sample {
@@ -107,12 +107,12 @@ fn plan(mission: &Mission, mode: &Mode, thresholds: Thresholds) -> Result<Answer
             let task = mission.ground(&problem, &[], &Limits::none()).map_err(codes)?;
             let config = Config::default().with_limits(limits.clone());
             let config = if thresholds == Thresholds::NONE { config.with_head_start(1) } else { config };
-            encodings::lexicographic(&task, &config, &mut |_| {}).solution
+            planner::lexicographic(&task, &config, &mut |_| {}).solution
         }
         Mode::Concurrent(separation) => {
             let task =
                 mission.ground_concurrent(&problem, &[], separation, &Limits::none()).map_err(codes)?;
-            encodings::optimize_concurrent(&task, &limits, &mut |_| {})
+            planner::optimize_concurrent(&task, &limits, &mut |_| {})
         }
     };
     Ok(Answer {

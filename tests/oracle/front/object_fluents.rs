@@ -1,14 +1,14 @@
 //! Functions with objects as values.
 
-#[path = "../../../encodings/tests/object_fluents/generate.rs"]
+#[path = "../../../crates/planner/tests/object_fluents/generate.rs"]
 mod generate;
-#[path = "../../../encodings/tests/object_fluents/model.rs"]
+#[path = "../../../crates/planner/tests/object_fluents/model.rs"]
 #[allow(dead_code, reason = "the planner's own tests ask more of it")]
 mod model;
 
 use super::{Known, Sample, of_texts, whole};
-use crate::random::Random;
 use generate::Generator;
+use testing::random::Random;
 
 pub fn sample(seed: u64) -> Sample {
     let task = Generator(Random(seed)).task();

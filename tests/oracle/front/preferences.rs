@@ -1,14 +1,14 @@
 //! Preferences and constraints of PDDL 3 in sequential plans.
 
-#[path = "../../../encodings/tests/preferences/generate.rs"]
+#[path = "../../../crates/planner/tests/preferences/generate.rs"]
 mod generate;
-#[path = "../../../encodings/tests/preferences/model.rs"]
+#[path = "../../../crates/planner/tests/preferences/model.rs"]
 #[allow(dead_code, reason = "the planner's own tests ask more of it")]
 mod model;
 
 use super::{Known, Sample, of_texts, whole};
-use crate::random::Random;
 use generate::Generator;
+use testing::random::Random;
 
 pub fn sample(seed: u64) -> Sample {
     let task = Generator(Random(seed)).task();

@@ -2,11 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use encodings::{
-    Backend, Config, Engine, Limits, Semantics, Solution, Status, Strategy, Thresholds, Unbounded,
-};
 use fastrand::Rng;
 use metaplan::mission::Planning as _;
+use planner::{
+    Backend, Config, Engine, Limits, MetricUnbounded, Solution, Status, StepSemantics, Strategy, Thresholds,
+};
 
 use crate::judge::{Case, Mode, Tally, plan_lines, project_verdict, rational, read, steps_of};
 
@@ -21,7 +21,7 @@ use super::truth::{Known, fewest_steps, within};
 const LIMIT: Duration = Duration::from_millis(500);
 
 fn config(rng: &mut Rng) -> Config {
-    let semantics = [Semantics::Sequential, Semantics::ForAllStep, Semantics::ExistsStep];
+    let semantics = [StepSemantics::Sequential, StepSemantics::ForAllStep, StepSemantics::ExistsStep];
     Config::default()
         .with_engine(one(rng, &[Engine::Auto, Engine::Sat, Engine::Search]))
         .with_confirmation(rng.bool())
@@ -43,7 +43,7 @@ pub fn check_variants(puzzle: &Puzzle, case: &Case, rng: &mut Rng, tally: &mut T
     let started = Instant::now();
     for _ in 0..2 {
         let config = config(rng);
-        let solution = encodings::optimize(&task, &config, &mut |_| {});
+        let solution = planner::optimize(&task, &config, &mut |_| {});
         let said = format!(
             "{:?} {:?} {:?} {:?} confirm: {} head start: {}",
             config.semantics,
@@ -58,7 +58,7 @@ pub fn check_variants(puzzle: &Puzzle, case: &Case, rng: &mut Rng, tally: &mut T
     }
     let horizon = rng.usize(0..5);
     let config = config(rng).with_horizon(horizon).with_semantics(None);
-    let solution = encodings::optimize(&task, &config, &mut |_| {});
+    let solution = planner::optimize(&task, &config, &mut |_| {});
     tally.count(format!("horizon: {:?}", solution.status));
     check_horizon(puzzle, case, &solution, (horizon, &config), tally);
     tally.planning += started.elapsed();
@@ -89,7 +89,7 @@ fn check(puzzle: &Puzzle, case: &Case, solution: &Solution, said: &str, tally: &
     let wrong = match (solution.status, &puzzle.explored.known) {
         (Status::Optimal, Known::Best((best, _))) => cost.as_ref() != Some(best),
         (Status::Optimal, Known::Open(Some((found, _)))) => worse(found),
-        (Status::Feasible, Known::Best(_)) => solution.unbounded == Some(Unbounded::Proved),
+        (Status::Feasible, Known::Best(_)) => solution.unbounded == Some(MetricUnbounded::Proved),
         (Status::Unsolvable, known) => !matches!(known, Known::NoPlan | Known::Open(None)),
         (Status::Optimal, Known::NoBest(_))
         | (Status::Optimal | Status::Feasible, Known::NoPlan)
@@ -176,7 +176,7 @@ pub fn check_objectives(puzzle: &Puzzle, expressions: &[Expr], case: &Case, tall
     let said = || expressions.iter().map(|e| objective(&puzzle.task, e)).collect::<Vec<_>>().join(", ");
     let started = Instant::now();
     if let Ok(task) = mission.ground(&problem, &metrics, &Limits::none()) {
-        let point = encodings::lexicographic(&task, &config(), &mut |_| {});
+        let point = planner::lexicographic(&task, &config(), &mut |_| {});
         let values: Vec<Number> = point.values.iter().map(rational).collect();
         tally.count(format!("list: {:?}", point.solution.status));
         let wrong = match point.solution.status {
@@ -189,7 +189,7 @@ pub fn check_objectives(puzzle: &Puzzle, expressions: &[Expr], case: &Case, tall
         }
     }
     if let Ok(task) = mission.ground(&problem, &metrics[..2], &Limits::none()) {
-        let found = encodings::pareto(&task, &config(), &mut |_| {});
+        let found = planner::pareto(&task, &config(), &mut |_| {});
         tally.count(format!("front: {:?}", found.status));
         let points = found.points.into_iter();
         let mut points: Vec<Vec<Number>> =

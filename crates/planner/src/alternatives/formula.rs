@@ -1,0 +1,141 @@
+//! Further cheapest plans by the SAT solver.
+//!
+//! The formula "a plan that costs at most the optimum", with as many steps as such a plan can have, is solved
+//! repeatedly. Each time, the plans found before are excluded.
+//!
+//! The choices that every cheapest plan makes are the backbone of that formula [1]. The solver is queried for a plan
+//! that differs from the first one in at least one of the remaining candidates. Such a plan rules out the candidates
+//! in which it differs; unsatisfiability proves that all remaining candidates are shared. Equal designs or objects
+//! count as different here.
+//!
+//! [1] J. Marques-Silva, M. Janota, I. Lynce: On computing backbones of propositional theories, ECAI 2010.
+
+use encodings::encode::{CostEncoding, CostLimit, Encoding, PlanConstraints, StepSemantics, VariableMeaning};
+use encodings::sat::{Answer, Backend, Lit, Solver};
+use search::bounds::Bounds;
+use task::context::Context;
+use task::plan::decode;
+use task::plan::ground::{GroundPlan, GroundStep, replay};
+use task::task::Task;
+
+use crate::alternatives::choices::{Alternatives, Choice, forced, shares};
+use crate::optimize::Config;
+
+/// Searches for at most `most` cheapest plans other than `first`. Returns `None` if the formula cannot be built
+/// within the limits.
+pub(super) fn by_formula(
+    context: Context<'_>,
+    bounds: &Bounds,
+    first: &GroundPlan,
+    most: usize,
+    config: &Config,
+) -> Option<Alternatives> {
+    let task = context.task;
+    let window = bounds.window(context, Some(first.cost), config.horizon).ok()?;
+    let is_complete = window.steps.is_some_and(|steps| steps <= window.allowed.len());
+    // An external solver's claim that a formula is unsatisfiable has not been verified.
+    let complete = is_complete && !matches!(config.backend, Backend::Program { .. });
+    let allowed = if is_complete || config.horizon.is_some() {
+        window.allowed
+    } else {
+        bounds.window(context, Some(first.cost), Some(first.steps.len())).ok()?.allowed
+    };
+    let cost = CostLimit { limit: first.cost, bounds, counting: CostEncoding::Sum };
+    let plans = PlanConstraints {
+        allowed: &allowed,
+        cost: Some(cost),
+        semantics: StepSemantics::Sequential,
+        max_clauses: usize::MAX,
+    };
+    let encoding = Encoding::with_equals(context, plans)?;
+    let mut solver = config.backend.start(&config.limits, u64::MAX);
+    for clause in config.limits.watch(encoding.formula.clauses()) {
+        solver.add_clause(clause.ok()?.1);
+    }
+    let mut run = Run { task, encoding, solver };
+    let plan =
+        |steps: &[GroundStep]| decode(context, &GroundPlan { steps: steps.to_vec(), cost: first.cost });
+    let mut found = vec![first.steps.clone()];
+    // Plans that differ only in waits are one plan for the reader.
+    let mut plans = vec![plan(&first.steps)];
+    let mut exhausted = false;
+    // Literal that excludes the known plans while it is assumed.
+    let others = run.encoding.formula.fresh(VariableMeaning::Others);
+    while plans.len() <= most && !exhausted {
+        if let Some(known) = found.last() {
+            run.exclude(known, others);
+        }
+        match run.solve(&[others]) {
+            (Answer::Satisfiable, Some(other)) => {
+                let shown = plan(&other);
+                found.push(other);
+                if !plans.contains(&shown) {
+                    plans.push(shown);
+                }
+            }
+            (Answer::Unsatisfiable, _) => exhausted = true,
+            _ => break,
+        }
+    }
+    // Where there are waits, one action is several operators, at one place or another.
+    let has_waits = task.operators.iter().any(|operator| operator.wait.is_some());
+    let choices = if complete && !has_waits { run.forced(&first.steps, &found) } else { None };
+    let forced = choices.map(|choices| forced(task, &first.steps, &choices));
+    plans.remove(0);
+    Some(Alternatives { plans, complete: complete && exhausted, forced })
+}
+
+struct Run<'a> {
+    task: &'a Task,
+    encoding: Encoding<'a>,
+    solver: Box<dyn Solver>,
+}
+
+impl Run<'_> {
+    /// Adds a clause that excludes a plan if `literal` holds.
+    fn exclude(&mut self, plan: &[GroundStep], literal: Lit) {
+        let mut clause = self.encoding.blocking_clause(plan);
+        clause.push(!literal);
+        self.solver.add_clause(&clause);
+    }
+
+    /// Solves the formula under assumptions, and decodes the plan.
+    fn solve(&mut self, assumptions: &[Lit]) -> (Answer, Option<Vec<GroundStep>>) {
+        let answer = self.solver.solve(assumptions);
+        if answer != Answer::Satisfiable {
+            return (answer, None);
+        }
+        let steps = self.encoding.decode(self.solver.as_ref());
+        let is_plan = replay(self.task, &steps).is_some();
+        debug_assert!(is_plan, "the encoding admits a sequence that is not a plan");
+        (answer, is_plan.then_some(steps))
+    }
+
+    /// Choices of the first plan that all cheapest plans make. The plans in `known` narrow the candidates before the
+    /// first query. Returns `None` if the solver gives no answer.
+    fn forced(&mut self, first: &[GroundStep], known: &[Vec<GroundStep>]) -> Option<Vec<Choice>> {
+        let mut choices = Choice::all(first);
+        for plan in known {
+            choices.retain(|choice| self.shares(first, plan, *choice));
+        }
+        while !choices.is_empty() {
+            let other = self.encoding.formula.fresh(VariableMeaning::Others);
+            let differs =
+                choices.iter().map(|choice| !self.encoding.choice(first, (choice.step, choice.slot)));
+            let clause: Vec<_> = differs.chain([!other]).collect();
+            self.solver.add_clause(&clause);
+            match self.solve(&[other]) {
+                (Answer::Satisfiable, Some(plan)) => {
+                    choices.retain(|choice| self.shares(first, &plan, *choice));
+                }
+                (Answer::Unsatisfiable, _) => break,
+                _ => return None,
+            }
+        }
+        Some(choices)
+    }
+
+    fn shares(&self, first: &[GroundStep], plan: &[GroundStep], choice: Choice) -> bool {
+        plan.get(choice.step).is_some_and(|other| shares(self.task, &first[choice.step], other, choice.slot))
+    }
+}

@@ -1,0 +1,121 @@
+//! All cheapest plans of small missions, enumerated: the same ones, and the same common choices.
+
+use std::collections::BTreeSet;
+use std::sync::atomic::Ordering;
+
+use task::context::Context;
+use task::ground::{GroundConfig, ground};
+use task::limits::Limits;
+use task::number::Int;
+use task::plan::ground::{GroundPlan, GroundStep};
+use task::plan::solution::Status;
+use task::plan::{Plan, decode};
+use task::task::{State, Task};
+use testing::missions::Mission;
+
+use super::{Forced, alternatives};
+use crate::optimize::{Config, Engine, optimize};
+use pddl::{Source, read};
+
+/// All plans that cost exactly so much, from a state on.
+fn all(task: &Task, state: &State, left: Int, path: &mut Vec<GroundStep>, found: &mut Vec<Vec<GroundStep>>) {
+    if left == 0 && task.is_goal(state) {
+        found.push(path.clone());
+    }
+    for (operator, id) in task.operators.iter().zip((0..).map(task::task::OperatorId)) {
+        for choice in operator.admitted_combinations().filter(|choice| operator.applicable(state, choice)) {
+            let cost = operator.cost_of(&choice);
+            if cost <= left {
+                let next = task.successor(operator, state, &choice).expect("small numbers");
+                path.push(GroundStep { operator: id, choice });
+                all(task, &next, left - cost, path, found);
+                path.pop();
+            }
+        }
+    }
+}
+
+/// What a plan does, as text.
+fn steps(plan: &Plan) -> Vec<String> {
+    plan.steps
+        .iter()
+        .map(|step| format!("{} {:?} {:?}", step.action, step.arguments, step.configuration))
+        .collect()
+}
+
+fn forced(first: &Plan, plans: &[Plan]) -> Vec<Forced> {
+    let designs: BTreeSet<&String> =
+        plans.iter().flat_map(|p| &p.steps).flat_map(|s| s.configuration.iter().map(|(_, d)| d)).collect();
+    let route = |step: &task::plan::Step| {
+        let plain = step.arguments.iter().filter(|argument| !designs.contains(argument));
+        (step.action.clone(), plain.cloned().collect::<Vec<_>>())
+    };
+    let at = |position: usize, step: &task::plan::Step| {
+        let all = |same: &dyn Fn(&task::plan::Step) -> bool| {
+            plans.iter().all(|plan| plan.steps.get(position).is_some_and(same))
+        };
+        let functions =
+            step.configuration.iter().filter(|pair| all(&|other| other.configuration.contains(pair)));
+        Forced {
+            action: all(&|other| route(other) == route(step)),
+            functions: functions.map(|(function, _)| function.clone()).collect(),
+        }
+    };
+    first.steps.iter().enumerate().map(|(position, step)| at(position, step)).collect()
+}
+
+/// Returns how many cheapest plans there are.
+fn check(seed: u64) -> usize {
+    let mission = Mission::random(seed);
+    if mission.weights.0 == 0 {
+        // Recharging is free then, and there are infinitely many cheapest plans.
+        return 0;
+    }
+    let (domain, problem) = (Source::new("d", mission.domain()), Source::new("p", mission.problem()));
+    let (domain, problem, _) = read(&domain, &problem).expect("PDDL");
+    let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
+    let config = Config::default();
+    let solution = optimize(&task, &config, &mut |_| {});
+    if solution.status != Status::Optimal {
+        assert!(alternatives(&task, &solution, 3, &config).is_none(), "seed {seed}");
+        return 0;
+    }
+    let ground = solution.ground.as_ref().expect("a plan");
+    let mut expected = Vec::new();
+    all(&task, &task.initial, ground.cost, &mut Vec::new(), &mut expected);
+    let plans: Vec<Plan> = expected
+        .into_iter()
+        .map(|steps| decode(Context::new(&task, &Limits::none()), &GroundPlan { steps, cost: ground.cost }))
+        .collect();
+    let first = solution.plan.as_ref().expect("a plan");
+    // By search, and by formulas.
+    for config in [config, Config::default().with_engine(Engine::Sat)] {
+        let context = format!("seed {seed}, {:?}: {mission:?}", config.engine);
+        let found = alternatives(&task, &solution, 1_000, &config).expect("alternatives");
+        let texts: BTreeSet<_> = found.plans.iter().chain([first]).map(steps).collect();
+        assert_eq!(texts, plans.iter().map(steps).collect(), "{context}");
+        assert_eq!(found.plans.len() + 1, plans.len(), "a plan is listed twice: {context}");
+        assert!(found.complete, "{context}");
+        assert_eq!(found.forced, Some(forced(first, &plans)), "{context}");
+        let fewer = alternatives(&task, &solution, 1, &config).expect("alternatives");
+        assert_eq!(
+            (fewer.plans.len(), &fewer.forced),
+            (1.min(found.plans.len()), &found.forced),
+            "{context}"
+        );
+        // Formulas are not asked for one plan more.
+        let most = if config.engine == Engine::Sat { 1 } else { 2 };
+        assert_eq!(fewer.complete, plans.len() <= most, "{context}");
+    }
+    let limits = Limits::none();
+    limits.interrupt().store(true, Ordering::Relaxed);
+    let late = alternatives(&task, &solution, 3, &Config::default().with_limits(limits)).expect("an answer");
+    assert!(!late.complete && late.forced.is_none(), "seed {seed}: what is not proved is claimed");
+    plans.len()
+}
+
+#[test]
+fn all_cheapest_plans_are_found_and_what_they_share() {
+    let several = (0..300).filter(|seed| check(*seed) > 1).count();
+    assert!(several > 8, "only {several} missions have several cheapest plans");
+}

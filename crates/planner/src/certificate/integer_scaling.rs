@@ -1,0 +1,80 @@
+//! By what the numbers of a ground task become integers, where they are not yet.
+
+use certificate::format::Integer;
+use num_bigint::BigInt;
+use num_integer::Integer as _;
+use num_traits::{One, Signed};
+
+use task::number::Rational;
+use task::task::Task;
+use task::task::common_denominator::CommonDenominator;
+use task::task::number::TaskNumber;
+use task::task::quantity::Linear;
+
+/// A common denominator with more bits is none.
+const MOST_BITS: u64 = 1 << 20;
+
+/// A factor for each kind of numbers.
+pub(super) struct Scales {
+    pub(super) numbers: Integer,
+    pub(super) costs: Integer,
+    pub(super) times: Integer,
+    /// For bounds on costs: what they are worth, in costs.
+    pub(super) bounds: Integer,
+}
+
+impl Scales {
+    /// For a task in integers.
+    pub(super) fn one() -> Self {
+        let one = || Integer::from(1);
+        Self { numbers: one(), costs: one(), times: one(), bounds: one() }
+    }
+
+    /// For a task in rationals, with bounds on costs in multiples of `unit`. None if a number is multiplied by a fraction, so that its
+    /// values have no common denominator.
+    pub(super) fn of(task: &Task<Rational>, unit: &Rational) -> Option<Self> {
+        let mut numbers = CommonDenominator::of_at_most(MOST_BITS);
+        let mut times = CommonDenominator::of_at_most(MOST_BITS);
+        let mut costs = CommonDenominator::of_at_most(MOST_BITS);
+        task.initial.numbers.iter().for_each(|number| numbers.number(number));
+        let rules = task.axioms.iter().flat_map(|layer| &layer.rules).map(|rule| &rule.body);
+        let conditions = task.operators.iter().map(|operator| &operator.condition);
+        for condition in conditions.chain(rules).chain([&task.goal]) {
+            condition.linears().for_each(|linear| numbers.quantity(&linear.quantity));
+        }
+        for operator in &task.operators {
+            for effect in &operator.numeric_effects {
+                numbers.quantity(&effect.value.quantity);
+                if !effect.value.coefficients.iter().all(|(_, factor)| factor.is_integer()) {
+                    return None;
+                }
+            }
+            costs.quantity(&operator.cost);
+            times.quantity(&operator.duration);
+            operator.wait.iter().for_each(|time| times.number(time));
+        }
+        costs.number(&task.objective.offset);
+        costs.number(unit);
+        let costs = Integer::from(costs.get()?);
+        let bounds = scaled(unit, &costs);
+        Some(Self { numbers: numbers.get()?.into(), times: times.get()?.into(), costs, bounds })
+    }
+}
+
+/// A number times a factor of which its denominator is a divisor.
+pub(super) fn scaled<N: TaskNumber>(number: &N, scale: &Integer) -> Integer {
+    let number = number.to_rational();
+    if let Some(integer) = number.to_int() {
+        return &Integer::from(integer) * scale;
+    }
+    let product = number.to_big() * scale.to_rational();
+    debug_assert!(product.is_integer(), "{number:?} times {scale}");
+    product.to_integer().into()
+}
+
+/// What a comparison is multiplied by, so that its factors are integers.
+pub(super) fn whole<N: TaskNumber>(linear: &Linear<N>) -> Integer {
+    let denominators = linear.coefficients.iter().map(|(_, factor)| factor.to_rational());
+    let denominators = denominators.filter(|factor| !factor.is_integer());
+    denominators.fold(BigInt::one(), |common, factor| common.lcm(factor.to_big().denom()).abs()).into()
+}

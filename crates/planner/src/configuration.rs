@@ -1,0 +1,481 @@
+//! Which design each of several functions gets, where their designs compete for components or share a budget.
+//!
+//! The best choice serves as many functions as can be served together; of those choices, it misses the fewest requirements, and of
+//! those it has the greatest sum of utilities. Of equals it is the first: earlier functions get the earlier ones of their designs. All three
+//! together are one integer, the worth, in which one function more outweighs any requirements, and one requirement any utility. A component
+//! that only one design can use is a budget of one.
+//!
+//! Function after function, all that has been chosen so far is kept unless something else is at least as good in every respect: of as
+//! much worth, no more of any budget taken. What is left at the end has the optimum among it. A choice is left out, too, if it can no
+//! more keep a budget, whatever comes, or if no completion is worth as much as a choice that is known. For that, the worth of the functions that
+//! follow is bounded by what they are worth at a price for each budget, whatever the prices are \[1\]; good ones are found by subgradients
+//! \[2\] in floating-point numbers, and then rounded, so that the bound is exact.
+//!
+//! - \[1\] H. Everett: Generalized Lagrange Multiplier Method for Solving Problems of Optimum Allocation of Resources, Operations
+//!   Research 11(3), 1963.
+//! - \[2\] M. Held, R. M. Karp: The Traveling-Salesman Problem and Minimum Spanning Trees: Part II, Mathematical Programming 1, 1971.
+
+use std::collections::BTreeSet;
+
+use num_bigint::BigInt;
+use num_integer::Integer as _;
+use num_rational::BigRational;
+use num_traits::{One as _, Signed as _, ToPrimitive as _, Zero as _};
+
+use task::limits::{Interrupted, Limits};
+
+/// Prices are looked for so often.
+const ROUNDS: usize = 300;
+/// Prices are fractions of this power of two.
+const PRICE_BITS: i32 = 40;
+
+/// One of the designs of a function.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct DesignChoice {
+    /// How many requirements of the function it misses.
+    pub missed: usize,
+    /// What it is worth; larger is better.
+    pub utility: BigRational,
+    /// What it takes of each budget.
+    pub demands: Vec<BigRational>,
+    /// Components that only one of all chosen designs can use, as numbers of the caller's.
+    pub components: BTreeSet<usize>,
+}
+
+/// A choice for each function, if it can be served.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Assignment {
+    /// The position of the design in the function's list.
+    pub designs: Vec<Option<usize>>,
+    /// The sum of the utilities.
+    pub utility: BigRational,
+    /// Whether it is proved that no choice is better; a limit was reached if not.
+    pub optimal: bool,
+}
+
+/// The best choice for functions, each with its designs in the order of preference among equals, under budgets.
+pub fn configure(functions: &[Vec<DesignChoice>], budgets: &[BigRational], limits: &Limits) -> Assignment {
+    let problem = Problem::new(functions, budgets);
+    let (prices, known) = problem.prices();
+    let (designs, optimal) = match problem.search(&prices, &known, limits) {
+        Ok(designs) => (designs, true),
+        Err(Interrupted) => (known.designs, false),
+    };
+    let chosen = functions.iter().zip(&designs).filter_map(|(own, at)| at.and_then(|at| own.get(at)));
+    let utility = chosen.map(|design| &design.utility).sum();
+    Assignment { designs, utility, optimal }
+}
+
+/// A design in integers.
+struct Item {
+    worth: BigInt,
+    demands: Vec<BigInt>,
+}
+
+/// The problem in integers.
+struct Problem {
+    functions: Vec<Vec<Item>>,
+    /// Those of the caller, and one for each component.
+    budgets: Vec<BigInt>,
+    /// For each function, the least that it and those after it can take of each budget; one more entry for none.
+    least: Vec<Vec<BigInt>>,
+}
+
+/// What has been chosen for the functions so far.
+#[derive(Clone, Default)]
+struct Label {
+    designs: Vec<Option<usize>>,
+    worth: BigInt,
+    spent: Vec<BigInt>,
+}
+
+impl Label {
+    fn with(&self, position: Option<usize>, item: Option<&Item>) -> Self {
+        let mut label = self.clone();
+        label.designs.push(position);
+        if let Some(item) = item {
+            label.worth += &item.worth;
+            label.spent.iter_mut().zip(&item.demands).for_each(|(spent, demand)| *spent += demand);
+        }
+        label
+    }
+
+    /// Whether whatever can be added to the other one can be added to this one.
+    fn is_as_free(&self, other: &Self) -> bool {
+        self.spent.iter().zip(&other.spent).all(|(own, other)| own <= other)
+    }
+}
+
+/// A price for each budget, as a fraction of 2^`PRICE_BITS`, and what functions are worth at most at these prices.
+struct LagrangeMultipliers {
+    each: Vec<BigInt>,
+    /// For each function, of it and those after it; one more entry for none.
+    after: Vec<BigInt>,
+}
+
+/// Numbers as integers of one scale, and the scale.
+fn scaled<'a>(numbers: impl Iterator<Item = &'a BigRational> + Clone) -> (Vec<BigInt>, BigInt) {
+    let scale = numbers.clone().fold(BigInt::one(), |scale, number| scale.lcm(number.denom()));
+    (numbers.map(|number| (number * &scale).to_integer()).collect(), scale)
+}
+
+impl Problem {
+    fn new(functions: &[Vec<DesignChoice>], budgets: &[BigRational]) -> Self {
+        let all = || functions.iter().flatten();
+        let (utilities, _) = scaled(all().map(|design| &design.utility));
+        // Utilities may be negative: one requirement outweighs the difference of any two sums of them.
+        let requirement: BigInt = utilities.iter().map(BigInt::abs).sum::<BigInt>() * 2 + 1;
+        let function =
+            &requirement * all().map(|design| BigInt::from(design.missed)).sum::<BigInt>() + &requirement;
+        let mut worths =
+            all().zip(utilities).map(|(design, utility)| &function - &requirement * design.missed + utility);
+        let components: BTreeSet<usize> =
+            all().flat_map(|design| design.components.iter().copied()).collect();
+        let zero = BigRational::zero();
+        let demand =
+            |design: &'_ DesignChoice, budget: usize| design.demands.get(budget).unwrap_or(&zero).clone();
+        let mut columns = Vec::new();
+        let mut whole = Vec::new();
+        for (budget, most) in budgets.iter().enumerate() {
+            let numbers: Vec<BigRational> =
+                all().map(|design| demand(design, budget)).chain([most.clone()]).collect();
+            let (mut column, _) = scaled(numbers.iter());
+            whole.push(column.pop().unwrap_or_default());
+            columns.push(column.into_iter());
+        }
+        for component in components {
+            let uses = all().map(|design| BigInt::from(u8::from(design.components.contains(&component))));
+            columns.push(uses.collect::<Vec<_>>().into_iter());
+            whole.push(BigInt::one());
+        }
+        let mut item = || Item {
+            worth: worths.next().unwrap_or_default(),
+            demands: columns.iter_mut().map(|column| column.next().unwrap_or_default()).collect(),
+        };
+        let functions: Vec<Vec<Item>> =
+            functions.iter().map(|designs| designs.iter().map(|_| item()).collect()).collect();
+        let mut least = vec![vec![BigInt::zero(); whole.len()]];
+        for designs in functions.iter().rev() {
+            let after = least.last().cloned().unwrap_or_default();
+            let own = after.into_iter().enumerate().map(|(budget, after)| {
+                let demands = designs.iter().filter_map(|design| design.demands.get(budget));
+                // A function that is not served takes nothing.
+                after + demands.min().cloned().unwrap_or_default().min(BigInt::zero())
+            });
+            let own = own.collect();
+            least.push(own);
+        }
+        least.reverse();
+        Self { functions, budgets: whole, least }
+    }
+
+    fn nothing(&self) -> Label {
+        Label { spent: vec![BigInt::zero(); self.budgets.len()], ..Label::default() }
+    }
+
+    /// Whether the functions from this one on can be chosen for so that all budgets are kept.
+    fn fits(&self, label: &Label, from: usize) -> bool {
+        let Some(least) = self.least.get(from) else { return true };
+        let ahead = label.spent.iter().zip(least).map(|(spent, least)| spent + least);
+        ahead.zip(&self.budgets).all(|(spent, budget)| spent <= *budget)
+    }
+
+    /// For each function the first design that fits, in an order of preference.
+    fn greedy(&self, preference: impl Fn(&Item) -> f64) -> Label {
+        let mut label = self.nothing();
+        for (at, designs) in self.functions.iter().enumerate() {
+            let mut order: Vec<(usize, f64)> = designs.iter().map(&preference).enumerate().collect();
+            order.sort_by(|a, b| b.1.total_cmp(&a.1));
+            let mut with =
+                order.into_iter().map(|(position, _)| label.with(Some(position), designs.get(position)));
+            let found = with.find(|new| self.fits(new, at.saturating_add(1)));
+            label = found.unwrap_or_else(|| label.with(None, None));
+        }
+        // What a later function would have given back may not have come.
+        if self.fits(&label, self.functions.len()) {
+            return label;
+        }
+        self.functions.iter().fold(self.nothing(), |label, _| label.with(None, None))
+    }
+
+    /// Good prices, and the best choice that was met on the way.
+    #[expect(clippy::cast_possible_truncation, reason = "rounding is meant; bounds hold for whatever prices")]
+    fn prices(&self) -> (LagrangeMultipliers, Label) {
+        let float = |number: &BigInt| number.to_f64().unwrap_or(f64::MAX);
+        let budgets: Vec<f64> = self.budgets.iter().map(float).collect();
+        let mut known = self.greedy(|item| float(&item.worth));
+        let mut prices = vec![0.0_f64; budgets.len()];
+        let mut best = (f64::INFINITY, prices.clone());
+        let mut stride = 1.0;
+        for _ in 0..ROUNDS {
+            let reduced = |item: &Item| {
+                let paid: f64 =
+                    item.demands.iter().zip(&prices).map(|(demand, price)| float(demand) * price).sum();
+                float(&item.worth) - paid
+            };
+            let (mut bound, mut left) = (0.0, budgets.clone());
+            for designs in &self.functions {
+                let chosen =
+                    designs.iter().map(|item| (item, reduced(item))).max_by(|a, b| a.1.total_cmp(&b.1));
+                let Some((item, worth)) = chosen.filter(|(_, worth)| *worth > 0.0) else { continue };
+                bound += worth;
+                left.iter_mut().zip(&item.demands).for_each(|(left, demand)| *left -= float(demand));
+            }
+            bound += budgets.iter().zip(&prices).map(|(budget, price)| budget * price).sum::<f64>();
+            let met = self.greedy(reduced);
+            if met.worth > known.worth {
+                known = met;
+            }
+            if bound < best.0 {
+                best = (bound, prices.clone());
+            } else {
+                stride *= 0.97;
+            }
+            let length: f64 = left.iter().map(|left| left * left).sum();
+            if length <= 0.0 {
+                break;
+            }
+            let step = stride * (bound - float(&known.worth)).max(0.0) / length;
+            prices.iter_mut().zip(&left).for_each(|(price, left)| *price = (*price - step * left).max(0.0));
+        }
+        let one = 2.0_f64.powi(PRICE_BITS);
+        let each: Vec<BigInt> =
+            best.1.iter().map(|price| BigInt::from((price * one).min(1e30) as i128)).collect();
+        let mut after = vec![BigInt::zero()];
+        for designs in self.functions.iter().rev() {
+            let reduced = designs.iter().map(|item| {
+                let paid: BigInt = item.demands.iter().zip(&each).map(|(demand, price)| demand * price).sum();
+                (&item.worth << PRICE_BITS) - paid
+            });
+            let own = reduced.max().unwrap_or_default().max(BigInt::zero());
+            let sum = after.last().cloned().unwrap_or_default() + own;
+            after.push(sum);
+        }
+        after.reverse();
+        (LagrangeMultipliers { each, after }, known)
+    }
+
+    /// At most so much is a choice worth that begins like this, as a fraction of 2^`PRICE_BITS`.
+    fn bound(&self, label: &Label, from: usize, prices: &LagrangeMultipliers) -> BigInt {
+        let left = self.budgets.iter().zip(&label.spent).map(|(budget, spent)| budget - spent);
+        let paid: BigInt = left.zip(&prices.each).map(|(left, price)| left * price).sum();
+        (&label.worth << PRICE_BITS) + paid + prices.after.get(from).cloned().unwrap_or_default()
+    }
+
+    /// The best choice, where one is known.
+    fn search(
+        &self,
+        prices: &LagrangeMultipliers,
+        known: &Label,
+        limits: &Limits,
+    ) -> Result<Vec<Option<usize>>, Interrupted> {
+        let wanted: BigInt = &known.worth << PRICE_BITS;
+        let mut labels = vec![self.nothing()];
+        for (from, designs) in (1..).zip(&self.functions) {
+            let mut next: Vec<Label> = Vec::new();
+            for label in limits.watch(&labels) {
+                let label = label?;
+                let with = designs.iter().enumerate().map(|(at, item)| label.with(Some(at), Some(item)));
+                for new in limits.watch(with.chain([label.with(None, None)])) {
+                    let new = new?;
+                    let is_worse = |old: &Label| old.worth >= new.worth && old.is_as_free(&new);
+                    let is_hopeless = !self.fits(&new, from) || self.bound(&new, from, prices) < wanted;
+                    if is_hopeless || next.iter().any(is_worse) {
+                        continue;
+                    }
+                    next.retain(|old| old.worth >= new.worth || !new.is_as_free(old));
+                    next.push(new);
+                }
+            }
+            labels = next;
+        }
+        // Labels are in the order of preference.
+        let best =
+            labels.into_iter().reduce(|best, other| if other.worth > best.worth { other } else { best });
+        Ok(best.map_or_else(|| known.designs.clone(), |best| best.designs))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use testing::random::Random;
+
+    fn number(value: i64) -> BigRational {
+        BigRational::from_integer(value.into())
+    }
+
+    /// Functions served, requirements missed, utility.
+    type Worth = (usize, std::cmp::Reverse<usize>, BigRational);
+
+    /// All choices, the preferred ones first; the first of the best ones.
+    fn by_enumeration(
+        functions: &[Vec<DesignChoice>],
+        budgets: &[BigRational],
+    ) -> (Worth, Vec<Option<usize>>) {
+        let mut all: Vec<Vec<Option<usize>>> = vec![Vec::new()];
+        for designs in functions {
+            let choices = || (0..designs.len()).map(Some).chain([None]);
+            all = all
+                .iter()
+                .flat_map(|known| choices().map(|own| [known.clone(), vec![own]].concat()))
+                .collect();
+        }
+        let mut best: Option<(Worth, Vec<Option<usize>>)> = None;
+        for designs in all {
+            let chosen: Vec<&DesignChoice> =
+                functions.iter().zip(&designs).filter_map(|(own, at)| at.map(|at| &own[at])).collect();
+            let used: usize = chosen.iter().map(|own| own.components.len()).sum();
+            let different: BTreeSet<usize> = chosen.iter().flat_map(|own| own.components.clone()).collect();
+            let spent =
+                |budget: usize| chosen.iter().map(|own| own.demands[budget].clone()).sum::<BigRational>();
+            if used > different.len() || (0..budgets.len()).any(|budget| spent(budget) > budgets[budget]) {
+                continue;
+            }
+            let missed: usize = chosen.iter().map(|own| own.missed).sum();
+            let utility = chosen.iter().map(|own| own.utility.clone()).sum::<BigRational>();
+            let worth = (chosen.len(), std::cmp::Reverse(missed), utility);
+            if best.as_ref().is_none_or(|(known, _)| worth > *known) {
+                best = Some((worth, designs));
+            }
+        }
+        best.expect("nothing at all is a choice")
+    }
+
+    fn random(random: &mut Random) -> (Vec<Vec<DesignChoice>>, Vec<BigRational>) {
+        let budgets: Vec<BigRational> = (0..random.below(3)).map(|_| number(random.below(9))).collect();
+        let functions = (0..=random.below(4)).map(|_| {
+            let design = |random: &mut Random| DesignChoice {
+                missed: random.below(2) as usize,
+                utility: number(random.below(4) - 1),
+                demands: budgets.iter().map(|_| number(random.below(6) - 1)).collect(),
+                components: (0..random.below(3)).map(|_| random.below(4) as usize).collect(),
+            };
+            (0..random.below(4)).map(|_| design(random)).collect()
+        });
+        (functions.collect(), budgets.clone())
+    }
+
+    #[test]
+    fn the_best_choice_is_that_of_an_enumeration() {
+        let mut draw = Random(7);
+        let mut partly = 0;
+        for round in 0..3000 {
+            let (functions, budgets) = random(&mut draw);
+            let chosen = configure(&functions, &budgets, &Limits::none());
+            // Where less than nothing is left, nothing is chosen at all.
+            if budgets.iter().any(|budget| *budget < BigRational::zero()) {
+                continue;
+            }
+            let ((served, _, utility), designs) = by_enumeration(&functions, &budgets);
+            assert!(chosen.optimal);
+            assert_eq!(
+                (chosen.designs, chosen.utility),
+                (designs, utility),
+                "round {round}: {functions:?} {budgets:?}"
+            );
+            partly += usize::from(served < functions.len());
+        }
+        assert!((300..2700).contains(&partly), "the choices are of one kind: {partly}");
+    }
+
+    /// Numbers as sensors and spreadsheets write them: 16 digits, huge and tiny ones, side by side.
+    #[test]
+    fn numbers_of_the_field_are_exact() {
+        let mut draw = Random(11);
+        let power = |exponent: usize| {
+            BigRational::from_integer(BigInt::from(10).pow(u32::try_from(exponent).expect("small")))
+        };
+        for round in 0..300 {
+            let number = |draw: &mut Random| {
+                let digits = number(draw.below(1 << 53)) / power(16);
+                match draw.below(6) {
+                    0 => digits * power(320),
+                    1 => digits / power(320),
+                    _ => digits,
+                }
+            };
+            let functions: Vec<Vec<DesignChoice>> = (0..=draw.below(3))
+                .map(|_| {
+                    let design = |draw: &mut Random| DesignChoice {
+                        missed: 0,
+                        utility: number(draw),
+                        demands: vec![number(draw)],
+                        components: BTreeSet::new(),
+                    };
+                    (0..=draw.below(3)).map(|_| design(&mut draw)).collect()
+                })
+                .collect();
+            // Just enough for some choice, or too little for it by as little as can be.
+            let some: BigRational =
+                functions.iter().filter_map(|own| own.first()).map(|own| own.demands[0].clone()).sum();
+            for budget in [some.clone(), some - power(0) / power(640)] {
+                let budgets = [budget.max(BigRational::zero())];
+                let chosen = configure(&functions, &budgets, &Limits::none());
+                let ((_, _, utility), designs) = by_enumeration(&functions, &budgets);
+                assert_eq!(
+                    (chosen.designs, chosen.utility),
+                    (designs, utility),
+                    "round {round}: {functions:?} {budgets:?}"
+                );
+            }
+        }
+    }
+
+    /// The multiple-choice knapsack problem by dynamic programming over each amount that can be spent.
+    fn by_amounts(functions: &[Vec<(i64, usize)>], budget: usize) -> (usize, i64) {
+        let mut best = vec![(0, 0); budget + 1];
+        for designs in functions {
+            let with = |left: usize| {
+                let fitting = designs.iter().filter(|(_, demand)| *demand <= left);
+                let worths = fitting
+                    .map(|(utility, demand)| (best[left - demand].0 + 1, best[left - demand].1 + utility));
+                worths.chain([best[left]]).max()
+            };
+            best = (0..=budget).map(|left| with(left).expect("one")).collect();
+        }
+        best[budget]
+    }
+
+    #[test]
+    fn thousands_of_designs_are_as_by_dynamic_programming() {
+        let mut draw = Random(5);
+        for (count, designs, budget) in [(40, 50, 300), (20, 200, 90), (100, 20, 450), (8, 3, 9)] {
+            let functions: Vec<Vec<(i64, usize)>> = (0..count)
+                .map(|_| (0..designs).map(|_| (draw.below(1000), 1 + draw.below(30) as usize)).collect())
+                .collect();
+            let item = |(utility, demand): &(i64, usize)| DesignChoice {
+                missed: 0,
+                utility: number(*utility),
+                demands: vec![number(*demand as i64)],
+                components: BTreeSet::new(),
+            };
+            let choices: Vec<Vec<DesignChoice>> =
+                functions.iter().map(|own| own.iter().map(item).collect()).collect();
+            let chosen = configure(&choices, &[number(budget)], &Limits::none());
+            let (served, utility) = by_amounts(&functions, budget as usize);
+            assert!(chosen.optimal);
+            assert_eq!((chosen.designs.iter().flatten().count(), chosen.utility), (served, number(utility)));
+        }
+    }
+
+    #[test]
+    fn a_limit_leaves_a_choice_that_is_allowed() {
+        let item = |utility: i64, demand: i64| DesignChoice {
+            missed: 0,
+            utility: number(utility),
+            demands: vec![number(demand)],
+            components: BTreeSet::new(),
+        };
+        let functions = vec![vec![item(9, 5), item(1, 1)], vec![item(9, 5), item(2, 1)]];
+        let chosen = configure(&functions, &[number(6)], &Limits::none().with_time(Duration::ZERO));
+        assert_eq!(
+            chosen,
+            Assignment { designs: vec![Some(0), Some(1)], utility: number(11), optimal: false }
+        );
+        let chosen = configure(&functions, &[number(6)], &Limits::none());
+        assert_eq!((chosen.designs, chosen.optimal), (vec![Some(0), Some(1)], true));
+    }
+}

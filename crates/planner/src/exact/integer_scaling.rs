@@ -1,0 +1,79 @@
+//! The same task in other units: all constants become integers, as sums and comparisons of these are quick.
+
+use std::convert::Infallible;
+
+use num_rational::BigRational;
+use num_traits::One;
+
+use task::context::Context;
+use task::limits::Interrupted;
+use task::number::Rational;
+use task::task::common_denominator::CommonDenominator;
+use task::task::quantity::{Linear, Quantity};
+use task::task::table_map::TableMap;
+use task::task::{Condition, Task};
+
+/// Common denominators of more bits are not looked for.
+const MOST_BITS: u64 = 200;
+
+/// A task whose costs are this many times those of the task that it was made from.
+pub struct Integral {
+    pub(crate) task: Task<Rational>,
+    pub(crate) cost_scale: Rational,
+}
+
+fn compared(condition: &mut Condition<Rational>) -> impl Iterator<Item = &mut Linear<Rational>> {
+    condition.comparisons.iter_mut().chain(&mut condition.above)
+}
+
+/// All linear expressions of a task.
+fn linears(task: &mut Task<Rational>) -> impl Iterator<Item = &mut Linear<Rational>> {
+    let bodies = task.axioms.iter_mut().flat_map(|layer| &mut layer.rules).map(|rule| &mut rule.body);
+    let operators = task.operators.iter_mut().flat_map(|operator| {
+        let values = operator.numeric_effects.iter_mut().map(|effect| &mut effect.value);
+        compared(&mut operator.condition).chain(values)
+    });
+    bodies.chain([&mut task.goal]).flat_map(compared).chain(operators)
+}
+
+/// What numbers are multiplied by; they stay as they are if their common denominator is too long.
+fn scale(denominator: CommonDenominator) -> Rational {
+    let scale = |common| Rational::from_big(BigRational::from_integer(common));
+    denominator.get().map_or_else(Rational::one, scale)
+}
+
+/// All numbers of a quantity times another one.
+fn multiply(quantity: &mut Quantity<Rational>, scale: &Rational, tables: &mut TableMap<Rational>) {
+    let product = |number: &Rational| Ok::<_, Infallible>(number.clone() * scale);
+    let Ok(scaled) = tables.map(quantity, &product);
+    *quantity = scaled;
+}
+
+impl Integral {
+    /// What a search goes by is scaled: conditions, effects, costs, and the initial state.
+    pub(crate) fn of(context: Context<'_, Rational>) -> Result<Self, Interrupted> {
+        let mut task = context.task.clone();
+        let mut costs = CommonDenominator::of_at_most(MOST_BITS);
+        for operator in context.limits.watch(&task.operators) {
+            costs.quantity(&operator?.cost);
+        }
+        let mut numbers = CommonDenominator::of_at_most(MOST_BITS);
+        task.initial.numbers.iter().for_each(|number| numbers.number(number));
+        for linear in linears(&mut task) {
+            numbers.quantity(&linear.quantity);
+        }
+        let (cost_scale, number_scale) = (scale(costs), scale(numbers));
+        let mut tables = TableMap::default();
+        for operator in &mut task.operators {
+            multiply(&mut operator.cost, &cost_scale, &mut tables);
+        }
+        for number in &mut task.initial.numbers {
+            *number = number.clone() * &number_scale;
+        }
+        let mut tables = TableMap::default();
+        for linear in linears(&mut task) {
+            multiply(&mut linear.quantity, &number_scale, &mut tables);
+        }
+        Ok(Self { task, cost_scale })
+    }
+}

@@ -1,0 +1,345 @@
+//! Tasks whose numbers do not fit integers of a fixed size: planned in exact rationals, by search alone.
+//!
+//! No scale makes integers of what an action multiplies by one half, and a common denominator of many measured numbers can be
+//! longer than any machine integer. The search needs no integers: it adds and compares. Its estimates are those of the same
+//! task without numbers, whose costs are rounded down to integers, so that no plan is cheaper than estimated.
+
+mod integer_scaling;
+
+use std::time::Instant;
+
+use num_bigint::BigInt;
+use num_integer::Integer;
+use num_rational::BigRational;
+use num_traits::{One, ToPrimitive, Zero};
+use search::bounds::Bounds;
+use search::search::{Heuristic, SearchOutcome, search_states};
+use task::context::Context;
+use task::error::Errors;
+use task::ground::{Generality, GroundConfig, ground_for};
+use task::limits::Interrupted;
+use task::number::{Int, Rational, dense};
+use task::plan::ground::GroundPlan;
+use task::plan::solution::{MetricUnbounded, Proof, Solution, Statistics, Status};
+use task::plan::{Plan, decode, metric};
+use task::task::quantity::{Linear, NumericId, Quantity};
+use task::task::timing::Timing;
+use task::task::{Condition, NumericEffect, Objective, Operator, State, Task};
+
+use crate::exact::integer_scaling::Integral;
+use crate::optimize::{Config, can_repeat_reward};
+use pddl::ast::{Domain, Problem};
+
+/// How many states are stored at most.
+const STATE_LIMIT: usize = 2_000_000;
+/// Costs of the task that estimates are made from take at most so many bits.
+const COST_BITS: u64 = 90;
+
+/// A ground task in rationals of any size.
+#[derive(Debug, Clone)]
+pub struct ExactTask(pub Task<Rational>);
+
+/// Grounds a domain and a problem that have passed `pddl::check`, whatever the size of their numbers. Such a task is planned by
+/// [`optimize_exact`]; a task that [`task::ground`] accepts is planned faster and with more proofs.
+///
+/// # Errors
+/// Every construct that the planner does not handle, with its place.
+pub fn ground_exact(domain: &Domain, problem: &Problem, config: &GroundConfig) -> Result<ExactTask, Errors> {
+    ground_for(domain, problem, config, &Generality::default()).map(ExactTask)
+}
+
+impl ExactTask {
+    /// Where the problem has no metric: whether plans are measured by their time, and not by the number of their steps.
+    pub fn is_timed(&self) -> bool {
+        self.0.is_measured_by_time(&Rational::one())
+    }
+}
+
+/// Finds a cheapest plan by search. Of the configuration it heeds the horizon and the limits.
+///
+/// With a horizon, a cheapest plan that is longer is not an answer: then a best plan within it is looked for, which is not called
+/// optimal. Where actions improve the metric, plans with fewest steps count, and of those the best by the metric.
+pub fn optimize_exact(task: &ExactTask, config: &Config) -> Solution {
+    let started = Instant::now();
+    let task = &task.0;
+    let mut solution = match &task.unreachable {
+        Some(reason) => answer(Status::Unsolvable, None, Some(Proof::Relaxation(reason.clone()))),
+        None if task.operators.iter().any(|operator| operator.cost.minimum().is_negative()) => {
+            fewest_steps(task, config)
+        }
+        None => cheapest(task, config),
+    };
+    solution.statistics.operators = task.operators.len();
+    solution.statistics.search = started.elapsed();
+    solution
+}
+
+/// For a task whose operators all cost at least 0.
+fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
+    let context = Context::new(task, &config.limits);
+    let any = explore(context);
+    let show = |plan: &GroundPlan<Rational>| decode(context, plan);
+    let too_long =
+        |plan: &GroundPlan<Rational>| config.horizon.is_some_and(|horizon| plan.steps.len() > horizon);
+    match (any, config.horizon) {
+        (ExactOutcome::Known(solution), _) => *solution,
+        (ExactOutcome::Optimal(plan), _) if !too_long(&plan) => {
+            let lower = Some(metric(task, &plan.cost));
+            let solution = answer(Status::Optimal, Some(show(&plan)), Some(Proof::Search));
+            Solution { lower_bound: lower, ..solution }
+        }
+        (ExactOutcome::Optimal(plan), Some(horizon)) => within(context, horizon, &plan.cost),
+        (ExactOutcome::Unknown(_, lower), Some(horizon)) => within(context, horizon, &lower),
+        (ExactOutcome::Optimal(plan), None) => answer(Status::Feasible, Some(show(&plan)), None),
+        (ExactOutcome::Unknown(plan, lower), None) => {
+            let status = if plan.is_some() { Status::Feasible } else { Status::Unknown };
+            let lower = Some(metric(task, &lower));
+            Solution { lower_bound: lower, ..answer(status, plan.as_ref().map(show), None) }
+        }
+    }
+}
+
+/// The best plan with at most `horizon` steps, where no plan at all costs less than `lower`.
+fn within(context: Context<'_, Rational>, horizon: usize, lower: &Rational) -> Solution {
+    let shorter = with_horizon(context.task, horizon);
+    let (status, plan, proof) = match explore(Context { task: &shorter, ..context }) {
+        ExactOutcome::Optimal(plan) | ExactOutcome::Unknown(Some(plan), _) => {
+            (Status::Feasible, Some(plan), None)
+        }
+        ExactOutcome::Known(solution) => (Status::UnsolvableWithinHorizon, None, solution.proof),
+        ExactOutcome::Unknown(None, _) => (Status::Unknown, None, None),
+    };
+    let show = |plan: &GroundPlan<Rational>| decode(context, plan);
+    let solution = answer(status, plan.as_ref().map(show), proof);
+    Solution { lower_bound: Some(metric(context.task, lower)), horizon, ..solution }
+}
+
+/// For a metric that actions improve: fewest steps first, then the best metric among those plans.
+fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
+    let nothing = |solution: Solution| Solution { lower_bound: None, ..solution };
+    let unknown = || nothing(answer(Status::Unknown, None, None));
+    let context = Context::new(task, &config.limits);
+    let by_steps = with_costs(task.clone(), |_| Quantity::constant(Rational::one()));
+    let steps = match explore(Context { task: &by_steps, ..context }) {
+        ExactOutcome::Optimal(plan) => plan.steps.len(),
+        ExactOutcome::Known(solution) => return nothing(*solution),
+        ExactOutcome::Unknown(..) => return unknown(),
+    };
+    if config.horizon.is_some_and(|horizon| steps > horizon) {
+        let solution = answer(Status::UnsolvableWithinHorizon, None, Some(Proof::Search));
+        return Solution { horizon: config.horizon.unwrap_or(steps), ..nothing(solution) };
+    }
+    // No plan has fewer steps, so a constant for each step changes nothing but the sign of the costs.
+    let least = task.operators.iter().map(|operator| operator.cost.minimum()).min().unwrap_or_default();
+    let shifted = with_costs(with_horizon(task, steps), |operator| {
+        let mut cost = operator.cost.clone();
+        cost.constant = cost.constant - &least;
+        cost
+    });
+    let (plan, proof) = match explore(Context { task: &shifted, ..context }) {
+        ExactOutcome::Optimal(plan) => (plan, Some(Proof::Search)),
+        ExactOutcome::Unknown(Some(plan), _) => (plan, None),
+        ExactOutcome::Known(_) | ExactOutcome::Unknown(None, _) => return unknown(),
+    };
+    let shift = least * &Rational::from_big(BigRational::from_integer(steps.into()));
+    let plan = GroundPlan { cost: plan.cost + &shift, ..plan };
+    let proved = can_repeat_reward(context, &plan.steps);
+    Solution {
+        horizon: steps,
+        unbounded: Some(if proved { MetricUnbounded::Proved } else { MetricUnbounded::Suspected }),
+        ..nothing(answer(Status::Feasible, Some(decode(context, &plan)), proof))
+    }
+}
+
+/// What a search came to.
+enum ExactOutcome {
+    Optimal(GroundPlan<Rational>),
+    /// There is no plan.
+    Known(Box<Solution>),
+    /// A limit was reached; the best plan so far, and what no plan costs less than.
+    Unknown(Option<GroundPlan<Rational>>, Rational),
+}
+
+fn explore(context: Context<'_, Rational>) -> ExactOutcome {
+    let limits = context.limits;
+    let prepared = Integral::of(context)
+        .and_then(|integral| Ok((RoundedBounds::new(Context::new(&integral.task, limits))?, integral)));
+    let Ok((bounds, Integral { task, cost_scale })) = prepared else {
+        return ExactOutcome::Unknown(None, Rational::zero());
+    };
+    let unscaled = |cost: Rational| cost / cost_scale.clone();
+    let original = |plan: GroundPlan<Rational>| GroundPlan { cost: unscaled(plan.cost), ..plan };
+    let none = |proof| ExactOutcome::Known(Box::new(answer(Status::Unsolvable, None, Some(proof))));
+    let Some(lower) = bounds.estimate(&task.initial) else {
+        let reason = "no path leads to the goal in a projection of the task to one or two of its variables";
+        return none(Proof::Relaxation(reason.into()));
+    };
+    match search_states(Context::new(&task, limits), &bounds, STATE_LIMIT) {
+        SearchOutcome::Optimal(plan) => ExactOutcome::Optimal(original(plan)),
+        SearchOutcome::None => none(Proof::Search),
+        SearchOutcome::Unknown(plan) => ExactOutcome::Unknown(plan.map(original), unscaled(lower)),
+    }
+}
+
+fn answer(status: Status, plan: Option<Plan>, proof: Option<Proof>) -> Solution {
+    Solution {
+        status,
+        plan,
+        ground: None,
+        lower_bound: None,
+        horizon: 0,
+        proof,
+        unbounded: None,
+        statistics: Statistics::default(),
+    }
+}
+
+/// The same task with other costs, and a metric of their plain sum.
+fn with_costs(
+    mut task: Task<Rational>,
+    cost: impl Fn(&Operator<Rational>) -> Quantity<Rational>,
+) -> Task<Rational> {
+    for operator in &mut task.operators {
+        operator.cost = cost(operator);
+    }
+    task.objective = Objective { scale: 1, offset: Rational::zero(), maximize: false, rest: Vec::new() };
+    task
+}
+
+/// The same task for plans with at most so many steps: each uses up one of a number of them. As in formulas, waits are steps.
+fn with_horizon(task: &Task<Rational>, horizon: usize) -> Task<Rational> {
+    let mut task = task.clone();
+    let left = NumericId(dense(task.initial.numbers.len()));
+    task.number_names.push("steps left".to_owned());
+    task.initial.numbers.push(Rational::from_big(BigRational::from_integer(horizon.into())));
+    let mut after = Linear::variable(left);
+    after.quantity.constant = -Rational::one();
+    for operator in &mut task.operators {
+        operator.condition.comparisons.push(after.clone());
+        operator.numeric_effects.push(NumericEffect { variable: left, value: after.clone() });
+    }
+    task
+}
+
+/// Bounds of a task without numbers, whose costs are those of the task times a factor, rounded down.
+pub struct RoundedBounds {
+    pub(crate) bounds: Bounds,
+    /// What an integer of the bounds is worth.
+    pub(crate) unit: Rational,
+}
+
+impl RoundedBounds {
+    fn new(context: Context<'_, Rational>) -> Result<Self, Interrupted> {
+        Self::of(context, Bounds::new)
+    }
+
+    /// Bounds that each rest on one projection.
+    pub(crate) fn of_projections(context: Context<'_, Rational>) -> Result<Self, Interrupted> {
+        Self::of(context, Bounds::of_projections)
+    }
+
+    fn of(
+        context: Context<'_, Rational>,
+        bounds: impl FnOnce(Context<'_>) -> Result<Bounds, Interrupted>,
+    ) -> Result<Self, Interrupted> {
+        let task = context.task;
+        let costs: Vec<BigRational> =
+            task.operators.iter().map(|operator| operator.cost.minimum().to_big()).collect();
+        let factor = factor(&costs);
+        let rounded = |cost: &BigRational| {
+            let rounded = (cost * &factor).floor().to_integer().to_i128();
+            rounded.map_or(0, |rounded| rounded.max(0))
+        };
+        let operators = task.operators.iter().zip(&costs);
+        let bare = Task {
+            object_names: Vec::new(),
+            schema_names: Vec::new(),
+            variables: task.variables.clone(),
+            basic: task.basic,
+            exclusive: task.exclusive.clone(),
+            number_names: Vec::new(),
+            number_scale: 1,
+            number_multiples: Vec::new(),
+            axioms: Vec::new(),
+            slots: Vec::new(),
+            operators: operators.map(|(operator, cost)| bare_operator(operator, rounded(cost))).collect(),
+            initial: without_numbers(&task.initial),
+            goal: bare_condition(&task.goal),
+            objective: Objective::sum(),
+            others: Vec::new(),
+            time_scale: 1,
+            unreachable: None,
+        };
+        Ok(Self {
+            bounds: bounds(Context::new(&bare, context.limits))?,
+            unit: Rational::from_big(factor.recip()),
+        })
+    }
+}
+
+impl Heuristic<Rational> for RoundedBounds {
+    fn estimate(&self, state: &State<Rational>) -> Option<Rational> {
+        let rounded = self.bounds.estimate(&without_numbers(state))?;
+        Some(Rational::from_integer(rounded) * &self.unit)
+    }
+}
+
+/// A factor for costs: one that makes integers of them if these are short enough, else a power of two after which the largest
+/// one is as long as admitted.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "numbers have fewer than 2^63 bits, and the greater length is what the smaller one is taken from"
+)]
+fn factor(costs: &[BigRational]) -> BigRational {
+    let largest = costs.iter().max().cloned().unwrap_or_default();
+    let most = BigInt::one() << COST_BITS;
+    let mut common = BigInt::one();
+    for cost in costs {
+        common = common.lcm(cost.denom());
+        if common > most {
+            break;
+        }
+    }
+    let common = BigRational::from_integer(common);
+    if &largest * &common <= BigRational::from_integer(most.clone()) {
+        return common;
+    }
+    // At most this long: a number below 2^a divided by one of at least 2^(b - 1) is below 2^(a - b + 1).
+    let (numerator, denominator) = (largest.numer().bits(), largest.denom().bits());
+    let one = BigInt::one();
+    if denominator + COST_BITS > numerator {
+        BigRational::from_integer(one << (denominator + COST_BITS - numerator - 1))
+    } else {
+        BigRational::new(one.clone(), one << (numerator + 1 - denominator - COST_BITS))
+    }
+}
+
+fn without_numbers(state: &State<Rational>) -> State {
+    State { values: state.values.clone(), numbers: Vec::new() }
+}
+
+/// A condition without its numbers.
+fn bare_condition(condition: &Condition<Rational>) -> Condition {
+    let (facts, clauses) = (condition.facts.clone(), condition.clauses.clone());
+    Condition { facts, clauses, ..Condition::default() }
+}
+
+/// What estimates need to know of an operator.
+fn bare_operator(operator: &Operator<Rational>, cost: Int) -> Operator {
+    Operator {
+        schema: operator.schema,
+        arguments: Vec::new(),
+        configuration: Vec::new(),
+        slots: [].into(),
+        forbidden: [].into(),
+        condition: bare_condition(&operator.condition),
+        effects: operator.effects.clone(),
+        conditional: operator.conditional.clone(),
+        numeric_effects: Vec::new(),
+        cost: Quantity::constant(cost),
+        others: Vec::new(),
+        duration: Quantity::constant(0),
+        wait: None,
+        timing: Timing::free(),
+    }
+}

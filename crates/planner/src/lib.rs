@@ -1,0 +1,57 @@
+//! Proved optimal plans of PDDL tasks: a portfolio of heuristic search and SAT, lists of objectives, alternatives, replanning, certificates.
+//!
+//! What is absent: OWL. Availability of designs arrives as facts of the problem.
+
+#![warn(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    clippy::arithmetic_side_effects
+)]
+#![cfg_attr(
+    test,
+    allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
+        clippy::cast_sign_loss,
+        clippy::arithmetic_side_effects
+    )
+)]
+
+mod alternatives;
+mod certificate;
+mod configuration;
+mod exact;
+mod optimize;
+mod planner;
+mod replan;
+
+pub use self::certificate::{Certificate, Outputs as RefutationOutputs, certify, certify_exact, refute};
+pub use alternatives::{Alternatives, Forced, alternatives};
+pub use configuration::{Assignment, DesignChoice, configure};
+pub use encodings::encode::StepSemantics;
+pub use encodings::sat::{Backend, BackendError};
+pub use encodings::shipped;
+pub use exact::{ExactTask, ground_exact, optimize_exact};
+pub use optimize::{Config, Engine, Front, Point, Strategy, lexicographic, optimize, pareto};
+pub use planner::Planner;
+pub use replan::{FirstStep, Progress, Query, ReplanOutcome, Replanner};
+pub use task::ground::{GroundConfig, ground};
+pub use task::limits::Limits;
+pub use task::plan::solution::{
+    Improvement, MetricUnbounded, Moment, PlannerPart, Proof, Solution, Statistics, Status,
+};
+pub use task::plan::transitions::{TaskState, Transition};
+pub use task::plan::{Exact, NotANumber, Plan, Step};
+pub use task::task::Task;
+#[doc(hidden)]
+pub use task::thresholds::Thresholds;
+pub use task::words::UnknownWord;
+pub use task::{CODES, Error, Errors, File, Place};
+pub use temporal::{TemporalTask, ground_concurrent, optimize_concurrent};
+pub use {num_rational::BigRational, pddl};
+
+/// The example of the README is compiled and run with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

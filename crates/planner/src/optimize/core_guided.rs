@@ -1,0 +1,187 @@
+//! A lower bound that rises, contradiction by contradiction, until a plan costs as much.
+//!
+//! What a plan pays beyond the lower bound is a sum over literals: each, if true, adds its weight. All of them are assumed to be
+//! false. The solver answers with a plan, which then is a cheapest one, or with a core: some of them, of which one at least is
+//! true in every plan. So every plan pays the least weight in the core, which is taken from each weight in it. What is left of the
+//! sum is that more than one of them may be true, more than two, and so on: literals of a totalizer, with that weight, one of
+//! which is added for each core that has the one before it (OLL [1, 2]). Heavy literals come first (stratification [3]), so that plans
+//! are found on the way; a literal whose weight alone makes a plan as dear as the best known is false for good [3].
+//!
+//! \[1\] B. Andres, B. Kaufmann, O. Matheis, T. Schaub: Unsatisfiability-based optimization in clasp, ICLP 2012.
+//! \[2\] A. Morgado, C. Dodaro, J. Marques-Silva: Core-guided `MaxSAT` with soft cardinality constraints, CP 2014.
+//! \[3\] C. Ansótegui, M. L. Bonet, J. Gabàs, J. Levy: Improving SAT-based weighted `MaxSAT` solvers, CP 2012.
+
+use std::collections::BTreeMap;
+
+use encodings::encode::{Encoding, Family, Formula, VariableMeaning};
+use encodings::sat::{Answer, Lit, Totalizer};
+use rustc_hash::FxHashMap;
+use task::number::{Int, dense};
+
+use crate::optimize::optimizer_run::{Best, IncrementalSolver, Run, StrategyOutcome};
+
+/// A core is given to the solver again this often, as long as a smaller one comes back.
+const CORE_TRIM_ROUNDS: usize = 4;
+
+/// What plans pay.
+struct Search {
+    /// Every plan of the formula pays this much.
+    lower: Int,
+    /// What a literal adds if it is true: all of them at least 1.
+    weights: BTreeMap<Lit, Int>,
+    totalizers: Vec<Totalizer>,
+    /// For the literals of totalizers: which one's, and more than how many it says there are.
+    outputs: FxHashMap<Lit, (usize, usize)>,
+}
+
+impl Search {
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "weights of one source are differences of its amounts, which are at most the gap"
+    )]
+    fn new(encoding: &Encoding<'_>) -> Self {
+        let (lower, literals) = encoding.payments();
+        let mut weights = BTreeMap::new();
+        for (literal, weight) in literals {
+            *weights.entry(*literal).or_default() += weight;
+        }
+        Self { lower, weights, totalizers: Vec::new(), outputs: FxHashMap::default() }
+    }
+
+    /// The literals that weigh at least so much, negated.
+    fn assumptions(&self, least: Int) -> Vec<Lit> {
+        self.weights.iter().filter(|(_, weight)| **weight >= least).map(|(literal, _)| !*literal).collect()
+    }
+
+    /// The next lighter weight to begin assumptions with: at most half of it, if there is one.
+    fn lighter(&self, than: Int) -> Option<Int> {
+        let below = self.weights.values().copied().filter(|weight| *weight < than);
+        let lightest = below.clone().min()?;
+        Some(below.filter(|weight| *weight <= than / 2).max().unwrap_or(lightest))
+    }
+
+    /// Takes note of a core: literals of which one at least is true.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "a core has weights that are at most what the limit leaves, and the least of them is taken off each"
+    )]
+    fn pay(&mut self, core: &[Lit], formula: &mut Formula) {
+        let weight = core.iter().filter_map(|literal| self.weights.get(literal)).copied().min().unwrap_or(0);
+        self.lower += weight;
+        for literal in core {
+            if let Some(own) = self.weights.get_mut(literal) {
+                *own -= weight;
+                if *own == 0 {
+                    self.weights.remove(literal);
+                }
+            }
+            if let Some((totalizer, count)) = self.outputs.get(literal).copied() {
+                self.output(totalizer, count + 1, weight, formula);
+            }
+        }
+        formula.add(Family::Bound, core.iter().copied());
+        if core.len() > 1 {
+            let newest = self.totalizers.len();
+            self.totalizers.push(Totalizer::new(core));
+            self.output(newest, 1, weight, formula);
+        }
+    }
+
+    /// More than so many of a totalizer's literals cost so much more.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "weights are at most what the limit on the cost leaves, and each core has its own literals"
+    )]
+    fn output(&mut self, totalizer: usize, count: usize, weight: Int, formula: &mut Formula) {
+        let mut variables = dense(formula.variables());
+        let mut clauses = Vec::new();
+        let add = |clause: &[Lit]| clauses.push(clause.to_vec());
+        let Some(literal) = self.totalizers[totalizer].more_than(count, &mut variables, add) else { return };
+        while formula.variables() < variables as usize {
+            formula.fresh(VariableMeaning::Paid);
+        }
+        for clause in clauses {
+            formula.add(Family::Bound, clause);
+        }
+        *self.weights.entry(literal).or_default() += weight;
+        self.outputs.insert(literal, (totalizer, count));
+    }
+
+    /// What would make a plan dearer than the limit is false.
+    fn harden(&mut self, limit: Int, formula: &mut Formula) {
+        let lower = self.lower;
+        let heavy: Vec<Lit> = self
+            .weights
+            .iter()
+            .filter(|(_, weight)| **weight > limit.saturating_sub(lower))
+            .map(|(literal, _)| *literal)
+            .collect();
+        for literal in heavy {
+            formula.add(Family::Bound, [!literal]);
+            self.weights.remove(&literal);
+        }
+    }
+}
+
+/// Raises the lower bound of a formula's plans until it is above their limit, or a plan is as cheap.
+pub(super) fn raise(
+    run: &mut Run<'_>,
+    mut encoding: Encoding<'_>,
+    limit: Int,
+    best: &mut Best,
+) -> StrategyOutcome {
+    let mut search = Search::new(&encoding);
+    let mut live = run.live(u64::MAX);
+    let mut least = search.lighter(Int::MAX).unwrap_or(Int::MAX);
+    loop {
+        let limit = limit.min(best.plan.below());
+        if search.lower > limit {
+            return StrategyOutcome::Exhausted;
+        }
+        search.harden(limit, &mut encoding.formula);
+        match run.call(&mut live, &encoding, &search.assumptions(least)) {
+            (Answer::Unsatisfiable, _) => {
+                let core = match trimmed(run, &mut live, &encoding) {
+                    Some(core) if core.is_empty() => return StrategyOutcome::Exhausted,
+                    Some(core) => core,
+                    None => return StrategyOutcome::Interrupted,
+                };
+                search.pay(&core, &mut encoding.formula);
+                if search.lower > best.lower {
+                    best.lower = search.lower.min(limit.saturating_add(1));
+                    run.announce(best, encoding.horizon());
+                }
+            }
+            (_, None) => return StrategyOutcome::Interrupted,
+            (_, Some(plan)) => {
+                if plan.cost < best.plan.cost {
+                    best.plan = plan;
+                    run.announce(best, encoding.horizon());
+                }
+                match search.lighter(least) {
+                    Some(lighter) => least = lighter,
+                    None => return StrategyOutcome::Exhausted,
+                }
+            }
+        }
+    }
+}
+
+/// The core that the solver has found, or a part of it that is one, too; none if a limit was reached.
+fn trimmed(run: &mut Run<'_>, live: &mut IncrementalSolver, encoding: &Encoding<'_>) -> Option<Vec<Lit>> {
+    let mut core = live.solver.core().to_vec();
+    for _ in 0..CORE_TRIM_ROUNDS {
+        if core.len() < 2 {
+            break;
+        }
+        match run.call(live, encoding, &core) {
+            (Answer::Unsatisfiable, _) if live.solver.core().len() < core.len() => {
+                core = live.solver.core().to_vec();
+            }
+            (Answer::Unsatisfiable, _) => break,
+            _ => return None,
+        }
+    }
+    core.sort_unstable();
+    Some(core.into_iter().map(|literal| !literal).collect())
+}

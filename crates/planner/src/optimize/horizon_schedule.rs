@@ -1,0 +1,137 @@
+//! Any plan, with few steps.
+
+use std::time::Instant;
+
+use encodings::encode::StepSemantics;
+use encodings::sat::Answer;
+use search::bounds::Bounds;
+use task::plan::ground::GroundPlan;
+use task::plan::solution::{Proof, Solution, Status};
+use task::task::Task;
+
+use crate::optimize::optimizer_run::Run;
+use crate::optimize::sat_budget::{FORMULA_LIMIT, SatBudget};
+
+/// Longer and longer formulas without a cost limit, several of them open at a time [1].
+///
+/// [1] J. Rintanen, K. Heljanko, I. Niemelä: Planning as satisfiability: parallel plans and algorithms for plan search,
+/// Artificial Intelligence 170, 2006, section 6.
+pub(super) struct HorizonSchedule {
+    /// Horizons that are not decided.
+    open: Vec<usize>,
+    /// The next longer one; none if there is no further one.
+    next: Option<usize>,
+    /// No plan has more steps than these, if it is a shortest one or is not to have more.
+    most: usize,
+    /// Up to here there is no plan.
+    refuted: usize,
+}
+
+/// What became of longer and longer formulas.
+pub(super) enum FirstPlanOutcome {
+    Plan(GroundPlan),
+    /// There is none, of any length or within the horizon.
+    Refuted(Box<Solution>),
+    /// The allowance is used up.
+    Paused,
+    /// A limit was reached, or formulas become too large.
+    Over,
+}
+
+impl HorizonSchedule {
+    pub(super) fn new(run: &Run<'_>) -> Self {
+        let states = states(run.task).map_or(usize::MAX, |n| n.saturating_sub(1));
+        let most = run.config.horizon.unwrap_or(usize::MAX).min(states);
+        Self { open: Vec::new(), next: Some(0), most, refuted: 0 }
+    }
+
+    /// Goes on with all open horizons and one more, each with this allowance.
+    pub(super) fn advance(
+        &mut self,
+        run: &mut Run<'_>,
+        bounds: &Bounds,
+        allowance: SatBudget,
+    ) -> FirstPlanOutcome {
+        if let Some(horizon) = self.next.take()
+            && horizon.saturating_mul(run.task.operators.len()) <= FORMULA_LIMIT
+        {
+            self.open.push(horizon);
+            let longer = horizon.saturating_add(1).saturating_add(horizon / 4).min(self.most);
+            self.next = (horizon < self.most).then_some(longer);
+        }
+        for horizon in std::mem::take(&mut self.open) {
+            match decide(run, bounds, horizon, allowance) {
+                (_, Some(plan)) => return FirstPlanOutcome::Plan(plan),
+                (Answer::Unsatisfiable, None) => self.refuted = self.refuted.max(horizon),
+                // A plan whose cost does not fit is none, and longer ones cost no less.
+                (Answer::Satisfiable, None) => return FirstPlanOutcome::Over,
+                (Answer::Interrupted, None) => {
+                    // Without an allowance that could be used up, numbers are too large for a formula.
+                    if run.config.limits.reached() || allowance.conflicts == u64::MAX {
+                        return FirstPlanOutcome::Over;
+                    }
+                    self.open.push(horizon);
+                }
+            }
+        }
+        if self.open.is_empty() && self.next.is_none() {
+            if self.refuted < self.most {
+                return FirstPlanOutcome::Over;
+            }
+            return FirstPlanOutcome::Refuted(Box::new(self.refuted(run)));
+        }
+        FirstPlanOutcome::Paused
+    }
+
+    fn refuted(&self, run: &Run<'_>) -> Solution {
+        let horizon = self.most;
+        let bounded = states(run.task).is_some_and(|states| horizon.saturating_add(1) >= states);
+        if bounded {
+            run.without_plan(Status::Unsolvable, horizon, Some(Proof::Sat { step_bound: horizon }))
+        } else {
+            run.without_plan(Status::UnsolvableWithinHorizon, horizon, None)
+        }
+    }
+}
+
+/// Longer and longer formulas, however long each takes.
+pub(super) fn first_plan(run: &mut Run<'_>, bounds: &Bounds) -> Result<GroundPlan, Box<Solution>> {
+    let mut first = HorizonSchedule::new(run);
+    loop {
+        match first.advance(run, bounds, SatBudget::UNLIMITED) {
+            FirstPlanOutcome::Plan(plan) => return Ok(plan),
+            FirstPlanOutcome::Refuted(solution) => return Err(solution),
+            FirstPlanOutcome::Paused if first.open.is_empty() => {}
+            FirstPlanOutcome::Paused | FirstPlanOutcome::Over => {
+                return Err(Box::new(run.without_plan(Status::Unknown, first.refuted, None)));
+            }
+        }
+    }
+}
+
+fn decide(
+    run: &mut Run<'_>,
+    bounds: &Bounds,
+    horizon: usize,
+    allowance: SatBudget,
+) -> (Answer, Option<GroundPlan>) {
+    let started = Instant::now();
+    let window = bounds.window(run.context(), None, Some(horizon));
+    let semantics = run.semantics(StepSemantics::ExistsStep);
+    let encoding =
+        window.ok().and_then(|window| run.encoding(&window.allowed, None, semantics, allowance.clauses));
+    run.statistics.encode = run.statistics.encode.saturating_add(started.elapsed());
+    encoding.map_or((Answer::Interrupted, None), |encoding| {
+        let mut live = run.live(allowance.conflicts(encoding.formula.clause_count()));
+        run.call(&mut live, &encoding, &[])
+    })
+}
+
+/// How many states the task has at most, if that is few: a shortest plan visits none twice.
+fn states(task: &Task) -> Option<usize> {
+    if !task.initial.numbers.is_empty() {
+        return None;
+    }
+    let sizes = task.variables[..task.basic].iter().map(|variable| variable.values.len());
+    sizes.into_iter().try_fold(1_usize, usize::checked_mul)
+}

@@ -1,0 +1,27 @@
+//! Cheaper and cheaper plans from one solver, until there is none.
+
+use encodings::encode::Encoding;
+use encodings::sat::Answer;
+
+use crate::optimize::optimizer_run::{Best, Run, StrategyOutcome};
+
+/// Asks for cheaper and cheaper plans of a formula until there is none. The solver keeps what it has learnt: a lower limit is
+/// one more clause. It gives up after learning `budget` clauses.
+pub(super) fn linear_search_down(
+    run: &mut Run<'_>,
+    mut encoding: Encoding<'_>,
+    best: &mut Best,
+    budget: u64,
+) -> StrategyOutcome {
+    let mut live = run.live(budget);
+    loop {
+        let better = match run.call(&mut live, &encoding, &[]) {
+            (Answer::Unsatisfiable, _) => return StrategyOutcome::Exhausted,
+            (_, None) => return StrategyOutcome::Interrupted,
+            (_, Some(better)) => better,
+        };
+        best.plan = better;
+        run.announce(best, encoding.horizon());
+        encoding.tighten(best.plan.below());
+    }
+}

@@ -1,0 +1,244 @@
+//! Several objectives: one after the other, or against each other.
+//!
+//! What an earlier objective has come to is a budget for the later ones: a numeric variable that every operator uses up by its
+//! cost. So each question is an ordinary task with one objective, and each answer has an ordinary proof. The Pareto front is
+//! enumerated by the ε-constraint method [1]: best by A, then among those best by B, then strictly better by B, and so on.
+//!
+//! [1] Y. Haimes, L. Lasdon, D. Wismer: On a bicriterion formulation of the problems of integrated system identification
+//! and system optimization, IEEE Trans. SMC 1(3), 1971.
+
+use task::context::Context;
+use task::number::{Int, Rational};
+use task::plan::ground::GroundPlan;
+use task::plan::solution::{Improvement, Solution, Status};
+use task::plan::{Exact, decode};
+use task::task::quantity::{Linear, NumericId, Quantity};
+use task::task::{NumericEffect, Operator, Task};
+
+use crate::optimize::cheapest::optimize;
+use crate::optimize::config::Config;
+
+/// A point of the Pareto front, or what is known in place of one.
+#[derive(Debug, Clone)]
+pub struct Point {
+    /// The plan; its cost is that of the first objective.
+    pub solution: Solution,
+    /// What the plan comes to by each objective; empty if there is no plan.
+    pub values: Vec<Exact>,
+}
+
+/// The Pareto front of two objectives.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Front {
+    /// Best by the first objective to best by the second.
+    pub points: Vec<Point>,
+    /// Whether it is proved that there are no other points: `Optimal`, or `Unsolvable` if there is no plan at all.
+    pub status: Status,
+}
+
+/// Finds a plan that is best by the first objective of the task, among those best by the second, and so on.
+/// The values by all objectives come with it; they are empty if there is no plan.
+///
+/// ```
+/// use metaplan_planner::pddl::{ast::Direction, read_objective};
+/// use metaplan_planner::{Config, GroundConfig, ground, lexicographic};
+/// # use metaplan_planner::pddl::{Source, read};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let domain = Source::new("d", "(define (domain d) (:requirements :typing :numeric-fluents) (:types place)
+/// #   (:predicates (at ?p - place) (way ?a ?b - place)) (:functions (time) (energy))
+/// #   (:action walk :parameters (?a ?b - place) :precondition (and (at ?a) (way ?a ?b))
+/// #     :effect (and (not (at ?a)) (at ?b) (increase (time) 5) (increase (energy) 1)))
+/// #   (:action ride :parameters (?a ?b - place) :precondition (and (at ?a) (way ?a ?b))
+/// #     :effect (and (not (at ?a)) (at ?b) (increase (time) 1) (increase (energy) 4))))");
+/// # let problem = Source::new("p", "(define (problem p) (:domain d) (:objects a b c - place)
+/// #   (:init (at a) (way a b) (way b c) (= (time) 0) (= (energy) 0)) (:goal (at c)) (:metric minimize (time)))");
+/// # let (domain, problem, _warnings) = read(&domain, &problem)?;
+/// let objective = |text: &str| read_objective(Direction::Minimize, &Source::new("objective", text), &domain, &problem);
+/// let objectives = vec![objective("(time)")?, objective("(energy)")?];
+/// let task = ground(&domain, &problem, &GroundConfig::default().with_objectives(objectives))?;
+/// let point = lexicographic(&task, &Config::default(), &mut |_| {});
+/// assert_eq!(point.values.iter().map(ToString::to_string).collect::<Vec<_>>(), ["2", "8"]);
+/// # Ok(())
+/// # }
+/// ```
+pub fn lexicographic(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement)) -> Point {
+    let order: Vec<usize> = (0..=task.others.len()).collect();
+    in_order(task, &order, &[], config, report)
+}
+
+/// Enumerates the plans of which no other one is better by one of the first two objectives and not worse by
+/// the other, one plan for each pair of values.
+///
+/// ```
+/// use metaplan_planner::pddl::{ast::Direction, read_objective};
+/// use metaplan_planner::{Config, GroundConfig, Status, ground, pareto};
+/// # use metaplan_planner::pddl::{Source, read};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let domain = Source::new("d", "(define (domain d) (:requirements :typing :numeric-fluents) (:types place)
+/// #   (:predicates (at ?p - place) (way ?a ?b - place)) (:functions (time) (energy))
+/// #   (:action walk :parameters (?a ?b - place) :precondition (and (at ?a) (way ?a ?b))
+/// #     :effect (and (not (at ?a)) (at ?b) (increase (time) 5) (increase (energy) 1)))
+/// #   (:action ride :parameters (?a ?b - place) :precondition (and (at ?a) (way ?a ?b))
+/// #     :effect (and (not (at ?a)) (at ?b) (increase (time) 1) (increase (energy) 4))))");
+/// # let problem = Source::new("p", "(define (problem p) (:domain d) (:objects a b c - place)
+/// #   (:init (at a) (way a b) (way b c) (= (time) 0) (= (energy) 0)) (:goal (at c)) (:metric minimize (time)))");
+/// # let (domain, problem, _warnings) = read(&domain, &problem)?;
+/// let objective = |text: &str| read_objective(Direction::Minimize, &Source::new("objective", text), &domain, &problem);
+/// let objectives = vec![objective("(time)")?, objective("(energy)")?];
+/// let task = ground(&domain, &problem, &GroundConfig::default().with_objectives(objectives))?;
+/// let front = pareto(&task, &Config::default(), &mut |_| {});
+/// assert_eq!((front.status, front.points.len()), (Status::Optimal, 3));
+/// # Ok(())
+/// # }
+/// ```
+pub fn pareto(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement)) -> Front {
+    let mut points = Vec::new();
+    let mut budgets: Vec<(usize, Int)> = Vec::new();
+    loop {
+        let point = in_order(task, &[0, 1], &budgets, config, report);
+        match (point.solution.status, &point.solution.ground) {
+            (Status::Optimal, Some(plan)) => {
+                let by_second = cost_by(task, 1, plan).and_then(|cost| cost.checked_sub(1));
+                points.push(point);
+                // A sum that does not fit is not a budget: there may be other points.
+                let Some(budget) = by_second else { return Front { points, status: Status::Feasible } };
+                budgets = vec![(1, budget)];
+            }
+            (Status::Unsolvable, _) if points.is_empty() => {
+                return Front { points: vec![point], status: Status::Unsolvable };
+            }
+            (Status::Unsolvable, _) => return Front { points, status: Status::Optimal },
+            (status, _) => {
+                points.extend((point.solution.plan.is_some() || points.is_empty()).then_some(point));
+                let status = if points.len() > 1 || points[0].solution.plan.is_some() {
+                    Status::Feasible
+                } else {
+                    status
+                };
+                return Front { points, status };
+            }
+        }
+    }
+}
+
+/// Optimizes by some objectives in order, within budgets for some.
+fn in_order(
+    task: &Task,
+    order: &[usize],
+    budgets: &[(usize, Int)],
+    config: &Config,
+    report: &mut dyn FnMut(Improvement),
+) -> Point {
+    let context = Context::new(task, &config.limits);
+    let mut budgets = budgets.to_vec();
+    let mut best: Option<Solution> = None;
+    for objective in order {
+        let mut narrowed = task.clone();
+        for (other, budget) in &budgets {
+            limit(&mut narrowed, *other, *budget);
+        }
+        swap_objective(&mut narrowed, *objective);
+        let solution = optimize(&narrowed, config, report);
+        let Some(plan) = &solution.ground else {
+            // The plan that was best so far stays a plan; that nothing better was found for the rest is not proved.
+            let known = best.map(|known| Solution { status: Status::Feasible, proof: None, ..known });
+            return finish(context, known.unwrap_or(solution));
+        };
+        let spent = cost_by(task, *objective, plan);
+        budgets.extend(spent.map(|spent| (*objective, spent)));
+        // A sum that does not fit is not a budget for what comes next.
+        let proved = solution.status == Status::Optimal && spent.is_some();
+        best = Some(match best {
+            None => solution,
+            Some(first) => Solution {
+                status: if proved { first.status } else { Status::Feasible },
+                proof: first.proof.filter(|_| proved),
+                plan: solution.plan,
+                ground: solution.ground,
+                ..first
+            },
+        });
+        if !proved {
+            break;
+        }
+    }
+    finish(context, best.unwrap_or_else(|| optimize(task, config, report)))
+}
+
+/// Shows the plan by the task's own objectives.
+fn finish(context: Context<'_>, mut solution: Solution) -> Point {
+    let task = context.task;
+    let mut values = Vec::new();
+    if let Some(plan) = &solution.ground {
+        let objectives = std::iter::once(&task.objective).chain(&task.others);
+        values.extend(
+            objectives
+                .enumerate()
+                .map(|(position, objective)| objective.metric(&exact_cost_by(task, position, plan))),
+        );
+        if let Some(cost) = cost_by(task, 0, plan) {
+            let plan = GroundPlan { steps: plan.steps.clone(), cost };
+            let shown = decode(context, &plan);
+            // Some fluents of a metric may only be measured in the end.
+            values[0] = shown.cost.clone();
+            (solution.plan, solution.ground) = (Some(shown), Some(plan));
+        }
+    }
+    Point { solution, values }
+}
+
+/// What an operator costs by an objective, by its position.
+fn cost(operator: &Operator, objective: usize) -> &Quantity<Int> {
+    objective.checked_sub(1).map_or(&operator.cost, |other| &operator.others[other])
+}
+
+/// What the steps of a plan cost by an objective, by its position.
+fn costs_by(task: &Task, objective: usize, plan: &GroundPlan) -> impl Iterator<Item = Int> {
+    plan.steps.iter().map(move |step| {
+        let operator = &task.operators[step.operator.index()];
+        cost(operator, objective).at(&step.choice, &operator.sizes())
+    })
+}
+
+/// What a plan costs by an objective; none if that does not fit.
+fn cost_by(task: &Task, objective: usize, plan: &GroundPlan) -> Option<Int> {
+    costs_by(task, objective, plan).try_fold(0, Int::checked_add)
+}
+
+/// What a plan costs by an objective, however much that is.
+fn exact_cost_by(task: &Task, objective: usize, plan: &GroundPlan) -> Rational {
+    costs_by(task, objective, plan).map(Rational::from_integer).sum()
+}
+
+/// Admits only plans that cost at most so much by an objective.
+fn limit(task: &mut Task, objective: usize, budget: Int) {
+    let variable = NumericId::of(task.initial.numbers.len());
+    task.initial.numbers.push(budget);
+    task.number_names.push(String::new());
+    let always = task.operators.iter().all(|operator| cost(operator, objective).minimum() >= 0);
+    for operator in &mut task.operators {
+        let cost = cost(operator, objective).clone();
+        if cost.is_zero() {
+            continue;
+        }
+        let mut left = Linear::constant(0);
+        left.quantity = cost;
+        let mut left = left.negated();
+        left.add(&Linear::variable(variable));
+        if always {
+            operator.condition.comparisons.push(left.clone());
+        }
+        operator.numeric_effects.push(NumericEffect { variable, value: left });
+    }
+    task.goal.comparisons.push(Linear::variable(variable));
+}
+
+/// Makes an objective the first one.
+fn swap_objective(task: &mut Task, objective: usize) {
+    let Some(other) = objective.checked_sub(1) else { return };
+    std::mem::swap(&mut task.objective, &mut task.others[other]);
+    for operator in &mut task.operators {
+        std::mem::swap(&mut operator.cost, &mut operator.others[other]);
+    }
+}

@@ -1,0 +1,286 @@
+//! One run of the optimizer: what it asks the SAT solver, what it has heard, and how it ends.
+
+use std::cell::OnceCell;
+use std::time::Instant;
+
+use encodings::encode::{CostLimit, Encoding, PlanConstraints, StepSemantics, Symmetry};
+use encodings::sat::{Answer, Backend, Lit, Solver};
+use search::bounds::Bounds;
+use task::context::Context;
+use task::limits::Interrupted;
+use task::number::Int;
+use task::plan::ground::{GroundPlan, GroundStep, cost, pass};
+use task::plan::solution::{Improvement, Moment, Proof, Solution, Statistics, Status};
+use task::plan::{decode, metric};
+use task::task::Task;
+use tracing::field::{Empty, debug};
+use tracing::info_span;
+
+use crate::optimize::config::Config;
+
+/// Bounds are noted that are this part higher than the one before.
+const REPORT_STEP: Int = 100;
+
+/// A task with what has come of it so far.
+pub(super) struct Run<'a> {
+    pub(super) task: &'a Task,
+    pub(super) config: &'a Config,
+    pub(super) report: &'a mut dyn FnMut(Improvement),
+    pub(super) statistics: Statistics,
+    started: Instant,
+    /// What was noted last.
+    noted: Option<(Option<Int>, Int)>,
+    /// Found out when it is first needed.
+    symmetry: OnceCell<Symmetry>,
+}
+
+/// What is known of the cheapest plan.
+pub(super) struct Best {
+    /// The cheapest so far.
+    pub(super) plan: GroundPlan,
+    /// No plan is cheaper than this.
+    pub(super) lower: Int,
+}
+
+/// What a formula covers.
+pub(super) struct FormulaScope {
+    /// Plans that cost at most so much.
+    pub(super) limit: Int,
+    /// For each step, whether each operator can be there.
+    pub(super) allowed: Vec<Vec<bool>>,
+    /// That no such plan has more steps is known.
+    pub(super) step_bound: Option<usize>,
+}
+
+impl FormulaScope {
+    /// How many operator variables the formula has.
+    pub(super) fn size(&self) -> usize {
+        self.allowed.iter().map(|row| row.iter().filter(|flag| **flag).count()).sum()
+    }
+}
+
+/// What a strategy came to within a formula.
+pub(super) enum StrategyOutcome {
+    /// None of its plans within its limit is cheaper than the best one.
+    Exhausted,
+    /// A limit was reached.
+    Interrupted,
+}
+
+/// A solver that has the clauses of a formula, up to some position.
+pub(super) struct IncrementalSolver {
+    pub(super) solver: Box<dyn Solver>,
+    known: usize,
+    conflicts: u64,
+}
+
+impl<'a> Run<'a> {
+    pub(super) fn new(task: &'a Task, config: &'a Config, report: &'a mut dyn FnMut(Improvement)) -> Self {
+        let statistics = Statistics { operators: task.operators.len(), ..Statistics::default() };
+        Self {
+            task,
+            config,
+            report,
+            statistics,
+            started: Instant::now(),
+            noted: None,
+            symmetry: OnceCell::new(),
+        }
+    }
+
+    pub(super) fn context(&self) -> Context<'a> {
+        Context::new(self.task, &self.config.limits)
+    }
+
+    /// Notes that two parts of the planner contradict each other. It fails loudly where that is tested.
+    pub(super) fn report_internal_contradiction(&mut self, what: &str) {
+        debug_assert!(false, "{what}");
+        self.statistics.contradiction = Some(what.to_owned());
+    }
+
+    /// Notes what the best plan costs, if there is one, and what none costs less than.
+    pub(super) fn note(&mut self, cost: Option<Int>, lower: Int) {
+        let is_news = self.noted.is_none_or(|(known, bound)| {
+            let more = lower.saturating_sub(bound);
+            known != cost || more > bound / REPORT_STEP || more > 0 && cost == Some(lower)
+        });
+        if !is_news {
+            return;
+        }
+        self.noted = Some((cost, lower));
+        self.statistics.history.push(Moment {
+            time: self.started.elapsed(),
+            cost: cost.map(|cost| metric(self.task, &cost)),
+            lower_bound: metric(self.task, &lower),
+        });
+    }
+
+    pub(super) fn announce(&mut self, best: &Best, horizon: usize) {
+        self.note(Some(best.plan.cost), best.lower);
+        let improvement = Improvement {
+            cost: metric(self.task, &best.plan.cost),
+            lower_bound: metric(self.task, &best.lower),
+            horizon,
+        };
+        (self.report)(improvement);
+    }
+
+    /// How many operators stand at a step.
+    pub(super) fn semantics(&self, unless_given: StepSemantics) -> StepSemantics {
+        match self.config.horizon {
+            Some(_) => StepSemantics::Sequential,
+            None => self.config.semantics.unwrap_or(unless_given),
+        }
+    }
+
+    /// None if a limit was reached, or if there are more clauses than `most`.
+    pub(super) fn encoding(
+        &self,
+        allowed: &[Vec<bool>],
+        cost: Option<CostLimit<'_>>,
+        semantics: StepSemantics,
+        most: usize,
+    ) -> Option<Encoding<'a>> {
+        let span = info_span!("encode", steps = allowed.len(), variables = Empty, clauses = Empty).entered();
+        let plans = PlanConstraints { allowed, cost, semantics, max_clauses: most };
+        let encoding = Encoding::new(self.context(), plans, &self.symmetry)?;
+        let formula = &encoding.formula;
+        span.record("variables", formula.variables()).record("clauses", formula.clause_count());
+        Some(encoding)
+    }
+
+    /// What plans that cost at most so much can look like.
+    pub(super) fn extent(
+        &self,
+        bounds: &Bounds,
+        limit: Int,
+        best: &Best,
+    ) -> Result<FormulaScope, Interrupted> {
+        let window = bounds.window(self.context(), Some(limit), self.config.horizon)?;
+        let complete = |steps: &usize| *steps <= window.allowed.len();
+        let step_bound = window.steps.filter(complete);
+        let allowed = if window.steps.is_some() {
+            window.allowed
+        } else {
+            // Without a step bound longer plans are worth a try, though they prove nothing.
+            let longer = self
+                .config
+                .horizon
+                .unwrap_or_else(|| best.plan.steps.len().saturating_mul(2).saturating_add(4));
+            bounds.window(self.context(), Some(limit), Some(longer))?.allowed
+        };
+        Ok(FormulaScope { limit, allowed, step_bound })
+    }
+
+    /// A solver without clauses that gives up at a limit, or after learning `budget` clauses.
+    pub(super) fn live(&self, budget: u64) -> IncrementalSolver {
+        IncrementalSolver {
+            solver: self.config.backend.start(&self.config.limits, budget),
+            known: 0,
+            conflicts: 0,
+        }
+    }
+
+    /// Decides a formula under assumptions, by a solver that may know a part of it; a plan comes with the answer that it is
+    /// satisfiable.
+    pub(super) fn call(
+        &mut self,
+        live: &mut IncrementalSolver,
+        encoding: &Encoding<'_>,
+        assumptions: &[Lit],
+    ) -> (Answer, Option<GroundPlan>) {
+        let started = Instant::now();
+        let formula = &encoding.formula;
+        let span = info_span!("solve", clauses = formula.clause_count(), conflicts = Empty, answer = Empty)
+            .entered();
+        for item in self.config.limits.watch(formula.clauses_from(live.known)) {
+            let Ok((_, clause)) = item else { return (Answer::Interrupted, None) };
+            live.solver.add_clause(clause);
+        }
+        live.known = formula.clause_count();
+        if formula.variables() >= self.statistics.variables {
+            self.statistics.variables = formula.variables();
+            self.statistics.clauses = formula.clause_count();
+            self.statistics.families = formula.counts();
+        }
+        let answer = live.solver.solve(assumptions);
+        let conflicts = live.solver.conflicts();
+        let more = conflicts.saturating_sub(live.conflicts);
+        self.statistics.calls = self.statistics.calls.saturating_add(1);
+        self.statistics.conflicts = self.statistics.conflicts.saturating_add(more);
+        live.conflicts = conflicts;
+        span.record("conflicts", more).record("answer", debug(answer));
+        if let Some(reason) = live.solver.failure() {
+            self.statistics.failure = Some(reason.to_owned());
+        }
+        if let (Answer::Unsatisfiable, Backend::Program { command, arguments }) =
+            (answer, &self.config.backend)
+        {
+            let words: Vec<&str> = std::iter::once(command).chain(arguments).map(String::as_str).collect();
+            self.statistics.unchecked = Some(words.join(" "));
+        }
+        self.statistics.solve = self.statistics.solve.saturating_add(started.elapsed());
+        let plan = if answer == Answer::Satisfiable {
+            self.check(encoding.decode(live.solver.as_ref()))
+        } else {
+            None
+        };
+        (answer, plan)
+    }
+
+    /// A plan of the solver, replayed. That it is applicable is what the encoding is for; that it is, is checked.
+    fn check(&mut self, steps: Vec<GroundStep>) -> Option<GroundPlan> {
+        if pass(self.task, &self.task.initial, &steps).is_none() {
+            self.report_internal_contradiction("a formula admits a sequence of actions that is not a plan");
+            return None;
+        }
+        // A plan whose cost does not fit is none that the rest can reckon with.
+        cost(self.task, &steps).map(|cost| GroundPlan { steps, cost })
+    }
+
+    /// The answer; nothing is proved where parts of the planner contradict each other.
+    pub(super) fn finish(
+        self,
+        status: Status,
+        plan: Option<&GroundPlan>,
+        lower: Option<Int>,
+        horizon: usize,
+        proof: Option<Proof>,
+    ) -> Solution {
+        let context = self.context();
+        let doubtful = self.statistics.contradiction.is_some();
+        let status = match status {
+            Status::Optimal if doubtful => Status::Feasible,
+            Status::Unsolvable if doubtful => Status::Unknown,
+            other => other,
+        };
+        let (lower, proof) = if doubtful { (None, None) } else { (lower, proof) };
+        let mut statistics = self.statistics;
+        if matches!(proof, Some(Proof::Bound | Proof::Search | Proof::Relaxation(_))) {
+            statistics.unchecked = None;
+        }
+        Solution {
+            status,
+            plan: plan.map(|plan| decode(context, plan)),
+            ground: plan.cloned(),
+            lower_bound: lower.map(|lower| metric(self.task, &lower)),
+            horizon,
+            proof,
+            unbounded: None,
+            statistics,
+        }
+    }
+
+    pub(super) fn without_plan(&self, status: Status, horizon: usize, proof: Option<Proof>) -> Solution {
+        Solution {
+            status,
+            plan: None,
+            ground: None,
+            lower_bound: None,
+            horizon,
+            proof,
+            unbounded: None,
+            statistics: self.statistics.clone(),
+        }
+    }
+}

@@ -1,0 +1,303 @@
+//! Search and the SAT solver in turns: a plan soon, a bound that rises, and a proof by whichever comes to it first.
+//!
+//! In each round, the exact search, the search for some plan, and formulas get about the same work, twice as much as in the round
+//! before. Work is counted in what was looked at, and not in time, so that the same task has the same answer. What one of
+//! them finds limits the others.
+
+use std::time::Instant;
+
+use search::bounds::Bounds;
+use search::satisfice::{Satisficer, StepResult};
+use search::search::{InterleavedSearch, SearchOutcome, SearchProblem, SearchTask, plan_tiebreak};
+use task::number::Int;
+use task::plan::ground::GroundPlan;
+use task::plan::solution::{PlannerPart, Proof, Solution, Statistics, Status};
+use tracing::field::Empty;
+use tracing::{Span, info_span};
+
+use crate::optimize::config::Engine;
+use crate::optimize::horizon_schedule::{FirstPlanOutcome, HorizonSchedule};
+use crate::optimize::optimizer_run::{Best, Run};
+use crate::optimize::prover::{Prover, ProverOutcome};
+use crate::optimize::sat_budget::SatBudget;
+use crate::optimize::sat_confirmation::{into_solution, proved_by_bound, proved_by_search};
+
+/// For each state that the exact search stores in a round: how many nodes and propositions the search for some plan goes through, and how
+/// many clauses a formula has at most.
+const RELAXATION_WORK_PER_STATE: usize = 200;
+const CLAUSES_PER_STATE: usize = 50;
+/// For each conflict of the SAT solver, how many states the exact search stores.
+const STATES_PER_CONFLICT: u64 = 4;
+/// The allowances of formulas and of the search for some plan are halved so often at most.
+const MAX_BACKOFF: u32 = 3;
+/// A plan that costs more than this ratio times the lower bound is likely to have better ones that are easier to find than a proof.
+const NEAR_OPTIMAL_RATIO: (Int, Int) = (3, 2);
+
+/// What is left to be tried, and what is known.
+struct Portfolio<'r, 'a> {
+    run: Run<'a>,
+    bounds: &'r Bounds,
+    exact: Option<InterleavedSearch<'r, Int, Bounds>>,
+    satisficer: Option<Satisficer<'a, Int>>,
+    first: Option<HorizonSchedule>,
+    prover: Option<Prover>,
+    best: Option<GroundPlan>,
+    lower: Int,
+    /// Why no plan costs less than that.
+    reason: Proof,
+    /// How often the allowance of formulas is halved, and that of the search for some plan.
+    share: u32,
+    satisficer_share: u32,
+}
+
+/// An answer, or that the next one has its turn.
+type Turn = Option<Ending>;
+
+enum Ending {
+    /// The exact search has ended with this plan.
+    Exact(GroundPlan),
+    Unsolvable,
+    /// The best plan costs no more than the lower bound, for a reason.
+    Proved(Proof),
+    Refuted(Box<Solution>),
+    /// A limit was reached, or nothing is left.
+    Over,
+}
+
+/// Finds a cheapest plan by all means.
+pub(super) fn solve(run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
+    let started = Instant::now();
+    let context = run.context();
+    let Ok(prepared) = SearchTask::new(context) else {
+        return run.finish(Status::Unknown, None, Some(lower), 0, None);
+    };
+    let space = prepared.as_ref().map(|prepared| SearchProblem { context, bounds, prepared, orbits: None });
+    let exact =
+        space.map(|space| InterleavedSearch::new(space, &context.task.initial).continue_without_forecast());
+    let is_sat = run.config.engine != Engine::Search;
+    let mut portfolio = Portfolio {
+        first: is_sat.then(|| HorizonSchedule::new(&run)),
+        prover: is_sat.then(Prover::default),
+        run,
+        bounds,
+        exact,
+        satisficer: None,
+        best: None,
+        lower,
+        reason: Proof::Bound,
+        share: MAX_BACKOFF,
+        satisficer_share: 0,
+    };
+    let ending = portfolio.rounds();
+    portfolio.note_search(started);
+    portfolio.end(ending)
+}
+
+impl<'r, 'a: 'r> Portfolio<'r, 'a> {
+    fn rounds(&mut self) -> Ending {
+        // Most tasks are done here.
+        let unit = self.run.config.head_start.max(1);
+        if let Some(ending) = self.search_exactly(unit) {
+            return ending;
+        }
+        if let Ok(satisficer) = Satisficer::new(self.run.context()) {
+            self.satisficer = satisficer;
+        }
+        let mut stored = unit;
+        for round in 0..u32::MAX {
+            let work = unit.saturating_mul(1_usize.checked_shl(round.min(20)).unwrap_or(1));
+            stored = stored.saturating_add(work);
+            let turns: [fn(&mut Self, usize, usize) -> Turn; 3] =
+                [Self::satisfice, |own, _, stored| own.search_exactly(stored), Self::sat_turn];
+            for turn in turns {
+                if self.run.config.limits.reached() {
+                    return Ending::Over;
+                }
+                if let Some(ending) = turn(self, work, stored) {
+                    return ending;
+                }
+            }
+            let is_over = self.exact.is_none() && self.satisficer.is_none();
+            if is_over && if self.best.is_some() { self.prover.is_none() } else { self.first.is_none() } {
+                return Ending::Over;
+            }
+        }
+        Ending::Over
+    }
+
+    fn search_exactly(&mut self, stored: usize) -> Turn {
+        let Self { exact, run, lower, reason, best, .. } = self;
+        let exact = exact.as_mut()?;
+        let span = info_span!("search", expanded = Empty, generated = Empty).entered();
+        let cost = best.as_ref().map(|plan| plan.cost);
+        if let Some(cost) = cost {
+            exact.set_upper_bound(&cost);
+        }
+        let before = exact.figures();
+        let found = exact.run(stored, &mut |_, bound| {
+            if *bound > *lower {
+                (*lower, *reason) = (*bound, Proof::Search);
+                run.note(cost, *bound);
+            }
+        });
+        exact.figures().add_to(before, &mut run.statistics);
+        record(&span, &run.statistics);
+        match found {
+            Some(SearchOutcome::Optimal(plan)) => Some(Ending::Exact(plan)),
+            Some(SearchOutcome::None) if self.best.is_none() => Some(Ending::Unsolvable),
+            Some(SearchOutcome::None) => Some(Ending::Over),
+            Some(SearchOutcome::Unknown(plan)) => {
+                self.exact = None;
+                plan.and_then(|plan| self.improve(plan, PlannerPart::Search)).or_else(|| self.meets())
+            }
+            None => {
+                let plan = exact.best_plan();
+                plan.and_then(|plan| self.improve(plan, PlannerPart::Search)).or_else(|| self.meets())
+            }
+        }
+    }
+
+    fn satisfice(&mut self, work: usize, _: usize) -> Turn {
+        let satisficer = self.satisficer.as_mut()?;
+        let span = info_span!("satisfice", expanded = Empty, generated = Empty).entered();
+        let nodes = work.saturating_mul(RELAXATION_WORK_PER_STATE) as u64;
+        let limit = self.best.as_ref().map(|plan| plan.cost);
+        // A plan is worth more than a better one, and who finds none has less the next time, as long as there is hope for a proof.
+        let has_hope = self.exact.as_ref().is_some_and(InterleavedSearch::may_finish);
+        let is_near = |cost: Int| {
+            cost.saturating_mul(NEAR_OPTIMAL_RATIO.1) <= self.lower.saturating_mul(NEAR_OPTIMAL_RATIO.0)
+        };
+        let (twice, halved) = match limit {
+            None => (1, 0),
+            Some(cost) => (0, if has_hope && is_near(cost) { self.satisficer_share } else { 0 }),
+        };
+        self.satisficer_share = self.satisficer_share.saturating_add(1).min(MAX_BACKOFF);
+        let before = satisficer.figures;
+        let advance = satisficer.run(limit.as_ref(), (nodes << twice >> halved).max(1));
+        satisficer.figures.add_to(before, &mut self.run.statistics);
+        record(&span, &self.run.statistics);
+        match advance {
+            Ok(StepResult::Plan(plan)) => {
+                self.satisficer_share = 0;
+                self.improve(plan, PlannerPart::Satisficing)
+            }
+            Ok(StepResult::Unsolvable) => Some(Ending::Unsolvable),
+            Ok(StepResult::Paused) => None,
+            Ok(StepResult::Ended) => {
+                self.run.statistics.restarts = satisficer.restarts();
+                self.satisficer = None;
+                None
+            }
+            Err(_) => Some(Ending::Over),
+        }
+    }
+
+    fn sat_turn(&mut self, work: usize, _: usize) -> Turn {
+        let alone = self.exact.is_none() && self.satisficer.is_none();
+        let before = (self.lower, self.best.as_ref().map(|plan| plan.cost));
+        let share = self.share;
+        let allowance = SatBudget {
+            clauses: CLAUSES_PER_STATE.saturating_mul(work).checked_shr(share).unwrap_or(0),
+            conflicts: (work as u64 / STATES_PER_CONFLICT).checked_shr(share).unwrap_or(0).max(1),
+        };
+        let allowance = if alone { SatBudget::UNLIMITED } else { allowance };
+        let turn = self.ask_for(allowance);
+        // Who achieves nothing has less the next time, and who does has more.
+        let achieved = before != (self.lower, self.best.as_ref().map(|plan| plan.cost));
+        self.share =
+            if achieved { share.saturating_sub(1) } else { share.saturating_add(1).min(MAX_BACKOFF) };
+        turn
+    }
+
+    fn ask_for(&mut self, allowance: SatBudget) -> Turn {
+        match &self.best {
+            None => match self.first.as_mut()?.advance(&mut self.run, self.bounds, allowance) {
+                FirstPlanOutcome::Plan(plan) => self.improve(plan, PlannerPart::Sat),
+                FirstPlanOutcome::Refuted(solution) => Some(Ending::Refuted(solution)),
+                FirstPlanOutcome::Paused => None,
+                FirstPlanOutcome::Over => {
+                    self.first = None;
+                    None
+                }
+            },
+            Some(plan) => {
+                let mut best = Best { plan: plan.clone(), lower: self.lower };
+                let proving = self.prover.as_mut()?.advance(&mut self.run, self.bounds, &mut best, allowance);
+                if best.lower > self.lower {
+                    let step_bound = self.prover.as_ref().map_or(0, |prover| prover.step_bound);
+                    (self.lower, self.reason) = (best.lower, Proof::Sat { step_bound });
+                }
+                if best.plan.cost < plan.cost {
+                    self.run.statistics.found_by = Some(PlannerPart::Sat);
+                    self.best = Some(best.plan);
+                }
+                match proving {
+                    ProverOutcome::Proved(proof) => Some(Ending::Proved(proof)),
+                    ProverOutcome::Paused => None,
+                    ProverOutcome::Over => {
+                        self.prover = None;
+                        None
+                    }
+                }
+            }
+        }
+    }
+
+    /// Takes note of a plan if it is better than what is known.
+    fn improve(&mut self, plan: GroundPlan, part: PlannerPart) -> Turn {
+        if self.best.as_ref().is_none_or(|best| plan.cost < best.cost) {
+            self.run.statistics.found_by = Some(part);
+            let horizon = plan.steps.len();
+            let best = Best { plan, lower: self.lower };
+            self.run.announce(&best, horizon);
+            self.best = Some(best.plan);
+        }
+        self.meets()
+    }
+
+    /// Whether the best plan costs no more than the lower bound.
+    fn meets(&self) -> Turn {
+        let best = self.best.as_ref()?;
+        (best.cost <= self.lower).then(|| Ending::Proved(self.reason.clone()))
+    }
+
+    fn note_search(&mut self, started: Instant) {
+        let statistics = &mut self.run.statistics;
+        let sat = statistics.encode.saturating_add(statistics.solve);
+        let search = started.elapsed().saturating_sub(sat);
+        statistics.search = statistics.search.saturating_add(search);
+        if let Some(satisficer) = &self.satisficer {
+            statistics.restarts = satisficer.restarts();
+        }
+    }
+
+    fn end(self, ending: Ending) -> Solution {
+        let Self { mut run, bounds, best, lower, .. } = self;
+        match (ending, best) {
+            (Ending::Exact(plan), _) => {
+                run.statistics.found_by.get_or_insert(PlannerPart::Search);
+                let plan = plan_tiebreak::select_canonical_plan(run.context(), bounds, plan);
+                proved_by_search(run, bounds, plan, lower)
+            }
+            (Ending::Unsolvable, _) => run.finish(Status::Unsolvable, None, None, 0, Some(Proof::Search)),
+            (Ending::Refuted(solution), _) => *solution,
+            (Ending::Proved(proof), Some(plan)) => {
+                let best = Best { lower: plan.cost, plan };
+                match proof {
+                    Proof::Bound => proved_by_bound(run, &best),
+                    Proof::Search => proved_by_search(run, bounds, best.plan, lower),
+                    proof => into_solution(run, &best, 0, Some(proof)),
+                }
+            }
+            (Ending::Over, Some(plan)) => into_solution(run, &Best { plan, lower }, 0, None),
+            (Ending::Over | Ending::Proved(_), None) => {
+                run.finish(Status::Unknown, None, Some(lower), 0, None)
+            }
+        }
+    }
+}
+
+/// So many states have been looked at until now, by all searches.
+fn record(span: &Span, statistics: &Statistics) {
+    span.record("expanded", statistics.expanded).record("generated", statistics.generated);
+}

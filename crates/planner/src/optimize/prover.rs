@@ -1,0 +1,113 @@
+//! A plan to a cheapest one by formulas, stage by stage.
+
+use std::time::Instant;
+
+use encodings::encode::{CostEncoding, CostLimit, StepSemantics};
+use search::bounds::Bounds;
+use task::number::Int;
+use task::plan::solution::Proof;
+
+use crate::optimize::config::Strategy;
+use crate::optimize::core_guided::raise;
+use crate::optimize::linear_search::linear_search_down;
+use crate::optimize::optimizer_run::{Best, FormulaScope, Run, StrategyOutcome};
+use crate::optimize::sat_budget::{FORMULA_LIMIT, SatBudget};
+
+/// The first formula is for plans within this part of the gap between the lower bound and the best plan known; each further one
+/// for twice as much of it.
+const STAGES: Int = 8;
+
+/// Formulas for plans that are cheaper than the best one, the first for those within a part of the gap to the lower bound.
+#[derive(Default)]
+pub(super) struct Prover {
+    stage: Option<Int>,
+    /// Steps up to which plans were considered.
+    pub(super) horizon: usize,
+    /// The step bound of the formula that has raised the lower bound last.
+    pub(super) step_bound: usize,
+}
+
+/// What formulas have come to.
+pub(super) enum ProverOutcome {
+    /// The best plan is a cheapest one.
+    Proved(Proof),
+    /// The allowance is used up.
+    Paused,
+    /// More would prove nothing, or a limit was reached.
+    Over,
+}
+
+impl Prover {
+    /// Decides formulas, each within an allowance; the plan, the lower bound and the reason for it become better on the way.
+    pub(super) fn advance(
+        &mut self,
+        run: &mut Run<'_>,
+        bounds: &Bounds,
+        best: &mut Best,
+        allowance: SatBudget,
+    ) -> ProverOutcome {
+        loop {
+            let steps = best.plan.steps.len();
+            if run.config.limits.reached() || steps.saturating_mul(run.task.operators.len()) > FORMULA_LIMIT {
+                return ProverOutcome::Over;
+            }
+            let gap = best.plan.cost.saturating_sub(best.lower);
+            let stage = *self.stage.get_or_insert(gap / STAGES);
+            let limit = best.plan.below().min(best.lower.saturating_add(stage));
+            let Ok(extent) = run.extent(bounds, limit, best) else { return ProverOutcome::Over };
+            self.horizon = self.horizon.max(extent.allowed.len());
+            if extent.step_bound.is_none() && stage < Int::MAX {
+                // That there is no such plan would prove nothing.
+                self.stage = Some(Int::MAX);
+                continue;
+            }
+            if extent.size() > FORMULA_LIMIT {
+                return ProverOutcome::Over;
+            }
+            if extent.size() > allowance.clauses {
+                return ProverOutcome::Paused;
+            }
+            match (within(run, bounds, &extent, best, allowance), extent.step_bound) {
+                (StrategyOutcome::Exhausted, Some(step_bound)) => {
+                    best.lower = best.plan.cost.min(limit.saturating_add(1));
+                    self.step_bound = step_bound;
+                    if best.lower == best.plan.cost {
+                        return ProverOutcome::Proved(Proof::Sat { step_bound });
+                    }
+                    run.announce(best, self.horizon);
+                    self.stage = Some(stage.saturating_mul(2).max(1));
+                }
+                (StrategyOutcome::Exhausted, None) => return ProverOutcome::Over,
+                (StrategyOutcome::Interrupted, _) if run.config.limits.reached() => {
+                    return ProverOutcome::Over;
+                }
+                (StrategyOutcome::Interrupted, _) => return ProverOutcome::Paused,
+            }
+        }
+    }
+}
+
+/// Decides whether there is a plan that costs at most the limit of an extent, and finds a cheapest one.
+pub(super) fn within(
+    run: &mut Run<'_>,
+    bounds: &Bounds,
+    extent: &FormulaScope,
+    best: &mut Best,
+    allowance: SatBudget,
+) -> StrategyOutcome {
+    let is_unlimited = allowance.conflicts == u64::MAX;
+    let cores = is_unlimited && extent.step_bound.is_some() && run.config.strategy == Strategy::Cores;
+    let started = Instant::now();
+    let counting = if cores { CostEncoding::Apart } else { CostEncoding::Sum };
+    let cost = CostLimit { limit: extent.limit, bounds, counting };
+    let semantics = run.semantics(StepSemantics::Sequential);
+    let encoding = run.encoding(&extent.allowed, Some(cost), semantics, allowance.clauses);
+    run.statistics.encode = run.statistics.encode.saturating_add(started.elapsed());
+    let Some(encoding) = encoding else { return StrategyOutcome::Interrupted };
+    if cores {
+        raise(run, encoding, extent.limit, best)
+    } else {
+        let conflicts = allowance.conflicts(encoding.formula.clause_count());
+        linear_search_down(run, encoding, best, conflicts)
+    }
+}

@@ -1,0 +1,113 @@
+//! The bounded reading of a metric that actions improve: fewest steps first, then the metric.
+
+use search::bounds::Bounds;
+use task::context::Context;
+use task::limits::Interrupted;
+use task::number::Int;
+use task::plan::decode;
+use task::plan::ground::{GroundStep, cost, pass};
+use task::plan::solution::{Improvement, MetricUnbounded, Proof, Solution, Status};
+use task::task::number::TaskNumber;
+use task::task::quantity::Quantity;
+use task::task::{Objective, Operator, Task};
+
+use crate::optimize::config::Config;
+use crate::optimize::horizon_schedule::first_plan;
+use crate::optimize::optimizer_run::{Best, Run, StrategyOutcome};
+use crate::optimize::prover::within;
+use crate::optimize::sat_budget::SatBudget;
+use crate::optimize::solve::solve;
+
+/// For a metric that actions improve: fewest steps first, then the best metric among those plans.
+pub(super) fn shortest_then_best(asked: Run<'_>) -> Solution {
+    let lowest = asked.task.operators.iter().map(|operator| operator.cost.minimum()).min().unwrap_or(0);
+    let by_steps = with_costs(asked.task, |_| Quantity::constant(1));
+    let context = asked.context();
+    let mut silent = |_: Improvement| {};
+    let shortest = solve(Run::new(&by_steps, asked.config, &mut silent));
+    // Waits are steps, too, which a plan in names does not show.
+    let steps = match (&shortest.ground, shortest.status) {
+        (Some(plan), Status::Optimal) => plan.steps.len(),
+        // The plan that there may be is measured by its steps, not by the metric: of no use to the user.
+        (Some(_), _) => return unknown(shortest),
+        (None, _) => return Solution { lower_bound: None, ..shortest },
+    };
+    // Every plan of the task with this horizon has exactly this many steps, so a constant for each step
+    // changes nothing but the sign of the costs.
+    let shifted = with_costs(asked.task, |operator| {
+        let mut cost = operator.cost.clone();
+        // The numbers of a quantity, and so its least value, stay below `QUANTITY_LIMIT`: nothing is cut off.
+        cost.constant = cost.constant.saturating_sub(lowest);
+        cost
+    });
+    let config = Config { horizon: Some(steps), ..asked.config.clone() };
+    let mut run = Run::new(&shifted, &config, &mut silent);
+    run.statistics = asked.statistics;
+    let Ok(bounds) = Bounds::new(run.context()) else {
+        return unknown(shortest);
+    };
+    let plan = match first_plan(&mut run, &bounds) {
+        Ok(plan) => plan,
+        Err(solution) => return *solution,
+    };
+    let mut best = Best { plan, lower: 0 };
+    let tightened = match run.extent(&bounds, best.plan.below(), &best) {
+        Ok(mut extent) => {
+            extent.allowed.truncate(steps);
+            within(&mut run, &bounds, &extent, &mut best, SatBudget::UNLIMITED)
+        }
+        Err(Interrupted) => StrategyOutcome::Interrupted,
+    };
+    let is_proved = matches!(tightened, StrategyOutcome::Exhausted) && run.statistics.unchecked.is_none();
+    let proof = is_proved.then_some(Proof::Sat { step_bound: steps });
+    let mut plan = best.plan;
+    let statistics = run.statistics;
+    let Some(by_metric) = cost(asked.task, &plan.steps) else { return unknown(shortest) };
+    plan.cost = by_metric;
+    let unbounded = if can_repeat_reward(context, &plan.steps) {
+        MetricUnbounded::Proved
+    } else {
+        MetricUnbounded::Suspected
+    };
+    Solution {
+        status: Status::Feasible,
+        plan: Some(decode(context, &plan)),
+        ground: Some(plan),
+        lower_bound: None,
+        horizon: steps,
+        proof,
+        unbounded: Some(unbounded),
+        statistics,
+    }
+}
+
+/// What is left of an answer by the number of steps where nothing is known by the metric.
+fn unknown(by_steps: Solution) -> Solution {
+    Solution { status: Status::Unknown, plan: None, ground: None, lower_bound: None, proof: None, ..by_steps }
+}
+
+/// The same task with other costs, and a metric of their plain sum.
+fn with_costs(task: &Task, cost: impl Fn(&Operator) -> Quantity<Int>) -> Task {
+    let mut task = task.clone();
+    for operator in &mut task.operators {
+        operator.cost = cost(operator);
+    }
+    task.objective = Objective::sum();
+    task
+}
+
+/// Whether some action that improves the metric is applicable in a state on the way, and leaves it as it is; no if a
+/// limit is reached before one is found.
+pub fn can_repeat_reward<N: TaskNumber>(context: Context<'_, N>, plan: &[GroundStep]) -> bool {
+    let Context { task, limits } = context;
+    let Some(states) = pass(task, &task.initial, plan) else { return false };
+    states.iter().any(|state| {
+        task.operators.iter().filter(|operator| operator.cost.minimum() < N::zero()).any(|operator| {
+            operator.admitted_combinations().take_while(|_| !limits.reached()).any(|choice| {
+                operator.cost.at(&choice, &operator.sizes()) < N::zero()
+                    && operator.applicable(state, &choice)
+                    && task.successor(operator, state, &choice).as_ref() == Some(state)
+            })
+        })
+    })
+}

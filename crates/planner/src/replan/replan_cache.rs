@@ -1,0 +1,78 @@
+//! What is ground once: the task with everything available, and with a part of it.
+
+use search::bounds::Bounds;
+use search::search::SearchTask;
+use search::search::plan_tiebreak;
+use task::context::Context;
+use task::lifted::ObjectId;
+use task::limits::{Interrupted, Limits};
+use task::task::{Argument, Task};
+
+use crate::replan::restrict_designs;
+use crate::replan::state_mapping::Layout;
+
+/// What holds for all problems.
+pub(super) struct GroundBase {
+    /// With everything available.
+    pub(super) task: Task,
+    pub(super) layout: Layout,
+    /// For each schema the parameters that must be available, each with the predicate that says so.
+    pub(super) requirements: Vec<Vec<(usize, usize)>>,
+}
+
+/// What holds for all states in which the same is available.
+pub(super) struct AvailabilityContext {
+    pub(super) task: Task,
+    pub(super) bounds: Bounds,
+    pub(super) prepared: Option<SearchTask>,
+    pub(super) ties: plan_tiebreak::TieBreakContext,
+}
+
+impl GroundBase {
+    /// The task with what is available.
+    pub(super) fn masked(&self, available: &[Vec<ObjectId>], limits: &Limits) -> Result<Task, Interrupted> {
+        let is_allowed = |schema: u32, position: usize, object: ObjectId| {
+            let mut needed = self.requirements[schema as usize].iter().filter(|(own, _)| *own == position);
+            needed.all(|(_, predicate)| available[*predicate].binary_search(&object).is_ok())
+        };
+        restrict_designs::restrict(&self.task, &is_allowed, limits)
+    }
+
+    /// What holds for all states in which this is available.
+    pub(super) fn restrict(
+        &self,
+        available: &[Vec<ObjectId>],
+        limits: &Limits,
+    ) -> Result<AvailabilityContext, Interrupted> {
+        let task = self.masked(available, limits)?;
+        let context = Context::new(&task, limits);
+        let bounds = Bounds::new(context)?;
+        let prepared = SearchTask::new(context)?;
+        let ties = plan_tiebreak::TieBreakContext::new(context, &bounds)?;
+        Ok(AvailabilityContext { task, bounds, prepared, ties })
+    }
+
+    /// For each predicate the objects that some operator needs to be available, sorted.
+    #[expect(clippy::arithmetic_side_effects, reason = "predicates are held in memory")]
+    pub(super) fn possible(&self) -> Vec<Vec<ObjectId>> {
+        let count = self.requirements.iter().flatten().map(|(_, predicate)| predicate + 1).max().unwrap_or(0);
+        let mut found = vec![Vec::new(); count];
+        for operator in &self.task.operators {
+            for (position, predicate) in &self.requirements[operator.schema as usize] {
+                match operator.arguments[*position] {
+                    Argument::Object(object) => found[*predicate].push(object),
+                    Argument::Slot(slot) => {
+                        let slot = &operator.slots[slot as usize];
+                        let designs = &self.task.slots[slot.slot.index()].designs;
+                        found[*predicate].extend(slot.designs.iter().map(|index| designs[*index as usize]));
+                    }
+                }
+            }
+        }
+        for objects in &mut found {
+            objects.sort_unstable();
+            objects.dedup();
+        }
+        found
+    }
+}

@@ -1,0 +1,182 @@
+//! A task with all designs to the task with those that are available.
+//!
+//! Every operator with a design that is needed and not available goes; where designs are still open, tables and exclusions
+//! keep the rows of what is left. That is the task which grounding would make of the problem with these designs,
+//! apart from operators that nothing leads to any more.
+
+use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
+
+use task::lifted::ObjectId;
+use task::limits::{Interrupted, Limits};
+use task::number::{Int, dense};
+use task::task::quantity::{Linear, Quantity, SlotSet, Table};
+use task::task::{Argument, ForbiddenCombinations, NumericEffect, Operator, SlotUse, Task};
+
+/// For each slot of an operator the positions of its designs that are left.
+type KeptDesigns = Arc<[Vec<u32>]>;
+
+/// What is left of an operator's slots: which positions of the designs before, and the uses that they make.
+type RestrictedSlots = (KeptDesigns, Arc<[SlotUse]>);
+
+/// What operators share is made once; by where it lies, which is held by the whole task meanwhile.
+#[derive(Default)]
+struct SharedTables {
+    slots: FxHashMap<(*const SlotUse, u32), RestrictedSlots>,
+    tables: FxHashMap<(*const Int, *const Vec<u32>), Arc<[Int]>>,
+    forbidden: FxHashMap<(*const ForbiddenCombinations, *const Vec<u32>), Arc<[ForbiddenCombinations]>>,
+}
+
+/// The task with the operators for which `is_allowed` answers with yes, asked with their schema, a position among its parameters, and
+/// the object there.
+pub(super) fn restrict(
+    task: &Task,
+    is_allowed: &dyn Fn(u32, usize, ObjectId) -> bool,
+    limits: &Limits,
+) -> Result<Task, Interrupted> {
+    let mut shared = SharedTables::default();
+    let mut operators = Vec::with_capacity(task.operators.len());
+    for operator in limits.watch(&task.operators) {
+        let operator = operator?;
+        let allowed = |position: usize, object| is_allowed(operator.schema, position, object);
+        let fixed = operator.arguments.iter().enumerate().all(|(position, argument)| match argument {
+            Argument::Object(object) => allowed(position, *object),
+            Argument::Slot(_) => true,
+        });
+        if fixed {
+            operators.extend(shared.operator(task, operator, &allowed));
+        }
+    }
+    // Everything but the operators is the same.
+    Ok(Task {
+        operators,
+        object_names: task.object_names.clone(),
+        schema_names: task.schema_names.clone(),
+        number_multiples: task.number_multiples.clone(),
+        variables: task.variables.clone(),
+        exclusive: task.exclusive.clone(),
+        axioms: task.axioms.clone(),
+        slots: task.slots.clone(),
+        number_names: task.number_names.clone(),
+        initial: task.initial.clone(),
+        goal: task.goal.clone(),
+        objective: task.objective.clone(),
+        others: task.others.clone(),
+        unreachable: task.unreachable.clone(),
+        ..*task
+    })
+}
+
+impl SharedTables {
+    /// None if a slot has no design left.
+    fn operator(
+        &mut self,
+        task: &Task,
+        operator: &Operator,
+        allowed: &dyn Fn(usize, ObjectId) -> bool,
+    ) -> Option<Operator> {
+        if operator.slots.is_empty() {
+            return Some(operator.clone());
+        }
+        let entry = self.slots.entry((operator.slots.as_ptr(), operator.schema));
+        let (kept, slots) = entry.or_insert_with(|| left(task, operator, allowed)).clone();
+        if kept.iter().any(Vec::is_empty) {
+            return None;
+        }
+        if kept.iter().zip(operator.slots.iter()).all(|(kept, slot)| kept.len() == slot.designs.len()) {
+            return Some(operator.clone());
+        }
+        let sizes = operator.sizes();
+        let mut copy = operator.clone();
+        copy.slots = slots;
+        copy.forbidden = self.forbidden(&operator.forbidden, &kept);
+        copy.cost = self.quantity(&operator.cost, &kept, &sizes);
+        copy.duration = self.quantity(&operator.duration, &kept, &sizes);
+        copy.others = operator.others.iter().map(|other| self.quantity(other, &kept, &sizes)).collect();
+        copy.condition.comparisons =
+            operator.condition.comparisons.iter().map(|linear| self.linear(linear, &kept, &sizes)).collect();
+        let effects = operator.numeric_effects.iter().map(|effect| NumericEffect {
+            variable: effect.variable,
+            value: self.linear(&effect.value, &kept, &sizes),
+        });
+        copy.numeric_effects = effects.collect();
+        Some(copy)
+    }
+
+    fn linear(&mut self, linear: &Linear<Int>, kept: &KeptDesigns, sizes: &[usize]) -> Linear<Int> {
+        Linear {
+            coefficients: linear.coefficients.clone(),
+            quantity: self.quantity(&linear.quantity, kept, sizes),
+        }
+    }
+
+    fn quantity(&mut self, quantity: &Quantity<Int>, kept: &KeptDesigns, sizes: &[usize]) -> Quantity<Int> {
+        let table = |table: &Table<Int>| {
+            let entry = self.tables.entry((table.values.as_ptr(), kept.as_ptr()));
+            let values = entry.or_insert_with(|| rows(table, kept, sizes)).clone();
+            Table { slots: table.slots.clone(), values }
+        };
+        Quantity { constant: quantity.constant, tables: quantity.tables.iter().map(table).collect() }
+    }
+
+    fn forbidden(
+        &mut self,
+        all: &Arc<[ForbiddenCombinations]>,
+        kept: &KeptDesigns,
+    ) -> Arc<[ForbiddenCombinations]> {
+        let entry = self.forbidden.entry((all.as_ptr(), kept.as_ptr()));
+        entry.or_insert_with(|| all.iter().map(|rule| exclusions(rule, kept)).collect()).clone()
+    }
+}
+
+/// What is left of an operator's slots.
+fn left(task: &Task, operator: &Operator, allowed: &dyn Fn(usize, ObjectId) -> bool) -> RestrictedSlots {
+    let arguments = |slot: usize| {
+        let own = move |argument: &Argument| *argument == Argument::Slot(dense(slot));
+        operator.arguments.iter().enumerate().filter(move |(_, argument)| own(argument)).map(|(at, _)| at)
+    };
+    let kept: KeptDesigns = operator
+        .slots
+        .iter()
+        .enumerate()
+        .map(|(position, slot)| {
+            let fits = |index: &u32| {
+                let design = task.slots[slot.slot.index()].designs[slot.designs[*index as usize] as usize];
+                arguments(position).all(|argument| allowed(argument, design))
+            };
+            (0..dense(slot.designs.len())).filter(fits).collect()
+        })
+        .collect();
+    let uses = operator.slots.iter().zip(kept.iter()).map(|(slot, kept)| SlotUse {
+        slot: slot.slot,
+        designs: kept.iter().map(|index| slot.designs[*index as usize]).collect(),
+    });
+    let uses = uses.collect();
+    (kept, uses)
+}
+
+/// The rows of a table that are left.
+#[expect(clippy::arithmetic_side_effects, reason = "a position in the table, which is in memory")]
+fn rows(table: &Table<Int>, kept: &KeptDesigns, sizes: &[usize]) -> Arc<[Int]> {
+    let mut positions = vec![0_usize];
+    for slot in &table.slots {
+        let (size, kept) = (sizes[*slot as usize], &kept[*slot as usize]);
+        positions = positions
+            .iter()
+            .flat_map(|position| kept.iter().map(move |index| position * size + *index as usize))
+            .collect();
+    }
+    positions.into_iter().map(|position| table.values[position]).collect()
+}
+
+/// The combinations of a rule that are still possible.
+fn exclusions(rule: &ForbiddenCombinations, kept: &KeptDesigns) -> ForbiddenCombinations {
+    let moved =
+        |(slot, index): (&u32, &u32)| kept[*slot as usize].iter().position(|known| known == index).map(dense);
+    let combination = |bad: &SlotSet| rule.slots.iter().zip(bad).map(moved).collect::<Option<SlotSet>>();
+    ForbiddenCombinations {
+        slots: rule.slots.clone(),
+        combinations: rule.combinations.iter().filter_map(combination).collect(),
+    }
+}

@@ -1,0 +1,270 @@
+//! A problem to a state of a task that was ground for another problem, if that is the same task.
+//!
+//! Two problems of one domain lead to the same operators if they differ in three respects only: in what is available, in
+//! numbers that actions change, and in facts that actions change and that the task has variables for, of which none holds that the
+//! relaxed reachability of the task has not met, and no two that its operators take to exclude each other. For then all that is reachable from the one state is among what is reachable
+//! from the other. Facts and values that nothing reads may differ at will. Everything else must be the same.
+
+use num_rational::BigRational;
+use num_traits::ToPrimitive;
+use rustc_hash::{FxHashMap, FxHashSet};
+use task::lifted::ObjectId;
+use task::number::{Int, dense};
+use task::task::{Fact, State, Task};
+
+use crate::replan::usage::{Usage, key};
+use pddl::ast::{Atom, InitialElement, Name, Problem};
+use pddl::validate::Advance;
+
+/// What facts and values of problems are in a task.
+#[derive(Debug)]
+pub(super) struct Layout {
+    usage: Usage,
+    /// The predicates that say what is available, all with one argument.
+    assumed: Vec<Name>,
+    objects: FxHashMap<String, ObjectId>,
+    /// What the problem was beside its initial state.
+    frame: String,
+    /// Facts with a variable; the flag says whether relaxed reachability has met it.
+    facts: FxHashMap<String, (Fact, bool)>,
+    numbers: FxHashMap<String, usize>,
+    scale: BigRational,
+    /// Facts that must hold, by position.
+    fixed: FxHashMap<String, usize>,
+    /// Values that must be the same, by position.
+    values: FxHashMap<String, (usize, BigRational)>,
+    /// A state in which no fact holds.
+    nothing: Vec<u32>,
+}
+
+/// A state of the task, and what is available.
+#[derive(Debug, Clone)]
+pub(super) struct ReplanState {
+    pub(super) state: State,
+    /// For each predicate the objects that are available, sorted.
+    pub(super) available: Vec<Vec<ObjectId>>,
+}
+
+impl Layout {
+    /// What a problem is in the task that was made of it with everything available.
+    #[expect(clippy::arithmetic_side_effects, reason = "every variable has a value")]
+    pub(super) fn new(usage: Usage, assumed: &[Name], problem: &Problem, task: &Task) -> Self {
+        let names = task.object_names.iter().map(|name| name.to_ascii_lowercase());
+        let numbers = task.number_names.iter().map(|name| name.to_ascii_lowercase());
+        let mut layout = Self {
+            usage,
+            assumed: assumed.to_vec(),
+            objects: names.zip((0..).map(ObjectId)).collect(),
+            frame: frame(problem),
+            facts: facts(task),
+            numbers: numbers.zip(0..).collect(),
+            scale: BigRational::from_integer(task.number_scale.into()),
+            fixed: FxHashMap::default(),
+            values: FxHashMap::default(),
+            nothing: task.variables.iter().map(|variable| dense(variable.values.len()) - 1).collect(),
+        };
+        for element in &problem.init {
+            match element {
+                InitialElement::Fact(atom) => {
+                    let key = key(atom);
+                    if !layout.facts.contains_key(&key) && layout.matters(atom, &key) {
+                        let position = layout.fixed.len();
+                        layout.fixed.entry(key).or_insert(position);
+                    }
+                }
+                InitialElement::Value(function, value, _) => {
+                    let key = key(function);
+                    if !layout.numbers.contains_key(&key) && layout.value_matters(function) {
+                        let position = layout.values.len();
+                        layout.values.entry(key).or_insert((position, value.clone()));
+                    }
+                }
+                InitialElement::NegatedFact(_) | InitialElement::Timed(..) => {}
+            }
+        }
+        layout
+    }
+
+    /// Whether a fact without a variable must be as it was.
+    fn matters(&self, atom: &Atom, key: &str) -> bool {
+        let predicate = &atom.predicate.name;
+        !self.assumed.contains(predicate)
+            && (!self.usage.is_changed(predicate) || self.usage.is_read(predicate, key))
+    }
+
+    /// Whether a value without a variable must be as it was.
+    fn value_matters(&self, function: &Atom) -> bool {
+        let name = &function.predicate.name;
+        !self.usage.is_changed(name) || self.usage.is_function_read(name)
+    }
+
+    /// The situation that a problem describes; none if the task is not good for it.
+    pub(super) fn situation(&self, task: &Task, problem: &Problem) -> Option<ReplanState> {
+        if frame(problem) != self.frame {
+            return None;
+        }
+        let numbers = vec![None; self.numbers.len()];
+        let mut reading = Reading {
+            values: self.nothing.clone(),
+            numbers,
+            available: vec![Vec::new(); self.assumed.len()],
+            fixed: vec![false; self.fixed.len()],
+            fixed_values: vec![false; self.values.len()],
+        };
+        for element in &problem.init {
+            self.read(element, &mut reading)?;
+        }
+        let is_complete = reading.fixed.iter().chain(&reading.fixed_values).all(|seen| *seen);
+        let numbers = reading.numbers.into_iter().collect::<Option<Vec<Int>>>()?;
+        let mut state = State { values: reading.values, numbers };
+        if !respects_exclusion(task, &state) {
+            return None;
+        }
+        task.evaluate_axioms(&mut state);
+        for objects in &mut reading.available {
+            objects.sort_unstable();
+            objects.dedup();
+        }
+        is_complete.then_some(ReplanState { state, available: reading.available })
+    }
+
+    fn read(&self, element: &InitialElement, reading: &mut Reading) -> Option<()> {
+        match element {
+            InitialElement::Fact(atom) => {
+                let key = key(atom);
+                if let Some(predicate) = self.assumed.iter().position(|name| *name == atom.predicate.name) {
+                    let object = key.trim_end_matches(')').split_once(' ')?.1;
+                    reading.available[predicate].push(*self.objects.get(object)?);
+                } else if let Some((fact, is_reached)) = self.facts.get(&key) {
+                    return self.set(&mut reading.values, *fact, *is_reached);
+                } else if let Some(position) = self.fixed.get(&key) {
+                    reading.fixed[*position] = true;
+                } else if self.matters(atom, &key) {
+                    return None;
+                }
+            }
+            InitialElement::Value(function, value, _) => {
+                let key = key(function);
+                if let Some(position) = self.numbers.get(&key) {
+                    reading.numbers[*position] = Some(self.integer(value)?);
+                } else if let Some((position, known)) = self.values.get(&key) {
+                    reading.fixed_values[*position] = true;
+                    return (known == value).then_some(());
+                } else if self.value_matters(function) {
+                    return None;
+                }
+            }
+            InitialElement::NegatedFact(_) => {}
+            InitialElement::Timed(..) => return None,
+        }
+        Some(())
+    }
+
+    /// A fact holds; two that exclude each other do not.
+    fn set(&self, values: &mut [u32], fact: Fact, is_reached: bool) -> Option<()> {
+        let value = &mut values[fact.variable.index()];
+        let is_free = *value == self.nothing[fact.variable.index()] || *value == fact.value;
+        *value = fact.value;
+        (is_free && is_reached).then_some(())
+    }
+
+    fn integer(&self, value: &BigRational) -> Option<Int> {
+        let scaled = value * &self.scale;
+        scaled.is_integer().then(|| scaled.to_integer().to_i128()).flatten()
+    }
+
+    /// The state after a step; none if it changes what must be as it was.
+    pub(super) fn advance(&self, task: &Task, state: &State, step: &Advance) -> Option<State> {
+        let mut next = state.clone();
+        for atom in &step.deleted {
+            let key = key(atom);
+            let is_settled = || self.fixed.contains_key(&key) || self.assumed.contains(&atom.predicate.name);
+            match self.facts.get(&key) {
+                Some((fact, _)) if fact.holds(&next.values) => {
+                    next.values[fact.variable.index()] = self.nothing[fact.variable.index()];
+                }
+                None if is_settled() => return None,
+                _ => {}
+            }
+        }
+        for atom in &step.added {
+            let key = key(atom);
+            match self.facts.get(&key) {
+                Some((fact, is_reached)) => self.set(&mut next.values, *fact, *is_reached)?,
+                None if self.matters(atom, &key) || self.assumed.contains(&atom.predicate.name) => {
+                    return None;
+                }
+                None => {}
+            }
+        }
+        for change in &step.values {
+            match self.numbers.get(&key(&change.function)) {
+                Some(position) => next.numbers[*position] = self.integer(&change.after)?,
+                None if self.value_matters(&change.function) => return None,
+                None => {}
+            }
+        }
+        if !respects_exclusion(task, &next) {
+            return None;
+        }
+        task.evaluate_axioms(&mut next);
+        Some(next)
+    }
+
+    /// Objects by their names in small letters.
+    pub(super) fn object(&self, name: &str) -> Option<ObjectId> {
+        self.objects.get(&name.to_ascii_lowercase()).copied()
+    }
+}
+
+/// Whether no two facts hold of which the operators take for granted that at most one does.
+fn respects_exclusion(task: &Task, state: &State) -> bool {
+    task.exclusive.iter().all(|group| group.iter().filter(|fact| fact.holds(&state.values)).count() <= 1)
+}
+
+/// What is read of a problem.
+struct Reading {
+    values: Vec<u32>,
+    numbers: Vec<Option<Int>>,
+    available: Vec<Vec<ObjectId>>,
+    /// By position, whether it holds.
+    fixed: Vec<bool>,
+    fixed_values: Vec<bool>,
+}
+
+/// All of a problem but its initial state, as text.
+fn frame(problem: &Problem) -> String {
+    use std::fmt::Write as _;
+    let mut text = String::new();
+    for object in &problem.objects {
+        text.push_str(object.identifier.name.as_str());
+        for kind in &object.r#type.alternatives {
+            text.push(':');
+            text.push_str(kind.name.as_str());
+        }
+        text.push(' ');
+    }
+    // Places belong to it: a text that stands elsewhere counts as another one, which costs time and is not a mistake.
+    let _ = write!(text, "{:?} {:?}", problem.goal, problem.metric);
+    text
+}
+
+/// The facts that basic variables stand for, and whether they hold initially or are an effect of some operator.
+fn facts(task: &Task) -> FxHashMap<String, (Fact, bool)> {
+    let mut reached: FxHashSet<Fact> = FxHashSet::default();
+    for operator in &task.operators {
+        reached.extend(operator.effects.iter().copied());
+        reached.extend(operator.conditional.iter().flat_map(|effect| effect.effects.iter().copied()));
+    }
+    let mut facts = FxHashMap::default();
+    for (variable, id) in task.variables[..task.basic].iter().zip((0..).map(task::task::VariableId)) {
+        for (text, value) in variable.values.iter().zip(0..) {
+            let fact = Fact { variable: id, value };
+            let is_reached = reached.contains(&fact) || task.initial.values[id.index()] == value;
+            if text.starts_with('(') {
+                facts.insert(text.to_ascii_lowercase(), (fact, is_reached));
+            }
+        }
+    }
+    facts
+}

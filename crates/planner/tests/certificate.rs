@@ -1,0 +1,234 @@
+//! Certificates of generated missions: accepted for what is true, rejected for what is not, however they are changed.
+
+#[allow(dead_code, reason = "another suite uses the rest")]
+use certificate::{Faithful, check as check_argument, faithful, verification_conditions, witness};
+use metaplan_planner::{Certificate, Config, GroundConfig, Limits, Status, certify, ground, optimize};
+use num_rational::BigRational;
+use pddl::ast::{Domain, Problem};
+use pddl::{Source, read};
+use serde_json::{Value, json};
+use testing::missions::Mission;
+use testing::random::Random;
+
+/// The files of a mission.
+fn files(seed: u64) -> (Domain, Problem) {
+    let mission = Mission::random(seed);
+    let (domain, problem) = (mission.domain(), mission.problem());
+    let (domain, problem, _) = read(&Source::new("domain", domain), &Source::new("problem", problem))
+        .unwrap_or_else(|errors| panic!("seed {seed}: {errors:?}"));
+    (domain, problem)
+}
+
+/// The certificate of a mission, and the least cost (none if there is no plan).
+fn certified(seed: u64) -> (Certificate, Option<BigRational>) {
+    let mission = Mission::random(seed);
+    let (domain, problem) = files(seed);
+    let task =
+        ground(&domain, &problem, &GroundConfig::default()).unwrap_or_else(|errors| panic!("{errors:?}"));
+    let solution = optimize(&task, &Config::default(), &mut |_| {});
+    let cost = solution.plan.as_ref().map(|plan| plan.cost.to_rational());
+    assert_eq!(solution.status, if cost.is_some() { Status::Optimal } else { Status::Unsolvable });
+    assert_eq!(cost, mission.oracle().map(|cost| BigRational::from_integer(cost.into())), "seed {seed}");
+    let certificate = certify(&task, &solution, &Limits::none());
+    (certificate.unwrap_or_else(|| panic!("seed {seed}: no certificate")), cost)
+}
+
+/// Claims that are false: that plans cost more than they do, or that there are none.
+fn false_claims(cost: &BigRational) -> [Option<BigRational>; 2] {
+    [Some(cost + BigRational::from_integer(1.into())), None]
+}
+
+/// What the comparison of a written task with the files of a mission says.
+fn compared((domain, problem): &(Domain, Problem), task: &str) -> Faithful {
+    match witness(domain, problem, task, &|| false) {
+        Ok(witness) => faithful(domain, problem, task, &witness, &|| false),
+        Err(verdict) => verdict,
+    }
+}
+
+fn check(seed: u64) {
+    let (certificate, cost) = certified(seed);
+    let Certificate { task: written, argument } = &certificate;
+    let accepted = check_argument(written, argument, cost.as_ref());
+    assert!(accepted.is_ok(), "seed {seed}: {accepted:?}");
+    let found = compared(&files(seed), written);
+    assert!(matches!(found, Faithful::Yes { .. }), "seed {seed}: {found:?}");
+    for claim in cost.iter().flat_map(false_claims) {
+        let accepted = check_argument(written, argument, claim.as_ref());
+        assert!(accepted.is_err(), "seed {seed}: {claim:?} is accepted");
+    }
+}
+
+#[test]
+fn the_truth_is_accepted_and_nothing_else() {
+    (0..150).for_each(check);
+}
+
+/// Changes a value somewhere: a number, null or a flag becomes another, an element goes or comes twice.
+fn mutate(value: &mut Value, random: &mut Random) {
+    match value {
+        Value::Array(elements) if !elements.is_empty() => {
+            let position = random.below(elements.len() as u64) as usize;
+            match random.below(12) {
+                0 => drop(elements.remove(position)),
+                1 => elements.push(elements[position].clone()),
+                _ => mutate(&mut elements[position], random),
+            }
+        }
+        Value::Object(fields) if !fields.is_empty() => {
+            let position = random.below(fields.len() as u64) as usize;
+            if let Some((_, field)) = fields.iter_mut().nth(position) {
+                mutate(field, random);
+            }
+        }
+        Value::Number(number) => {
+            let old = number.as_i64().unwrap_or_default();
+            *value = [json!(old + 1), json!(old - 1), json!(old + random.below(100)), json!(0), Value::Null]
+                [random.below(5) as usize]
+                .clone();
+        }
+        Value::Null => *value = json!(random.below(50)),
+        Value::Bool(flag) => *flag = !*flag,
+        other => *other = json!("else"),
+    }
+}
+
+/// However an argument is changed, it does not prove what is false; and a changed task is not the task.
+fn withstands(seed: u64, mutants: usize) {
+    let (certificate, cost) = certified(seed);
+    let files = files(seed);
+    let mut random = Random(seed);
+    let argument: Value = serde_json::from_str(&certificate.argument).expect("JSON");
+    let written: Value = serde_json::from_str(&certificate.task).expect("JSON");
+    for number in 0..mutants {
+        let mut mutant = argument.clone();
+        for _ in 0..=random.below(3) {
+            mutate(&mut mutant, &mut random);
+        }
+        for claim in cost.iter().flat_map(false_claims) {
+            let accepted = check_argument(&certificate.task, &mutant.to_string(), claim.as_ref());
+            assert!(accepted.is_err(), "seed {seed}, mutant {number}: {claim:?} is accepted\n{mutant}");
+        }
+        let mut mutant = written.clone();
+        mutate(&mut mutant, &mut random);
+        // It may still stand for the files, but then it proves nothing that is false of them.
+        let written = mutant.to_string();
+        let stands = matches!(compared(&files, &written), Faithful::Yes { .. });
+        for claim in cost.iter().flat_map(false_claims).chain([cost.clone()]) {
+            let accepted = check_argument(&written, &certificate.argument, claim.as_ref()).is_ok();
+            assert!(
+                !(accepted && stands) || claim == cost,
+                "seed {seed}, mutant {number}: {claim:?}\n{written}"
+            );
+        }
+    }
+}
+
+#[test]
+fn changed_arguments_prove_nothing_that_is_false() {
+    (200..230).for_each(|seed| withstands(seed, 40));
+}
+
+/// What can be read in two ways proves nothing: a number that an operator changes twice, a number with two factors, a design that
+/// is not there.
+#[test]
+fn tasks_that_can_be_read_in_two_ways_are_refused() {
+    let (mut twice, mut factors, mut designs) = (0, 0, 0);
+    let refused = |seed: u64, task: &Value, certificate: &Certificate, cost: &BigRational| {
+        let written = task.to_string();
+        let found = compared(&files(seed), &written);
+        assert!(matches!(found, Faithful::No(_)), "seed {seed}: {written}");
+        let accepted = check_argument(&written, &certificate.argument, Some(cost));
+        assert!(accepted.is_err(), "seed {seed}: {written}");
+    };
+    for seed in 0..20 {
+        let (certificate, cost) = certified(seed);
+        let Some(cost) = cost else { continue };
+        let task: Value = serde_json::from_str(&certificate.task).expect("JSON");
+        let operators = task["operators"].as_array().expect("operators");
+        if let Some(at) = operators.iter().position(|own| own["changes"][0][1]["factors"].is_array()) {
+            let mut mutant = task.clone();
+            let changes = mutant["operators"][at]["changes"].as_array_mut().expect("changes");
+            changes.push(json!([changes[0][0], { "quantity": { "constant": 0 } }]));
+            refused(seed, &mutant, &certificate, &cost);
+            twice += 1;
+            let mut mutant = task.clone();
+            let own = mutant["operators"][at]["changes"][0][1]["factors"].as_array_mut().expect("factors");
+            own.insert(0, json!([own[0][0], -5]));
+            refused(seed, &mutant, &certificate, &cost);
+            factors += 1;
+        }
+        if operators
+            .iter()
+            .any(|own| !task["uses"][own["uses"].as_u64().expect("uses") as usize][0].is_null())
+        {
+            for combination in [json!([60_000]), json!([0, 0])] {
+                let mut mutant = task.clone();
+                for exclusions in mutant["exclusions"].as_array_mut().expect("exclusions") {
+                    *exclusions = json!([{ "slots": [0], "combinations": [combination] }]);
+                }
+                refused(seed, &mutant, &certificate, &cost);
+                designs += 1;
+            }
+        }
+    }
+    assert!(twice > 0 && factors > 0 && designs > 0, "{twice}, {factors}, {designs}");
+}
+
+/// An instance that leaves everything as it is has no operator, and needs none.
+#[test]
+fn what_changes_nothing_needs_no_operator() {
+    let domain = "(define (domain d) (:requirements :typing :action-costs)
+      (:types design place - object) (:constants slow fast - design)
+      (:predicates (at ?p - place) (mode ?d - design) (suits ?d - design))
+      (:functions (total-cost))
+      (:action reconfigure :parameters (?from ?to - design)
+        :precondition (and (mode ?from) (suits ?to))
+        :effect (and (not (mode ?from)) (mode ?to) (increase (total-cost) 1)))
+      (:action go :parameters (?a ?b - place) :precondition (and (at ?a) (mode fast))
+        :effect (and (not (at ?a)) (at ?b) (increase (total-cost) 2))))";
+    let problem = "(define (problem p) (:domain d) (:objects a b - place)
+      (:init (at a) (mode slow) (suits slow) (suits fast) (= (total-cost) 0))
+      (:goal (at b)) (:metric minimize (total-cost)))";
+    let (domain, problem, _) =
+        read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("a mission");
+    let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
+    let solution = optimize(&task, &Config::default(), &mut |_| {});
+    let certificate = certify(&task, &solution, &Limits::none()).expect("a certificate");
+    let found = compared(&(domain, problem), &certificate.task);
+    // Two designs to themselves, two places to themselves.
+    assert!(matches!(found, Faithful::Yes { instances: 8, idle: 4, .. }), "{found:?}");
+}
+
+/// What the SMT solver answers to the verification conditions of a claim.
+fn answers(solver: &str, certificate: &Certificate, claim: Option<&BigRational>) -> Vec<String> {
+    let conditions = verification_conditions(&certificate.task, &certificate.argument, claim);
+    let conditions = conditions.expect("documents").expect("no derived variables");
+    let file = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("argument.smt2");
+    std::fs::write(&file, conditions).expect("a file");
+    let output = std::process::Command::new(solver).arg(&file).output().expect("the solver runs");
+    String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect()
+}
+
+/// Needs an SMT solver that reads SMT-LIB 2, named by `METAPLAN_SMT`, such as Z3 (`python3 -m venv z3; z3/bin/pip install z3-solver`,
+/// then `METAPLAN_SMT=z3/bin/z3`).
+#[test]
+#[ignore = "needs an SMT solver"]
+fn an_smt_solver_accepts_the_truth_and_nothing_else() {
+    let Ok(solver) = std::env::var("METAPLAN_SMT") else { panic!("METAPLAN_SMT names no solver") };
+    for seed in 0..100 {
+        let (certificate, cost) = certified(seed);
+        let found = answers(&solver, &certificate, cost.as_ref());
+        assert!(found.len() >= 2 && found.iter().all(|answer| answer == "unsat"), "seed {seed}: {found:?}");
+        for claim in cost.iter().flat_map(false_claims) {
+            let found = answers(&solver, &certificate, claim.as_ref());
+            assert!(found.iter().any(|answer| answer == "sat"), "seed {seed}, {claim:?}: {found:?}");
+        }
+    }
+}
+
+#[test]
+#[ignore = "minutes"]
+fn many_changed_arguments_prove_nothing_that_is_false() {
+    (1_000..2_000).for_each(|seed| withstands(seed, 100));
+}

@@ -1,0 +1,443 @@
+//! Durations that the planner chooses: known optima, and random tasks on which no plan over a grid of times and durations, executed by the
+//! validator, is better than what is found, or exists where none is claimed to.
+
+use std::fmt::Write as _;
+
+use metaplan_planner::{
+    GroundConfig, Limits, Plan, Solution, Status, ground_concurrent, optimize_concurrent,
+};
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use pddl::ast::{Domain, Problem};
+use pddl::validate::{Options, PlanText, validate};
+use pddl::{Source, read};
+use testing::random::Random;
+
+fn rational(numerator: i128, denominator: i128) -> BigRational {
+    BigRational::new(BigInt::from(numerator), BigInt::from(denominator))
+}
+
+pub fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
+    let read = read(&Source::new("domain", domain), &Source::new("problem", problem));
+    let (domain, problem, _) = read.unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
+    (domain, problem)
+}
+
+/// The best plan, by the planner; what it claims of it, the validator confirms.
+pub fn solve(domain: &Domain, problem: &Problem, separation: &BigRational, limits: &Limits) -> Solution {
+    let task = ground_concurrent(domain, problem, &GroundConfig::default(), separation)
+        .unwrap_or_else(|errors| panic!("{errors:?}"));
+    let solution = optimize_concurrent(&task, limits, &mut |_| {});
+    if let Some(plan) = &solution.plan {
+        let text = written(plan);
+        let value = metric(domain, problem, &text, separation).unwrap_or_else(|why| panic!("{why}\n{text}"));
+        assert_eq!(value, plan.cost.to_rational(), "{text}");
+    }
+    solution
+}
+
+pub fn written(plan: &Plan) -> String {
+    let mut text = String::new();
+    for step in &plan.steps {
+        let words = [std::slice::from_ref(&step.action), &step.arguments[..]].concat().join(" ");
+        let _ = writeln!(text, "{}: ({words}) [{}]", step.start, step.duration);
+    }
+    text
+}
+
+/// What the validator says a plan costs; else why it is not valid.
+pub fn metric(
+    domain: &Domain,
+    problem: &Problem,
+    text: &str,
+    separation: &BigRational,
+) -> Result<BigRational, String> {
+    let plan =
+        PlanText::parse(&Source::new("plan", text)).unwrap_or_else(|errors| panic!("{errors:?}\n{text}"));
+    let options = Options::default().with_concurrent(true).with_tolerance(separation.clone());
+    let verdict = validate(domain, problem, &plan, &options);
+    match verdict.violation {
+        None => Ok(verdict.metric.unwrap_or(verdict.total_time)),
+        Some(violation) => Err(violation.message),
+    }
+}
+
+/// The status, the metric and the lines of the plan, with a separation of a thousandth.
+fn check(name: &str, domain: &str, problem: &str, expected: (Status, Option<&str>, &[&str])) {
+    let (domain, problem) = parse(domain, problem);
+    let solution = solve(&domain, &problem, &rational(1, 1000), &Limits::none());
+    let cost = solution.plan.as_ref().map(|plan| plan.cost.to_string());
+    let text = solution.plan.as_ref().map(written).unwrap_or_default();
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!((solution.status, cost.as_deref(), &lines[..]), expected, "{name}\n{text}");
+}
+
+fn durative(name: &str, duration: &str, condition: &str, effect: &str) -> String {
+    format!(
+        "(:durative-action {name} :parameters () :duration {duration}
+           :condition (and {condition}) :effect (and {effect}))\n"
+    )
+}
+
+/// Actions over some atoms and numbers.
+fn domain(actions: &[String]) -> String {
+    format!(
+        "(define (domain d) (:predicates (p) (q) (g) (h) (busy))
+           (:functions (fuel) (charge) (rate) (temperature) (total-cost)) {})",
+        actions.concat()
+    )
+}
+
+fn problem(init: &str, goal: &str, metric: &str) -> String {
+    format!(
+        "(define (problem n) (:domain d)
+           (:init (= (fuel) 0) (= (charge) 0) (= (rate) 2) (= (temperature) 20) (= (total-cost) 0) {init})
+           (:goal (and {goal})) (:metric minimize {metric}))"
+    )
+}
+
+#[test]
+fn as_much_is_charged_as_is_needed() {
+    let charge = durative(
+        "load",
+        "(and (>= ?duration 1) (<= ?duration 10))",
+        "(at start (not (busy)))",
+        "(at start (busy)) (at end (not (busy))) (at end (increase (charge) (* ?duration (rate))))",
+    );
+    let drive = durative(
+        "drive",
+        "(= ?duration 3)",
+        "(at start (not (busy))) (at start (>= (charge) 7))",
+        "(at start (busy)) (at end (not (busy))) (at start (decrease (charge) 7)) (at end (g))",
+    );
+    let both = domain(&[charge.clone(), drive.clone()]);
+    let time = "(total-time)";
+    let lines = ["0: (load) [3.5]", "3.501: (drive) [3]"];
+    check("once", &both, &problem("", "(g)", time), (Status::Optimal, Some("6.501"), &lines));
+    // Ten is the most at once.
+    let far = domain(&[charge, drive.replace('7', "25")]);
+    let solution = {
+        let (domain, problem) = parse(&far, &problem("", "(g)", time));
+        solve(&domain, &problem, &rational(1, 1000), &Limits::none())
+    };
+    assert_eq!(
+        (solution.status, solution.plan.map(|plan| plan.cost.to_string())),
+        (Status::Optimal, Some("15.502".into()))
+    );
+}
+
+#[test]
+fn what_is_spent_at_the_start_is_paid_for() {
+    // Twice as long as it takes, so much fuel; the tank has 9.
+    let burn = durative(
+        "burn",
+        "(and (>= ?duration 2) (<= ?duration 8))",
+        "(at start (>= (fuel) (* 2 ?duration)))",
+        "(at start (decrease (fuel) (* 2 ?duration))) (at end (increase (temperature) (* 5 ?duration))) (at end (h))",
+    );
+    let all = domain(std::slice::from_ref(&burn));
+    let goal = |least: &str| {
+        problem("(= (fuel) 9)", &format!("(h) (>= (temperature) {least})"), "(total-time)")
+            .replace("(= (fuel) 0)", "")
+    };
+    let twice = ["0: (burn) [2]", "0.001: (burn) [2]"];
+    check("enough for two at once", &all, &goal("40"), (Status::Optimal, Some("2.001"), &twice));
+    let once = domain(&[burn
+        .replace("(at start (>=", "(at start (q)) (at start (>=")
+        .replace("(at start (decrease", "(at start (not (q))) (at start (decrease")]);
+    let goal_of_one = |least: &str| goal(least).replace("(= (fuel) 9)", "(= (fuel) 9) (q)");
+    check("enough", &once, &goal_of_one("40"), (Status::Optimal, Some("4"), &["0: (burn) [4]"]));
+    check("all", &once, &goal_of_one("42.5"), (Status::Optimal, Some("4.5"), &["0: (burn) [4.5]"]));
+    let (domain, problem) = parse(&all, &goal("42.6"));
+    let solution = solve(&domain, &problem, &rational(1, 1000), &Limits::none());
+    assert_eq!((solution.status, solution.plan), (Status::Unsolvable, None));
+}
+
+#[test]
+fn a_match_burns_as_long_as_it_is_needed_and_no_longer_than_it_can() {
+    let light = |most: &str| {
+        durative(
+            "light",
+            &format!("(and (>= ?duration 0.5) (<= ?duration {most}))"),
+            "(at start (q))",
+            "(at start (not (q))) (at start (p)) (at end (not (p))) (at end (increase (total-cost) (* 3 ?duration)))",
+        )
+    };
+    let mend = |goal: &str| {
+        durative(
+            &format!("mend{goal}"),
+            "(and (>= ?duration 2) (<= ?duration 4))",
+            "(at start (not (busy))) (over all (p))",
+            &format!("(at start (busy)) (at end (not (busy))) (at end ({goal}))"),
+        )
+    };
+    let all = |most: &str| domain(&[light(most), mend("g"), mend("h")]);
+    let task = problem("(q)", "(g) (h)", "(+ (total-time) (total-cost))");
+    let lines = ["0: (light) [4.001]", "0: (mendg) [2]", "2.001: (mendh) [2]"];
+    check("long", &all("7"), &task, (Status::Optimal, Some("16.004"), &lines));
+    check("just", &all("4.001"), &task, (Status::Optimal, Some("16.004"), &lines));
+    check("short", &all("4"), &task, (Status::Unsolvable, None, &[]));
+}
+
+#[test]
+fn bounds_may_be_numbers_that_actions_change() {
+    // No longer than the charge lasts, which another action raises.
+    let run = durative(
+        "run",
+        "(and (>= ?duration 1) (<= ?duration (/ (charge) 2)))",
+        "(at start (not (h)))",
+        "(at start (h)) (at end (increase (temperature) ?duration)) (at end (g))",
+    );
+    let load = durative(
+        "load",
+        "(= ?duration 2)",
+        "(at start (q))",
+        "(at start (not (q))) (at end (increase (charge) 7))",
+    );
+    let all = domain(&[run, load]);
+    let lines = ["0: (load) [2]", "2.001: (run) [3.5]"];
+    check(
+        "raised",
+        &all,
+        &problem("(q)", "(g) (>= (temperature) 23.5)", "(total-time)"),
+        (Status::Optimal, Some("5.501"), &lines),
+    );
+    check(
+        "not enough",
+        &all,
+        &problem("(q)", "(g) (>= (temperature) 23.6)", "(total-time)"),
+        (Status::Unsolvable, None, &[]),
+    );
+}
+
+/// Plans are written in decimals, and have to be valid as they are written.
+#[test]
+fn durations_are_decimals() {
+    let load = durative(
+        "load",
+        "(and (>= ?duration 1) (<= ?duration 10))",
+        "(at start (q))",
+        "(at start (not (q))) (at end (increase (charge) (* 1.5 ?duration))) (at end (g))",
+    );
+    let all = domain(&[load]);
+    let (domain, problem) = parse(&all, &problem("(q)", "(g) (>= (charge) 5)", "(total-time)"));
+    let solution = solve(&domain, &problem, &rational(1, 1000), &Limits::none());
+    let plan = solution.plan.expect("a plan");
+    // A third more costs less than a millionth: that there is nothing in between is not claimed.
+    assert_eq!((solution.status, plan.cost.to_string()), (Status::Feasible, "3.333334".to_owned()));
+    assert_eq!(solution.lower_bound.map(|bound| bound.to_string()), Some("10/3".to_owned()));
+}
+
+#[test]
+fn more_than_a_number_is_a_little_more() {
+    let load = durative(
+        "load",
+        "(and (> ?duration 2) (< ?duration 3))",
+        "(at start (q))",
+        "(at start (not (q))) (at end (increase (charge) ?duration)) (at end (g))",
+    );
+    let all = domain(&[load]);
+    let goal =
+        |most: &str| problem("(q)", &format!("(g) (> (charge) 2.5) (< (charge) {most})"), "(total-time)");
+    check("between", &all, &goal("3"), (Status::Feasible, Some("2.500001"), &["0: (load) [2.500001]"]));
+    let (domain, problem) = parse(&all, &goal("2.5"));
+    let limits = Limits::none().with_room(1 << 20);
+    assert_eq!(solve(&domain, &problem, &rational(1, 1000), &limits).status, Status::Unknown);
+}
+
+/// What is shorter than the separation the planner does not look at, and claims nothing of.
+#[test]
+fn no_action_is_shorter_than_the_separation() {
+    for (bounds, status) in [
+        ("(>= ?duration 0.001)", Status::Optimal),
+        ("(>= ?duration 0.0001)", Status::Feasible),
+        ("(>= ?duration 0)", Status::Feasible),
+        ("()", Status::Feasible),
+    ] {
+        let all = domain(&[durative("a", bounds, "(at start (q))", "(at start (not (q))) (at end (g))")]);
+        check(
+            bounds,
+            &all,
+            &problem("(q)", "(g)", "(total-time)"),
+            (status, Some("0.001"), &["0: (a) [0.001]"]),
+        );
+    }
+}
+
+/// A boiler must be warm enough all along, and cools when it is used.
+#[test]
+fn what_holds_over_all_rests_on_durations() {
+    let heat = durative(
+        "heat",
+        "(and (>= ?duration 1) (<= ?duration 30))",
+        "",
+        "(at end (increase (temperature) (* 4 ?duration))) (at end (increase (total-cost) ?duration))",
+    );
+    let draw = durative(
+        "draw",
+        "(= ?duration 5)",
+        "(at start (>= (temperature) 50)) (over all (>= (temperature) 35)) (at end (<= (temperature) 60))",
+        "(at start (decrease (temperature) 20)) (at end (g))",
+    );
+    let all = domain(&[heat, draw]);
+    let (domain, problem) = parse(&all, &problem("", "(g)", "(total-cost)"));
+    let solution = solve(&domain, &problem, &rational(1, 1000), &Limits::none().with_room(1 << 22));
+    // Of a condition over all that several happenings can keep up nothing is claimed.
+    let cost = solution.plan.as_ref().map(|plan| plan.cost.to_string());
+    assert_eq!((solution.status, cost.as_deref()), (Status::Feasible, Some("8.75")));
+}
+
+fn literal(random: &mut Random) -> String {
+    let atom = ["(p)", "(q)", "(h)"][random.below(3) as usize];
+    if random.below(3) == 0 { format!("(not {atom})") } else { atom.to_owned() }
+}
+
+fn condition(random: &mut Random) -> String {
+    match random.below(6) {
+        0 => format!("(<= (fuel) {})", 1 + random.below(3)),
+        1 | 2 => format!("(>= (fuel) {})", 1 + random.below(4)),
+        _ => literal(random),
+    }
+}
+
+fn effect(random: &mut Random, is_durative: bool) -> String {
+    match random.below(9) {
+        0 | 1 if is_durative => format!("(increase (fuel) (* {} ?duration))", 1 + random.below(3)),
+        2 if is_durative => "(decrease (fuel) ?duration)".to_owned(),
+        3 if is_durative => "(assign (charge) (- 4 ?duration))".to_owned(),
+        4 => format!("(decrease (fuel) {})", 1 + random.below(2)),
+        5 => format!("(increase (charge) {})", 1 + random.below(2)),
+        _ => literal(random),
+    }
+}
+
+fn timed(random: &mut Random, times: &[&str], part: &mut dyn FnMut(&mut Random) -> String) -> String {
+    let count = 1 + random.below(2);
+    let parts = (0..count).map(|_| {
+        let time = times[random.below(times.len() as u64) as usize];
+        format!("({time} {})", part(random))
+    });
+    parts.collect::<Vec<_>>().join(" ")
+}
+
+/// A random task of three actions, and how long each may take: nothing for one that is instantaneous.
+fn sample(random: &mut Random) -> (String, String, [Vec<i128>; 3]) {
+    let mut durations = [const { Vec::new() }; 3];
+    let mut actions = Vec::new();
+    for (index, allowed) in durations.iter_mut().enumerate() {
+        if index == 2 && random.below(2) == 0 {
+            actions.push(format!(
+                "(:action a{index} :parameters () :precondition (and {})
+                   :effect (and {} {} (increase (total-cost) 2)))",
+                condition(random),
+                effect(random, false),
+                literal(random)
+            ));
+            continue;
+        }
+        let least = i128::from(1 + random.below(2));
+        let most = least + i128::from(random.below(3));
+        *allowed = (least..=most).collect();
+        let upper = if random.below(4) == 0 { "(+ (charge) 1)".to_owned() } else { most.to_string() };
+        let bounds = format!("(and (>= ?duration {least}) (<= ?duration {upper}))");
+        if upper.contains("charge") {
+            *allowed = (least..=4).collect();
+        }
+        let conditions = timed(random, &["at start", "over all", "at end"], &mut condition);
+        let times = ["at start", "at end"];
+        let effects = timed(random, &times, &mut |random| effect(random, true));
+        let more = timed(random, &times, &mut literal);
+        let cost = ["2", "?duration", "(* 2 ?duration)"][random.below(3) as usize];
+        let effects = format!("{effects} {more} (at end (increase (total-cost) {cost}))");
+        actions.push(durative(&format!("a{index}"), &bounds, &conditions, &effects));
+    }
+    let mut init = format!("(= (fuel) {})", random.below(3));
+    for atom in ["(p)", "(q)", "(h)"] {
+        if random.below(2) == 0 {
+            let _ = write!(init, " {atom}");
+        }
+    }
+    if random.below(4) == 0 {
+        let _ = write!(init, " (at {} {})", 1 + random.below(4), literal(random));
+    }
+    let goal = format!("{} {} {}", literal(random), condition(random), condition(random));
+    let metric = ["(total-time)", "(+ (total-time) (total-cost))"][random.below(2) as usize];
+    let problem = problem(&init, &goal, metric).replacen("(= (fuel) 0)", "", 1);
+    (domain(&actions), problem, durations)
+}
+
+/// The last start that brute force tries.
+const LAST: i128 = 4;
+
+/// The least metric of valid plans of up to three actions that start and last whole units, which are the separation.
+fn brute_force(durations: &[Vec<i128>; 3], domain: &Domain, problem: &Problem) -> Option<BigRational> {
+    let separation = rational(1, 1);
+    let mut best: Option<BigRational> = None;
+    let mut open: Vec<Vec<(i128, usize, i128)>> = vec![Vec::new()];
+    while let Some(plan) = open.pop() {
+        let mut text = String::new();
+        for (start, action, duration) in &plan {
+            let _ = writeln!(text, "{start}: (a{action}) [{duration}]");
+        }
+        if let Ok(value) = metric(domain, problem, &text, &separation)
+            && best.as_ref().is_none_or(|best| value < *best)
+        {
+            best = Some(value);
+        }
+        if plan.len() == 3 {
+            continue;
+        }
+        let last = plan.last().copied().unwrap_or((0, 0, 0));
+        for start in last.0..=LAST {
+            for (action, allowed) in durations.iter().enumerate() {
+                let instant = if allowed.is_empty() { &[0][..] } else { &[] };
+                for duration in allowed.iter().chain(instant) {
+                    if (start, action, *duration) >= last {
+                        open.push([&plan[..], &[(start, action, *duration)]].concat());
+                    }
+                }
+            }
+        }
+    }
+    best
+}
+
+/// Whether a task is decided; then no plan of brute force is better than the one that is found, or there is none.
+fn agree(seed: u64) -> bool {
+    let (domain, problem, durations) = sample(&mut Random(seed));
+    let (read_domain, read_problem) = parse(&domain, &problem);
+    let limits = Limits::none().with_time(std::time::Duration::from_secs(1)).with_room(1 << 24);
+    let solution = solve(&read_domain, &read_problem, &rational(1, 1), &limits);
+    if solution.status == Status::Unknown {
+        return false;
+    }
+    let expected = brute_force(&durations, &read_domain, &read_problem);
+    let found = solution.plan.as_ref().map(|plan| plan.cost.to_rational());
+    let context = || format!("seed {seed}: {found:?}, {expected:?}\n{domain}\n{problem}");
+    let bound = solution.lower_bound.as_ref().map(metaplan_planner::Exact::to_rational);
+    if let (Some(bound), Some(expected)) = (bound, &expected) {
+        assert!(bound <= *expected, "{}", context());
+    }
+    match solution.status {
+        Status::Unsolvable => assert_eq!(expected, None, "{}", context()),
+        Status::Optimal => {
+            assert!(expected.as_ref().is_none_or(|best| found.as_ref() <= Some(best)), "{}", context());
+        }
+        _ => return false,
+    }
+    true
+}
+
+#[test]
+fn no_plan_on_a_grid_is_better() {
+    let decided = (0..60).filter(|seed| agree(*seed)).count();
+    assert!(decided >= 20, "{decided} of 60 decided");
+}
+
+#[test]
+#[ignore = "half an hour"]
+fn no_plan_on_a_grid_is_better_on_many() {
+    let from = std::env::var("FROM").ok().and_then(|text| text.parse().ok()).unwrap_or(1_000);
+    let decided = (from..from + 1_000).filter(|seed| agree(*seed)).count();
+    assert!(decided >= 300, "{decided} of 1000 decided");
+}

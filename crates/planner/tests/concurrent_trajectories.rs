@@ -1,0 +1,283 @@
+//! Preferences, and constraints on trajectories and times, where actions overlap: known answers, and random tasks on which plans over a
+//! grid of times, executed by the validator, are no better than what is found.
+
+use std::fmt::Write as _;
+use std::time::{Duration, Instant};
+
+use metaplan_planner::{Limits, Status};
+use testing::random::Random;
+
+use crate::concurrent_durations::{metric, parse, solve, written};
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use pddl::ast::{Domain, Problem};
+
+/// Interfering happenings lie half a unit apart; plans of brute force have whole times.
+fn separation() -> BigRational {
+    BigRational::new(BigInt::from(1), BigInt::from(2))
+}
+
+const DOMAIN: &str = "(define (domain d) (:predicates (p) (q) (r))
+  (:durative-action raise :parameters () :duration (= ?duration 3)
+    :condition (at start (not (p))) :effect (and (at end (p))))
+  (:durative-action lower :parameters () :duration (= ?duration 2)
+    :condition (at start (p)) :effect (and (at start (not (p))) (at end (r))))
+  (:durative-action light :parameters () :duration (= ?duration 2)
+    :condition (at start (not (q))) :effect (and (at start (q)) (at end (not (q))))))";
+
+/// The status, the metric and the plan for constraints, by metric.
+fn check(constraints: &str, goal: &str, metric: &str, expected: (Status, Option<&str>, &[&str])) {
+    let problem = format!(
+        "(define (problem n) (:domain d) (:init) (:goal (and {goal})) (:constraints (and {constraints})) {metric})"
+    );
+    let (domain, problem) = parse(DOMAIN, &problem);
+    let solution = solve(&domain, &problem, &separation(), &Limits::none());
+    let cost = solution.plan.as_ref().map(|plan| plan.cost.to_string());
+    let text = solution.plan.as_ref().map(written).unwrap_or_default();
+    let lines: Vec<&str> = text.lines().collect();
+    assert_eq!((solution.status, cost.as_deref(), &lines[..]), expected, "{constraints}\n{text}");
+}
+
+#[test]
+fn wishes_for_the_end_are_weighed_and_proved() {
+    let metric = |weight: &str| format!("(:metric minimize (+ (total-time) (* {weight} (is-violated w))))");
+    let wish = "(preference w (at end (p)))";
+    let raise = ["0: (raise) [3]"];
+    // Three units of time are worth it, or not.
+    check(wish, "", &metric("4"), (Status::Optimal, Some("3"), &raise));
+    check(wish, "", &metric("2"), (Status::Optimal, Some("2"), &[]));
+    check("(preference w (at end (not (p))))", "(p)", &metric("2"), (Status::Optimal, Some("5"), &raise));
+    check("(preference w (at end (and (p) (r))))", "(p)", &metric("2"), (Status::Optimal, Some("5"), &raise));
+    check("", "(p) (preference w (r))", &metric("2"), (Status::Optimal, Some("5"), &raise));
+    let all = ["0: (raise) [3]", "1: (raise) [3]", "3.5: (lower) [2]"];
+    check("", "(p) (preference w (r))", &metric("6"), (Status::Optimal, Some("5.5"), &all));
+}
+
+#[test]
+fn constraints_are_kept() {
+    let time = "(:metric minimize (total-time))";
+    check("(sometime (q))", "(p)", time, (Status::Optimal, Some("3"), &["0: (raise) [3]", "0: (light) [2]"]));
+    // The light goes off when p holds already.
+    let later = ["0: (raise) [3]", "3.5: (light) [2]"];
+    check("(sometime (q)) (always (imply (q) (p)))", "(p)", time, (Status::Feasible, Some("5.5"), &later));
+}
+
+/// Of which object an action is, it does not read.
+#[test]
+fn an_action_with_objects_may_note_that_it_was_there() {
+    let domain = "(define (domain d) (:predicates (on ?x) (off ?x))
+      (:durative-action light :parameters (?x) :duration (= ?duration 2)
+        :condition (at start (off ?x)) :effect (and (at start (not (off ?x))) (at end (on ?x)))))";
+    let problem =
+        "(define (problem n) (:domain d) (:objects a b c) (:init (off a) (off b) (off c)) (:goal (on a))
+      (:constraints (and (sometime (on b)) (preference w (sometime (on c)))))
+      (:metric minimize (+ (total-time) (is-violated w))))";
+    let (domain, problem) = parse(domain, problem);
+    let solution = solve(&domain, &problem, &separation(), &Limits::none());
+    let cost = solution.plan.as_ref().map(|plan| plan.cost.to_string());
+    assert_eq!((solution.status, cost.as_deref()), (Status::Optimal, Some("2")));
+}
+
+#[test]
+fn times_are_kept() {
+    let time = "(:metric minimize (total-time))";
+    let raise = &["0: (raise) [3]"][..];
+    check("(within 3 (p))", "(p)", time, (Status::Feasible, Some("3"), raise));
+    check("(within 2.5 (p))", "(p)", time, (Status::Unknown, None, &[]));
+    check("(hold-after 3 (p))", "", time, (Status::Feasible, Some("3"), raise));
+    // The state of time 3 is the one that is reached then.
+    check("(hold-during 0 3 (not (p)))", "(p)", time, (Status::Feasible, Some("3"), raise));
+    let later = &["1: (raise) [3]"][..];
+    check("(hold-during 1 4 (not (p)))", "(p)", time, (Status::Feasible, Some("4"), later));
+    // What is violated is counted.
+    let weighed = "(:metric minimize (+ (total-time) (* 2 (is-violated w))))";
+    check("(preference w (within 2 (p)))", "(p)", weighed, (Status::Feasible, Some("5"), raise));
+    check("(preference w (within 3 (p)))", "(p)", weighed, (Status::Feasible, Some("3"), raise));
+    check("(preference w (hold-after 1 (q)))", "(p)", weighed, (Status::Feasible, Some("5"), raise));
+}
+
+#[test]
+fn what_costs_nothing_is_the_best() {
+    // The search keeps happenings apart that need not be; that no plan costs less than nothing is known all the same.
+    let wish = "(preference w (always (imply (q) (p)))) (sometime (q))";
+    let metric = "(:metric minimize (is-violated w))";
+    let lines = ["0: (raise) [3]", "3.5: (light) [2]"];
+    check(wish, "", metric, (Status::Optimal, Some("0"), &lines));
+}
+
+#[test]
+fn what_has_to_follow_in_time_is_judged_by_the_times_of_the_plan() {
+    let soon = |time: &str| format!("(sometime (q)) (always-within {time} (q) (p))");
+    let time = "(:metric minimize (total-time))";
+    let both = ["0: (raise) [3]", "0: (light) [2]"];
+    check(&soon("3"), "(p)", time, (Status::Feasible, Some("3"), &both));
+    // It is put off until nothing has to follow.
+    let late = ["0: (raise) [3]", "3.5: (light) [2]"];
+    check(&soon("1"), "(p)", time, (Status::Feasible, Some("5.5"), &late));
+    let weighed = "(:metric minimize (+ (total-time) (* 2 (is-violated w))))";
+    let wish = |time: &str| format!("(sometime (q)) (preference w (always-within {time} (q) (p)))");
+    check(&wish("3"), "(p)", weighed, (Status::Feasible, Some("3"), &both));
+    check(&wish("2.9"), "(p)", weighed, (Status::Feasible, Some("5"), &both));
+}
+
+fn literal(random: &mut Random) -> String {
+    let atom = ["(p)", "(q)", "(h)"][random.below(3) as usize];
+    if random.below(3) == 0 { format!("(not {atom})") } else { atom.to_owned() }
+}
+
+fn formula(random: &mut Random) -> String {
+    match random.below(4) {
+        0 => format!("(and {} {})", literal(random), literal(random)),
+        1 => format!("(or {} {})", literal(random), literal(random)),
+        _ => literal(random),
+    }
+}
+
+fn trajectory(random: &mut Random) -> String {
+    let (one, other) = (formula(random), formula(random));
+    let (from, until) = (random.below(4), random.below(6));
+    match random.below(12) {
+        9 => format!("(always-within {} {one} {other})", random.below(4)),
+        0 | 10 | 11 => format!("(at end {one})"),
+        1 => format!("(always {one})"),
+        2 => format!("(sometime {one})"),
+        3 => format!("(at-most-once {one})"),
+        4 => format!("(sometime-after {one} {other})"),
+        5 => format!("(sometime-before {one} {other})"),
+        6 => format!("(within {until} {one})"),
+        7 => format!("(hold-during {from} {until} {one})"),
+        _ => format!("(hold-after {from} {one})"),
+    }
+}
+
+/// A random task of three actions, and how long each takes.
+fn sample(random: &mut Random) -> (String, String, [i128; 3]) {
+    let mut domain = "(define (domain d) (:predicates (p) (q) (h))".to_owned();
+    let mut durations = [0; 3];
+    for (index, duration) in durations.iter_mut().enumerate() {
+        let (condition, effect, more) = (literal(random), literal(random), literal(random));
+        let preference =
+            if random.below(4) == 0 { format!("(preference v {})", literal(random)) } else { String::new() };
+        if random.below(3) == 0 {
+            let _ = write!(
+                domain,
+                "\n(:action a{index} :parameters () :precondition (and {condition} {preference}) :effect (and {effect}))"
+            );
+            continue;
+        }
+        *duration = i128::from(1 + random.below(2));
+        let time = |random: &mut Random| ["at start", "at end"][random.below(2) as usize];
+        let (when, first, second) =
+            (["at start", "over all"][random.below(2) as usize], time(random), time(random));
+        let preference =
+            if preference.is_empty() { preference } else { format!("({} {preference})", time(random)) };
+        let _ = write!(
+            domain,
+            "\n(:durative-action a{index} :parameters () :duration (= ?duration {duration})
+               :condition (and ({when} {condition}) {preference}) :effect (and ({first} {effect}) ({second} {more})))"
+        );
+    }
+    domain.push(')');
+    let mut constraints = String::new();
+    for _ in 0..=random.below(3) {
+        let own = trajectory(random);
+        let own = if random.below(3) == 0 { own } else { format!("(preference w {own})") };
+        let _ = write!(constraints, " {own}");
+    }
+    let init: String = ["(p)", "(q)", "(h)"].into_iter().filter(|_| random.below(2) == 0).collect();
+    let goal = format!("{} (preference v {})", literal(random), formula(random));
+    let weigh = |weight, name| format!("(* {weight} (is-violated {name}))");
+    let mut metric = format!("(total-time) {}", weigh(random.below(3), "v"));
+    if constraints.contains("preference") {
+        metric.push_str(&weigh(1 + random.below(4), "w"));
+    }
+    let problem = format!(
+        "(define (problem n) (:domain d) (:init {init}) (:goal (and {goal})) (:constraints (and {constraints}))
+           (:metric minimize (+ {metric})))"
+    );
+    (domain, problem, durations)
+}
+
+/// The last start that brute force tries.
+const LAST: i128 = 5;
+
+/// The least metric of valid plans of up to three actions that start at whole times: of all, and of those with no two happenings at one
+/// time.
+fn brute_force(durations: [i128; 3], domain: &Domain, problem: &Problem) -> [Option<BigRational>; 2] {
+    let mut best = [None, None];
+    let mut open: Vec<Vec<(i128, usize)>> = vec![Vec::new()];
+    while let Some(plan) = open.pop() {
+        let (mut text, mut times) = (String::new(), Vec::new());
+        for (start, action) in &plan {
+            let duration = durations[*action];
+            let _ = writeln!(text, "{start}: (a{action}) [{duration}]");
+            times.push(*start);
+            times.extend((duration > 0).then_some(*start + duration));
+        }
+        let count = times.len();
+        times.sort_unstable();
+        times.dedup();
+        if let Ok(value) = metric(domain, problem, &text, &separation()) {
+            for (best, counts) in best.iter_mut().zip([true, times.len() == count]) {
+                if counts && best.as_ref().is_none_or(|best| value < *best) {
+                    *best = Some(value.clone());
+                }
+            }
+        }
+        let last = plan.last().copied().unwrap_or((0, 0));
+        if plan.len() < 3 {
+            let next = (last.0..=LAST).flat_map(|start| (0..3).map(move |action| (start, action)));
+            open.extend(next.filter(|next| *next >= last).map(|next| [&plan[..], &[next]].concat()));
+        }
+    }
+    best
+}
+
+/// Compares with brute force. Whether a plan was found, and whether it is proved to be the best.
+fn agree(seed: u64) -> (bool, bool) {
+    let (domain, problem, durations) = sample(&mut Random(seed));
+    let (read_domain, read_problem) = parse(&domain, &problem);
+    let time = Duration::from_secs(2);
+    let limits = Limits::none().with_time(time).with_room(1 << 24);
+    let began = Instant::now();
+    let solution = solve(&read_domain, &read_problem, &separation(), &limits);
+    let is_over = began.elapsed() < time;
+    let [best, apart] = brute_force(durations, &read_domain, &read_problem);
+    let found = solution.plan.as_ref().map(|plan| plan.cost.to_rational());
+    let plan = solution.plan.as_ref().map(written).unwrap_or_default();
+    let context = || format!("seed {seed}: {found:?}, {best:?}, {apart:?}\n{domain}\n{problem}\n{plan}");
+    let bound = solution.lower_bound.as_ref().map(metaplan_planner::Exact::to_rational);
+    if let (Some(bound), Some(best)) = (bound, &best) {
+        assert!(bound <= *best, "{}", context());
+    }
+    match solution.status {
+        Status::Unsolvable => assert_eq!(best, None, "{}", context()),
+        Status::Optimal => {
+            assert!(best.as_ref().is_none_or(|best| found.as_ref() <= Some(best)), "{}", context());
+        }
+        _ => {}
+    }
+    // What has no two happenings at one time is not left out.
+    let prefers = domain.contains("preference");
+    if is_over
+        && !prefers
+        && let Some(apart) = &apart
+    {
+        assert!(found.as_ref().is_some_and(|found| found <= apart), "{}", context());
+    }
+    (found.is_some(), solution.status == Status::Optimal)
+}
+
+#[test]
+fn no_plan_on_a_grid_is_better() {
+    let all: Vec<_> = (0..150).map(agree).collect();
+    let (found, proved) = (all.iter().filter(|own| own.0).count(), all.iter().filter(|own| own.1).count());
+    assert!(found >= 40 && proved >= 8, "{found} found, {proved} proved");
+}
+
+#[test]
+#[ignore = "half an hour"]
+fn no_plan_on_a_grid_is_better_on_many() {
+    let found = (1_000..6_000).filter(|seed| agree(*seed).0).count();
+    assert!(found >= 1_500, "{found} of 5000 found");
+}

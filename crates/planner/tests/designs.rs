@@ -1,0 +1,155 @@
+//! Many designs, designs that depend on each other, and expressions over designs and fluents at once: what is claimed is
+//! what the definition of a plan says, worked out by hand for each task.
+
+use std::fmt::Write as _;
+
+use metaplan_planner::{Config, GroundConfig, Solution, Status, ground, optimize};
+use pddl::{Source, read};
+
+fn solve(domain: &str, problem: &str) -> Solution {
+    let (domain, problem, _) =
+        read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
+    let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
+    optimize(&task, &Config::default(), &mut |_| {})
+}
+
+/// A plan's cost and its steps, as written.
+fn answer(solution: &Solution) -> Option<(String, Vec<String>)> {
+    let plan = solution.plan.as_ref()?;
+    let step = |step: &metaplan_planner::Step| {
+        let words = std::iter::once(&step.action).chain(&step.arguments);
+        words.map(String::as_str).collect::<Vec<_>>().join(" ")
+    };
+    Some((plan.cost.to_string(), plan.steps.iter().map(step).collect()))
+}
+
+#[allow(clippy::unnecessary_wraps)]
+fn found(cost: &str, steps: &[&str]) -> Option<(String, Vec<String>)> {
+    Some((cost.to_owned(), steps.iter().map(|step| (*step).to_owned()).collect()))
+}
+
+/// `count` designs, of which each solves `f1` and `f2`; `value` writes what is known of the design with an index.
+fn designs(count: usize, value: impl Fn(usize) -> String) -> String {
+    let mut text = String::from("(define (problem p) (:domain d) (:objects");
+    for index in 0..count {
+        let _ = write!(text, " d{index}");
+    }
+    text.push_str(" - design) (:init (= (bat) 10) (= (total-cost) 0)");
+    for index in 0..count {
+        let _ = write!(text, " (fd_solve_f d{index} f1) (fd_solve_f d{index} f2) {}", value(index));
+    }
+    text.push_str(") (:goal (done)) (:metric minimize (total-cost)))");
+    text
+}
+
+/// Two functions with different designs; only the last one of 400 uses little.
+#[test]
+fn no_combination_of_many_designs_is_forgotten() {
+    let domain = "(define (domain d) (:requirements :typing :fluents :equality :negative-preconditions)
+      (:types design function) (:constants f1 f2 - function)
+      (:predicates (fd_solve_f ?d - design ?f - function) (done))
+      (:functions (bat) (total-cost) (use ?d - design))
+      (:action run :parameters (?a ?b - design)
+        :precondition (and (fd_solve_f ?a f1) (fd_solve_f ?b f2) (not (= ?a ?b)) (>= (bat) (use ?a)))
+        :effect (and (done) (decrease (bat) (use ?a)) (increase (total-cost) 1)))
+      (:action sleep :parameters () :precondition () :effect (and (done) (increase (total-cost) 50))))";
+    let value = |index| format!("(= (use d{index}) {})", if index == 399 { 1 } else { 100 });
+    let problem = designs(400, value);
+    // Without the other way there is nothing that a plan could fall back on.
+    let without = domain.split("(:action sleep").next().map(|text| format!("{text})")).unwrap_or_default();
+    for domain in [domain, &without] {
+        let solution = solve(domain, &problem);
+        assert_eq!(answer(&solution), found("1", &["run d399 d0"]), "{solution:?}");
+        assert_eq!(solution.status, Status::Optimal);
+    }
+}
+
+/// A design that solves another design: its function is not known before that one is chosen.
+#[test]
+fn a_function_may_be_a_design_itself() {
+    let action = |name: &str, solves: &str, cost: u32| {
+        format!(
+            "(:action {name} :parameters (?a ?b ?c) :precondition (and {solves}) :effect (and (g) (increase (total-cost) {cost})))"
+        )
+    };
+    let problem = "(define (problem p) (:domain d) (:objects o1 o2 o3)
+      (:init (fd_solve_f o1 o2) (fd_solve_f o2 o3) (= (total-cost) 0)) (:goal (g)) (:metric minimize (total-cost)))";
+    let chains = [
+        "(fd_solve_f ?a ?b) (fd_solve_f ?b ?c)",
+        "(fd_solve_f ?b ?c) (fd_solve_f ?a ?b)",
+        "(fd_solve_f ?a ?b) (fd_solve_f ?b ?c) (not (fd_solve_f ?c ?a))",
+    ];
+    for chain in chains {
+        let domain = format!(
+            "(define (domain d) (:requirements :fluents :negative-preconditions) (:predicates (fd_solve_f ?x ?y) (g))
+              (:functions (total-cost)) {} {})",
+            action("go", chain, 1),
+            action("detour", "(fd_solve_f ?a ?b) (= ?b ?c)", 7)
+        );
+        let solution = solve(&domain, problem);
+        assert_eq!(answer(&solution), found("1", &["go o1 o2 o3"]), "{chain}: {solution:?}");
+    }
+    // Each the function of the other.
+    let domain = format!(
+        "(define (domain d) (:requirements :fluents) (:predicates (fd_solve_f ?x ?y) (g)) (:functions (total-cost)) {})",
+        action("go", "(fd_solve_f ?a ?b) (fd_solve_f ?b ?a)", 1)
+    );
+    let both = problem.replace("(fd_solve_f o2 o3)", "(fd_solve_f o2 o1)");
+    assert_eq!(answer(&solve(&domain, &both)), found("1", &["go o2 o1 o1"]));
+    assert_eq!(solve(&domain, problem).status, Status::Unsolvable);
+}
+
+/// Products and quotients of what a design determines and of what actions change.
+#[test]
+fn factors_of_a_design_and_of_a_fluent_may_meet() {
+    let task = |precondition: &str, effect: &str| {
+        format!(
+            "(define (domain d) (:requirements :typing :fluents) (:types design function) (:constants f1 - function)
+              (:predicates (fd_solve_f ?d - design ?f - function) (done))
+              (:functions (bat) (x) (total-cost) (f ?d - design) (g ?d - design) (speed ?d - design))
+              (:action run :parameters (?d - design) :precondition (and (fd_solve_f ?d f1) {precondition})
+                :effect (and (increase (total-cost) (f ?d)) {effect}))
+              (:action grow :parameters () :effect (and (increase (total-cost) 1) (increase (x) 3)))
+              (:action fin :parameters () :precondition (<= (bat) 4) :effect (done)))"
+        )
+    };
+    let problem = "(define (problem p) (:domain d) (:objects a b - design)
+      (:init (fd_solve_f a f1) (fd_solve_f b f1) (= (bat) 10) (= (x) 3) (= (total-cost) 0)
+        (= (f a) 2) (= (f b) 3) (= (g a) 1) (= (g b) 2) (= (speed a) 2) (= (speed b) 1))
+      (:goal (done)) (:metric minimize (total-cost)))";
+    let check = |precondition: &str, effect: &str, expected: Option<(&str, &[&str])>| {
+        let solution = solve(&task(precondition, effect), problem);
+        let expected = expected.and_then(|(cost, steps)| found(cost, steps));
+        assert_eq!(answer(&solution), expected, "{precondition} {effect}: {solution:?}");
+        assert!(matches!(solution.status, Status::Optimal | Status::Unsolvable), "{solution:?}");
+    };
+    // 10 - 2 * 1 * 3 = 4 with a, and 10 - 3 * 2 * 3 < 4 with b, which costs more.
+    check("", "(decrease (bat) (* (f ?d) (* (g ?d) (x))))", Some(("2", &["run a", "fin"])));
+    // 0 with a; with b the battery is charged.
+    check("", "(decrease (bat) (* (* (f ?d) (x)) (- 1 (g ?d))))", None);
+    // a needs x to grow, runs twice then; b costs 3 each time.
+    let twice: &[&str] = &["grow", "run a", "run a", "fin"];
+    check("(>= (/ (x) (speed ?d)) 3)", "(decrease (bat) 3)", Some(("5", twice)));
+    check("(>= (x) (* 3 (speed ?d)))", "(decrease (bat) 3)", Some(("5", twice)));
+    check("(or (>= (x) (* 3 (speed ?d))) (>= (f ?d) (x)))", "(decrease (bat) 3)", Some(("5", twice)));
+    // 10 - 3 * 2, 10 - 3 * 1.
+    check("", "(decrease (bat) (* (x) (speed ?d)))", Some(("2", &["run a", "fin"])));
+}
+
+fn falling_costs(count: usize) -> (String, String) {
+    let domain = "(define (domain d) (:requirements :typing :fluents) (:types design function) (:constants f1 f2 - function)
+      (:predicates (fd_solve_f ?d - design ?f - function) (done)) (:functions (bat) (total-cost) (cost ?d - design))
+      (:action run :parameters (?a - design) :precondition (fd_solve_f ?a f1)
+        :effect (and (done) (increase (total-cost) (cost ?a)))))";
+    (domain.to_owned(), designs(count, |index| format!("(= (cost d{index}) {})", 1_000_000 - index)))
+}
+
+/// Designs are numbered beyond 16 bits.
+#[test]
+#[ignore = "takes 10 s in debug"]
+fn the_best_of_66_000_designs_is_found() {
+    let (domain, problem) = falling_costs(66_000);
+    let solution = solve(&domain, &problem);
+    assert_eq!(answer(&solution), found("934001", &["run d65999"]), "{:?}", solution.status);
+    assert_eq!(solution.status, Status::Optimal);
+}

@@ -1,0 +1,174 @@
+//! Costs, times and numbers that grow beyond their types while actions are executed: nothing panics, and nothing is claimed that
+//! is not so.
+
+use std::fmt::Write as _;
+use std::time::Duration;
+
+use metaplan_planner::{
+    Config, Exact, GroundConfig, Limits, Solution, Status, Task, ground, ground_concurrent, lexicographic,
+    optimize, optimize_concurrent,
+};
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use pddl::ast::{Direction, Domain, Problem};
+use pddl::{Source, read, read_objective};
+
+/// Nearly the largest number of a task, 2^118. So many times as much does not fit 128 bits.
+const LARGE: &str = "330000000000000000000000000000000000";
+const MANY: usize = 520;
+
+fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
+    let read = read(&Source::new("domain", domain), &Source::new("problem", problem));
+    let (domain, problem, _) = read.unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
+    (domain, problem)
+}
+
+fn task(domain: &str, problem: &str) -> Task {
+    let (domain, problem) = parse(domain, problem);
+    ground(&domain, &problem, &GroundConfig::default()).unwrap_or_else(|errors| panic!("{errors:?}"))
+}
+
+fn solve(task: &Task) -> Solution {
+    let limits = Limits::none().with_time(Duration::from_secs(60));
+    optimize(task, &Config::default().with_limits(limits), &mut |_| {})
+}
+
+/// A number as the files write it.
+fn large(times: usize) -> BigRational {
+    BigRational::from_integer(LARGE.parse::<BigInt>().expect("a number") * BigInt::from(times))
+}
+
+/// A robot in a corridor of so many places, to whose end it has to go; each move costs as much as `cost` says.
+fn corridor(places: usize, cost: &str, metric: &str) -> Task {
+    let domain = format!(
+        "(define (domain d) (:requirements :typing :numeric-fluents) (:types place)
+          (:predicates (at ?p - place) (next ?p ?q - place)) (:functions (total-cost) (energy))
+          (:action move :parameters (?p ?q - place) :precondition (and (at ?p) (next ?p ?q))
+            :effect (and (not (at ?p)) (at ?q) {cost})))"
+    );
+    let mut problem = String::from("(define (problem p) (:domain d) (:objects");
+    (0..places).for_each(|place| write!(problem, " p{place}").expect("a string"));
+    problem.push_str(" - place) (:init (at p0) (= (total-cost) 0) (= (energy) 0)");
+    (1..places).for_each(|place| write!(problem, " (next p{} p{place})", place - 1).expect("a string"));
+    write!(problem, ") (:goal (at p{})) {metric})", places - 1).expect("a string");
+    task(&domain, &problem)
+}
+
+#[test]
+fn a_plan_whose_cost_does_not_fit_is_not_called_cheapest_nor_impossible() {
+    let task = corridor(MANY, &format!("(increase (total-cost) {LARGE})"), "(:metric minimize (total-cost))");
+    let solution = solve(&task);
+    assert_eq!((solution.status, solution.proof), (Status::Unknown, None));
+}
+
+#[test]
+fn rewards_whose_sum_does_not_fit_are_not_counted() {
+    let reward = format!("(decrease (total-cost) {LARGE})");
+    let solution = solve(&corridor(MANY, &reward, "(:metric minimize (total-cost))"));
+    assert_eq!((solution.status, solution.proof), (Status::Unknown, None));
+}
+
+#[test]
+fn the_metric_of_a_situation_is_exact_however_large_it_is() {
+    let cost = format!("(increase (total-cost) {LARGE})");
+    let places = 516;
+    let task = corridor(places, &cost, &format!("(:metric minimize (+ {LARGE} (total-cost)))"));
+    let mut situation = task.start();
+    for _ in 1..places {
+        let [next] = &task.transitions(&situation).expect("numbers that fit")[..] else { panic!("one way") };
+        situation = next.after.clone();
+    }
+    assert_eq!(task.metric(&situation).to_rational(), large(places));
+}
+
+#[test]
+fn shares_of_costs_are_ordered_however_large_their_sum_is() {
+    // Two robots, each with many ways to its goal that cost the same.
+    let domain = "(define (domain d) (:requirements :typing :action-costs) (:types place robot)
+        (:predicates (at ?r - robot ?p - place) (next ?p ?q - place)) (:functions (total-cost) (cost ?p - place))
+        (:action move :parameters (?r - robot ?p ?q - place) :precondition (and (at ?r ?p) (next ?p ?q))
+          :effect (and (not (at ?r ?p)) (at ?r ?q) (increase (total-cost) (cost ?p)))))";
+    let mut problem = String::from("(define (problem p) (:domain d) (:objects a b - robot hub end");
+    (0..MANY).for_each(|place| write!(problem, " p{place}").expect("a string"));
+    write!(
+        problem,
+        " - place) (:init (at a hub) (at b hub) (= (total-cost) 0) (= (cost hub) {LARGE}) (= (cost end) 0)"
+    )
+    .expect("a string");
+    for place in 0..MANY {
+        write!(problem, " (next hub p{place}) (next p{place} end) (= (cost p{place}) 1)").expect("a string");
+    }
+    problem.push_str(") (:goal (and (at a end) (at b end))) (:metric minimize (total-cost)))");
+    let solution = solve(&task(domain, &problem));
+    assert_eq!(solution.status, Status::Optimal, "{:?}", solution.proof);
+    let cost = large(2) + BigRational::from_integer(2.into());
+    assert_eq!(solution.plan.expect("a plan").cost.to_rational(), cost);
+}
+
+/// Work that has to be done many times.
+const WORK: &str = "(define (domain d) (:requirements :durative-actions :numeric-fluents :action-costs)
+    (:functions (done) (total-cost) (long))
+    (:durative-action work :parameters () :duration (= ?duration (long)) :condition (at start (>= (done) 0))
+      :effect (and (at end (increase (done) 1)) (at end (increase (total-cost) 1)))))";
+
+fn work(metric: &str) -> String {
+    format!(
+        "(define (problem p) (:domain d) (:init (= (done) 0) (= (total-cost) 0) (= (long) {LARGE}))
+          (:goal (>= (done) {MANY})) (:metric minimize {metric}))"
+    )
+}
+
+#[test]
+fn starts_are_exact_however_late_they_are() {
+    let solution = solve(&task(WORK, &work("(total-cost)")));
+    assert_eq!(solution.status, Status::Optimal, "{:?}", solution.proof);
+    assert_eq!(solution.plan.expect("a plan").makespan().to_rational(), large(MANY));
+}
+
+#[test]
+fn an_objective_whose_sum_does_not_fit_is_shown_and_not_proved() {
+    let (domain, problem) = parse(WORK, &work("(total-cost)"));
+    let objective = |text: &str| {
+        let source = Source::new("objective", text);
+        read_objective(Direction::Minimize, &source, &domain, &problem).expect("an objective")
+    };
+    let objectives = vec![objective("(total-cost)"), objective("(total-time)")];
+    let task = ground(&domain, &problem, &GroundConfig::default().with_objectives(objectives));
+    let limits = Limits::none().with_time(Duration::from_secs(10));
+    let config = Config::default().with_limits(limits);
+    let point = lexicographic(&task.expect("a task"), &config, &mut |_| {});
+    assert_eq!(point.solution.status, Status::Feasible);
+    let values: Vec<_> = point.values.iter().map(Exact::to_rational).collect();
+    assert_eq!(values, [BigRational::from_integer(MANY.into()), large(MANY)]);
+}
+
+#[test]
+fn the_least_number_of_the_type_is_too_large_as_well() {
+    // From 2^112 to 2^124, which is the most that a number may come to, and then to -2^127.
+    let domain =
+        "(define (domain d) (:requirements :numeric-fluents) (:predicates (a) (b) (c)) (:functions (x))
+        (:action grow :parameters () :precondition (a) :effect (and (not (a)) (b) (scale-up (x) 4096)))
+        (:action flip :parameters () :precondition (b) :effect (and (not (b)) (c) (scale-up (x) -8))))";
+    let problem = "(define (problem p) (:domain d) (:init (a) (= (x) 5192296858534827628530496329220096))
+        (:goal (and (c) (<= (x) 0))))";
+    let solution = solve(&task(domain, problem));
+    assert_eq!((solution.status, solution.proof), (Status::Unknown, None));
+}
+
+#[test]
+fn a_metric_whose_offset_is_too_large_is_refused() {
+    let domain = "(define (domain d) (:requirements :durative-actions :numeric-fluents) (:predicates (a))
+        (:functions (total-cost))
+        (:durative-action act :parameters () :duration (= ?duration 1) :condition (and)
+          :effect (and (at end (a)) (at end (increase (total-cost) 20000000000000000000000000000000000)))))";
+    let problem = format!(
+        "(define (problem p) (:domain d) (:init (= (total-cost) 0)) (:goal (a))
+          (:metric minimize (+ {LARGE} (+ (* 0.002 (total-time)) (total-cost)))))"
+    );
+    let (domain, problem) = parse(domain, &problem);
+    let separation = BigRational::from_integer(1.into());
+    match ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation) {
+        Ok(task) => panic!("{:?}", optimize_concurrent(&task, &Limits::none(), &mut |_| {}).status),
+        Err(errors) => assert!(errors.iter().all(|error| error.code() == "E304"), "{errors:?}"),
+    }
+}

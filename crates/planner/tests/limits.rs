@@ -1,0 +1,119 @@
+//! A limit ends every stage soon, and never becomes an answer.
+#![expect(clippy::print_stdout, reason = "times are what some of these tests are for")]
+
+use std::fmt::Write as _;
+use std::time::{Duration, Instant};
+
+use metaplan_planner::{Config, Engine, Error, GroundConfig, Limits, Status, alternatives, ground, optimize};
+use pddl::ast::{Domain, Problem};
+use pddl::{Source, read};
+
+fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
+    let (domain, problem, _) =
+        read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
+    (domain, problem)
+}
+
+/// Robots that carry parcels about on a ring, with functions of equal designs; each may rest without end.
+fn depot(places: usize, parcels: usize, designs: usize) -> (Domain, Problem) {
+    let domain = "(define (domain depot) (:requirements :typing :fluents :equality :negative-preconditions)
+      (:types place parcel design function) (:constants f1 f2 - function)
+      (:predicates (at ?p - place) (way ?a ?b - place) (lies ?x - parcel ?p - place) (held ?x - parcel) (free)
+        (fd_solve_f ?d - design ?f - function))
+      (:functions (total-cost) (bat) (use ?d - design) (price ?d - design))
+      (:action go :parameters (?a ?b - place ?c ?d - design)
+        :precondition (and (at ?a) (way ?a ?b) (fd_solve_f ?c f1) (fd_solve_f ?d f2) (not (= ?c ?d)) (>= (bat) (use ?c)))
+        :effect (and (not (at ?a)) (at ?b) (decrease (bat) (use ?c)) (increase (total-cost) (price ?d))))
+      (:action take :parameters (?x - parcel ?p - place) :precondition (and (at ?p) (lies ?x ?p) (free))
+        :effect (and (held ?x) (not (free)) (not (lies ?x ?p)) (increase (total-cost) 1)))
+      (:action put :parameters (?x - parcel ?p - place) :precondition (and (at ?p) (held ?x))
+        :effect (and (not (held ?x)) (free) (lies ?x ?p) (increase (total-cost) 1))))";
+    let mut text = String::from("(define (problem p) (:domain depot) (:objects");
+    (0..places).for_each(|index| _ = write!(text, " p{index}"));
+    text.push_str(" - place");
+    (0..parcels).for_each(|index| _ = write!(text, " x{index}"));
+    text.push_str(" - parcel");
+    (0..designs).for_each(|index| _ = write!(text, " d{index}"));
+    text.push_str(" - design) (:init (at p0) (free) (= (bat) 1000000) (= (total-cost) 0)");
+    for index in 0..places {
+        let _ = write!(text, " (way p{index} p{0}) (way p{0} p{index})", (index + 1) % places);
+    }
+    (0..parcels).for_each(|index| _ = write!(text, " (lies x{index} p{})", index * 7 % places));
+    for index in 0..designs {
+        let _ = write!(
+            text,
+            " (fd_solve_f d{index} f1) (fd_solve_f d{index} f2) (= (use d{index}) {}) (= (price d{index}) {})",
+            1 + index % 3,
+            2 + index % 5
+        );
+    }
+    text.push_str(") (:goal (and");
+    (0..parcels)
+        .for_each(|index| _ = write!(text, " (lies x{index} p{})", (index * 7 + places / 2) % places));
+    text.push_str(")) (:metric minimize (total-cost)))");
+    parse(domain, &text)
+}
+
+/// Grounds and plans; the status, if the task could be ground in time, and the whole time.
+fn run(domain: &Domain, problem: &Problem, limit: Duration, engine: Engine) -> (Option<Status>, Duration) {
+    let started = Instant::now();
+    let limits = Limits::none().with_time(limit);
+    let config = GroundConfig::default().with_limits(limits.clone());
+    let task = match ground(domain, problem, &config) {
+        Ok(task) => task,
+        Err(errors) => {
+            assert!(matches!(errors[..], [Error::Interrupted]), "{errors:?}");
+            return (None, started.elapsed());
+        }
+    };
+    let config = Config::default().with_engine(engine).with_limits(limits);
+    let solution = optimize(&task, &config, &mut |_| {});
+    if let Some(others) = alternatives(&task, &solution, 2, &config) {
+        assert!(others.plans.len() <= 2);
+    }
+    (Some(solution.status), started.elapsed())
+}
+
+/// There is a plan, so whenever time is up, it is never said that there is none.
+#[test]
+fn wherever_time_is_up_there_is_no_false_answer() {
+    let (domain, problem) = depot(4, 2, 3);
+    let mut ended = 0;
+    for engine in [Engine::Auto, Engine::Sat] {
+        // Steps of a fifth: from before grounding to after the proof.
+        let mut microseconds = 100.0_f64;
+        while microseconds < 3e6 {
+            let limit = Duration::from_secs_f64(microseconds / 1e6);
+            let (status, _) = run(&domain, &problem, limit, engine);
+            let honest = [None, Some(Status::Unknown), Some(Status::Feasible), Some(Status::Optimal)];
+            assert!(honest.contains(&status), "{status:?} after {limit:?}");
+            ended += usize::from(status == Some(Status::Optimal));
+            if status == Some(Status::Optimal) {
+                break;
+            }
+            microseconds *= 1.2;
+        }
+    }
+    assert!(ended > 0, "nothing was ever proved");
+}
+
+fn check_overrun(name: &str, (domain, problem): &(Domain, Problem)) {
+    for seconds in [1, 3, 8] {
+        for engine in [Engine::Auto, Engine::Sat] {
+            let limit = Duration::from_secs(seconds);
+            let (status, passed) = run(domain, problem, limit, engine);
+            println!("{name}, {engine:?}, limit {seconds} s: {passed:.1?}, {status:?}");
+            let most = limit + Duration::from_secs(1);
+            assert!(passed <= most, "{name}, {engine:?}: {passed:?} with a limit of {limit:?}");
+            assert_ne!(status, Some(Status::Unsolvable), "{name}");
+        }
+    }
+}
+
+#[test]
+#[ignore = "takes minutes; in release"]
+fn large_tasks_end_within_a_second_of_the_limit() {
+    check_overrun("20,000 operators", &depot(400, 25, 3));
+    check_overrun("1,000 designs for each of two functions", &depot(20, 3, 1_000));
+    check_overrun("65,000 designs for each of two functions", &depot(3, 1, 65_000));
+}

@@ -1,0 +1,147 @@
+//! Preferences and constraints on trajectories: random tasks against all plans up to a length, executed and judged by the definition
+//! of PDDL 3 on the whole sequence of states. Planner and validator have to agree with that.
+
+mod generate;
+mod model;
+
+use std::time::Duration;
+
+use generate::Generator;
+use metaplan_planner::{Config, Engine, GroundConfig, Limits, Solution, Status, ground, optimize};
+use pddl::validate::{Options, PlanText, validate};
+use pddl::{Source, read};
+use testing::random::Random;
+
+/// None where an instance has too many cases.
+fn solve(domain: &str, problem: &str, engine: Engine) -> Option<Solution> {
+    let (domain, problem, _) = read(&Source::new("domain", domain), &Source::new("problem", problem))
+        .unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
+    let task = match ground(&domain, &problem, &GroundConfig::default()) {
+        Ok(task) => task,
+        Err(errors) => {
+            let has_cases = errors.iter().all(|error| error.to_string().contains("with more than 64 cases"));
+            assert!(has_cases, "{errors:?}");
+            return None;
+        }
+    };
+    let limits = Limits::none().with_time(Duration::from_secs(2));
+    Some(optimize(&task, &Config::default().with_engine(engine).with_limits(limits), &mut |_| {}))
+}
+
+fn compare(seed: u64) -> bool {
+    let task = Generator(Random(seed)).task();
+    let (domain, problem) = (task.domain(), task.problem());
+    let best = task.best();
+    let Some(solution) = solve(&domain, &problem, if seed % 8 == 7 { Engine::Sat } else { Engine::Auto })
+    else {
+        return false;
+    };
+    let about = || format!("seed {seed}\n{domain}\n{problem}\n{solution:?}");
+    let Some(plan) = &solution.plan else {
+        // The solver alone may not end.
+        assert!(matches!(solution.status, Status::Unsolvable | Status::Unknown), "{}", about());
+        assert!(best.is_none() || solution.status == Status::Unknown, "{}", about());
+        return false;
+    };
+    let is_proved = solution.status == Status::Optimal;
+    let steps: Vec<(usize, usize)> = plan
+        .steps
+        .iter()
+        .map(|step| {
+            let object = step.arguments.first().map_or(0, |object| usize::from(object == "o1"));
+            (step.action[1..].parse().unwrap_or_else(|_| panic!("{}", about())), object)
+        })
+        .collect();
+    let cost: i64 = plan.cost.to_string().parse().unwrap_or_else(|_| panic!("{}", about()));
+    assert_eq!(task.judge(&steps), Some(cost), "{}", about());
+    let is_best = best.is_none_or(|best| if task.maximize { cost >= best } else { cost <= best });
+    assert!(is_best || !is_proved, "{best:?} is better\n{}", about());
+    is_proved
+}
+
+#[test]
+fn the_cheapest_plans_are_those_of_the_definition() {
+    let seeds: u64 =
+        std::env::var("METAPLAN_SEEDS").map_or(100, |text| text.parse().expect("a number of seeds"));
+    let solved = (0..seeds).filter(|seed| compare(*seed)).count();
+    assert!(solved * 5 > 2 * seeds as usize, "only {solved} tasks have plans that are proved");
+}
+
+#[test]
+fn the_validator_judges_random_plans_by_the_definition() {
+    let (mut valid, mut invalid) = (0, 0);
+    for seed in 0..400 {
+        let mut generator = Generator(Random(1_000_000 + seed));
+        let task = generator.task();
+        let (domain_text, problem_text) = (task.domain(), task.problem());
+        let (domain, problem, _) = read(
+            &Source::new("domain", domain_text.as_str()),
+            &Source::new("problem", problem_text.as_str()),
+        )
+        .expect("it is read");
+        let mut plan: Vec<(usize, usize)> = Vec::new();
+        for _ in 0..12 {
+            let action = generator.below(3) as usize;
+            let x = if task.actions[action].has_parameter { generator.below(2) as usize } else { 0 };
+            plan.push((action, x));
+            if task.execute(&plan).is_none() {
+                plan.pop();
+            }
+        }
+        let line = |(action, x): &(usize, usize)| {
+            if task.actions[*action].has_parameter {
+                format!("(a{action} o{x})\n")
+            } else {
+                format!("(a{action})\n")
+            }
+        };
+        let text: String = plan.iter().map(line).collect();
+        let parsed = PlanText::parse(&Source::new("plan", text.as_str())).expect("it is a plan");
+        let verdict = validate(&domain, &problem, &parsed, &Options::default());
+        let metric = verdict.metric.as_ref().map(ToString::to_string);
+        let expected = task.judge(&plan).map(|metric| metric.to_string());
+        assert_eq!(metric, expected, "{domain_text}\n{problem_text}\n{text}\n{verdict:?}");
+        *(if verdict.valid { &mut valid } else { &mut invalid }) += 1;
+    }
+    assert!(valid > 50 && invalid > 50, "{valid} valid and {invalid} invalid plans");
+}
+
+/// A comparison with an undefined number is neither true nor false, so that a plan without it would be no plan at all.
+#[test]
+fn numbers_without_an_initial_value_are_refused() {
+    let domain = "(define (domain d) (:predicates (done)) (:functions (f) (g) (total-cost))
+      (:action set_f :effect (and (assign (f) 5) (increase (total-cost) 10)))
+      (:action set_g :effect (and (assign (g) 5) (increase (total-cost) 1)))
+      (:action finish :precondition (preference a (> (f) 3)) :effect (and (done) (increase (total-cost) 1))))";
+    let soft = |preference: &str| format!("(:constraints (preference a {preference}))");
+    let (sometime, in_the_end) = (soft("(sometime (> (+ (f) (g)) 3))"), soft("(at end (> (f) 3))"));
+    let defined = soft("(sometime (> (g) 3))");
+    let ground_with = |values: &str, constraints: &str| {
+        let problem = format!(
+            "(define (problem p) (:domain d) (:init (= (total-cost) 0) {values}) (:goal (done)) {constraints}
+               (:metric minimize (+ (total-cost) (* 4 (is-violated a)))))"
+        );
+        let (domain, problem, _) =
+            read(&Source::new("domain", domain), &Source::new("problem", &problem)).expect("PDDL");
+        ground(&domain, &problem, &GroundConfig::default())
+    };
+    for (values, constraints) in
+        [("", ""), ("(= (g) 0)", &sometime[..]), ("(= (g) 0)", &in_the_end[..]), ("(= (g) 0)", &defined[..])]
+    {
+        let errors = ground_with(values, constraints).expect_err("it would be neither met nor violated");
+        assert!(errors.iter().all(|error| error.to_string().contains("no initial value")), "{errors:?}");
+    }
+    for constraints in ["", &sometime[..], &in_the_end[..]] {
+        let task = ground_with("(= (f) 0) (= (g) 0)", constraints).expect("a task");
+        let solution = optimize(&task, &Config::default(), &mut |_| {});
+        // To do nothing about it costs 4 more for each; to set g is enough for the sum.
+        let expected = if constraints.is_empty() {
+            "5"
+        } else if constraints == sometime {
+            "6"
+        } else {
+            "9"
+        };
+        assert_eq!(solution.plan.expect("a plan").cost.to_string(), expected, "{constraints}");
+    }
+}

@@ -1,0 +1,140 @@
+//! What is claimed of tasks at the edges: nothing to do, nothing that helps, free cycles, metrics without a best value.
+
+use metaplan_planner::{
+    Backend, Config, GroundConfig, MetricUnbounded, Proof, Status, StepSemantics, ground, optimize,
+};
+use pddl::{Source, read};
+
+const DOMAIN: &str = "(define (domain d)
+  (:types place)
+  (:predicates (at ?p - place) (way ?a ?b - place) (on))
+  (:functions (total-cost) (reward) (fuel) (length ?a ?b - place))
+  (:action go :parameters (?a ?b - place) :precondition (and (at ?a) (way ?a ?b))
+    :effect (and (not (at ?a)) (at ?b) (increase (total-cost) (length ?a ?b))))
+  (:action burn :parameters () :precondition (>= (fuel) 1) :effect (and (decrease (fuel) 1) (increase (reward) 1)))
+  (:action flip :parameters () :precondition (not (on)) :effect (on))
+  (:action flop :parameters () :precondition (on) :effect (not (on))))";
+
+/// Status, cost and steps of the answer, with and without the quick search, by every solver and in all semantics.
+fn check(name: &str, init: &str, goal: &str, metric: &str, expected: (Status, Option<&str>, Option<usize>)) {
+    let problem = format!(
+        "(define (problem p) (:domain d) (:objects a b c - place)
+          (:init (at a) (= (total-cost) 0) (= (reward) 0) (= (fuel) 2) {init}) (:goal {goal}) {metric})"
+    );
+    let (domain, problem, _) =
+        read(&Source::new("domain", DOMAIN), &Source::new("problem", problem)).expect("PDDL");
+    let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
+    for backend in Backend::BUILT_IN {
+        let semantics = [StepSemantics::Sequential, StepSemantics::ForAllStep, StepSemantics::ExistsStep];
+        for semantics in semantics.into_iter().map(Some).chain([None]) {
+            let backend: Backend = backend.parse().expect("a solver");
+            let solution = optimize(
+                &task,
+                &Config::default().with_semantics(semantics).with_backend(backend),
+                &mut |_| {},
+            );
+            let plan = solution.plan.as_ref();
+            let found = (solution.status, plan.map(|p| p.cost.to_string()), plan.map(|p| p.steps.len()));
+            let expected = (expected.0, expected.1.map(str::to_owned), expected.2);
+            assert_eq!(found, expected, "{name}, {semantics:?}: {solution:?}");
+            let claims = matches!(solution.status, Status::Optimal | Status::Unsolvable);
+            assert!(!claims || solution.proof.is_some(), "{name}: a claim without a proof");
+        }
+    }
+}
+
+const COST: &str = "(:metric minimize (total-cost))";
+const WAYS: &str = "(way a b) (= (length a b) 2) (way b c) (= (length b c) 3)";
+/// There and back for nothing.
+const FREE: &str = "(way a b) (= (length a b) 0) (way b a) (= (length b a) 0) (way b c) (= (length b c) 3)";
+
+#[test]
+fn a_goal_that_holds_takes_no_step() {
+    check("cost", WAYS, "(at a)", COST, (Status::Optimal, Some("0"), Some(0)));
+    check("no metric", WAYS, "(at a)", "", (Status::Optimal, Some("0"), Some(0)));
+    check("empty goal", WAYS, "(and)", COST, (Status::Optimal, Some("0"), Some(0)));
+}
+
+#[test]
+fn a_goal_out_of_reach_is_proved_so() {
+    let none = (Status::Unsolvable, None, None);
+    check("no way back", WAYS, "(and (at a) (at b))", COST, none);
+    check("no way", "(way a b) (= (length a b) 2)", "(at c)", COST, none);
+    check("free cycle", "(way a b) (= (length a b) 0) (way b a) (= (length b a) 0)", "(at c)", COST, none);
+    check("contradiction", WAYS, "(and (on) (not (on)))", COST, none);
+}
+
+#[test]
+fn cycles_that_cost_nothing_do_no_harm() {
+    check("cycle", FREE, "(at c)", COST, (Status::Optimal, Some("3"), Some(2)));
+    check("toggle", FREE, "(and (at c) (on))", COST, (Status::Optimal, Some("3"), Some(3)));
+    check("all free", FREE, "(at b)", COST, (Status::Optimal, Some("0"), Some(1)));
+}
+
+#[test]
+fn a_metric_without_a_best_value_is_read_with_bounds() {
+    let metric = "(:metric maximize (reward))";
+    check("burning", WAYS, "(at c)", metric, (Status::Feasible, Some("0"), Some(2)));
+    let problem = format!(
+        "(define (problem p) (:domain d) (:objects a - place)
+          (:init (at a) (= (total-cost) 0) (= (reward) 0) (= (fuel) 2)) (:goal (on)) {metric})"
+    );
+    // That burning ends is not what the planner sees of the metric; waving does not end.
+    let waving = DOMAIN.replace(
+        "(:action flip",
+        "(:action wave :parameters () :precondition () :effect (increase (reward) 1)) (:action flip",
+    );
+    for (domain, expected) in
+        [(DOMAIN, MetricUnbounded::Suspected), (waving.as_str(), MetricUnbounded::Proved)]
+    {
+        let (domain, problem, _) =
+            read(&Source::new("domain", domain), &Source::new("problem", problem.as_str())).expect("PDDL");
+        let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
+        let solution = optimize(&task, &Config::default(), &mut |_| {});
+        assert_eq!((solution.status, solution.unbounded), (Status::Feasible, Some(expected)), "{solution:?}");
+        assert!(solution.lower_bound.is_none(), "{solution:?}");
+    }
+}
+
+#[test]
+fn proofs_name_what_they_rest_on() {
+    let problem = format!(
+        "(define (problem p) (:domain d) (:objects a b c - place)
+          (:init (at a) (= (total-cost) 0) (= (reward) 0) (= (fuel) 2) {FREE}) (:goal (at c)) {COST})"
+    );
+    let (domain, problem, _) =
+        read(&Source::new("domain", DOMAIN), &Source::new("problem", problem)).expect("PDDL");
+    let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
+    let solution = optimize(&task, &Config::default(), &mut |_| {});
+    // The projection to the place is exact here, so its cost to go is the cost.
+    assert_eq!(solution.proof, Some(Proof::Bound));
+    let within = Config::default().with_horizon(1);
+    assert_eq!(optimize(&task, &within, &mut |_| {}).status, Status::UnsolvableWithinHorizon);
+}
+
+/// Changes of one number at one time that contradict each other leave an action inapplicable, as the validator has it.
+#[test]
+fn contradictory_changes_leave_an_action_inapplicable() {
+    let solve = |effect: &str| {
+        let domain = format!(
+            "(define (domain d) (:predicates (done) (lit)) (:functions (x))
+              (:action work :parameters () :effect (and (done) {effect}))
+              (:action light :parameters () :effect (lit)))"
+        );
+        let problem = "(define (problem p) (:domain d) (:init (= (x) 2)) (:goal (done)))";
+        let (domain, problem, _) =
+            read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
+        let task = ground(&domain, &problem, &GroundConfig::default()).map_err(|errors| errors.len())?;
+        Ok(optimize(&task, &Config::default(), &mut |_| {}).plan.map(|plan| plan.steps.len()))
+    };
+    assert_eq!(solve("(assign (x) 5) (increase (x) 1)"), Ok(None));
+    assert_eq!(solve("(increase (x) 1) (assign (x) 3)"), Ok(None));
+    assert_eq!(solve("(scale-up (x) 2) (decrease (x) 1)"), Ok(None));
+    assert_eq!(solve("(assign (x) 5) (assign (x) 6)"), Ok(None));
+    assert_eq!(solve("(assign (x) 5) (assign (x) 5)"), Ok(Some(1)));
+    assert_eq!(solve("(increase (x) 5) (decrease (x) 6)"), Ok(Some(1)));
+    assert_eq!(solve("(scale-up (x) 5) (scale-down (x) 6)"), Ok(Some(1)));
+    // Where it depends on the state, what is lit matters.
+    assert_eq!(solve("(assign (x) 5) (when (not (lit)) (increase (x) 1))"), Ok(Some(2)));
+    assert_eq!(solve("(assign (x) 5) (assign (x) (+ (x) 3))"), Err(1));
+}

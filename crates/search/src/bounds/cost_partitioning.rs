@@ -1,0 +1,130 @@
+//! Costs divided among projections, so that their estimates add up.
+//!
+//! Saturated cost partitioning [1]: projections take their share of the operators' costs one after the other, each only as
+//! much as its estimates need; what is left is for the next. The order decides how much that is, so that several are tried. The
+//! sum is consistent, as each estimate is for the costs it took. What one projection cannot see at all, such as goals of
+//! another robot, or changes of designs off its pattern, another one counts.
+//!
+//! [1] J. Seipp, T. Keller, M. Helmert: Saturated cost partitioning for optimal classical planning, JAIR 67, 2020.
+
+use std::cmp::Reverse;
+
+use num_bigint::BigInt;
+use task::context::Context;
+use task::limits::{Interrupted, Limits};
+use task::number::{GROWTH_LIMIT, Int};
+
+use crate::bounds::pattern_database::Projection;
+
+/// How many sums are kept.
+const MAX_PARTITIONINGS: usize = 4;
+/// How many orders are tried at most, and how many transitions may be looked at in all.
+const MAX_ORDERS: usize = 60;
+const MAX_TRANSITIONS: usize = 6_000_000;
+
+/// Estimates that may be added up: positions of projections, and the share of the cost to go from each abstract state.
+pub(super) struct CostPartitioning {
+    parts: Vec<(usize, Vec<Option<Int>>)>,
+}
+
+impl CostPartitioning {
+    /// The sum for a state, of which the abstract states are given by position.
+    pub(super) fn estimate(&self, states: &[u32]) -> Int {
+        let shares = self.parts.iter().map(|(position, to_go)| to_go[states[*position] as usize]);
+        // Dead ends are noticed by the projections themselves. A sum that is cut off stays a lower bound, and consistent.
+        let sum = shares.fold(0, |sum: Int, share| sum.saturating_add(share.unwrap_or(0)));
+        sum.min(GROWTH_LIMIT)
+    }
+
+    fn new(
+        projections: &[Projection],
+        costs: &[Int],
+        order: &[usize],
+        limits: &Limits,
+    ) -> Result<Self, Interrupted> {
+        let mut left = costs.to_vec();
+        let mut parts = Vec::new();
+        for position in order {
+            let to_go = projections[*position].goal_distances(&left, limits)?;
+            if to_go.iter().any(|cost| cost.is_some_and(|cost| cost > 0)) {
+                for (left, taken) in left.iter_mut().zip(projections[*position].saturated(&to_go)) {
+                    *left = (*left).saturating_sub(taken);
+                }
+                parts.push((*position, to_go));
+            }
+        }
+        Ok(Self { parts })
+    }
+}
+
+/// Sums of shares for the projections of a task, the one with the highest estimate of the initial state first; none where one
+/// projection alone is as good.
+pub(super) fn saturated_cost_partitionings(
+    context: Context<'_>,
+    projections: &[Projection],
+) -> Result<Vec<CostPartitioning>, Interrupted> {
+    let Context { task, limits } = context;
+    let costs: Vec<Int> = task.operators.iter().map(|operator| operator.cost.minimum().max(0)).collect();
+    let initial: Vec<u32> = projections.iter().map(|projection| projection.state(&task.initial)).collect();
+    let alone = |position: usize| projections[position].goal_distance(initial[position]).unwrap_or(0);
+    let mut useful: Vec<usize> = Vec::new();
+    let mut positions: Vec<usize> = (0..projections.len()).filter(|position| alone(*position) > 0).collect();
+    positions.sort_by_key(|position| projections[*position].pattern.len());
+    for position in positions {
+        // What another one says with fewer variables is not divided between both.
+        let is_coarser = |known: &usize| projections[position].is_dominated_by(&projections[*known]);
+        if !useful.iter().any(is_coarser) {
+            useful.push(position);
+        }
+    }
+    useful.sort_unstable();
+    let transitions: usize = useful.iter().map(|position| projections[*position].transition_count()).sum();
+    if useful.len() < 2 || transitions > MAX_TRANSITIONS {
+        return Ok(Vec::new());
+    }
+    let mut budget = MAX_TRANSITIONS.checked_div(transitions).unwrap_or(MAX_TRANSITIONS).clamp(1, MAX_ORDERS);
+    let mut tried: Vec<(Int, Vec<usize>, CostPartitioning)> = Vec::new();
+    let mut attempt = |order: Vec<usize>, tried: &mut Vec<(Int, Vec<usize>, CostPartitioning)>| {
+        if budget == 0 || tried.iter().any(|(_, known, _)| *known == order) {
+            return Ok(());
+        }
+        budget = budget.saturating_sub(1);
+        let partition = CostPartitioning::new(projections, &costs, &order, limits)?;
+        tried.push((partition.estimate(&initial), order, partition));
+        // Stable: of equal ones the earlier stays first.
+        tried.sort_by_key(|(estimate, ..)| Reverse(*estimate));
+        Ok(())
+    };
+    let greedy = by_yield(projections, &useful, alone);
+    attempt(greedy.clone(), &mut tried)?;
+    for first in &useful {
+        let rest = greedy.iter().filter(|position| *position != first);
+        attempt(std::iter::once(first).chain(rest).copied().collect(), &mut tried)?;
+    }
+    // Then the best order, with two neighbours exchanged.
+    for (before, place) in (1..useful.len()).enumerate() {
+        let mut order = tried[0].1.clone();
+        order.swap(before, place);
+        attempt(order, &mut tried)?;
+    }
+    let best = useful.iter().map(|position| alone(*position)).max().unwrap_or(0);
+    if tried[0].0 <= best {
+        return Ok(Vec::new());
+    }
+    tried.truncate(MAX_PARTITIONINGS);
+    Ok(tried.into_iter().map(|(.., partition)| partition).collect())
+}
+
+/// Projections that give much and take little come first.
+fn by_yield(projections: &[Projection], useful: &[usize], alone: impl Fn(usize) -> Int) -> Vec<usize> {
+    let taken = |position: usize| {
+        let projection = &projections[position];
+        // What is more is no less in the order below.
+        projection.saturated(projection.costs()).fold(0, Int::saturating_add).max(1)
+    };
+    let mut order: Vec<(usize, Int, Int)> =
+        useful.iter().map(|position| (*position, alone(*position), taken(*position))).collect();
+    let product = |a: &Int, b: &Int| BigInt::from(*a) * b;
+    order.sort_by(|(_, a, s), (_, b, t)| product(b, s).cmp(&product(a, t)));
+    order.into_iter().map(|(position, ..)| position).collect()
+}

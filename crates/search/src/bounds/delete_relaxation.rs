@@ -1,0 +1,234 @@
+//! A task without what is deleted: rules by which facts follow from facts, each at the cost of an operator.
+//!
+//! The delete relaxation [1]. An operator is one rule for what it sets in any case, and one for each conditional effect; all have
+//! the operator's least cost, which is paid once. Rules of derived variables, and what makes one literal of a clause hold, cost
+//! nothing. Numbers are left out, and derived variables may be false at any time: the relaxation of a task allows all that the task
+//! does.
+//!
+//! [1] B. Bonet, H. Geffner: Planning as heuristic search, Artificial Intelligence 129, 2001.
+
+use rustc_hash::FxHashMap;
+
+use task::number::{Int, dense};
+use task::task::{Condition, Fact, Literal, Task};
+
+/// Costs may be at most so much, so that sums fit.
+const COST_LIMIT: Int = 1 << 40;
+/// The fact that always holds.
+pub(super) const ALWAYS: u32 = 0;
+/// The fact that stands for the goal.
+pub(super) const GOAL: u32 = 1;
+
+/// Lists one after the other.
+#[derive(Default)]
+pub(super) struct Lists {
+    ends: Vec<u32>,
+    all: Vec<u32>,
+}
+
+impl Lists {
+    fn push(&mut self, list: impl IntoIterator<Item = u32>) {
+        self.all.extend(list);
+        self.ends.push(dense(self.all.len()));
+    }
+
+    /// For each of so many things the positions of the lists that it is in.
+    fn inverse(&self, count: usize) -> Self {
+        let mut positions: Vec<Vec<u32>> = vec![Vec::new(); count];
+        for list in 0..dense(self.ends.len()) {
+            for thing in self.list(list) {
+                positions[*thing as usize].push(list);
+            }
+        }
+        let mut inverse = Self::default();
+        for list in positions {
+            inverse.push(list);
+        }
+        inverse
+    }
+
+    pub(super) fn list(&self, position: u32) -> &[u32] {
+        let begin = position.checked_sub(1).map_or(0, |before| self.ends[before as usize]);
+        &self.all[begin as usize..self.ends[position as usize] as usize]
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.ends.len()
+    }
+}
+
+/// A task without what is deleted.
+pub(super) struct DeleteRelaxation {
+    /// What each payer pays: the operators, then one that pays nothing.
+    pub(super) costs: Vec<u64>,
+    /// For each rule who pays, what it requires (never nothing), and what follows.
+    pub(super) payers: Vec<u32>,
+    pub(super) required: Lists,
+    pub(super) given: Lists,
+    /// The rules of each payer.
+    pub(super) rules_of: Lists,
+    /// For each fact the rules that require it, and those from which it follows.
+    pub(super) required_by: Lists,
+    pub(super) given_by: Lists,
+    /// The number of each variable's first fact.
+    first: Vec<u32>,
+    basic: usize,
+}
+
+struct Builder<'a> {
+    task: &'a Task,
+    first: Vec<u32>,
+    facts: u32,
+    payers: Vec<u32>,
+    required: Lists,
+    given: Lists,
+    clauses: FxHashMap<Vec<u32>, u32>,
+    free: u32,
+}
+
+impl DeleteRelaxation {
+    /// None if costs are too large.
+    pub(super) fn new(task: &Task) -> Option<Self> {
+        let costs = task.operators.iter().map(|operator| operator.cost.minimum().max(0));
+        let costs = costs.map(|cost| u64::try_from(cost).ok().filter(|_| cost <= COST_LIMIT));
+        let mut costs: Vec<u64> = costs.collect::<Option<_>>()?;
+        costs.push(0);
+        let mut builder = Builder::new(task);
+        builder.rule(builder.free, &task.goal, &[], vec![GOAL]);
+        for (operator, payer) in task.operators.iter().zip(0..) {
+            let given: Vec<u32> = operator.effects.iter().map(|fact| builder.fact(*fact)).collect();
+            builder.rule(payer, &operator.condition, &[], given);
+            for effect in &operator.conditional {
+                let given = effect.effects.iter().map(|fact| builder.fact(*fact)).collect();
+                builder.rule(payer, &operator.condition, &effect.condition, given);
+            }
+        }
+        for rule in task.axioms.iter().flat_map(|layer| &layer.rules) {
+            let head = builder.fact(rule.head);
+            builder.rule(builder.free, &rule.body, &[], vec![head]);
+        }
+        let Builder { first, facts, payers, required, given, .. } = builder;
+        let mut of: Vec<Vec<u32>> = vec![Vec::new(); costs.len()];
+        for (payer, rule) in payers.iter().zip(0..) {
+            of[*payer as usize].push(rule);
+        }
+        let mut rules_of = Lists::default();
+        for rules in of {
+            rules_of.push(rules);
+        }
+        let (required_by, given_by) = (required.inverse(facts as usize), given.inverse(facts as usize));
+        Some(Self {
+            costs,
+            payers,
+            required,
+            given,
+            rules_of,
+            required_by,
+            given_by,
+            first,
+            basic: task.basic,
+        })
+    }
+
+    pub(super) fn facts(&self) -> usize {
+        self.required_by.len()
+    }
+
+    /// The facts of a state.
+    #[expect(clippy::arithmetic_side_effects, reason = "facts are numbered")]
+    pub(super) fn state<'s>(&'s self, values: &'s [u32]) -> impl Iterator<Item = u32> + 's {
+        let values = values[..self.basic].iter().zip(&self.first);
+        values.map(|(value, first)| first + value).chain([ALWAYS])
+    }
+}
+
+impl<'a> Builder<'a> {
+    #[expect(clippy::arithmetic_side_effects, reason = "facts are held in memory")]
+    fn new(task: &'a Task) -> Self {
+        let mut facts = GOAL + 1;
+        let first = task.variables.iter().map(|variable| {
+            let first = facts;
+            facts += dense(variable.values.len());
+            first
+        });
+        let first = first.collect();
+        let (payers, required, given) = (Vec::new(), Lists::default(), Lists::default());
+        let free = dense(task.operators.len());
+        Self { task, first, facts, payers, required, given, clauses: FxHashMap::default(), free }
+    }
+
+    /// A derived variable may be false at any time.
+    #[expect(clippy::arithmetic_side_effects, reason = "facts are numbered")]
+    fn fact(&self, fact: Fact) -> u32 {
+        let variable = fact.variable.index();
+        if variable >= self.task.basic && fact.value != 0 {
+            ALWAYS
+        } else {
+            self.first[variable] + fact.value
+        }
+    }
+
+    /// The facts of which each makes a literal hold.
+    fn literal(&self, literal: Literal) -> Vec<u32> {
+        if literal.positive {
+            return vec![self.fact(literal.fact)];
+        }
+        let values = 0..dense(self.task.variables[literal.fact.variable.index()].values.len());
+        let others = values.filter(|value| *value != literal.fact.value);
+        others.map(|value| self.fact(Fact { value, ..literal.fact })).collect()
+    }
+
+    /// A fact that stands for one of some.
+    #[expect(clippy::arithmetic_side_effects, reason = "facts are held in memory")]
+    fn any(&mut self, mut facts: Vec<u32>) -> u32 {
+        facts.sort_unstable();
+        facts.dedup();
+        if let [fact] = facts[..] {
+            return fact;
+        }
+        if facts.contains(&ALWAYS) {
+            return ALWAYS;
+        }
+        if let Some(known) = self.clauses.get(&facts) {
+            return *known;
+        }
+        let fact = self.facts;
+        self.facts += 1;
+        for one in &facts {
+            self.add(self.free, vec![*one], vec![fact]);
+        }
+        self.clauses.insert(facts, fact);
+        fact
+    }
+
+    fn rule(&mut self, payer: u32, condition: &Condition, literals: &[Literal], given: Vec<u32>) {
+        let mut required: Vec<u32> = condition.facts.iter().map(|fact| self.fact(*fact)).collect();
+        for clause in &condition.clauses {
+            let facts = clause.iter().flat_map(|literal| self.literal(*literal)).collect();
+            required.push(self.any(facts));
+        }
+        for literal in literals {
+            required.push(self.any(self.literal(*literal)));
+        }
+        self.add(payer, required, given);
+    }
+
+    fn add(&mut self, payer: u32, mut required: Vec<u32>, mut given: Vec<u32>) {
+        required.sort_unstable();
+        required.dedup();
+        if required.len() > 1 {
+            required.retain(|fact| *fact != ALWAYS);
+        }
+        if required.is_empty() {
+            required.push(ALWAYS);
+        }
+        given.sort_unstable();
+        given.dedup();
+        given.retain(|fact| *fact != ALWAYS && required.binary_search(fact).is_err());
+        if !given.is_empty() {
+            self.payers.push(payer);
+            self.required.push(required);
+            self.given.push(given);
+        }
+    }
+}

@@ -1,0 +1,240 @@
+//! A lower bound by landmarks: what every plan has to pay at some cut between the state and the goal, cut after cut.
+//!
+//! LM-cut [1]. The estimate h^max says from which fact each rule of the relaxed task has its value. The rules that lead from what is
+//! reached before into what leads to the goal for nothing are a landmark: every plan has one of their operators. The least of
+//! their costs is counted, and taken off all of them, until the goal costs nothing. An operator with conditional effects is several
+//! rules, and pays once for all of them, so that no cost is counted twice.
+//!
+//! [1] M. Helmert, C. Domshlak: Landmarks, critical paths and abstractions: what's the difference anyway?, ICAPS 2009.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use task::number::dense;
+use task::task::Task;
+
+use crate::bounds::delete_relaxation::{ALWAYS, DeleteRelaxation, GOAL};
+
+/// Steps of a computer for each thing that is looked at.
+const WORK_PER_VISIT: u64 = 8;
+/// What is not reached.
+const UNREACHABLE: u64 = u64::MAX;
+/// No fact.
+const NONE: u32 = u32::MAX;
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum CutSide {
+    Open,
+    /// From here the goal costs nothing more.
+    Goal,
+    /// Reached from the state without entering the zone of the goal.
+    Before,
+}
+
+/// The bound for any state of a task.
+pub struct LandmarkCut {
+    relaxed: DeleteRelaxation,
+    costs: Vec<u64>,
+    /// For each fact what h^max says, and where it lies.
+    values: Vec<u64>,
+    zones: Vec<CutSide>,
+    /// For each rule how many facts are required, how many of them are not reached, the dearest one, and what it costs.
+    lengths: Vec<u32>,
+    left: Vec<u32>,
+    supporters: Vec<u32>,
+    supports: Vec<u64>,
+    queue: BinaryHeap<Reverse<(u64, u32)>>,
+    stack: Vec<u32>,
+    /// Payers in the cut, and whether each payer is.
+    cut: Vec<u32>,
+    in_cut: Vec<bool>,
+    work: u64,
+}
+
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "costs are below 2^40, and cuts are fewer than steps of a computer"
+)]
+impl LandmarkCut {
+    /// None if costs are too large.
+    pub(crate) fn new(task: &Task) -> Option<Self> {
+        let relaxed = DeleteRelaxation::new(task)?;
+        let (facts, rules) = (relaxed.facts(), relaxed.payers.len());
+        let length = |rule: u32| dense(relaxed.required.list(rule).len());
+        let lengths: Vec<u32> = (0..dense(rules)).map(length).collect();
+        Some(Self {
+            costs: relaxed.costs.clone(),
+            values: vec![UNREACHABLE; facts],
+            zones: vec![CutSide::Open; facts],
+            left: lengths.clone(),
+            lengths,
+            supporters: vec![NONE; rules],
+            supports: vec![0; rules],
+            queue: BinaryHeap::new(),
+            stack: Vec::new(),
+            cut: Vec::new(),
+            in_cut: vec![false; relaxed.costs.len()],
+            work: 0,
+            relaxed,
+        })
+    }
+
+    /// What it took so far, in steps of a computer.
+    pub(crate) fn work(&self) -> u64 {
+        self.work.saturating_mul(WORK_PER_VISIT)
+    }
+
+    /// What the cuts come to, a lower bound on the cost to the goal; none if the goal cannot be reached.
+    pub(crate) fn lm_cut_value(&mut self, values: &[u32]) -> Option<u64> {
+        self.costs.clone_from(&self.relaxed.costs);
+        self.reach(values);
+        let mut sum = 0;
+        while self.values[GOAL as usize] > 0 {
+            if self.values[GOAL as usize] == UNREACHABLE {
+                return None;
+            }
+            self.mark_goal_zone();
+            sum += self.cross(values);
+            self.lower();
+            self.zones.fill(CutSide::Open);
+        }
+        Some(sum)
+    }
+
+    /// The values of h^max from a state.
+    fn reach(&mut self, values: &[u32]) {
+        self.values.fill(UNREACHABLE);
+        self.supporters.fill(NONE);
+        self.left.clone_from(&self.lengths);
+        self.work += (self.left.len() + self.values.len()) as u64 / 4;
+        for fact in self.relaxed.state(values) {
+            self.values[fact as usize] = 0;
+            self.queue.push(Reverse((0, fact)));
+        }
+        while let Some(Reverse((value, fact))) = self.queue.pop() {
+            if value > self.values[fact as usize] {
+                continue;
+            }
+            let rules = self.relaxed.required_by.list(fact);
+            self.work += 2 + rules.len() as u64;
+            for rule in rules {
+                let left = &mut self.left[*rule as usize];
+                *left -= 1;
+                if *left == 0 {
+                    // Facts come in the order of their values, so that this one is the dearest.
+                    self.supporters[*rule as usize] = fact;
+                    self.supports[*rule as usize] = value;
+                    let total = value + self.costs[self.relaxed.payers[*rule as usize] as usize];
+                    offer(self.relaxed.given.list(*rule), total, &mut self.values, &mut self.queue);
+                }
+            }
+        }
+    }
+
+    /// The facts from which the goal costs nothing more.
+    fn mark_goal_zone(&mut self) {
+        self.zones[GOAL as usize] = CutSide::Goal;
+        self.stack.push(GOAL);
+        while let Some(fact) = self.stack.pop() {
+            let rules = self.relaxed.given_by.list(fact);
+            self.work += rules.len() as u64;
+            for rule in rules {
+                let supporter = self.supporters[*rule as usize];
+                if supporter != NONE
+                    && self.costs[self.relaxed.payers[*rule as usize] as usize] == 0
+                    && self.zones[supporter as usize] != CutSide::Goal
+                {
+                    self.zones[supporter as usize] = CutSide::Goal;
+                    self.stack.push(supporter);
+                }
+            }
+        }
+    }
+
+    /// Finds the payers that cross into the goal's zone, and takes the least of their costs off all of them.
+    fn cross(&mut self, values: &[u32]) -> u64 {
+        for payer in self.cut.drain(..) {
+            self.in_cut[payer as usize] = false;
+        }
+        for fact in self.relaxed.state(values) {
+            self.zones[fact as usize] = CutSide::Before;
+            self.stack.push(fact);
+        }
+        while let Some(fact) = self.stack.pop() {
+            let rules = self.relaxed.required_by.list(fact);
+            self.work += rules.len() as u64;
+            for rule in rules {
+                if self.supporters[*rule as usize] != fact {
+                    continue;
+                }
+                let given = self.relaxed.given.list(*rule);
+                if given.iter().any(|fact| self.zones[*fact as usize] == CutSide::Goal) {
+                    let payer = self.relaxed.payers[*rule as usize];
+                    if !std::mem::replace(&mut self.in_cut[payer as usize], true) {
+                        self.cut.push(payer);
+                    }
+                    continue;
+                }
+                for fact in given {
+                    if self.zones[*fact as usize] == CutSide::Open {
+                        self.zones[*fact as usize] = CutSide::Before;
+                        self.stack.push(*fact);
+                    }
+                }
+            }
+        }
+        let costs = &mut self.costs;
+        let least = self.cut.iter().map(|payer| costs[*payer as usize]).min().unwrap_or(0);
+        for payer in &self.cut {
+            costs[*payer as usize] -= least;
+        }
+        least
+    }
+
+    /// The values of h^max, once the payers of the cut pay less.
+    fn lower(&mut self) {
+        for payer in &self.cut {
+            for rule in self.relaxed.rules_of.list(*payer) {
+                if self.supporters[*rule as usize] != NONE {
+                    let total = self.supports[*rule as usize] + self.costs[*payer as usize];
+                    offer(self.relaxed.given.list(*rule), total, &mut self.values, &mut self.queue);
+                }
+            }
+        }
+        while let Some(Reverse((value, fact))) = self.queue.pop() {
+            if value > self.values[fact as usize] {
+                continue;
+            }
+            let rules = self.relaxed.required_by.list(fact);
+            self.work += 2 + rules.len() as u64;
+            for rule in rules {
+                if self.supporters[*rule as usize] != fact || self.supports[*rule as usize] <= value {
+                    continue;
+                }
+                let required = self.relaxed.required.list(*rule);
+                let values = &self.values;
+                let dearest = required.iter().copied().max_by_key(|fact| values[*fact as usize]);
+                let supporter = dearest.unwrap_or(ALWAYS);
+                let before =
+                    std::mem::replace(&mut self.supports[*rule as usize], values[supporter as usize]);
+                self.supporters[*rule as usize] = supporter;
+                if values[supporter as usize] < before {
+                    let cost = self.costs[self.relaxed.payers[*rule as usize] as usize];
+                    let total = values[supporter as usize] + cost;
+                    offer(self.relaxed.given.list(*rule), total, &mut self.values, &mut self.queue);
+                }
+            }
+        }
+    }
+}
+
+/// Lowers the values of facts.
+fn offer(facts: &[u32], total: u64, values: &mut [u64], queue: &mut BinaryHeap<Reverse<(u64, u32)>>) {
+    for fact in facts {
+        let value = &mut values[*fact as usize];
+        if total < *value {
+            *value = total;
+            queue.push(Reverse((total, *fact)));
+        }
+    }
+}

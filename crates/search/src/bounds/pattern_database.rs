@@ -1,0 +1,383 @@
+//! A task seen through a few of its finite-domain variables.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use task::context::Context;
+use task::limits::{Interrupted, Limits};
+use task::number::{GROWTH_LIMIT, Int, dense};
+use task::task::{ConditionalEffect, Literal, OperatorId, State, VariableId};
+
+/// An operator leads from one abstract state to another.
+#[derive(Debug, Clone, Copy)]
+pub struct Transition {
+    pub source: u32,
+    pub target: u32,
+}
+
+/// A projection with its abstract state space and the cost to go from each abstract state.
+pub struct Projection {
+    pub pattern: Vec<VariableId>,
+    sizes: Vec<usize>,
+    initial: u32,
+    goals: Vec<u32>,
+    /// For each operator its cost with the cheapest designs and where it leads; empty if it reads and changes
+    /// nothing of the pattern.
+    operators: Vec<(Int, Vec<Transition>)>,
+    /// The least cost of an operator that touches nothing of the pattern.
+    idle_cost: Option<Int>,
+    /// Cost to the nearest goal state.
+    to_go: Vec<Option<Int>>,
+}
+
+/// The sum of two amounts from 0 to the limit of growth, at most that limit: what is known to cost so much may cost more. Sums that are
+/// cut off stay lower bounds, and consistent ones.
+fn sum(a: Int, b: Int) -> Int {
+    a.saturating_add(b).min(GROWTH_LIMIT)
+}
+
+impl Projection {
+    pub(crate) fn new(context: Context<'_>, pattern: Vec<VariableId>) -> Result<Self, Interrupted> {
+        let Context { task, limits } = context;
+        let sizes: Vec<_> =
+            pattern.iter().map(|variable| task.variables[variable.index()].values.len()).collect();
+        let mut projection = Self {
+            pattern,
+            sizes,
+            initial: 0,
+            goals: Vec::new(),
+            operators: Vec::new(),
+            idle_cost: None,
+            to_go: Vec::new(),
+        };
+        projection.initial = projection.state(&task.initial);
+        let goal = projection.required(&task.goal.facts);
+        projection.goals = projection.matching(&goal);
+        for operator in limits.watch(&task.operators) {
+            let operator = operator?;
+            // Rewards (negative costs) have no place in Dijkstra's algorithm; counting them as 0 serves reachability.
+            let cost = operator.cost.minimum().max(0);
+            let before = projection.required(&operator.condition.facts);
+            let after = projection.required(&operator.effects);
+            let conditional: Vec<_> = operator
+                .conditional
+                .iter()
+                .map(|effect| (effect, projection.required(&effect.effects)))
+                .filter(|(_, after)| after.iter().any(Option::is_some))
+                .collect();
+            let touched = !conditional.is_empty() || before.iter().chain(&after).any(Option::is_some);
+            let mut transitions = Vec::new();
+            if touched {
+                for source in projection.matching(&before) {
+                    for target in projection.targets(source, &after, &conditional) {
+                        transitions.push(Transition { source, target });
+                    }
+                }
+            } else {
+                projection.idle_cost = Some(projection.idle_cost.map_or(cost, |known: Int| known.min(cost)));
+            }
+            projection.operators.push((cost, transitions));
+        }
+        let costs: Vec<Int> = projection.operators.iter().map(|(cost, _)| *cost).collect();
+        projection.to_go = projection.goal_distances(&costs, limits)?;
+        Ok(projection)
+    }
+
+    fn size(&self) -> usize {
+        self.sizes.iter().product()
+    }
+
+    /// The abstract state of a state.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "an abstract state is below the number of them, which are in memory"
+    )]
+    pub(crate) fn state(&self, state: &State) -> u32 {
+        let values = self.pattern.iter().map(|variable| state.values[variable.index()] as usize);
+        dense(self.sizes.iter().zip(values).fold(0, |index, (size, value)| index * size + value))
+    }
+
+    /// The value of each pattern variable in an abstract state.
+    #[expect(clippy::arithmetic_side_effects, reason = "every variable has a value, so that no size is 0")]
+    pub fn values(&self, state: u32) -> Vec<u32> {
+        let mut rest = state as usize;
+        let mut values: Vec<_> = self
+            .sizes
+            .iter()
+            .rev()
+            .map(|size| {
+                let value = rest % size;
+                rest /= size;
+                dense(value)
+            })
+            .collect();
+        values.reverse();
+        values
+    }
+
+    fn required(&self, facts: &[task::task::Fact]) -> Vec<Option<u32>> {
+        let value = |variable| facts.iter().find(|fact| fact.variable == variable).map(|fact| fact.value);
+        self.pattern.iter().map(|variable| value(*variable)).collect()
+    }
+
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "abstract states are below the number of them, which are in memory"
+    )]
+    fn matching(&self, required: &[Option<u32>]) -> Vec<u32> {
+        let mut states = vec![0_u32];
+        for (size, value) in self.sizes.iter().zip(required) {
+            let range = value.map_or(0..dense(*size), |value| value..value + 1);
+            states = states
+                .iter()
+                .flat_map(|s| range.clone().map(move |value| s * dense(*size) + value))
+                .collect();
+        }
+        states
+    }
+
+    /// Where an operator can lead: a conditional effect whose condition the abstract state leaves open may take
+    /// place or not.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "abstract states are below the number of them, which are in memory"
+    )]
+    fn targets(
+        &self,
+        source: u32,
+        effects: &[Option<u32>],
+        conditional: &[(&ConditionalEffect, Vec<Option<u32>>)],
+    ) -> Vec<u32> {
+        let values = self.values(source);
+        let set = |values: &[u32], effects: &[Option<u32>]| -> Vec<u32> {
+            values.iter().zip(effects).map(|(old, new)| new.unwrap_or(*old)).collect()
+        };
+        let truth = |literal: &Literal| {
+            let position = self.pattern.iter().position(|variable| *variable == literal.fact.variable)?;
+            Some((values[position] == literal.fact.value) == literal.positive)
+        };
+        let mut reached = vec![set(&values, effects)];
+        for (effect, after) in conditional {
+            let truths: Vec<_> = effect.condition.iter().map(truth).collect();
+            if truths.contains(&Some(false)) {
+                continue;
+            }
+            let fired: Vec<_> = reached.iter().map(|values| set(values, after)).collect();
+            if truths.contains(&None) {
+                reached.extend(fired);
+                reached.sort_unstable();
+                reached.dedup();
+            } else {
+                reached = fired;
+            }
+        }
+        let index = |values: Vec<u32>| {
+            self.sizes.iter().zip(values).fold(0, |index, (size, value)| index * dense(*size) + value)
+        };
+        reached.into_iter().map(index).collect()
+    }
+
+    /// The cost to go from each abstract state, if operators cost so much.
+    pub(crate) fn goal_distances(
+        &self,
+        costs: &[Int],
+        limits: &Limits,
+    ) -> Result<Vec<Option<Int>>, Interrupted> {
+        self.distances(|operator| costs[operator], self.goals.iter().map(|goal| (*goal, 0)), limits)
+    }
+
+    /// The least costs of operators with which the cost to go is as given.
+    #[expect(clippy::arithmetic_side_effects, reason = "costs to go are between 0 and GROWTH_LIMIT")]
+    pub(crate) fn saturated(&self, to_go: &[Option<Int>]) -> impl Iterator<Item = Int> {
+        self.operators.iter().map(|(_, transitions)| {
+            let falls = transitions
+                .iter()
+                .filter_map(|t| Some(to_go[t.source as usize]? - to_go[t.target as usize]?));
+            falls.fold(0, Int::max)
+        })
+    }
+
+    /// Whether the estimates are those of a projection to a part of the pattern: the other variables add nothing.
+    pub(crate) fn is_dominated_by(&self, other: &Self) -> bool {
+        let places: Option<Vec<usize>> =
+            other.pattern.iter().map(|own| self.pattern.iter().position(|known| known == own)).collect();
+        let Some(places) = places else { return false };
+        (0..).zip(&self.to_go).all(|(state, cost)| {
+            let values = self.values(state);
+            let parts = other.sizes.iter().zip(&places);
+            let coarse = parts.fold(0, |index: usize, (size, place)| {
+                index.saturating_mul(*size).saturating_add(values[*place] as usize)
+            });
+            other.to_go[coarse] == *cost
+        })
+    }
+
+    /// How much has to be looked at to compute costs to go.
+    #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
+    pub(crate) fn transition_count(&self) -> usize {
+        self.size() + self.operators.iter().map(|(_, transitions)| transitions.len()).sum::<usize>()
+    }
+
+    /// The least number of steps from each abstract state to the goal.
+    pub(crate) fn steps_to_go(&self, limits: &Limits) -> Result<Vec<Option<Int>>, Interrupted> {
+        self.distances(|_| 1, self.goals.iter().map(|goal| (*goal, 0)), limits)
+    }
+
+    /// What of a resource is used up at least until it is replenished or a goal state is reached. `used` is what
+    /// each operator uses, none if it may replenish; `left` is what a goal state must have left.
+    pub(crate) fn needs(
+        &self,
+        used: &[Option<Int>],
+        left: Int,
+        limits: &Limits,
+    ) -> Result<Vec<Option<Int>>, Interrupted> {
+        let replenishing = self.operators.iter().zip(used).filter(|(_, used)| used.is_none());
+        let free = replenishing.flat_map(|((_, transitions), _)| transitions).map(|t| (t.source, 0));
+        let goals = self.goals.iter().map(|goal| (*goal, left));
+        self.distances(|operator| used[operator].unwrap_or(0).max(0), goals.chain(free), limits)
+    }
+
+    /// Whether an operator changes or reads the pattern.
+    pub(crate) fn affects_pattern(&self, operator: usize) -> bool {
+        !self.operators[operator].1.is_empty()
+    }
+
+    /// The least sum of costs from each abstract state to one of the targets, each of which adds its own.
+    fn distances(
+        &self,
+        cost: impl Fn(usize) -> Int,
+        targets: impl Iterator<Item = (u32, Int)>,
+        limits: &Limits,
+    ) -> Result<Vec<Option<Int>>, Interrupted> {
+        let mut incoming: Vec<Vec<(u32, Int)>> = vec![Vec::new(); self.size()];
+        for item in limits.watch(self.operators.iter().enumerate()) {
+            let (operator, (_, transitions)) = item?;
+            for transition in transitions.iter().filter(|t| t.source != t.target) {
+                incoming[transition.target as usize].push((transition.source, cost(operator)));
+            }
+        }
+        let mut to_go = vec![None; self.size()];
+        let mut heap: BinaryHeap<_> = targets.map(|(target, own)| Reverse((own, target))).collect();
+        let mut pulse = limits.pulse();
+        while let Some(Reverse((cost, state))) = heap.pop() {
+            pulse.beat()?;
+            if to_go[state as usize].is_some() {
+                continue;
+            }
+            to_go[state as usize] = Some(cost);
+            for (source, step) in &incoming[state as usize] {
+                if to_go[*source as usize].is_none() {
+                    heap.push(Reverse((sum(cost, *step), *source)));
+                }
+            }
+        }
+        Ok(to_go)
+    }
+
+    /// The cost to go from the abstract state of a state; none if the goal is out of reach.
+    pub fn estimate(&self, state: &State) -> Option<Int> {
+        self.to_go[self.state(state) as usize]
+    }
+
+    /// The cost to go from each abstract state.
+    pub fn costs(&self) -> &[Option<Int>] {
+        &self.to_go
+    }
+
+    pub fn goal_distance(&self, state: u32) -> Option<Int> {
+        self.to_go[state as usize]
+    }
+
+    /// Where an operator leads, and whether it touches the pattern at all.
+    pub fn transitions(&self, operator: OperatorId) -> &[Transition] {
+        &self.operators[operator.index()].1
+    }
+
+    /// Least cost of reaching each abstract state in exactly one more step.
+    fn advance(&self, costs: &[Option<Int>]) -> Vec<Option<Int>> {
+        let improve =
+            |slot: &mut Option<Int>, cost: Int| *slot = Some(slot.map_or(cost, |known| known.min(cost)));
+        let mut next = vec![None; costs.len()];
+        if let Some(idle) = self.idle_cost {
+            for (slot, cost) in next.iter_mut().zip(costs) {
+                if let Some(cost) = cost {
+                    improve(slot, sum(*cost, idle));
+                }
+            }
+        }
+        for (step, transitions) in &self.operators {
+            for transition in transitions {
+                if let Some(cost) = costs[transition.source as usize] {
+                    improve(&mut next[transition.target as usize], sum(cost, *step));
+                }
+            }
+        }
+        next
+    }
+
+    fn start(&self) -> Vec<Option<Int>> {
+        let mut costs = vec![None; self.size()];
+        costs[self.initial as usize] = Some(0);
+        costs
+    }
+
+    /// The most steps that a plan with cost at most `limit` can have; none if there is no such bound, or one above `most`.
+    pub(crate) fn step_bound(
+        &self,
+        limit: Int,
+        most: usize,
+        limits: &Limits,
+    ) -> Result<Option<usize>, Interrupted> {
+        let fits = |costs: &[Option<Int>]| {
+            costs
+                .iter()
+                .zip(&self.to_go)
+                .any(|(c, h)| matches!((c, h), (Some(c), Some(h)) if sum(*c, *h) <= limit))
+        };
+        let mut costs = self.start();
+        let mut bound = 0;
+        for step in limits.watch(0..=most) {
+            let step = step?;
+            if !fits(&costs) {
+                return Ok(Some(bound));
+            }
+            bound = step;
+            let next = self.advance(&costs);
+            if next == costs {
+                return Ok(None);
+            }
+            costs = next;
+        }
+        Ok(None)
+    }
+
+    /// Clears `allowed[step][operator]` wherever no plan with cost at most `limit` has the operator at that step.
+    pub(crate) fn restrict(
+        &self,
+        limit: Option<Int>,
+        allowed: &mut [Vec<bool>],
+        limits: &Limits,
+    ) -> Result<(), Interrupted> {
+        let within = |cost: Int| limit.is_none_or(|limit| cost <= limit);
+        let mut costs = self.start();
+        for row in limits.watch(allowed) {
+            let row = row?;
+            let through = |(c, h): (&Option<Int>, &Option<Int>)| Some(sum((*c)?, (*h)?));
+            let cheapest = costs.iter().zip(&self.to_go).filter_map(through).min();
+            for (flag, (cost, transitions)) in row.iter_mut().zip(&self.operators) {
+                *flag = *flag
+                    && if transitions.is_empty() {
+                        cheapest.is_some_and(|known| within(sum(known, *cost)))
+                    } else {
+                        transitions.iter().any(|transition| {
+                            let through =
+                                (&costs[transition.source as usize], &self.to_go[transition.target as usize]);
+                            matches!(through, (Some(c), Some(h)) if within(sum(sum(*c, *cost), *h)))
+                        })
+                    };
+            }
+            costs = self.advance(&costs);
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,82 @@
+//! Lower bounds on what is used up of a resource before it is replenished.
+//!
+//! A numeric variable is a resource if every operator that may lower it requires that it does not fall below 0 by that. Then
+//! the least consumption on the way to the goal, or to an operator that replenishes, in a projection is what a state must have
+//! at least: the resource-to-go of constrained shortest paths [1].
+//!
+//! [1] I. Dumitrescu, N. Boland: Improved preprocessing, labeling and scaling algorithms for the weight-constrained shortest
+//! path problem, Networks 42(3), 2003.
+
+use task::context::Context;
+use task::limits::Interrupted;
+use task::number::Int;
+use task::task::quantity::NumericId;
+use task::task::{Operator, State};
+
+use crate::bounds::pattern_database::Projection;
+
+/// A resource, and what each abstract state needs of it, by projection.
+pub(super) struct Resource {
+    pub(super) variable: NumericId,
+    /// By position of the projection.
+    pub(super) needs: Vec<(usize, Vec<Option<Int>>)>,
+}
+
+impl Resource {
+    /// Whether a state has enough to reach the goal or a replenishment, as far as projections tell. Where nothing is
+    /// needed, a value below 0 does no harm.
+    pub(super) fn has_enough_resources(&self, state: &State, projections: &[Projection]) -> bool {
+        let own = state.numbers[self.variable.index()];
+        self.needs.iter().all(|(projection, needs)| {
+            needs[projections[*projection].state(state) as usize].is_some_and(|need| need == 0 || need <= own)
+        })
+    }
+}
+
+/// The resources of a task.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "numbers of a task are above the least number of their type"
+)]
+pub(super) fn resources(
+    context: Context<'_>,
+    projections: &[Projection],
+) -> Result<Vec<Resource>, Interrupted> {
+    let Context { task, limits } = context;
+    let mut found = Vec::new();
+    for variable in limits.watch(NumericId::all(task.initial.numbers.len())) {
+        let variable = variable?;
+        let Some(used) = task.operators.iter().map(|o| used(o, variable)).collect::<Option<Vec<_>>>() else {
+            continue;
+        };
+        let left = task.goal.comparisons.iter().filter(|c| c.coefficients[..] == [(variable, 1)]);
+        let left = left.map(|comparison| -comparison.quantity.constant).fold(0, Int::max);
+        let mut needs = Vec::new();
+        for (projection, position) in projections.iter().zip(0..) {
+            let anywhere =
+                |operator: usize| used[operator].is_none() && !projection.affects_pattern(operator);
+            if !(0..used.len()).any(anywhere) {
+                needs.push((position, projection.needs(&used, left, limits)?));
+            }
+        }
+        found.push(Resource { variable, needs });
+    }
+    Ok(found)
+}
+
+/// What an operator uses at least (none if it may replenish); nothing if it may lower the variable below 0.
+#[allow(clippy::option_option)]
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "the numbers of a quantity fit together, so that their sum is above the least number of its type"
+)]
+fn used(operator: &Operator, variable: NumericId) -> Option<Option<Int>> {
+    let Some(effect) = operator.numeric_effects.iter().find(|effect| effect.variable == variable) else {
+        return Some(Some(0));
+    };
+    let change = effect.value.quantity.maximum();
+    if effect.value.coefficients[..] != [(variable, 1)] || change > 0 {
+        return Some(None);
+    }
+    operator.condition.comparisons.contains(&effect.value).then_some(Some(-change))
+}

@@ -1,0 +1,218 @@
+//! A state to a relaxed plan, and what of it can be done at once: the FF heuristic with additive costs.
+//!
+//! Costs of propositions are those of h^add [1], found in their order; a relaxed plan is what its cheapest supporters come to [2].
+//!
+//! - \[1\] B. Bonet, H. Geffner: Planning as heuristic search, Artificial Intelligence 129, 2001.
+//! - \[2\] E. Keyder, H. Geffner: Heuristics for planning with action costs revisited, ECAI 2008.
+
+use num_traits::ToPrimitive as _;
+use task::task::State;
+use task::task::number::TaskNumber;
+
+use crate::satisfice::bucket_queue::Queue;
+use crate::satisfice::delete_relaxation::{NO_OPERATOR, Proposition, Relaxation};
+
+const UNREACHED: u32 = u32::MAX;
+/// Sums of costs do not grow beyond this.
+const MAX_COST: u32 = 1 << 30;
+/// An operator is not taken to be needed more often than this.
+const MAX_REPETITIONS: f64 = 10_000.0;
+
+/// What brought a proposition about most cheaply.
+#[derive(Debug, Clone, Copy)]
+struct Supporter {
+    node: u32,
+    times: u32,
+}
+
+/// Room for explorations, one after another.
+pub(super) struct FfHeuristic {
+    /// The cost of each proposition.
+    costs: Vec<u32>,
+    supporters: Vec<Supporter>,
+    /// For each node how many of its conditions are not reached, and what the others cost.
+    left: Vec<u32>,
+    sums: Vec<u32>,
+    initially_left: Vec<u32>,
+    queue: Queue,
+    /// For each direction what its sum is short of zero.
+    values: Vec<f64>,
+    /// Base nodes whose conditions cost nothing.
+    pub(super) applicable: Vec<u32>,
+    /// Operators of the relaxed plan that can be applied at once.
+    pub(super) preferred: Vec<u32>,
+    marked: Vec<bool>,
+    marks: Vec<Proposition>,
+    planned: Vec<u32>,
+    in_plan: Vec<bool>,
+}
+
+impl FfHeuristic {
+    pub(super) fn new<N: TaskNumber>(relaxation: &Relaxation<N>, operators: usize) -> Self {
+        let nodes = relaxation.operators.len();
+        let lengths = relaxation.conditions.iter().map(<[Proposition]>::len);
+        Self {
+            costs: vec![UNREACHED; relaxation.propositions],
+            supporters: vec![Supporter { node: NO_OPERATOR, times: 0 }; relaxation.propositions],
+            left: vec![0; nodes],
+            sums: vec![0; nodes],
+            initially_left: lengths.map(task::number::dense).collect(),
+            queue: Queue::default(),
+            values: vec![0.0; relaxation.directions.len()],
+            applicable: Vec::new(),
+            preferred: Vec::new(),
+            marked: vec![false; relaxation.propositions],
+            marks: Vec::new(),
+            planned: Vec::new(),
+            in_plan: vec![false; operators],
+        }
+    }
+
+    /// What a relaxed plan costs, where `prices` has the price of each operator, at least 1; none if there is no relaxed plan.
+    /// Afterwards `applicable` has the nodes of operators that may be applicable, and `preferred` operators of the relaxed plan among
+    /// them.
+    pub(super) fn estimate<N: TaskNumber>(
+        &mut self,
+        relaxation: &Relaxation<N>,
+        prices: &[u32],
+        state: &State<N>,
+    ) -> Option<u32> {
+        self.preferred.clear();
+        self.reach(relaxation, prices, state);
+        (self.costs[relaxation.goal as usize] < UNREACHED).then(|| self.relaxed_plan(relaxation, prices))
+    }
+
+    fn reach<N: TaskNumber>(&mut self, relaxation: &Relaxation<N>, prices: &[u32], state: &State<N>) {
+        self.costs.fill(UNREACHED);
+        self.sums.fill(0);
+        self.left.copy_from_slice(&self.initially_left);
+        self.queue.clear();
+        self.applicable.clear();
+        let none = Supporter { node: NO_OPERATOR, times: 0 };
+        for proposition in relaxation.facts(&state.values).chain(relaxation.always.iter().copied()) {
+            self.put(proposition, 0, none);
+        }
+        for (direction, index) in relaxation.directions.iter().zip(0..) {
+            let value: Option<N> = direction.value(&state.numbers);
+            for (threshold, strict, proposition) in &direction.thresholds {
+                // What does not fit is taken to hold.
+                let holds = value
+                    .as_ref()
+                    .is_none_or(|value| if *strict { value > threshold } else { value >= threshold });
+                if holds {
+                    self.put(*proposition, 0, none);
+                }
+            }
+            let index: usize = index;
+            self.values[index] = value.map_or(0.0, |value| value.approximate());
+        }
+        for node in 0..task::number::dense(self.left.len()) {
+            if self.left[node as usize] == 0 {
+                self.reached(relaxation, prices, node);
+            }
+        }
+        while let Some((cost, proposition)) = self.queue.pop() {
+            if self.costs[proposition as usize] != cost {
+                continue;
+            }
+            // What costs nothing is gone through to its end: it says what is applicable.
+            if cost > 0 && self.costs[relaxation.goal as usize] <= cost {
+                break;
+            }
+            for node in relaxation.waiting.of(proposition) {
+                let left = &mut self.left[*node as usize];
+                *left = left.saturating_sub(1);
+                let sum = &mut self.sums[*node as usize];
+                *sum = sum.saturating_add(cost).min(MAX_COST);
+                if *left == 0 {
+                    self.reached(relaxation, prices, *node);
+                }
+            }
+        }
+    }
+
+    fn put(&mut self, proposition: Proposition, cost: u32, supporter: Supporter) {
+        let known = &mut self.costs[proposition as usize];
+        if cost < *known {
+            *known = cost;
+            self.supporters[proposition as usize] = supporter;
+            self.queue.push(cost, proposition);
+        }
+    }
+
+    /// All conditions of a node are reached.
+    fn reached<N: TaskNumber>(&mut self, relaxation: &Relaxation<N>, prices: &[u32], node: u32) {
+        let sum = self.sums[node as usize];
+        let operator = relaxation.operators[node as usize];
+        if sum == 0 && relaxation.is_base[node as usize] {
+            self.applicable.push(operator);
+        }
+        let price = prices.get(operator as usize).copied().unwrap_or(0);
+        let cost = sum.saturating_add(price).min(MAX_COST);
+        for effect in relaxation.effects.of(node) {
+            self.put(*effect, cost, Supporter { node, times: 1 });
+        }
+        for support in &relaxation.supports[node as usize] {
+            let direction = &relaxation.directions[support.direction as usize];
+            let value = self.values[support.direction as usize];
+            for (threshold, _, proposition) in &direction.thresholds {
+                if self.costs[*proposition as usize] == 0 {
+                    continue;
+                }
+                let times = times(threshold.approximate() - value, support.gain);
+                let cost = sum.saturating_add(price.saturating_mul(times)).min(MAX_COST);
+                self.put(*proposition, cost, Supporter { node, times });
+            }
+        }
+    }
+
+    fn relaxed_plan<N: TaskNumber>(&mut self, relaxation: &Relaxation<N>, prices: &[u32]) -> u32 {
+        let mut total: u32 = 0;
+        self.marks.push(relaxation.goal);
+        let mut next = 0;
+        self.marked[relaxation.goal as usize] = true;
+        while let Some(proposition) = self.marks.get(next).copied() {
+            next = next.saturating_add(1);
+            let Supporter { node, times } = self.supporters[proposition as usize];
+            if node == NO_OPERATOR {
+                continue;
+            }
+            let operator = relaxation.operators[node as usize];
+            if operator != NO_OPERATOR {
+                // An operator that is needed for several purposes counts once, or as often as each comparison asks for.
+                if !self.in_plan[operator as usize] || times > 1 {
+                    let price = prices[operator as usize];
+                    total = total.saturating_add(price.saturating_mul(times)).min(MAX_COST);
+                }
+                if !self.in_plan[operator as usize] {
+                    self.in_plan[operator as usize] = true;
+                    self.planned.push(operator);
+                    if self.sums[node as usize] == 0 {
+                        self.preferred.push(operator);
+                    }
+                }
+            }
+            for condition in relaxation.conditions.of(node) {
+                if !self.marked[*condition as usize] {
+                    self.marked[*condition as usize] = true;
+                    self.marks.push(*condition);
+                }
+            }
+        }
+        for mark in self.marks.drain(..) {
+            self.marked[mark as usize] = false;
+        }
+        for operator in self.planned.drain(..) {
+            self.in_plan[operator as usize] = false;
+        }
+        total
+    }
+}
+
+/// How often so much has to be added until it is so much.
+fn times(missing: f64, gain: f64) -> u32 {
+    if gain.is_infinite() {
+        return 1;
+    }
+    (missing / gain).ceil().clamp(1.0, MAX_REPETITIONS).to_u32().unwrap_or(1)
+}

@@ -1,0 +1,134 @@
+//! Which landmarks were reached on the way to a state, and how many are still to come.
+//!
+//! A landmark is reached when it holds and those before it were reached. One that was reached has to hold again if it is a goal, or
+//! needed right before another one that was not reached [1].
+//!
+//! [1] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 5.
+
+use task::task::number::TaskNumber;
+use task::task::{Fact, State};
+
+use crate::satisfice::delete_relaxation::{Proposition, Relaxation};
+use crate::satisfice::landmarks::Landmarks;
+
+/// Landmarks with room for looking at states.
+pub(super) struct LandmarkStatus {
+    landmarks: Landmarks,
+    /// The facts of each landmark, and those of its propositions that are none.
+    facts: Vec<(Vec<Fact>, Vec<Proposition>)>,
+    /// For each proposition whether it is one that the state at hand lacks to come further.
+    wanted: Vec<bool>,
+    marks: Vec<Proposition>,
+    holds: Vec<bool>,
+}
+
+/// How many words hold a bit for each landmark.
+fn words(count: usize) -> usize {
+    count.div_ceil(64)
+}
+
+fn bit(words: &[u64], index: u32) -> bool {
+    words[(index >> 6) as usize] >> (index & 63) & 1 == 1
+}
+
+fn set(words: &mut [u64], index: u32) {
+    words[(index >> 6) as usize] |= 1 << (index & 63);
+}
+
+impl LandmarkStatus {
+    pub(super) fn new<N: TaskNumber>(landmarks: Landmarks, relaxation: &Relaxation<N>) -> Self {
+        let count = landmarks.all.len();
+        let facts = landmarks.all.iter().map(|landmark| {
+            let facts = landmark.any_of.iter().filter_map(|own| relaxation.fact_of(*own)).collect();
+            let others = landmark.any_of.iter().copied().filter(|own| relaxation.fact_of(*own).is_none());
+            (facts, others.collect())
+        });
+        Self {
+            facts: facts.collect(),
+            landmarks,
+            wanted: vec![false; relaxation.propositions],
+            marks: Vec::new(),
+            holds: vec![false; count],
+        }
+    }
+
+    pub(super) fn stride(&self) -> usize {
+        words(self.landmarks.all.len())
+    }
+
+    /// What is reached in the initial state.
+    pub(super) fn initially<N: TaskNumber>(
+        &mut self,
+        relaxation: &Relaxation<N>,
+        state: &State<N>,
+    ) -> Vec<u64> {
+        let mut reached = vec![0; self.stride()];
+        // Those before one that holds may hold, too.
+        for _ in 0..self.landmarks.all.len() {
+            let before = reached.clone();
+            reached = self.progress(relaxation, &before, state);
+            if reached == before {
+                break;
+            }
+        }
+        reached
+    }
+
+    /// What is reached in a state after one in which `before` was reached.
+    pub(super) fn progress<N: TaskNumber>(
+        &mut self,
+        relaxation: &Relaxation<N>,
+        before: &[u64],
+        state: &State<N>,
+    ) -> Vec<u64> {
+        let mut reached = before.to_vec();
+        let all = self.landmarks.all.iter().zip(&self.facts);
+        for ((landmark, (facts, others)), index) in all.zip(0_u32..) {
+            let holds = facts.iter().any(|fact| fact.holds(&state.values))
+                || others.iter().any(|own| relaxation.holds(*own, state));
+            self.holds[index as usize] = holds;
+            if holds && !bit(before, index) && landmark.after.iter().all(|sooner| bit(before, *sooner)) {
+                set(&mut reached, index);
+            }
+        }
+        reached
+    }
+
+    /// How many landmarks are still to come, by what holds in the state that was progressed to last.
+    pub(super) fn remaining(&self, reached: &[u64]) -> u32 {
+        let mut left: u32 = 0;
+        for (landmark, index) in self.landmarks.all.iter().zip(0_u32..) {
+            let again = || {
+                !self.holds[index as usize]
+                    && (landmark.is_goal || landmark.needed_by.iter().any(|by| !bit(reached, *by)))
+            };
+            if !bit(reached, index) || again() {
+                left = left.saturating_add(1);
+            }
+        }
+        left
+    }
+
+    /// Notes what a next step should bring about.
+    pub(super) fn request_landmark(&mut self, reached: &[u64]) {
+        for mark in self.marks.drain(..) {
+            self.wanted[mark as usize] = false;
+        }
+        for (landmark, index) in self.landmarks.all.iter().zip(0_u32..) {
+            if !bit(reached, index) && landmark.after.iter().all(|sooner| bit(reached, *sooner)) {
+                for proposition in &landmark.any_of {
+                    self.wanted[*proposition as usize] = true;
+                    self.marks.push(*proposition);
+                }
+            }
+        }
+    }
+
+    pub(super) fn is_wanted(&self, proposition: Proposition) -> bool {
+        self.wanted[proposition as usize]
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.landmarks.all.is_empty()
+    }
+}

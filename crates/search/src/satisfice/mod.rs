@@ -1,0 +1,157 @@
+//! A plan soon: relaxed plans and landmarks guide a lazy greedy search, and then weighted A\*, as in LAMA [1].
+//!
+//! `delete_relaxation` is the task without deletes, `ff_heuristic` computes relaxed plans, `landmarks` finds landmarks, and `landmark_status` tracks which
+//! of them a state has reached. `search` is the greedy search with an `alternating_open_list` over the states of a `store`.
+//!
+//! Nothing that is found here rests on an estimate: a plan is executed by whoever takes it, and only a search that has been
+//! everywhere without one says that there is none.
+//!
+//! [1] S. Richter, M. Westphal: The LAMA planner: guiding cost-based anytime planning with landmarks, JAIR 39, 2010.
+
+pub mod alternating_open_list;
+pub mod bucket_queue;
+mod delete_relaxation;
+mod ff_heuristic;
+mod landmark_status;
+mod landmarks;
+mod search;
+mod search_context;
+mod store;
+
+use task::context::Context;
+use task::limits::{Interrupted, Limits};
+use task::plan::ground::GroundPlan;
+use task::task::OperatorId;
+use task::task::number::TaskNumber;
+
+use crate::search::{MutexPairs, SearchStatistics};
+
+use search::{HeuristicWeight, Outcome, Search};
+use search_context::{SearchContext, USELESS_OPERATOR_COST};
+
+/// The searches in their order: whether costs count, and how.
+const SEARCH_SEQUENCE: [(bool, HeuristicWeight); 6] = [
+    (false, HeuristicWeight::Greedy),
+    (true, HeuristicWeight::Greedy),
+    (true, HeuristicWeight::Times(5)),
+    (true, HeuristicWeight::Times(3)),
+    (true, HeuristicWeight::Times(2)),
+    (true, HeuristicWeight::Times(1)),
+];
+
+/// A search may take this part of the words that bytes are left for; then the next one has its turn.
+const MEMORY_SHARE: usize = 16;
+
+/// What came of going on for a while.
+pub enum StepResult<N> {
+    /// A cheaper plan.
+    Plan(GroundPlan<N>),
+    /// There is no plan at all.
+    Unsolvable,
+    /// Nothing yet; it may go on.
+    Paused,
+    /// There is nothing left to be tried.
+    Ended,
+}
+
+/// Searches for a plan, and then for cheaper and cheaper ones, that can be gone on with.
+pub struct Satisficer<'a, N> {
+    known: SearchContext<'a, N>,
+    limits: &'a Limits,
+    phase: usize,
+    search: Option<Search<N>>,
+    /// Whether it was tried to tell dead ends by pairs of facts.
+    knows_pairs: bool,
+    pub figures: SearchStatistics,
+}
+
+impl<'a, N: TaskNumber> Satisficer<'a, N> {
+    /// None if an operator has too many combinations of designs.
+    ///
+    /// # Errors
+    /// When a limit is reached.
+    pub fn new(context: Context<'a, N>) -> Result<Option<Self>, Interrupted> {
+        let Some(known) = SearchContext::new(context)? else { return Ok(None) };
+        Ok(Some(Self {
+            known,
+            limits: context.limits,
+            phase: 0,
+            search: None,
+            knows_pairs: false,
+            figures: SearchStatistics::default(),
+        }))
+    }
+
+    /// How often it has begun anew.
+    pub fn restarts(&self) -> usize {
+        self.phase
+    }
+
+    /// Looks for a plan that costs less than `limit`, or for any, until so much work is done: in nodes and propositions of the relaxed
+    /// task.
+    ///
+    /// # Errors
+    /// When a limit is reached.
+    pub fn run(&mut self, limit: Option<&N>, work: u64) -> Result<StepResult<N>, Interrupted> {
+        let Some((priced, weight)) = SEARCH_SEQUENCE.get(self.phase).copied() else {
+            return Ok(StepResult::Ended);
+        };
+        if !self.knows_pairs && self.figures.evaluated >= self.limits.thresholds().pairs {
+            self.knows_pairs = true;
+            self.known.pairs = MutexPairs::new(self.known.task, self.limits)?;
+            // Estimates do not count on what is of no use any more.
+            self.search = None;
+        }
+        let search = match &mut self.search {
+            Some(search) => search,
+            none => {
+                let mut prices = if priced {
+                    self.known.operator_costs()
+                } else {
+                    vec![1; self.known.task.operators.len()]
+                };
+                if let Some(pairs) = &self.known.pairs {
+                    let ids = OperatorId::all(prices.len());
+                    prices
+                        .iter_mut()
+                        .zip(ids)
+                        .filter(|(_, id)| pairs.is_operator_useless(*id))
+                        .for_each(|(price, _)| *price = USELESS_OPERATOR_COST);
+                }
+                none.insert(Search::new(&mut self.known, weight, prices))
+            }
+        };
+        let outcome = search.run(&mut self.known, limit, work, self.limits, &mut self.figures);
+        let is_large = search.size() > self.limits.room() / MEMORY_SHARE;
+        match outcome? {
+            Outcome::Plan(plan) => {
+                self.next();
+                Ok(StepResult::Plan(plan))
+            }
+            Outcome::Exhausted if limit.is_none() && !search.incomplete => Ok(StepResult::Unsolvable),
+            Outcome::Exhausted => {
+                self.next();
+                Ok(StepResult::Paused)
+            }
+            Outcome::Paused => {
+                if is_large {
+                    self.next();
+                }
+                Ok(StepResult::Paused)
+            }
+        }
+    }
+
+    fn next(&mut self) {
+        self.phase = self.phase.saturating_add(1);
+        // A greedy search by costs is the one before where all cost the same.
+        let is_uniform = || {
+            let prices = self.known.operator_costs();
+            prices.iter().all(|price| Some(price) == prices.first())
+        };
+        if SEARCH_SEQUENCE.get(self.phase) == Some(&(true, HeuristicWeight::Greedy)) && is_uniform() {
+            self.phase = self.phase.saturating_add(1);
+        }
+        self.search = None;
+    }
+}

@@ -1,0 +1,116 @@
+//! What the searches for a plan soon share: what is known of a task, and room for looking at its states.
+
+use num_traits::ToPrimitive as _;
+use task::context::Context;
+use task::limits::Interrupted;
+use task::number::dense;
+use task::task::number::TaskNumber;
+use task::task::{OperatorId, State, Task};
+
+use crate::satisfice::delete_relaxation::Relaxation;
+use crate::satisfice::ff_heuristic::FfHeuristic;
+use crate::satisfice::landmark_status::LandmarkStatus;
+use crate::satisfice::landmarks::Landmarks;
+use crate::search::design_combinations::pareto_optimal_combinations;
+use crate::search::{MutexPairs, is_monotone};
+
+/// The price of an operator that no plan needs.
+pub(super) const USELESS_OPERATOR_COST: u32 = 1 << 20;
+
+/// An operator with a combination of its designs, and what it costs.
+struct Step<N> {
+    operator: OperatorId,
+    choice: Vec<u32>,
+    cost: N,
+}
+
+/// What is known of a task, with room for looking at its states.
+pub(super) struct SearchContext<'a, N> {
+    pub(super) task: &'a Task<N>,
+    pub(super) relaxation: Relaxation<N>,
+    pub(super) explorer: FfHeuristic,
+    pub(super) status: LandmarkStatus,
+    /// What pairs of facts tell, once it was worked out.
+    pub(super) pairs: Option<MutexPairs>,
+    steps: Vec<Step<N>>,
+    /// For each operator the number of its first step; then the number of all.
+    first: Vec<u32>,
+}
+
+impl<'a, N: TaskNumber> SearchContext<'a, N> {
+    /// None if an operator has too many combinations of designs.
+    pub(super) fn new(context: Context<'a, N>) -> Result<Option<Self>, Interrupted> {
+        let Context { task, limits } = context;
+        let monotone = is_monotone(task);
+        let (mut steps, mut first) = (Vec::new(), Vec::new());
+        for item in limits.watch(task.operators.iter().zip(OperatorId::all(task.operators.len()))) {
+            let (own, operator) = item?;
+            first.push(dense(steps.len()));
+            let Some(choices) = pareto_optimal_combinations(own, monotone, false, limits)? else {
+                return Ok(None);
+            };
+            steps.extend(choices.into_iter().map(|(choice, cost)| Step { operator, choice, cost }));
+        }
+        first.push(dense(steps.len()));
+        let relaxation = Relaxation::new(task, limits)?;
+        let explorer = FfHeuristic::new(&relaxation, task.operators.len());
+        let status = LandmarkStatus::new(Landmarks::new(task, &relaxation, limits)?, &relaxation);
+        Ok(Some(Self { task, relaxation, explorer, status, pairs: None, steps, first }))
+    }
+
+    /// What it takes to look at a state, about, in nodes and propositions.
+    pub(super) fn size(&self) -> u64 {
+        self.relaxation.propositions.saturating_add(self.relaxation.operators.len()) as u64
+    }
+
+    pub(super) fn step(&self, step: u32) -> (OperatorId, &[u32], &N) {
+        let Step { operator, choice, cost } = &self.steps[step as usize];
+        (*operator, choice, cost)
+    }
+
+    /// The steps that are applicable in the state that was explored last, and which of them are preferred.
+    pub(super) fn steps(&mut self, state: &State<N>) -> (Vec<u32>, Vec<u32>) {
+        self.explorer.applicable.sort_unstable();
+        self.explorer.preferred.sort_unstable();
+        let (mut all, mut preferred) = (Vec::new(), Vec::new());
+        for operator in &self.explorer.applicable {
+            let own = &self.task.operators[*operator as usize];
+            if !own.condition.holds_propositionally(&state.values) {
+                continue;
+            }
+            let is_preferred =
+                self.explorer.preferred.binary_search(operator).is_ok() || self.brings_landmark(*operator);
+            let sizes = own.sizes();
+            let next = (*operator as usize).saturating_add(1);
+            for step in self.first[*operator as usize]..self.first[next] {
+                if own.condition.holds_numerically(&state.numbers, &self.steps[step as usize].choice, &sizes)
+                {
+                    all.push(step);
+                    if is_preferred {
+                        preferred.push(step);
+                    }
+                }
+            }
+        }
+        (all, preferred)
+    }
+
+    fn brings_landmark(&self, operator: u32) -> bool {
+        let effects = &self.task.operators[operator as usize].effects;
+        effects.iter().any(|fact| self.status.is_wanted(self.relaxation.fact(*fact)))
+    }
+
+    /// Each operator at its cost, in a unit of which operators that cost something cost ten on average, and 1 more.
+    pub(super) fn operator_costs(&self) -> Vec<u32> {
+        let costs: Vec<f64> =
+            self.task.operators.iter().map(|own| own.cost.minimum().approximate()).collect();
+        let paid: Vec<f64> = costs.iter().copied().filter(|cost| *cost > 0.0).collect();
+        let count = paid.len().to_f64().unwrap_or(1.0).max(1.0);
+        let mean = paid.iter().sum::<f64>() / count;
+        let price = |cost: &f64| {
+            let scaled = if *cost > 0.0 { (10.0 * cost / mean).round().min(100_000.0) } else { 0.0 };
+            scaled.to_u32().unwrap_or(0).saturating_add(1)
+        };
+        costs.iter().map(price).collect()
+    }
+}

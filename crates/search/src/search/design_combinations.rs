@@ -1,0 +1,319 @@
+//! The designs worth choosing for an operator.
+
+use std::collections::hash_map::Entry;
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use task::limits::{Interrupted, Limits};
+use task::number::dense;
+use task::task::Operator;
+use task::task::number::TaskNumber;
+use task::task::quantity::{Quantity, SlotSet};
+
+/// As many combinations of designs are looked at for one operator at most…
+const COMBINATION_LIMIT: usize = 2_000_000;
+/// … and as many of them are kept, none of which dominates another.
+const CHOICE_LIMIT: usize = 100_000;
+
+/// Designs for some slots of an operator, with what they add to its cost and to the numbers in its conditions and effects.
+struct Partial<N> {
+    choice: Vec<u32>,
+    cost: N,
+    profile: Vec<N>,
+}
+
+/// Combinations of designs, each with its cost.
+pub type CostedCombinations<N> = Vec<(Vec<u32>, N)>;
+
+/// The combinations of an operator's designs that no other one dominates, with their costs: none is cheaper or
+/// leaves more of the numeric variables. Of equal ones the first stands for all, unless `all` are asked for. None if there
+/// are too many: then nothing is known.
+///
+/// Slots that no table and no exclusion joins contribute by themselves, so what is dominated among the combinations of some of
+/// them is dominated in all combinations that extend it: k functions of m designs cost no m^k comparisons.
+///
+/// # Errors
+/// When a limit is reached.
+pub fn pareto_optimal_combinations<N: TaskNumber>(
+    operator: &Operator<N>,
+    monotone: bool,
+    all: bool,
+    limits: &Limits,
+) -> Result<Option<CostedCombinations<N>>, Interrupted> {
+    let sizes = operator.sizes();
+    let effects = operator.numeric_effects.iter().map(|effect| &effect.value.quantity);
+    let conditions = operator.condition.linears().map(|linear| &linear.quantity);
+    // A resource is usually compared and reduced by the same quantity.
+    let mut quantities: Vec<&Quantity<N>> = Vec::new();
+    for quantity in effects.chain(conditions) {
+        if !quantities.contains(&quantity) {
+            quantities.push(quantity);
+        }
+    }
+    let profile = quantities.iter().map(|quantity| quantity.constant.clone()).collect();
+    let mut front =
+        vec![Partial { choice: vec![0; sizes.len()], cost: operator.cost.constant.clone(), profile }];
+    for slots in independent(operator, &quantities) {
+        let Some(own) = own_front(operator, &quantities, &slots, (monotone, all), limits)? else {
+            return Ok(None);
+        };
+        if own.len().checked_mul(front.len()).is_none_or(|pairs| pairs > CHOICE_LIMIT) {
+            return Ok(None);
+        }
+        let slots = &slots;
+        let pairs = front.iter().flat_map(|known| own.iter().map(move |own| known.with(own, slots)));
+        front = best(pairs.collect(), monotone, all, limits)?;
+    }
+    Ok(Some(front.into_iter().map(|Partial { choice, cost, .. }| (choice, cost)).collect()))
+}
+
+/// Those combinations of designs for some slots that no other one dominates; none if there are too many.
+fn own_front<N: TaskNumber>(
+    operator: &Operator<N>,
+    quantities: &[&Quantity<N>],
+    slots: &[u32],
+    (monotone, all): (bool, bool),
+    limits: &Limits,
+) -> Result<Option<Vec<Partial<N>>>, Interrupted> {
+    let sizes = operator.sizes();
+    let mut counts = slots.iter().map(|slot| sizes[*slot as usize]);
+    let count = counts.try_fold(1_usize, usize::checked_mul);
+    if count.is_none_or(|count| count > COMBINATION_LIMIT) {
+        return Ok(None);
+    }
+    let rules = operator.forbidden.iter().filter(|rule| rule.slots.iter().all(|slot| slots.contains(slot)));
+    let rules: Vec<(&SlotSet, FxHashSet<&SlotSet>)> =
+        rules.map(|rule| (&rule.slots, rule.combinations.iter().collect())).collect();
+    let mut own = Vec::new();
+    for choice in limits.watch(Combinations::new(slots, &sizes)) {
+        let choice = choice?;
+        let part = |slots: &SlotSet| slots.iter().map(|slot| choice[*slot as usize]).collect::<SlotSet>();
+        if rules.iter().any(|(slots, bad)| bad.contains(&part(slots))) {
+            continue;
+        }
+        let sum = |quantity: &Quantity<N>| quantity.part(slots, &choice, &sizes);
+        let cost = sum(&operator.cost);
+        let profile = quantities.iter().map(|quantity| sum(quantity)).collect();
+        own.push(Partial { choice, cost, profile });
+        if own.len() > 2 * CHOICE_LIMIT {
+            own = best(own, monotone, all, limits)?;
+            if own.len() > CHOICE_LIMIT {
+                return Ok(None);
+            }
+        }
+    }
+    best(own, monotone, all, limits).map(Some)
+}
+
+impl<N: TaskNumber> Partial<N> {
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
+    )]
+    fn with(&self, other: &Self, slots: &[u32]) -> Self {
+        let mut choice = self.choice.clone();
+        for slot in slots {
+            choice[*slot as usize] = other.choice[*slot as usize];
+        }
+        let profile = self.profile.iter().zip(&other.profile).map(|(a, b)| a.clone() + b.clone()).collect();
+        Self { choice, cost: self.cost.clone() + other.cost.clone(), profile }
+    }
+}
+
+/// Those that none dominates, in lexicographic order of the designs.
+fn best<N: TaskNumber>(
+    mut all_of_them: Vec<Partial<N>>,
+    monotone: bool,
+    all: bool,
+    limits: &Limits,
+) -> Result<Vec<Partial<N>>, Interrupted> {
+    limits.check()?;
+    // What dominates comes before what it dominates.
+    all_of_them.sort_by(|a, b| {
+        a.cost.cmp(&b.cost).then_with(|| b.profile.cmp(&a.profile)).then_with(|| a.choice.cmp(&b.choice))
+    });
+    let mut front: Vec<Partial<N>> = Vec::new();
+    // Where profiles have to be equal, the first with each: none that comes later is cheaper.
+    let mut cheapest: FxHashMap<Vec<N>, N> = FxHashMap::default();
+    let mut pulse = limits.pulse();
+    for new in all_of_them {
+        let is_equal = |cost: &N, profile: &[N]| all && *cost == new.cost && profile == new.profile;
+        let is_dominated = if monotone {
+            // In one dimension the last one has the most of all that are as cheap.
+            let candidates = if new.profile.len() > 1 { 0 } else { front.len().saturating_sub(1) };
+            let mut is_dominated = false;
+            for old in &front[candidates..] {
+                pulse.beat()?;
+                let no_worse = old.profile.iter().zip(&new.profile).all(|(old, new)| old >= new);
+                if no_worse && !is_equal(&old.cost, &old.profile) {
+                    is_dominated = true;
+                    break;
+                }
+            }
+            is_dominated
+        } else {
+            pulse.beat()?;
+            match cheapest.entry(new.profile.clone()) {
+                Entry::Occupied(known) => !is_equal(known.get(), known.key()),
+                Entry::Vacant(entry) => {
+                    entry.insert(new.cost.clone());
+                    false
+                }
+            }
+        };
+        if !is_dominated {
+            front.push(new);
+        }
+    }
+    front.sort_by(|a, b| a.choice.cmp(&b.choice));
+    Ok(front)
+}
+
+/// The slots of an operator in groups that no table and no exclusion joins.
+fn independent<N>(operator: &Operator<N>, quantities: &[&Quantity<N>]) -> Vec<Vec<u32>> {
+    let tables = quantities.iter().copied().chain([&operator.cost]).flat_map(|quantity| &quantity.tables);
+    let joined = tables.map(|table| &table.slots).chain(operator.forbidden.iter().map(|rule| &rule.slots));
+    let mut groups: Vec<Vec<u32>> = (0..dense(operator.slots.len())).map(|slot| vec![slot]).collect();
+    for slots in joined {
+        let (mut together, apart): (Vec<_>, Vec<_>) =
+            groups.into_iter().partition(|group| group.iter().any(|slot| slots.contains(slot)));
+        together = if together.is_empty() { together } else { vec![together.concat()] };
+        groups = apart.into_iter().chain(together).collect();
+    }
+    for group in &mut groups {
+        group.sort_unstable();
+    }
+    groups.sort();
+    groups
+}
+
+/// Every combination of designs for some slots, in lexicographic order; the other slots stay at 0.
+struct Combinations<'a> {
+    slots: &'a [u32],
+    sizes: &'a [usize],
+    next: Option<Vec<u32>>,
+}
+
+impl<'a> Combinations<'a> {
+    fn new(slots: &'a [u32], sizes: &'a [usize]) -> Self {
+        let is_empty = slots.iter().any(|slot| sizes[*slot as usize] == 0);
+        Self { slots, sizes, next: (!is_empty).then(|| vec![0; sizes.len()]) }
+    }
+}
+
+impl Iterator for Combinations<'_> {
+    type Item = Vec<u32>;
+
+    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
+    fn next(&mut self) -> Option<Vec<u32>> {
+        let current = self.next.take()?;
+        let grows = |slot: &u32| (current[*slot as usize] as usize) + 1 < self.sizes[*slot as usize];
+        if let Some(position) = self.slots.iter().rposition(grows) {
+            let mut following = current.clone();
+            following[self.slots[position] as usize] += 1;
+            for slot in &self.slots[position + 1..] {
+                following[*slot as usize] = 0;
+            }
+            self.next = Some(following);
+        }
+        Some(current)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use task::number::Int;
+    use task::task::quantity::{Linear, NumericId, Table};
+    use task::task::{Condition, ForbiddenCombinations, NumericEffect, SlotId, SlotUse};
+
+    const SIZES: [usize; 4] = [2, 3, 2, 2];
+
+    /// A quantity with a table over each list of slots, filled with small numbers.
+    fn quantity(tables: &[Vec<u32>], numbers: &mut impl Iterator<Item = Int>) -> Quantity<Int> {
+        let mut quantity = Quantity::constant(numbers.next().unwrap_or(0));
+        for slots in tables {
+            let size = slots.iter().map(|slot| SIZES[*slot as usize]).product();
+            let values = (0..size).map(|_| numbers.next().unwrap_or(0)).collect();
+            quantity.add_table(Table { slots: slots.iter().copied().collect(), values });
+        }
+        quantity
+    }
+
+    fn operator(costs: &[Vec<u32>], uses: &[Vec<u32>], excluded: &[(u32, u32)], numbers: &[Int]) -> Operator {
+        let mut numbers = numbers.iter().copied().cycle();
+        let cost = quantity(costs, &mut numbers);
+        let variable = NumericId(0);
+        let value = Linear { coefficients: vec![(variable, 1)], quantity: quantity(uses, &mut numbers) };
+        let slot = |(size, slot): (&usize, u32)| SlotUse {
+            slot: SlotId(slot),
+            designs: (0..*size as u32).collect(),
+        };
+        // Slots 0 and 1 exclude each other's designs.
+        let combinations = excluded.iter().map(|(a, b)| [*a, *b].into()).collect();
+        Operator {
+            schema: 0,
+            arguments: Vec::new(),
+            configuration: Vec::new(),
+            slots: SIZES.iter().zip(0..).map(slot).collect(),
+            forbidden: [ForbiddenCombinations { slots: [0, 1].into(), combinations }].into(),
+            condition: Condition { comparisons: vec![value.clone()], ..Condition::default() },
+            effects: Vec::new(),
+            conditional: Vec::new(),
+            numeric_effects: vec![NumericEffect { variable, value }],
+            cost,
+            others: Vec::new(),
+            duration: Quantity::constant(0),
+            wait: None,
+            timing: task::task::timing::Timing::free(),
+        }
+    }
+
+    /// By definition: every combination against every other one.
+    fn expected(operator: &Operator, monotone: bool, all: bool) -> Vec<(Vec<u32>, Int)> {
+        let sizes = operator.sizes();
+        let value = |choice: &Vec<u32>| {
+            (operator.cost.at(choice, &sizes), operator.numeric_effects[0].value.quantity.at(choice, &sizes))
+        };
+        let choices: Vec<Vec<u32>> = operator.admitted_combinations().collect();
+        let beaten = |choice: &Vec<u32>| {
+            let (cost, left) = value(choice);
+            choices.iter().any(|other| {
+                let (own, more) = value(other);
+                let no_worse = own <= cost && if monotone { more >= left } else { more == left };
+                let equal = own == cost && more == left;
+                no_worse && if equal { !all && other < choice } else { true }
+            })
+        };
+        let best = choices.iter().filter(|choice| !beaten(choice));
+        best.map(|choice| (choice.clone(), value(choice).0)).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn independent_slots_lose_nothing(
+            costs in proptest::sample::subsequence(vec![vec![0], vec![1], vec![2], vec![3], vec![1, 2]], 0..=5),
+            uses in proptest::sample::subsequence(vec![vec![0], vec![1], vec![2], vec![3], vec![0, 3]], 0..=5),
+            excluded in proptest::collection::vec((0_u32..2, 0_u32..3), 0..4),
+            numbers in proptest::collection::vec(-4_i128..5, 1..40),
+            monotone: bool,
+        ) {
+            let operator = operator(&costs, &uses, &excluded, &numbers);
+            let limits = Limits::none();
+            prop_assert_eq!(pareto_optimal_combinations(&operator, monotone, true, &limits), Ok(Some(expected(&operator, monotone, true))));
+            // Of equal ones one stands for all.
+            let values = |choices: Vec<(Vec<u32>, Int)>| {
+                let sizes = operator.sizes();
+                let left = |choice: &[u32]| operator.numeric_effects[0].value.quantity.at(choice, &sizes);
+                let mut values: Vec<_> = choices.iter().map(|(choice, cost)| (*cost, left(choice))).collect();
+                values.sort_unstable();
+                values
+            };
+            let found = pareto_optimal_combinations(&operator, monotone, false, &limits).expect("no limit").unwrap_or_default();
+            prop_assert!(found.iter().all(|(choice, _)| operator.admits(choice)));
+            prop_assert_eq!(values(found), values(expected(&operator, monotone, false)));
+        }
+    }
+}

@@ -1,0 +1,447 @@
+//! Pairs of facts that no state on the way from the initial state to the goal has.
+//!
+//! What h² [1] says forwards, of pairs that no reachable state has, and backwards, of pairs that no state has from which the goal can be reached [2]:
+//! where a robot paints itself in, say. An operator before or after which such a pair holds is of no use. Numbers, clauses, and derived facts are left out, and what
+//! happens only under a condition may happen or not: more pairs are taken to be possible than are.
+//!
+//! [1] P. Haslum, H. Geffner: Admissible heuristics for optimal planning, AIPS 2000. [2] V. Alcázar, Á. Torralba: A reminder about the importance of
+//! computing and exploiting invariants in planning, ICAPS 2015.
+
+use task::limits::{Interrupted, Limits};
+use task::number::dense;
+use task::task::number::TaskNumber;
+use task::task::{Fact, Operator, OperatorId, Task, VariableId};
+
+/// As many facts are paired, at most: bits for all pairs take 8 MB then.
+const MAX_FACTS: usize = 8_000;
+/// As much work is done, at most, in words of bits that are looked at: about half a second.
+const MAX_WORK: usize = 400_000_000;
+/// How often both directions are gone through, at most; what one rules out, the other one does without.
+const MAX_ROUNDS: usize = 4;
+
+/// A set of facts by their numbers, or one such set for each fact.
+type Words = Vec<u64>;
+
+/// The operator with what matters here; facts are numbered.
+struct Rule {
+    /// What holds before.
+    before: Vec<u32>,
+    /// What holds after, of the facts that are known.
+    after: Vec<u32>,
+    /// What may be brought about.
+    adds: Vec<u32>,
+    /// The facts of variables that have another value after, for sure, or the same that was set.
+    set: Words,
+    /// The facts of variables that may change, and of which nothing is required.
+    open: Vec<u32>,
+    /// The facts of all variables that may change, or are required.
+    touched: Words,
+}
+
+/// By fact, the facts that hold beside it in some state.
+struct Table {
+    words: usize,
+    bits: Words,
+}
+
+impl Table {
+    fn new(facts: usize) -> Self {
+        let words = facts.div_ceil(64);
+        Self { words, bits: vec![0; words.saturating_mul(facts)] }
+    }
+
+    fn row(&self, fact: u32) -> &[u64] {
+        let start = (fact as usize).saturating_mul(self.words);
+        &self.bits[start..start.saturating_add(self.words)]
+    }
+
+    fn has(&self, one: u32, other: u32) -> bool {
+        has(self.row(one), other)
+    }
+
+    /// Notes two facts beside each other, and whether that is new.
+    fn insert(&mut self, one: u32, other: u32) -> bool {
+        let is_new = !self.has(one, other);
+        for (row, fact) in [(one, other), (other, one)] {
+            let start = (row as usize).saturating_mul(self.words);
+            insert(&mut self.bits[start..], fact);
+        }
+        is_new
+    }
+
+    /// Notes a fact beside all of a set, and whether anything is new.
+    fn join(&mut self, fact: u32, others: &[u64]) -> bool {
+        let mut is_new = false;
+        for (index, word) in others.iter().enumerate() {
+            let start = (fact as usize).saturating_mul(self.words);
+            let mut news = word & !self.bits[start.saturating_add(index)];
+            is_new |= news != 0;
+            while news != 0 {
+                let other = dense(index).saturating_mul(64).saturating_add(news.trailing_zeros());
+                self.insert(fact, other);
+                news &= news.saturating_sub(1);
+            }
+        }
+        is_new
+    }
+
+    /// The facts that hold beside each of some, where these hold beside each other.
+    fn beside(&self, facts: &[u32], all: &[u64]) -> Option<Words> {
+        let mut common = all.to_vec();
+        for fact in facts {
+            let row = self.row(*fact);
+            if facts.iter().any(|other| !has(row, *other)) {
+                return None;
+            }
+            common.iter_mut().zip(row).for_each(|(word, row)| *word &= row);
+        }
+        Some(common)
+    }
+}
+
+fn has(words: &[u64], fact: u32) -> bool {
+    words[(fact >> 6) as usize] >> (fact & 63) & 1 == 1
+}
+
+fn insert(words: &mut [u64], fact: u32) {
+    words[(fact >> 6) as usize] |= 1 << (fact & 63);
+}
+
+fn remove(words: &mut [u64], fact: u32) {
+    words[(fact >> 6) as usize] &= !(1 << (fact & 63));
+}
+
+fn common(words: &[u64], others: &[u64]) -> Words {
+    words.iter().zip(others).map(|(word, other)| word & other).collect()
+}
+
+fn without(words: &[u64], others: &[u64]) -> Words {
+    words.iter().zip(others).map(|(word, other)| word & !other).collect()
+}
+
+/// What can be told of a task by pairs of facts.
+pub struct MutexPairs {
+    /// The number of each basic variable's first value.
+    first: Vec<u32>,
+    /// The pairs that a state on the way to the goal may have.
+    alive: Table,
+    /// By operator, whether no plan needs it.
+    useless: Vec<bool>,
+}
+
+impl MutexPairs {
+    /// None if it takes too long to find out, or if there is nothing to tell.
+    pub(crate) fn new<N: TaskNumber>(task: &Task<N>, limits: &Limits) -> Result<Option<Self>, Interrupted> {
+        let mut first = Vec::with_capacity(task.basic);
+        let mut variables = Vec::new();
+        for (variable, id) in task.variables[..task.basic].iter().zip((0..).map(VariableId)) {
+            first.push(dense(variables.len()));
+            variables.extend(variable.values.iter().map(|_| id));
+        }
+        let facts = dense(variables.len());
+        if facts as usize > MAX_FACTS {
+            return Ok(None);
+        }
+        let mut maker = H2Builder { task, first, variables, facts, left: MAX_WORK };
+        let mut rules = Vec::with_capacity(task.operators.len());
+        for operator in limits.watch(&task.operators) {
+            let operator = operator?;
+            maker.left = maker.left.saturating_sub(maker.words());
+            rules.push(maker.rule(operator));
+        }
+        let mut useless = vec![false; rules.len()];
+        let mut alive = None;
+        for _ in 0..MAX_ROUNDS {
+            let Some(forwards) = maker.forwards(&rules, &useless, limits)? else { break };
+            let Some(backwards) = maker.backwards(&rules, &useless, &forwards, limits)? else { break };
+            let mut is_over = true;
+            let all = vec![u64::MAX; maker.words()];
+            for (rule, useless) in rules.iter().zip(&mut useless) {
+                let is_alive = |facts| backwards.beside(facts, &all).is_some();
+                if !(*useless || is_alive(&rule.before) && is_alive(&rule.after)) {
+                    *useless = true;
+                    is_over = false;
+                }
+            }
+            alive = Some(backwards);
+            if is_over {
+                break;
+            }
+        }
+        Ok(alive.map(|alive| Self { first: maker.first, alive, useless }))
+    }
+
+    /// Whether no plan needs an operator.
+    pub(crate) fn is_operator_useless(&self, operator: OperatorId) -> bool {
+        self.useless[operator.index()]
+    }
+
+    /// Whether the goal cannot be reached from a state, as far as pairs tell: those of the variables that have changed since a state of which that
+    /// is not so.
+    pub(crate) fn is_dead_end(&self, before: &[u32], values: &[u32]) -> bool {
+        let number = |variable: usize| self.first[variable].saturating_add(values[variable]);
+        (0..self.first.len()).filter(|variable| before[*variable] != values[*variable]).any(|changed| {
+            let row = self.alive.row(number(changed));
+            (0..self.first.len()).any(|variable| !has(row, number(variable)))
+        })
+    }
+}
+
+struct H2Builder<'a, N> {
+    task: &'a Task<N>,
+    first: Vec<u32>,
+    /// By fact.
+    variables: Vec<VariableId>,
+    facts: u32,
+    /// How many words may still be looked at.
+    left: usize,
+}
+
+impl<N: TaskNumber> H2Builder<'_, N> {
+    fn words(&self) -> usize {
+        (self.facts as usize).div_ceil(64)
+    }
+
+    fn is_basic(&self, variable: VariableId) -> bool {
+        variable.index() < self.task.basic
+    }
+
+    fn number(&self, fact: Fact) -> u32 {
+        self.first[fact.variable.index()].saturating_add(fact.value)
+    }
+
+    /// The numbers of a variable's values.
+    fn values(&self, variable: VariableId) -> std::ops::Range<u32> {
+        let first = self.first[variable.index()];
+        first..first.saturating_add(dense(self.task.variables[variable.index()].values.len()))
+    }
+
+    fn rule(&self, operator: &Operator<N>) -> Rule {
+        let required = operator.condition.facts.iter().filter(|fact| self.is_basic(fact.variable));
+        let conditional: Vec<Fact> =
+            operator.conditional.iter().flat_map(|effect| &effect.effects).copied().collect();
+        let may_change = |variable| conditional.iter().any(|fact| fact.variable == variable);
+        let known = operator.effects.iter().filter(|fact| !may_change(fact.variable));
+        let persists = |fact: &&Fact| {
+            !may_change(fact.variable)
+                && operator.effects.iter().all(|effect| effect.variable != fact.variable)
+        };
+        let [mut set, mut touched] = [vec![0; self.words()], vec![0; self.words()]];
+        for effect in &operator.effects {
+            self.values(effect.variable).for_each(|value| insert(&mut set, value));
+        }
+        let changing: Vec<VariableId> =
+            operator.effects.iter().chain(&conditional).map(|fact| fact.variable).collect();
+        let is_open = |variable: &&VariableId| required.clone().all(|fact| fact.variable != **variable);
+        let open = changing.iter().filter(is_open).flat_map(|variable| self.values(*variable));
+        let open: Vec<u32> = open.collect();
+        for variable in changing.iter().copied().chain(required.clone().map(|fact| fact.variable)) {
+            self.values(variable).for_each(|value| insert(&mut touched, value));
+        }
+        Rule {
+            before: required.clone().map(|fact| self.number(*fact)).collect(),
+            after: known.chain(required.filter(persists)).map(|fact| self.number(*fact)).collect(),
+            adds: operator.effects.iter().chain(&conditional).map(|fact| self.number(*fact)).collect(),
+            set,
+            open,
+            touched,
+        }
+    }
+
+    /// The pairs that a reachable state may have. None if that takes too long.
+    fn forwards(
+        &mut self,
+        rules: &[Rule],
+        useless: &[bool],
+        limits: &Limits,
+    ) -> Result<Option<Table>, Interrupted> {
+        let mut table = Table::new(self.facts as usize);
+        let initial: Vec<u32> = (0..dense(self.task.basic))
+            .map(|variable| {
+                self.number(Fact {
+                    variable: VariableId(variable),
+                    value: self.task.initial.values[variable as usize],
+                })
+            })
+            .collect();
+        let mut reached = vec![0; self.words()];
+        for fact in &initial {
+            insert(&mut reached, *fact);
+            for other in &initial {
+                table.insert(*fact, *other);
+            }
+        }
+        loop {
+            let mut is_over = true;
+            for item in limits.watch(rules.iter().zip(useless)) {
+                let (rule, useless) = item?;
+                let steps = rule.before.len().saturating_add(rule.adds.len()).saturating_add(2);
+                let Some(left) = self.left.checked_sub(steps.saturating_mul(table.words)) else {
+                    return Ok(None);
+                };
+                self.left = left;
+                if *useless {
+                    continue;
+                }
+                let Some(beside) = table.beside(&rule.before, &reached) else { continue };
+                let mut beside = without(&beside, &rule.set);
+                rule.adds.iter().for_each(|fact| insert(&mut beside, *fact));
+                for fact in &rule.adds {
+                    // Of one variable there is one value.
+                    let own = self.values(self.variables[*fact as usize]);
+                    let mut others = beside.clone();
+                    own.filter(|own| own != fact).for_each(|own| remove(&mut others, own));
+                    if table.join(*fact, &others) {
+                        is_over = false;
+                        insert(&mut reached, *fact);
+                    }
+                }
+            }
+            if is_over {
+                return Ok(Some(table));
+            }
+        }
+    }
+
+    /// The pairs that a state may have from which the goal can be reached, of those that a reachable one may have. None if that takes too long.
+    fn backwards(
+        &mut self,
+        rules: &[Rule],
+        useless: &[bool],
+        forwards: &Table,
+        limits: &Limits,
+    ) -> Result<Option<Table>, Interrupted> {
+        let mut table = Table::new(self.facts as usize);
+        let mut reached = vec![0; self.words()];
+        // What holds beside all that the goal asks for; all other values of these variables do not.
+        let goal = self.task.goal.facts.iter().filter(|fact| self.is_basic(fact.variable));
+        let goal: Vec<u32> = goal.map(|fact| self.number(*fact)).collect();
+        let all = self.facts_of(forwards);
+        let goal = forwards.beside(&goal, &all).unwrap_or_else(|| vec![0; self.words()]);
+        for fact in (0..self.facts).filter(|fact| has(&goal, *fact) && forwards.has(*fact, *fact)) {
+            insert(&mut reached, fact);
+            table.join(fact, &common(forwards.row(fact), &goal));
+        }
+        loop {
+            let mut is_over = true;
+            for item in limits.watch(rules.iter().zip(useless)) {
+                let (rule, useless) = item?;
+                let news = rule.before.len().saturating_add(rule.open.len());
+                let steps = rule.before.len().saturating_add(rule.after.len()).saturating_add(news);
+                let steps = steps.saturating_add(3).saturating_mul(table.words);
+                let Some(left) = self.left.checked_sub(steps) else { return Ok(None) };
+                self.left = left;
+                if *useless {
+                    continue;
+                }
+                let Some(beside) = table.beside(&rule.after, &reached) else { continue };
+                let Some(before) = forwards.beside(&rule.before, &all) else { continue };
+                let mut state = without(&beside, &rule.touched);
+                let news =
+                    || rule.before.iter().chain(&rule.open).copied().filter(|fact| has(&before, *fact));
+                news().for_each(|fact| insert(&mut state, fact));
+                let state = common(&state, &before);
+                for fact in news() {
+                    if table.join(fact, &common(&state, forwards.row(fact))) {
+                        is_over = false;
+                        insert(&mut reached, fact);
+                    }
+                }
+            }
+            if is_over {
+                return Ok(Some(table));
+            }
+        }
+    }
+
+    /// The facts that hold in some state of a table.
+    fn facts_of(&self, table: &Table) -> Words {
+        let mut all = vec![0; self.words()];
+        (0..self.facts).filter(|fact| table.has(*fact, *fact)).for_each(|fact| insert(&mut all, fact));
+        all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::search::stubborn_sets::tests::{reachable, switches, to_go};
+    use task::limits::Limits;
+    use testing::adl::Generator;
+    use testing::random::Random;
+    use testing::{depot, ground_text};
+
+    /// Whatever is on a way to the goal is not called dead, nor is an operator on it useless. How many states and operators are.
+    fn check(text: &(String, String)) -> Option<[usize; 2]> {
+        let task = ground_text(text.clone());
+        let (states, steps) = reachable(&task).filter(|_| task.unreachable.is_none())?;
+        let best = to_go(&task, &states, &steps);
+        let pairs = MutexPairs::new(&task, &Limits::none()).expect("no limit")?;
+        // Pairs of all variables are looked at.
+        let other: Vec<u32> = vec![u32::MAX; task.variables.len()];
+        let mut told = [0, 0];
+        for ((state, own), known) in states.iter().zip(&steps).zip(&best) {
+            let is_dead = pairs.is_dead_end(&other, &state.values);
+            assert!(known.is_none() || !is_dead, "{state:?} {text:?}");
+            told[0] += usize::from(is_dead);
+            for (id, to, _) in own {
+                let is_useless = pairs.is_operator_useless(*id);
+                assert!(known.is_none() || best[*to].is_none() || !is_useless, "{id:?} {text:?}");
+                told[1] += usize::from(is_useless);
+            }
+        }
+        Some(told)
+    }
+
+    fn check_all(seeds: std::ops::Range<u64>) {
+        let (mut looked, mut dead, mut useless) = (0, 0, 0);
+        for seed in seeds {
+            let mut random = Generator(Random(seed));
+            let others = [(random.domain(), random.problem()), depot(seed)];
+            for text in (0..40).map(|part| switches(40 * seed + part)).chain(others) {
+                let told = check(&text);
+                looked += usize::from(told.is_some());
+                dead += usize::from(told.is_some_and(|[dead, _]| dead > 0));
+                useless += usize::from(told.is_some_and(|[_, useless]| useless > 0));
+            }
+        }
+        assert!(
+            looked > 1_000 && dead > 50 && useless > 50,
+            "{looked} tasks, {dead} with dead states, {useless} with useless operators"
+        );
+    }
+
+    #[test]
+    fn what_is_on_a_way_to_the_goal_is_not_ruled_out() {
+        check_all(0..60);
+    }
+
+    #[test]
+    #[ignore = "takes minutes"]
+    fn what_is_on_a_way_to_the_goal_is_not_ruled_out_of_many() {
+        check_all(60..2_000);
+    }
+
+    /// Two tiles in a row above a robot, which paints the tile above it and does not come back to what is painted.
+    #[test]
+    fn who_paints_itself_in_is_dead() {
+        let domain = "(define (domain tiles) (:predicates (at ?t) (clear ?t) (painted ?t) (above ?a ?b))
+            (:action move :parameters (?a ?b) :precondition (and (at ?a) (clear ?b) (or (above ?a ?b) (above ?b ?a)))
+              :effect (and (not (at ?a)) (clear ?a) (at ?b) (not (clear ?b))))
+            (:action paint :parameters (?a ?b) :precondition (and (at ?a) (clear ?b) (above ?b ?a))
+              :effect (and (not (clear ?b)) (painted ?b)))
+            (:action paint-down :parameters (?a ?b) :precondition (and (at ?a) (clear ?b) (above ?a ?b))
+              :effect (and (not (clear ?b)) (painted ?b))))";
+        let problem = "(define (problem p) (:domain tiles) (:objects t0 t1 t2 t3)
+            (:init (at t0) (clear t1) (clear t2) (clear t3) (above t1 t0) (above t2 t1) (above t3 t2))
+            (:goal (and (painted t1) (painted t2) (painted t3))))";
+        let text = (domain.to_owned(), problem.to_owned());
+        let task = ground_text(text.clone());
+        let pairs = MutexPairs::new(&task, &Limits::none()).expect("no limit").expect("something to tell");
+        for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {
+            let is_down = task.schema_names[operator.schema as usize] == "paint-down";
+            assert_eq!(pairs.is_operator_useless(id), is_down, "{operator:?}");
+        }
+        assert!(check(&text).is_some_and(|[dead, _]| dead > 0));
+    }
+}

@@ -1,0 +1,113 @@
+//! Of which numeric variables more never hurts, of which less never hurts, and of which neither can be said.
+//!
+//! A variable is *asked* upwards where more of it may make a condition hold, downwards where less of it may. What is
+//! asked of a variable is asked of those that it is computed from: of those with a factor above 0 the same, of those with a
+//! factor below 0 the opposite. The least such sets tell which labels dominate which in a search with resources [1]: what is
+//! asked in one direction is compared, what is asked in both must be equal, and what is not asked at all does not count.
+//!
+//! [1] M. Desrochers, F. Soumis: A generalized permanent labelling algorithm for the shortest path problem with time
+//! windows, INFOR 26(3), 1988.
+
+use task::task::number::TaskNumber;
+use task::task::quantity::Linear;
+use task::task::{Condition, Fact, Task};
+
+/// What is asked of something: more of it (or its truth), less of it (or its falsity).
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Polarity {
+    pub up: bool,
+    pub down: bool,
+}
+
+const UP: Polarity = Polarity { up: true, down: false };
+const BOTH: Polarity = Polarity { up: true, down: true };
+
+impl Polarity {
+    fn flipped(self) -> Self {
+        Self { up: self.down, down: self.up }
+    }
+
+    fn with(self, other: Self) -> Self {
+        Self { up: self.up || other.up, down: self.down || other.down }
+    }
+}
+
+/// What is asked of each numeric variable, and of each derived variable as far as it depends on them.
+struct PolarityAnalysis<'a, N> {
+    task: &'a Task<N>,
+    numbers: Vec<Polarity>,
+    facts: Vec<Polarity>,
+    changed: bool,
+}
+
+/// What is asked of each numeric variable of a task.
+pub fn directions<N: TaskNumber>(task: &Task<N>) -> Vec<Polarity> {
+    let numbers = vec![Polarity::default(); task.initial.numbers.len()];
+    let facts = vec![Polarity::default(); task.variables.len()];
+    let mut asking = PolarityAnalysis { task, numbers, facts, changed: true };
+    if task.initial.numbers.is_empty() {
+        return asking.numbers;
+    }
+    while std::mem::take(&mut asking.changed) {
+        asking.spread();
+    }
+    asking.numbers
+}
+
+impl<N: TaskNumber> PolarityAnalysis<'_, N> {
+    fn spread(&mut self) {
+        let task = self.task;
+        self.condition(&task.goal, UP);
+        for operator in &task.operators {
+            self.condition(&operator.condition, UP);
+            for literal in operator.conditional.iter().flat_map(|effect| &effect.condition) {
+                self.fact(literal.fact, BOTH);
+            }
+            for effect in &operator.numeric_effects {
+                let asked = self.numbers[effect.variable.index()];
+                self.linear(&effect.value, asked);
+            }
+        }
+        for rule in task.axioms.iter().flat_map(|layer| &layer.rules) {
+            let head = self.facts[rule.head.variable.index()];
+            let asked = if rule.head.value == 0 { head } else { head.flipped() };
+            self.condition(&rule.body, asked);
+        }
+    }
+
+    fn condition(&mut self, condition: &Condition<N>, asked: Polarity) {
+        for fact in &condition.facts {
+            self.fact(*fact, asked);
+        }
+        for literal in condition.clauses.iter().flatten() {
+            self.fact(literal.fact, if literal.positive { asked } else { asked.flipped() });
+        }
+        for linear in condition.linears() {
+            self.linear(linear, asked);
+        }
+    }
+
+    /// The truth of a derived variable is its value 0.
+    fn fact(&mut self, fact: Fact, asked: Polarity) {
+        let asked = if fact.value == 0 { asked } else { asked.flipped() };
+        let known = &mut self.facts[fact.variable.index()];
+        let next = known.with(asked);
+        self.changed |= next != *known;
+        *known = next;
+    }
+
+    fn linear(&mut self, linear: &Linear<N>, asked: Polarity) {
+        for (variable, factor) in &linear.coefficients {
+            let asked = if *factor >= N::zero() { asked } else { asked.flipped() };
+            let known = &mut self.numbers[variable.index()];
+            let next = known.with(asked);
+            self.changed |= next != *known;
+            *known = next;
+        }
+    }
+}
+
+/// Whether more of any numeric variable can only help.
+pub fn is_monotone<N: TaskNumber>(task: &Task<N>) -> bool {
+    directions(task).iter().all(|asked| !asked.down)
+}

@@ -1,0 +1,39 @@
+//! The nodes of a best-first search that wait for their turn: a bucket for each priority, the last one in first out.
+
+use std::collections::BTreeMap;
+
+/// Less comes first.
+pub(super) struct OpenList<K> {
+    buckets: BTreeMap<K, Vec<u32>>,
+    length: usize,
+}
+
+impl<K: Ord + Clone> OpenList<K> {
+    pub(super) fn new() -> Self {
+        Self { buckets: BTreeMap::new(), length: 0 }
+    }
+
+    #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
+    pub(super) fn push(&mut self, key: K, node: u32) {
+        self.buckets.entry(key).or_default().push(node);
+        self.length += 1;
+    }
+
+    #[expect(clippy::arithmetic_side_effects, reason = "nothing is taken that was not counted")]
+    pub(super) fn pop(&mut self) -> Option<(K, u32)> {
+        loop {
+            let mut first = self.buckets.first_entry()?;
+            if let Some(node) = first.get_mut().pop() {
+                self.length -= 1;
+                return Some((first.key().clone(), node));
+            }
+            first.remove();
+        }
+    }
+
+    /// About how much memory is taken.
+    pub(super) fn bytes(&self) -> usize {
+        let nodes = self.length.saturating_mul(size_of::<u32>());
+        nodes.saturating_add(self.buckets.len().saturating_mul(size_of::<(K, Vec<u32>)>()))
+    }
+}

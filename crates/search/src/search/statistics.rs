@@ -1,0 +1,34 @@
+//! What a search has done.
+
+use task::plan::solution::Statistics;
+
+/// Counts of states.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SearchStatistics {
+    /// Those whose successors were looked at.
+    pub expanded: u64,
+    /// Successors of these.
+    pub generated: u64,
+    /// Those that were estimated.
+    pub evaluated: u64,
+}
+
+impl SearchStatistics {
+    #[must_use]
+    pub fn plus(self, other: Self) -> Self {
+        Self {
+            expanded: self.expanded.saturating_add(other.expanded),
+            generated: self.generated.saturating_add(other.generated),
+            evaluated: self.evaluated.saturating_add(other.evaluated),
+        }
+    }
+
+    /// Adds to statistics what was done since `before`.
+    pub fn add_to(self, before: Self, statistics: &mut Statistics) {
+        let add =
+            |sum: &mut u64, now: u64, before: u64| *sum = sum.saturating_add(now.saturating_sub(before));
+        add(&mut statistics.expanded, self.expanded, before.expanded);
+        add(&mut statistics.generated, self.generated, before.generated);
+        add(&mut statistics.evaluated, self.evaluated, before.evaluated);
+    }
+}

@@ -1,0 +1,467 @@
+//! Which of the operators that can be applied are enough: stubborn sets.
+//!
+//! Operators that do not interfere can be put into any order, so that all orders but one need not be searched. A set of operators
+//! is stubborn in a state [1] if it has
+//!
+//! - every operator that makes some part of the goal true that does not hold;
+//! - for each of its operators that cannot be applied, every operator that makes some part of its condition true that does not hold;
+//! - for each of its operators that can be applied, every operator that it *disturbs*: what requires or sets another value of a variable
+//!   that it sets, or asks for one in a conditional effect; and where it has conditional effects of its own, what sets what they ask for.
+//!
+//! It is enough to apply the operators of such a set. Take any plan from the state, and its first operator that is in the set: there
+//! is one by the first condition, and it can be applied already, as by the second condition something before it would be in the set
+//! otherwise. By the third it disturbs nothing that is before it, and nothing before it changes what it does, so that it can
+//! come first: the plan has the same operators in another order. That what comes before may make it inapplicable for a while
+//! does no harm [2]. So a cheapest plan with fewest steps is left from each state. That is all that the search needs, also where it drops
+//! states that a known one dominates, or that only interchangeable objects tell from a known one [3]: from the known one there is a plan
+//! with the same operators, or with their images, and so one that begins with an operator of its own stubborn set.
+//!
+//! A variable that an operator requires at one value and sets to another one is changed by others only from that value, or from any:
+//! what requires further values comes after something that is in the set already.
+//!
+//! Where few operators are left out the search goes on without, as finding out takes time.
+//!
+//! - \[1\] M. Wehrle, M. Helmert: Efficient stubborn sets: generalized algorithms and selection strategies, ICAPS 2014.
+//! - \[2\] S. Sievers, M. Wehrle: On weak stubborn sets in classical planning, IJCAI 2021.
+//! - \[3\] M. Wehrle, M. Helmert, A. Shleyfman, M. Katz: Integrating partial order reduction and symmetry elimination for cost-optimal
+//!   classical planning, IJCAI 2015.
+
+use std::sync::Arc;
+
+use task::lists::Lists;
+use task::number::dense;
+use task::task::{Condition, Fact, Literal, Operator, OperatorId, Task};
+
+/// Stubborn sets pay if at least one of so many operators is left out.
+const MIN_PRUNED_FRACTION: u64 = 5;
+
+/// Who requires, sets and asks for what in a task.
+pub struct Stubborn {
+    /// The number of each variable's first fact.
+    first: Vec<u32>,
+    /// By fact: the operators that require it, and those that may set it.
+    requiring: Lists,
+    setting: Lists,
+    /// By variable: those that require none of its values and may set it, and those that ask for it in a clause or for a conditional
+    /// effect.
+    blind: Lists,
+    asking: Lists,
+    /// By operator, and then for the goal: the numbers of the facts required.
+    required: Lists,
+}
+
+/// Room for looking at states, and what came of it.
+pub(super) struct StubbornSetPruning {
+    stubborn: Arc<Stubborn>,
+    /// By operator.
+    is_in: Vec<bool>,
+    can_be_applied: Vec<bool>,
+    /// Operators of the set that are not looked at yet, and all.
+    open: Vec<u32>,
+    all: Vec<u32>,
+    /// By fact: whether all that set it are in the set.
+    is_set: Vec<bool>,
+    set: Vec<u32>,
+    /// How many operators that can be applied are not in the set.
+    out: usize,
+    /// After so many states it is looked at whether it pays.
+    trial: u64,
+    /// States, and operators that could be applied in them, and those of them that were left out.
+    looked: u64,
+    applicable: u64,
+    left_out: u64,
+}
+
+impl Stubborn {
+    /// None where states have numbers or derived variables.
+    pub(crate) fn new<N>(task: &Task<N>) -> Option<Self> {
+        if !task.axioms.is_empty() || !task.initial.numbers.is_empty() || task.basic < task.variables.len() {
+            return None;
+        }
+        let mut facts = 0_u32;
+        let mut first = Vec::with_capacity(task.variables.len());
+        for variable in &task.variables {
+            first.push(facts);
+            facts = facts.checked_add(dense(variable.values.len()))?;
+        }
+        let number = |fact: &Fact| first[fact.variable.index()].saturating_add(fact.value);
+        let (mut required, mut set) = (Lists::default(), Lists::default());
+        let (mut blind, mut asked) = (Lists::default(), Lists::default());
+        for operator in &task.operators {
+            let facts = &operator.condition.facts;
+            let own: Vec<u32> = facts.iter().map(number).collect();
+            required.push(&own);
+            let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
+            let effects = operator.effects.iter().chain(conditional);
+            set.push(&sorted(effects.clone().map(number)));
+            let is_free = |effect: &&Fact| facts.iter().all(|fact| fact.variable != effect.variable);
+            blind.push(&sorted(effects.filter(is_free).map(|fact| fact.variable.0)));
+            let clauses = operator.condition.clauses.iter().flatten();
+            let literals = operator.conditional.iter().flat_map(|effect| &effect.condition);
+            asked.push(&sorted(clauses.chain(literals).map(|literal| literal.fact.variable.0)));
+        }
+        let requiring = required.inverse(facts as usize);
+        let goal: Vec<u32> = task.goal.facts.iter().map(number).collect();
+        required.push(&goal);
+        let variables = task.variables.len();
+        Some(Self {
+            requiring,
+            setting: set.inverse(facts as usize),
+            blind: blind.inverse(variables),
+            asking: asked.inverse(variables),
+            required,
+            first,
+        })
+    }
+
+    /// The numbers of a variable's facts.
+    fn facts(&self, variable: u32) -> std::ops::Range<u32> {
+        let next = self.first.get((variable as usize).saturating_add(1)).copied();
+        self.first[variable as usize]..next.unwrap_or_else(|| dense(self.setting.count()))
+    }
+}
+
+fn sorted(items: impl Iterator<Item = u32>) -> Vec<u32> {
+    let mut items: Vec<u32> = items.collect();
+    items.sort_unstable();
+    items.dedup();
+    items
+}
+
+impl StubbornSetPruning {
+    pub(super) fn new(stubborn: Arc<Stubborn>, trial: u64) -> Self {
+        let (operators, facts) = (stubborn.required.count(), stubborn.setting.count());
+        Self {
+            is_in: vec![false; operators],
+            can_be_applied: vec![false; operators],
+            open: Vec::new(),
+            all: Vec::new(),
+            is_set: vec![false; facts],
+            set: Vec::new(),
+            out: 0,
+            trial,
+            looked: 0,
+            applicable: 0,
+            left_out: 0,
+            stubborn,
+        }
+    }
+
+    /// Whether it leaves out too little for what it takes.
+    pub(super) fn prunes_too_little(&self) -> bool {
+        self.looked == self.trial && self.left_out.saturating_mul(MIN_PRUNED_FRACTION) < self.applicable
+    }
+
+    /// Leaves of the operators that can be applied in a state those that are enough; all where the goal holds. How many were looked at.
+    pub(super) fn prune_operators<N>(
+        &mut self,
+        task: &Task<N>,
+        values: &[u32],
+        applicable: &mut Vec<OperatorId>,
+    ) -> u64 {
+        for operator in &*applicable {
+            self.can_be_applied[operator.index()] = true;
+        }
+        self.out = applicable.len();
+        self.look(task, values);
+        for operator in &*applicable {
+            self.can_be_applied[operator.index()] = false;
+        }
+        self.looked = self.looked.saturating_add(1);
+        self.applicable = self.applicable.saturating_add(applicable.len() as u64);
+        if !self.all.is_empty() && self.out > 0 {
+            self.left_out = self.left_out.saturating_add(self.out as u64);
+            applicable.retain(|operator| self.is_in[operator.index()]);
+        }
+        let size = self.all.len() as u64;
+        self.open.clear();
+        for operator in self.all.drain(..) {
+            self.is_in[operator as usize] = false;
+        }
+        for fact in self.set.drain(..) {
+            self.is_set[fact as usize] = false;
+        }
+        size
+    }
+
+    /// Makes a stubborn set as far as it takes to see what it leaves out; an empty one where the goal holds.
+    fn look<N>(&mut self, task: &Task<N>, values: &[u32]) {
+        let stubborn = &*Arc::clone(&self.stubborn);
+        let goal = dense(task.operators.len());
+        if !self.enable(stubborn, goal, &task.goal, values) {
+            return;
+        }
+        while self.out > 0
+            && let Some(own) = self.open.pop()
+        {
+            let operator = &task.operators[own as usize];
+            if !self.enable(stubborn, own, &operator.condition, values) {
+                self.disturb(stubborn, operator);
+            }
+        }
+    }
+
+    /// Adds what makes some part of a condition true that does not hold; false if it holds.
+    fn enable<N>(&mut self, stubborn: &Stubborn, own: u32, condition: &Condition<N>, values: &[u32]) -> bool {
+        let mut best: Option<(usize, u32)> = None;
+        for (fact, number) in condition.facts.iter().zip(stubborn.required.of(own)) {
+            if fact.holds(values) {
+                continue;
+            }
+            if self.is_set[*number as usize] {
+                return true;
+            }
+            let count = stubborn.setting.of(*number).len();
+            if best.is_none_or(|(least, _)| count < least) {
+                best = Some((count, *number));
+            }
+        }
+        if let Some((_, number)) = best {
+            self.add_setting(stubborn, number);
+            return true;
+        }
+        let fails = |clause: &&Vec<Literal>| !clause.iter().any(|literal| literal.holds(values));
+        let Some(clause) = condition.clauses.iter().find(fails) else { return false };
+        for literal in clause {
+            let own = stubborn.first[literal.fact.variable.index()].saturating_add(literal.fact.value);
+            for number in stubborn.facts(literal.fact.variable.0) {
+                if (number == own) == literal.positive {
+                    self.add_setting(stubborn, number);
+                }
+            }
+        }
+        true
+    }
+
+    /// Adds what an operator disturbs, and what changes what it does.
+    fn disturb<N>(&mut self, stubborn: &Stubborn, operator: &Operator<N>) {
+        for effect in &operator.effects {
+            let required = operator.condition.facts.iter().find(|fact| fact.variable == effect.variable);
+            let variable = effect.variable.0;
+            let number = |fact: &Fact| stubborn.first[variable as usize].saturating_add(fact.value);
+            match required {
+                Some(required) if required.value == effect.value => continue,
+                Some(required) => {
+                    self.add_all(stubborn.requiring.of(number(required)));
+                    self.add_all(stubborn.blind.of(variable));
+                }
+                None => {
+                    for other in stubborn.facts(variable).filter(|other| *other != number(effect)) {
+                        self.add_all(stubborn.requiring.of(other));
+                        self.add_setting(stubborn, other);
+                    }
+                }
+            }
+            self.add_all(stubborn.asking.of(variable));
+        }
+        for effect in &operator.conditional {
+            for variable in effect.condition.iter().map(|literal| literal.fact.variable.0) {
+                for fact in stubborn.facts(variable) {
+                    self.add_setting(stubborn, fact);
+                }
+            }
+            for variable in effect.effects.iter().map(|fact| fact.variable.0) {
+                for fact in stubborn.facts(variable) {
+                    self.add_all(stubborn.requiring.of(fact));
+                    self.add_setting(stubborn, fact);
+                }
+                self.add_all(stubborn.asking.of(variable));
+            }
+        }
+    }
+
+    /// Adds all that set a fact.
+    fn add_setting(&mut self, stubborn: &Stubborn, number: u32) {
+        if !std::mem::replace(&mut self.is_set[number as usize], true) {
+            self.set.push(number);
+            self.add_all(stubborn.setting.of(number));
+        }
+    }
+
+    fn add_all(&mut self, operators: &[u32]) {
+        for operator in operators {
+            if !std::mem::replace(&mut self.is_in[*operator as usize], true) {
+                self.all.push(*operator);
+                self.open.push(*operator);
+                self.out = self.out.saturating_sub(self.can_be_applied[*operator as usize].into());
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use std::cmp::Reverse;
+    use std::collections::BinaryHeap;
+    use std::fmt::Write as _;
+
+    use rustc_hash::FxHashMap;
+
+    use super::*;
+    use crate::search::successor_generator::SuccessorGenerator;
+    use task::number::Int;
+    use task::task::State;
+    use testing::adl::Generator;
+    use testing::random::Random;
+    use testing::{depot, ground_text};
+
+    /// So many states of a task are looked at at most.
+    const STATES: usize = 3_000;
+
+    /// What can be done in a state: operators with where they lead and what they cost.
+    pub(in crate::search) type Steps = Vec<(OperatorId, usize, Int)>;
+
+    /// All states that can be reached; none if those are too many.
+    pub(in crate::search) fn reachable(task: &Task) -> Option<(Vec<State>, Vec<Steps>)> {
+        let mut known = FxHashMap::from_iter([(task.initial.clone(), 0)]);
+        let (mut states, mut steps): (Vec<State>, Vec<Steps>) = (vec![task.initial.clone()], Vec::new());
+        while let Some(state) = states.get(steps.len()).cloned() {
+            let mut own = Steps::new();
+            for (operator, id) in task.operators.iter().zip(OperatorId::all(task.operators.len())) {
+                for choice in
+                    operator.admitted_combinations().filter(|choice| operator.applicable(&state, choice))
+                {
+                    let next = task.successor(operator, &state, &choice)?;
+                    let position = *known.entry(next.clone()).or_insert_with(|| {
+                        states.push(next);
+                        states.len() - 1
+                    });
+                    own.push((id, position, operator.cost_of(&choice)));
+                }
+            }
+            if states.len() > STATES {
+                return None;
+            }
+            steps.push(own);
+        }
+        Some((states, steps))
+    }
+
+    /// The cost and the steps of a cheapest plan with fewest steps from each state, backwards by Dijkstra's algorithm.
+    pub(in crate::search) fn to_go(
+        task: &Task,
+        states: &[State],
+        steps: &[Steps],
+    ) -> Vec<Option<(Int, u32)>> {
+        let mut before: Vec<Vec<(usize, Int)>> = vec![Vec::new(); states.len()];
+        for (from, own) in steps.iter().enumerate() {
+            for (_, to, cost) in own {
+                before[*to].push((from, *cost));
+            }
+        }
+        let mut best: Vec<Option<(Int, u32)>> = vec![None; states.len()];
+        let mut open: BinaryHeap<_> = states
+            .iter()
+            .enumerate()
+            .filter(|(_, state)| task.is_goal(state))
+            .map(|(at, _)| Reverse(((0, 0), at)))
+            .collect();
+        while let Some(Reverse((value, at))) = open.pop() {
+            if best[at].is_none() {
+                best[at] = Some(value);
+                open.extend(
+                    before[at].iter().map(|(from, cost)| Reverse(((value.0 + cost, value.1 + 1), *from))),
+                );
+            }
+        }
+        best
+    }
+
+    /// From each state a cheapest plan with fewest steps is left. How many operators are left out, if the task has stubborn sets.
+    fn check(text: &(String, String)) -> Option<usize> {
+        let task = ground_text(text.clone());
+        let stubborn = Arc::new(Stubborn::new(&task).filter(|_| task.unreachable.is_none())?);
+        let (states, steps) = reachable(&task)?;
+        let best = to_go(&task, &states, &steps);
+        let index = SuccessorGenerator::new(&task);
+        let mut choosing = StubbornSetPruning::new(stubborn, u64::MAX);
+        let mut left_out = 0;
+        for ((state, own), expected) in states.iter().zip(&steps).zip(&best) {
+            if task.is_goal(state) {
+                continue;
+            }
+            let mut chosen = index.applicable(&task, state);
+            let all = chosen.len();
+            choosing.prune_operators(&task, &state.values, &mut chosen);
+            left_out += all - chosen.len();
+            let through = |(id, to, cost): &(OperatorId, usize, Int)| {
+                let (more, steps) = best[*to].filter(|_| chosen.contains(id))?;
+                Some((cost + more, steps + 1))
+            };
+            assert_eq!(own.iter().filter_map(through).min(), *expected, "{state:?} {text:?}");
+        }
+        Some(left_out)
+    }
+
+    /// A task whose operators require, set, and ask for whatever it happens to be; mostly of things of their own.
+    pub(in crate::search) fn switches(seed: u64) -> (String, String) {
+        let mut random = Random(seed);
+        let mut below = move |limit: i64| random.below(limit.unsigned_abs());
+        let count = 5;
+        let mut domain = String::from(
+            "(define (domain switches) (:requirements :adl :action-costs) (:functions (total-cost)) (:predicates",
+        );
+        for one in 0..count {
+            let _ = write!(domain, " (p{one})");
+        }
+        domain.push(')');
+        let literal = |below: &mut dyn FnMut(i64) -> i64, near: i64| {
+            let one = (near + below(2)) % count;
+            if below(2) == 0 { format!("(p{one})") } else { format!("(not (p{one}))") }
+        };
+        for action in 0..7 {
+            let near = below(count);
+            let required: Vec<String> = (0..below(3)).map(|_| literal(&mut below, near)).collect();
+            let clause = match below(4) {
+                0 => format!("(or {} {})", literal(&mut below, near), literal(&mut below, near + 2)),
+                _ => String::new(),
+            };
+            let when = match below(4) {
+                0 => format!("(when {} {})", literal(&mut below, near + 1), literal(&mut below, near + 2)),
+                _ => String::new(),
+            };
+            let _ = write!(
+                domain,
+                " (:action a{action} :parameters () :precondition (and {} {clause}) :effect (and {} {when} (increase (total-cost) {})))",
+                required.join(" "),
+                literal(&mut below, near),
+                below(3),
+            );
+        }
+        domain.push(')');
+        let mut init = String::new();
+        for one in (0..count).filter(|_| below(3) == 0) {
+            let _ = write!(init, " (p{one})");
+        }
+        let goal: String = (0..3).map(|one| literal(&mut below, 2 * one)).collect();
+        let problem = format!(
+            "(define (problem p) (:domain switches) (:init {init} (= (total-cost) 0)) (:goal (and {goal})) (:metric minimize (total-cost)))"
+        );
+        (domain, problem)
+    }
+
+    fn check_all(seeds: std::ops::Range<u64>) {
+        let (mut looked, mut paid) = (0, 0);
+        for seed in seeds {
+            let mut random = Generator(Random(seed));
+            let others = [(random.domain(), random.problem()), depot(seed)];
+            for text in (0..40).map(|part| switches(40 * seed + part)).chain(others) {
+                let left_out = check(&text);
+                looked += usize::from(left_out.is_some());
+                paid += usize::from(left_out.is_some_and(|count| count > 0));
+            }
+        }
+        assert!(looked > 1_000 && paid > 200, "{looked} tasks, operators are left out in {paid}");
+    }
+
+    #[test]
+    fn a_cheapest_plan_with_fewest_steps_is_left_from_each_state() {
+        check_all(0..60);
+    }
+
+    #[test]
+    #[ignore = "takes minutes"]
+    fn a_cheapest_plan_with_fewest_steps_is_left_from_each_state_of_many() {
+        check_all(60..1_000);
+    }
+}

@@ -1,0 +1,158 @@
+//! Which operators can be applied in a state: a decision tree over the variables that they require [1].
+//!
+//! A node holds the operators that require nothing more, asks for the value of one variable, and goes on with those that
+//! require this value, and with those that do not ask for it. So operators are not looked at one by one.
+//!
+//! [1] M. Helmert: The Fast Downward planning system, JAIR 26, 2006, section 5.3.
+
+use task::number::dense;
+use task::task::{OperatorId, State, Task};
+
+/// No further node.
+const NONE: u32 = u32::MAX;
+
+#[derive(Default)]
+struct Node {
+    /// What is required is complete here: a part of `operators`.
+    complete: (u32, u32),
+    /// The variable that is asked for next.
+    variable: u32,
+    /// By value, ascending: a part of `children`.
+    children: (u32, u32),
+    /// Where those go on that do not ask for it.
+    others: u32,
+}
+
+/// The operators of a task by what they require.
+pub struct SuccessorGenerator {
+    nodes: Vec<Node>,
+    operators: Vec<OperatorId>,
+    children: Vec<(u32, u32)>,
+}
+
+/// What an operator requires, ascending by variable, and its position.
+type Precondition = (Vec<(u32, u32)>, OperatorId);
+
+/// Operators that share what they require up to some depth, and where their node is to be noted.
+struct PendingSubtree {
+    from: usize,
+    to: usize,
+    depth: usize,
+    place: Place,
+}
+
+#[derive(Clone, Copy)]
+enum Place {
+    Root,
+    Others(usize),
+    Child(usize),
+}
+
+impl SuccessorGenerator {
+    pub fn new<N>(task: &Task<N>) -> Self {
+        Self::over(task, OperatorId::all(task.operators.len()))
+    }
+
+    /// An index of some operators, ascending.
+    #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
+    pub fn over<N>(task: &Task<N>, operators: impl Iterator<Item = OperatorId>) -> Self {
+        let required = |id: OperatorId| {
+            let facts = &task.operators[id.index()].condition.facts;
+            let mut facts: Vec<_> = facts.iter().map(|fact| (fact.variable.0, fact.value)).collect();
+            facts.sort_unstable();
+            facts.dedup();
+            (facts, id)
+        };
+        let mut all: Vec<Precondition> = operators.map(required).collect();
+        all.sort_unstable();
+        let mut index = Self { nodes: Vec::new(), operators: Vec::new(), children: Vec::new() };
+        let mut open = vec![PendingSubtree { from: 0, to: all.len(), depth: 0, place: Place::Root }];
+        while let Some(PendingSubtree { mut from, to, depth, place }) = open.pop() {
+            let id = index.nodes.len();
+            match place {
+                Place::Root => {}
+                Place::Others(node) => index.nodes[node].others = dense(id),
+                Place::Child(child) => index.children[child].1 = dense(id),
+            }
+            let begin = dense(index.operators.len());
+            while from < to && all[from].0.len() == depth {
+                index.operators.push(all[from].1);
+                from += 1;
+            }
+            let mut node =
+                Node { complete: (begin, dense(index.operators.len())), others: NONE, ..Node::default() };
+            if from < to {
+                let variable = all[from].0[depth].0;
+                node.variable = variable;
+                let first = dense(index.children.len());
+                while from < to && all[from].0[depth].0 == variable {
+                    let value = all[from].0[depth].1;
+                    let end = from + all[from..to].partition_point(|own| own.0[depth] <= (variable, value));
+                    let child = index.children.len();
+                    index.children.push((value, NONE));
+                    open.push(PendingSubtree { from, to: end, depth: depth + 1, place: Place::Child(child) });
+                    from = end;
+                }
+                node.children = (first, dense(index.children.len()));
+            }
+            index.nodes.push(node);
+            if from < to {
+                open.push(PendingSubtree { from, to, depth, place: Place::Others(id) });
+            }
+        }
+        index
+    }
+
+    /// The operators whose propositional condition holds, ascending.
+    pub fn applicable<N>(&self, task: &Task<N>, state: &State<N>) -> Vec<OperatorId> {
+        let mut found = Vec::new();
+        let mut stack = vec![0_u32];
+        while let Some(mut at) = stack.pop() {
+            while at != NONE {
+                let Node { complete, variable, children, others } = &self.nodes[at as usize];
+                found.extend_from_slice(&self.operators[complete.0 as usize..complete.1 as usize]);
+                let children = &self.children[children.0 as usize..children.1 as usize];
+                if !children.is_empty() {
+                    let value = state.values[*variable as usize];
+                    if let Ok(child) = children.binary_search_by_key(&value, |(value, _)| *value) {
+                        stack.push(children[child].1);
+                    }
+                }
+                at = *others;
+            }
+        }
+        // Facts are checked already; clauses are not.
+        found.retain(|id| {
+            let clauses = &task.operators[id.index()].condition.clauses;
+            clauses.iter().all(|clause| clause.iter().any(|literal| literal.holds(&state.values)))
+        });
+        found.sort_unstable();
+        found
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use testing::{depot, fleet, ground_text};
+
+    #[test]
+    fn those_are_found_whose_propositional_conditions_hold() {
+        for text in (0..30).flat_map(|seed| [fleet(seed), depot(seed)]) {
+            let task = ground_text(text);
+            let index = SuccessorGenerator::new(&task);
+            let mut state = task.initial.clone();
+            for step in 0..40 {
+                let expected: Vec<OperatorId> = OperatorId::all(task.operators.len())
+                    .filter(|id| task.operators[id.index()].condition.holds_propositionally(&state.values))
+                    .collect();
+                assert_eq!(index.applicable(&task, &state), expected);
+                let Some(id) = expected.get((step * 7) % expected.len().max(1)) else { break };
+                let operator = &task.operators[id.index()];
+                let Some(choice) = operator.admitted_combinations().next() else { break };
+                let Some(next) = task.successor(operator, &state, &choice) else { break };
+                state = next;
+            }
+        }
+    }
+}

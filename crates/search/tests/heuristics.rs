@@ -1,0 +1,53 @@
+//! Admissibility and consistency of the heuristics.
+
+use metaplan_search::bounds::Bounds;
+use task::context::Context;
+use task::limits::Limits;
+use testing::missions::Mission;
+use testing::{depot, fleet, ground_text, successors};
+
+/// Estimates never fall by more than a step costs, and are 0 at the goal: so they are lower bounds. Returns whether the shares of
+/// several projections say more of the initial state than any projection alone.
+fn check_estimates(text: &(String, String)) -> bool {
+    let task = ground_text(text.clone());
+    if task.unreachable.is_some() {
+        return false;
+    }
+    let (bounds, alone) = (
+        Bounds::new(Context::new(&task, &Limits::none())).expect("no limit"),
+        Bounds::of_projections(Context::new(&task, &Limits::none())).expect("no limit"),
+    );
+    let mut seen = rustc_hash::FxHashSet::from_iter([task.initial.clone()]);
+    let mut open = vec![task.initial.clone()];
+    while let Some(state) = open.pop() {
+        let estimate = bounds.estimate(&state);
+        assert!(!task.is_goal(&state) || estimate == Some(0), "{estimate:?} at a goal: {text:?}");
+        for (next, step) in successors(&task, &state) {
+            if let Some(after) = bounds.estimate(&next) {
+                assert!(estimate.is_some_and(|estimate| estimate <= step + after), "{state:?}: {text:?}");
+            }
+            if seen.len() < 3_000 && seen.insert(next.clone()) {
+                open.push(next);
+            }
+        }
+    }
+    bounds.estimate(&task.initial) > alone.estimate(&task.initial)
+}
+
+#[test]
+fn estimates_are_consistent_and_shares_add_up() {
+    let fleets = (0..12).filter(|seed| check_estimates(&fleet(*seed))).count();
+    let depots = (0..12).filter(|seed| check_estimates(&depot(*seed))).count();
+    assert!(fleets > 3 && depots > 3, "shares add up for {fleets} fleets and {depots} depots");
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn many_estimates_are_consistent() {
+    for seed in 12..600 {
+        check_estimates(&fleet(seed));
+        check_estimates(&depot(seed));
+        let mission = Mission::random(seed);
+        check_estimates(&(mission.domain(), mission.problem()));
+    }
+}

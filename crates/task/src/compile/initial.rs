@@ -1,0 +1,187 @@
+//! Conditions without free variables in the initial state.
+
+use num_rational::BigRational;
+use num_traits::Zero;
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use pddl::ast::{
+    Arithmetic, Atom, Comparison, Condition, Domain, Expression, InitialElement, Name, Problem, Span, Term,
+};
+
+use crate::error::{Error, File};
+
+use super::instances::{Binding, Objects, term};
+use super::syntax_edits::unsupported;
+
+type Key = (Name, Vec<Name>);
+
+/// What holds at first. Derived predicates are not asked for.
+pub(super) struct Initial<'t> {
+    objects: &'t Objects<'t>,
+    domain: &'t Domain,
+    facts: FxHashSet<Key>,
+    values: FxHashMap<Key, BigRational>,
+}
+
+fn key(atom: &Atom, binding: &Binding) -> Key {
+    let name = |argument: &Term| match term(argument, binding) {
+        Term::Variable(identifier) | Term::Constant(identifier) => identifier.name,
+    };
+    (atom.predicate.name.clone(), atom.arguments.iter().map(name).collect())
+}
+
+impl<'t> Initial<'t> {
+    pub(super) fn of(domain: &'t Domain, problem: &Problem, objects: &'t Objects<'t>) -> Self {
+        let (mut facts, mut values) = (FxHashSet::default(), FxHashMap::default());
+        values.insert((Name::new("total-cost"), Vec::new()), BigRational::zero());
+        for element in &problem.init {
+            match element {
+                InitialElement::Fact(atom) => {
+                    facts.insert(key(atom, &Vec::new()));
+                }
+                InitialElement::Value(atom, value, _) => {
+                    values.insert(key(atom, &Vec::new()), value.clone());
+                }
+                InitialElement::NegatedFact(_) | InitialElement::Timed(..) => {}
+            }
+        }
+        Self { objects, domain, facts, values }
+    }
+
+    /// Whether a condition holds; one that depends on an undefined value does not.
+    pub(super) fn holds(&self, condition: &Condition) -> bool {
+        self.truth(condition, &mut Vec::new()) == Some(true)
+    }
+
+    /// Whether a condition always is true or false: where it may be neither, what is not met is not the same as its negation.
+    pub(super) fn is_defined(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {
+        match self.undefined(condition, &mut Vec::new()) {
+            None => Ok(()),
+            Some(name) => Err(unsupported(
+                format!(
+                    "a constraint or preference on `{name}`, which has no initial value for some objects"
+                ),
+                "an initial value for each",
+                place,
+            )),
+        }
+    }
+
+    /// A function that a condition reads, and that may be without a value. Variables that nothing binds stand for all objects.
+    fn undefined<'c>(&self, condition: &'c Condition, binding: &mut Binding) -> Option<&'c Name> {
+        match condition {
+            Condition::And(parts) | Condition::Or(parts) => {
+                parts.iter().find_map(|part| self.undefined(part, binding))
+            }
+            Condition::Not(inner) => self.undefined(inner, binding),
+            Condition::Imply(premise, conclusion) => {
+                self.undefined(premise, binding).or_else(|| self.undefined(conclusion, binding))
+            }
+            Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {
+                let mut instances = self.objects.bindings(variables, binding);
+                instances.find_map(|mut inner| self.undefined(body, &mut inner))
+            }
+            Condition::Atom(_) | Condition::Equal(..) => None,
+            Condition::Compare(_, left, right, _) => {
+                [left, right].into_iter().find_map(|side| self.undefined_in(side, binding))
+            }
+        }
+    }
+
+    fn undefined_in<'c>(&self, expression: &'c Expression, binding: &Binding) -> Option<&'c Name> {
+        match expression {
+            Expression::Fluent(atom) => (!self.has_value(atom, binding)).then_some(&atom.predicate.name),
+            Expression::Operation(_, operands, _) => {
+                operands.iter().find_map(|operand| self.undefined_in(operand, binding))
+            }
+            Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => None,
+        }
+    }
+
+    fn has_value(&self, atom: &Atom, binding: &Binding) -> bool {
+        let is_bound = |argument: &Term| matches!(term(argument, binding), Term::Constant(_));
+        if atom.arguments.iter().all(is_bound) {
+            return self.values.contains_key(&key(atom, binding));
+        }
+        let name = &atom.predicate.name;
+        let mut declared = self.domain.functions.iter().filter(|own| own.identifier.name == *name);
+        let instances = declared.next().map(|own| {
+            let members =
+                own.parameters.iter().map(|parameter| self.objects.members(&parameter.r#type).count());
+            members.fold(1, usize::saturating_mul)
+        });
+        let known = self.values.keys().filter(|(own, _)| own == name).count();
+        instances.is_some_and(|instances| known >= instances)
+    }
+
+    /// The truth value in Kleene's logic; none where it depends on an undefined value.
+    fn truth(&self, condition: &Condition, binding: &mut Binding) -> Option<bool> {
+        match condition {
+            Condition::And(parts) | Condition::Or(parts) => {
+                let truths: Vec<_> = parts.iter().map(|part| self.truth(part, binding)).collect();
+                kleene(&truths, matches!(condition, Condition::Or(_)))
+            }
+            Condition::Not(inner) => self.truth(inner, binding).map(|holds| !holds),
+            Condition::Imply(premise, conclusion) => {
+                let premise = self.truth(premise, binding).map(|holds| !holds);
+                kleene(&[premise, self.truth(conclusion, binding)], true)
+            }
+            Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {
+                let instances = self.objects.bindings(variables, binding);
+                let truths: Vec<_> = instances.map(|mut inner| self.truth(body, &mut inner)).collect();
+                kleene(&truths, matches!(condition, Condition::Exists(..)))
+            }
+            Condition::Atom(atom) => Some(self.facts.contains(&key(atom, binding))),
+            Condition::Equal(left, right, _) => {
+                let name = |side: &Term| match term(side, binding) {
+                    Term::Variable(identifier) | Term::Constant(identifier) => identifier.name,
+                };
+                Some(name(left) == name(right))
+            }
+            Condition::Compare(operator, left, right, _) => {
+                let (left, right) = (self.value(left, binding)?, self.value(right, binding)?);
+                Some(match operator {
+                    Comparison::Less => left < right,
+                    Comparison::LessOrEqual => left <= right,
+                    Comparison::Equal => left == right,
+                    Comparison::GreaterOrEqual => left >= right,
+                    Comparison::Greater => left > right,
+                })
+            }
+        }
+    }
+
+    fn value(&self, expression: &Expression, binding: &Binding) -> Option<BigRational> {
+        match expression {
+            Expression::Number(number, _) => Some(number.clone()),
+            Expression::Fluent(atom) => self.values.get(&key(atom, binding)).cloned(),
+            Expression::Duration(_) | Expression::TotalTime(_) => None,
+            Expression::Operation(operation, operands, _) => {
+                let mut operands = operands.iter().map(|operand| self.value(operand, binding));
+                let first = operands.next()??;
+                let mut rest = operands.peekable();
+                if *operation == Arithmetic::Subtract && rest.peek().is_none() {
+                    return Some(-first);
+                }
+                rest.try_fold(first, |left, right| {
+                    let right = right?;
+                    Some(match operation {
+                        Arithmetic::Add => left + right,
+                        Arithmetic::Subtract => left - right,
+                        Arithmetic::Multiply => left * right,
+                        Arithmetic::Divide if right.is_zero() => return None,
+                        Arithmetic::Divide => left / right,
+                    })
+                })
+            }
+        }
+    }
+}
+
+/// A disjunction, or a conjunction, of truth values.
+fn kleene(truths: &[Option<bool>], is_disjunction: bool) -> Option<bool> {
+    if truths.contains(&Some(is_disjunction)) {
+        return Some(is_disjunction);
+    }
+    if truths.contains(&None) { None } else { Some(!is_disjunction) }
+}

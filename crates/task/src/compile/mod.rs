@@ -1,0 +1,178 @@
+//! PDDL 3 to PDDL 2: preferences and constraints on trajectories are compiled away, on the syntax tree, before names become ids.
+//!
+//! Each instance of a constraint gets atoms that remember what its automaton has to, and each action effects on them: a condition on
+//! the state *after* the action is regressed to the state before it (`regress`), so that no state is added to plans. What has to hold
+//! becomes a condition of actions and of the goal. Preferences are judged after the plan, by actions that are not shown (`preferences`):
+//! each either is met, or costs what the metric says (A. Gerevini et al.: Deterministic planning in the fifth international planning
+//! competition, Artificial Intelligence 173, 2009; regression after L. Bonassi et al.: On planning with qualitative
+//! state-trajectory constraints in PDDL3 by compiling them away, ICAPS 2021; preferences after E. Keyder, H. Geffner: Soft goals can be
+//! compiled away, JAIR 36, 2009). Where actions overlap, these actions never happen: their conditions are looked up in the last state.
+//!
+//! Names that are made up have a space, so that no file can mean them.
+
+mod deadline;
+mod initial;
+mod instances;
+mod preferences;
+mod regress;
+mod semantics;
+mod simplify;
+mod syntax_edits;
+mod timed;
+mod trajectory_monitors;
+use std::borrow::Cow;
+
+use crate::error::{Errors, File};
+use crate::limits::Limits;
+use pddl::ast::{Constraint, Domain, Expression, InitialElement, Metric, Name, Problem, Term};
+
+pub use deadline::Deadline;
+use instances::Objects;
+pub use semantics::PlanSemantics;
+use syntax_edits::unsupported;
+use trajectory_monitors::Monitors;
+
+/// A task without preferences and constraints.
+pub struct CompiledTask<'t> {
+    pub domain: Cow<'t, Domain>,
+    pub problem: Cow<'t, Problem>,
+    pub objectives: Cow<'t, [Metric]>,
+    /// What plans have to keep in time, or should, which is judged when their times are known.
+    pub deadlines: Vec<Deadline>,
+    /// Whether nothing keeps happenings apart that the files do not. Of no meaning where actions do not overlap.
+    pub is_exact: bool,
+}
+
+/// Whether there is anything to compile.
+pub fn is_needed(domain: &Domain, problem: &Problem) -> bool {
+    constraints(domain, problem).next().is_some()
+        || domain.actions.iter().any(|action| !action.preferences.is_empty())
+}
+
+/// Whether an action of that name is none of the domain, but judges preferences.
+pub fn is_hidden(action: &str) -> bool {
+    action.contains(' ')
+}
+
+/// Whether an action of that name judges an instance of a preference violated.
+pub fn is_violation(action: &str) -> bool {
+    is_hidden(action) && action.ends_with(preferences::VIOLATION)
+}
+
+/// Compiles preferences and constraints away. Preferences that no objective asks for are dropped.
+///
+/// # Errors
+/// Every constraint that cannot be compiled, with its place; or a limit was reached.
+pub fn compile<'t>(
+    domain: &'t Domain,
+    problem: &'t Problem,
+    objectives: &'t [Metric],
+    course: PlanSemantics<'_>,
+    limits: &Limits,
+) -> Result<CompiledTask<'t>, Errors> {
+    if !is_needed(domain, problem) {
+        let (domain, problem) = (Cow::Borrowed(domain), Cow::Borrowed(problem));
+        return Ok(CompiledTask {
+            domain,
+            problem,
+            objectives: Cow::Borrowed(objectives),
+            deadlines: Vec::new(),
+            is_exact: true,
+        });
+    }
+    let asked = asked(if objectives.is_empty() { problem.metric.as_slice() } else { objectives });
+    let objects = Objects::of(domain, problem, limits);
+    let mut monitors = Monitors::new(domain, problem, &objects, course);
+    let mut errors = Vec::new();
+    for (file, constraint) in constraints(domain, problem) {
+        if constraint.preference.as_ref().is_none_or(|name| asked.contains(&name.name)) {
+            errors.extend(monitors.add_constraint(file, constraint).err());
+        }
+    }
+    for preference in domain.actions.iter().flat_map(|action| &action.preferences) {
+        if asked.contains(&preference.name.name) {
+            let place = (File::Domain, preference.span);
+            errors.extend(monitors.is_defined(&preference.condition, place).err());
+        }
+    }
+    let has_events = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
+    if has_events && !asked.is_empty() && matches!(course, PlanSemantics::Sequence) {
+        errors.push(unsupported(
+            "a preference beside timed initial literals",
+            "a plan that waits for a literal after its last action would be judged too late",
+            (File::Problem, problem.metric.as_ref().map_or(problem.name.span, |metric| metric.span)),
+        ));
+    }
+    limits.check().map_err(|interrupted| vec![interrupted.into()])?;
+    if !errors.is_empty() {
+        return Err(errors.into());
+    }
+    let mut task = (domain.clone(), problem.clone());
+    (task.0.constraints, task.1.constraints) = (Vec::new(), Vec::new());
+    let mut is_exact = monitors.keeps_apart_nothing();
+    let (wanted, deadlines) = monitors.install(&mut task.0, &mut task.1);
+    let mut objectives = objectives.to_vec();
+    for metric in task.1.metric.iter_mut().chain(&mut objectives) {
+        name_violations(&mut metric.expression);
+    }
+    if !asked.is_empty() {
+        // What an action prefers, it reads.
+        let mut preferences = task.0.actions.iter().flat_map(|action| &action.preferences);
+        is_exact &= !preferences.any(|own| asked.contains(&own.name.name));
+        preferences::install(&mut task.0, &mut task.1, (wanted, &asked), course);
+    }
+    for action in &mut task.0.actions {
+        action.preferences.clear();
+    }
+    let (domain, problem) = (Cow::Owned(task.0), Cow::Owned(task.1));
+    Ok(CompiledTask { domain, problem, objectives: Cow::Owned(objectives), deadlines, is_exact })
+}
+
+fn constraints<'t>(
+    domain: &'t Domain,
+    problem: &'t Problem,
+) -> impl Iterator<Item = (File, &'t Constraint)> + use<'t> {
+    let of_domain = domain.constraints.iter().map(|constraint| (File::Domain, constraint));
+    of_domain.chain(problem.constraints.iter().map(|constraint| (File::Problem, constraint)))
+}
+
+/// The preference that `(is-violated NAME)` asks for.
+fn violation(expression: &Expression) -> Option<&Name> {
+    match expression {
+        Expression::Fluent(atom) if atom.predicate.name == Name::new("is-violated") => {
+            match &atom.arguments[..] {
+                [Term::Constant(name)] => Some(&name.name),
+                _ => None,
+            }
+        }
+        _ => None,
+    }
+}
+
+/// The preferences that some objectives ask for, each once.
+fn asked(objectives: &[Metric]) -> Vec<Name> {
+    fn walk(expression: &Expression, found: &mut Vec<Name>) {
+        if let Some(name) = violation(expression).filter(|name| !found.contains(name)) {
+            found.push(name.clone());
+        }
+        if let Expression::Operation(_, operands, _) = expression {
+            for operand in operands {
+                walk(operand, found);
+            }
+        }
+    }
+    let mut found = Vec::new();
+    for metric in objectives {
+        walk(&metric.expression, &mut found);
+    }
+    found
+}
+
+/// Gives the number of violations of each preference a function of its own.
+fn name_violations(expression: &mut Expression) {
+    if let Some(name) = violation(expression).cloned() {
+        *expression = Expression::Fluent(preferences::count(&name));
+    } else if let Expression::Operation(_, operands, _) = expression {
+        operands.iter_mut().for_each(name_violations);
+    }
+}

@@ -1,0 +1,121 @@
+//! Preferences as actions after the plan, which are not shown: each instance of a preference is met, or violated at a cost.
+//!
+//! They come in one order, each is possible in one way only, and they change nothing else. So every plan can be judged in exactly one way.
+//! Where actions overlap, the plan would last longer by them: there is one for each instance that is violated, which never happens. Its
+//! condition is looked up in the last state.
+
+use num_rational::BigRational;
+use num_traits::{One, Zero};
+
+use pddl::ast::{
+    Action, ActionBody, Assignment, Atom, Condition, Declaration, Domain, Effect, EffectTime, Expression,
+    InitialElement, Name, Problem, Span,
+};
+
+use super::semantics::PlanSemantics;
+use super::simplify::{all, flag, holds, not};
+use super::syntax_edits::{PreferenceInstance, declare, happen, hidden, require};
+
+/// Holds as long as actions can be executed.
+const GOING_ON: &str = "the plan goes on";
+
+/// How the names of actions end that judge an instance violated.
+pub(super) const VIOLATION: &str = " is violated";
+
+/// Never holds.
+const VIOLATED: &str = "a preference is violated";
+
+/// The function that counts the violations of a preference.
+pub(super) fn count(preference: &Name) -> Atom {
+    flag(&format!("violations of {preference}"))
+}
+
+fn violate(preference: &Name) -> Effect {
+    let one = Expression::Number(BigRational::one(), Span::default());
+    Effect::Assign(Assignment::Increase, count(preference), one, Span::default())
+}
+
+/// Adds the preferences that are asked for.
+pub(super) fn install(
+    domain: &mut Domain,
+    problem: &mut Problem,
+    (wanted, asked): (Vec<PreferenceInstance>, &[Name]),
+    course: PlanSemantics<'_>,
+) {
+    for name in asked {
+        let function = count(name);
+        domain.functions.push(Declaration { identifier: function.predicate.clone(), parameters: Vec::new() });
+        problem.init.push(InitialElement::Value(function, BigRational::zero(), Span::default()));
+    }
+    for action in &mut domain.actions {
+        count_preferences(action, asked);
+    }
+    if matches!(course, PlanSemantics::Overlapping(_)) {
+        look_up(domain, problem.name.span, wanted);
+    } else if !wanted.is_empty() {
+        follow(domain, problem, wanted);
+    }
+}
+
+/// Adds the actions that judge after the plan.
+fn follow(domain: &mut Domain, problem: &mut Problem, wanted: Vec<PreferenceInstance>) {
+    declare(domain, GOING_ON);
+    problem.init.push(InitialElement::Fact(flag(GOING_ON)));
+    for action in &mut domain.actions {
+        require(action, EffectTime::AtStart, holds(GOING_ON));
+    }
+    let goal = std::mem::replace(&mut problem.goal, Condition::And(Vec::new()));
+    let mut before = GOING_ON.to_owned();
+    let mut first = Some(goal);
+    for ((name, condition), number) in wanted.into_iter().zip(1_u64..) {
+        let after = format!("{number} preferences are judged");
+        declare(domain, &after);
+        // The goal holds when the first preference is judged, and nothing changes any more.
+        let ready = all([holds(&before)].into_iter().chain(first.take()));
+        let pass = [Effect::Delete(flag(&before)), Effect::Add(flag(&after))];
+        let met = (format!("preference {number} is met"), condition.clone(), None);
+        let violated = (format!("preference {number}{VIOLATION}"), not(condition), Some(violate(&name)));
+        for (own, condition, cost) in [met, violated] {
+            let body = ActionBody::Instantaneous {
+                precondition: all([ready.clone(), condition]),
+                effect: Effect::And(pass.iter().cloned().chain(cost).collect()),
+            };
+            domain.actions.push(hidden(&own, body, problem.name.span));
+        }
+        before = after;
+    }
+    problem.goal = holds(&before);
+}
+
+/// Adds the actions whose condition is that an instance is violated.
+fn look_up(domain: &mut Domain, span: Span, wanted: Vec<PreferenceInstance>) {
+    if !wanted.is_empty() {
+        declare(domain, VIOLATED);
+    }
+    for ((name, condition), number) in wanted.into_iter().zip(1_u64..) {
+        // What changes nothing would be left out.
+        let precondition = all([not(condition), not(holds(VIOLATED))]);
+        let effect = Effect::And(vec![violate(&name), Effect::Add(flag(VIOLATED))]);
+        let body = ActionBody::Instantaneous { precondition, effect };
+        domain.actions.push(hidden(&format!("preference {number}{VIOLATION}"), body, span));
+    }
+}
+
+/// Lets an action count the violations of its own preferences.
+fn count_preferences(action: &mut Action, asked: &[Name]) {
+    let preferences = std::mem::take(&mut action.preferences);
+    for preference in preferences.into_iter().filter(|own| asked.contains(&own.name.name)) {
+        let condition = not(preference.condition);
+        let counted = Effect::When(condition, Box::new(violate(&preference.name.name)));
+        let effect = if preference.variables.is_empty() {
+            counted
+        } else {
+            Effect::ForAll(preference.variables, Box::new(counted))
+        };
+        let time = match preference.time {
+            pddl::ast::ConditionTime::AtEnd => EffectTime::AtEnd,
+            _ => EffectTime::AtStart,
+        };
+        happen(action, time, effect);
+    }
+}

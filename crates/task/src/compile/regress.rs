@@ -1,0 +1,296 @@
+//! Conditions on the state after a happening to conditions on the state before it (R. Reiter: Knowledge in Action, 2001, chapter 4).
+
+use pddl::ast::{
+    Action, ActionBody, Arithmetic, Assignment, Atom, Condition, Effect, EffectTime, Expression, Name, Span,
+    Term, TypedName,
+};
+
+use super::simplify::{all, any, equal, exists, falsity, is_false, not};
+
+/// How many ways a comparison may turn out, by which of its functions change.
+const MAX_CASES: usize = 64;
+
+/// What one happening of an action changes.
+pub(super) struct Happening {
+    changes: Vec<Change>,
+}
+
+/// An effect with the quantifiers and conditions that it stands below.
+struct Change {
+    bound: Vec<TypedName>,
+    conditions: Vec<Condition>,
+    effect: Effect,
+}
+
+/// A way in which functions can change: when it is so, and what stands for each function then.
+type Way = (Condition, Vec<(Atom, Expression)>);
+
+/// A condition that cannot be regressed.
+pub(super) struct NotRegressable(pub(super) &'static str);
+
+impl Happening {
+    /// What an action changes at a time; an instantaneous one does everything at its start.
+    pub(super) fn of(action: &Action, time: EffectTime) -> Self {
+        let mut changes = Vec::new();
+        match &action.body {
+            ActionBody::Instantaneous { effect, .. } if time == EffectTime::AtStart => {
+                flatten(effect, &[], &[], &mut changes);
+            }
+            ActionBody::Instantaneous { .. } => {}
+            ActionBody::Durative { effects, .. } => {
+                for (_, effect) in effects.iter().filter(|(own, _)| *own == time) {
+                    flatten(effect, &[], &[], &mut changes);
+                }
+            }
+        }
+        Self { changes }
+    }
+
+    /// Whether a number of that function is changed.
+    pub(super) fn changes_function(&self, name: &Name) -> bool {
+        self.changes
+            .iter()
+            .map(|change| target(&change.effect))
+            .any(|(own, numeric)| numeric && own.predicate.name == *name)
+    }
+
+    /// Under which condition the happening may change whether a condition holds. The condition has no free variables.
+    pub(super) fn touches(&self, condition: &Condition) -> Condition {
+        let mut found = Vec::new();
+        self.touching(condition, &mut Vec::new(), &mut found);
+        any(found)
+    }
+
+    fn touching(&self, condition: &Condition, inner: &mut Vec<TypedName>, found: &mut Vec<Condition>) {
+        match condition {
+            Condition::And(parts) | Condition::Or(parts) => {
+                for part in parts {
+                    self.touching(part, inner, found);
+                }
+            }
+            Condition::Not(part) => self.touching(part, inner, found),
+            Condition::Imply(premise, conclusion) => {
+                self.touching(premise, inner, found);
+                self.touching(conclusion, inner, found);
+            }
+            Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {
+                let outer = inner.len();
+                inner.extend(variables.iter().cloned());
+                self.touching(body, inner, found);
+                inner.truncate(outer);
+            }
+            Condition::Atom(atom) => self.touched(atom, false, inner, found),
+            Condition::Equal(..) => {}
+            Condition::Compare(_, left, right, _) => {
+                let mut functions = Vec::new();
+                functions_of(left, &mut functions);
+                functions_of(right, &mut functions);
+                for atom in &functions {
+                    self.touched(atom, true, inner, found);
+                }
+            }
+        }
+    }
+
+    /// Under which conditions an atom or a function is changed, whatever stands for the variables in `inner`.
+    fn touched(&self, atom: &Atom, is_function: bool, inner: &[TypedName], found: &mut Vec<Condition>) {
+        for change in &self.changes {
+            let (target, numeric) = target(&change.effect);
+            if numeric != is_function || !is_same_symbol(target, atom) {
+                continue;
+            }
+            let is_inner = |term: &Term| match term {
+                Term::Variable(variable) => inner.iter().any(|own| own.identifier.name == variable.name),
+                Term::Constant(_) => false,
+            };
+            let pairs = target.arguments.iter().zip(&atom.arguments).filter(|(_, own)| !is_inner(own));
+            let matches = all(pairs.map(|(changed, own)| equal(changed, own)));
+            let same = exists(&change.bound, matches);
+            if !found.iter().any(|known| format!("{known:?}") == format!("{same:?}")) {
+                found.push(same);
+            }
+        }
+    }
+
+    /// The condition in terms of the state before.
+    pub(super) fn regress(&self, condition: &Condition) -> Result<Condition, NotRegressable> {
+        let each =
+            |parts: &[Condition]| parts.iter().map(|part| self.regress(part)).collect::<Result<Vec<_>, _>>();
+        Ok(match condition {
+            Condition::And(parts) => all(each(parts)?),
+            Condition::Or(parts) => any(each(parts)?),
+            Condition::Not(inner) => not(self.regress(inner)?),
+            Condition::Imply(premise, conclusion) => {
+                any([not(self.regress(premise)?), self.regress(conclusion)?])
+            }
+            Condition::Exists(variables, body) => {
+                Condition::Exists(variables.clone(), Box::new(self.regress(body)?))
+            }
+            Condition::ForAll(variables, body) => {
+                Condition::ForAll(variables.clone(), Box::new(self.regress(body)?))
+            }
+            Condition::Atom(atom) => {
+                let added = self.occurs(atom, |effect| matches!(effect, Effect::Add(_)));
+                let deleted = self.occurs(atom, |effect| matches!(effect, Effect::Delete(_)));
+                // Of an atom that is added and deleted, the addition counts.
+                any([added, all([Condition::Atom(atom.clone()), not(deleted)])])
+            }
+            Condition::Equal(..) => condition.clone(),
+            Condition::Compare(operator, left, right, span) => {
+                let mut functions = Vec::new();
+                functions_of(left, &mut functions);
+                functions_of(right, &mut functions);
+                let ways = self.ways(&functions)?;
+                any(ways.into_iter().map(|(condition, values)| {
+                    let (left, right) = (substitute(left, &values), substitute(right, &values));
+                    all([condition, Condition::Compare(*operator, left, right, *span)])
+                }))
+            }
+        })
+    }
+
+    /// When a change of an atom takes place.
+    fn occurs(&self, atom: &Atom, is_kind: impl Fn(&Effect) -> bool) -> Condition {
+        let changes = self.changes.iter().filter(|change| is_kind(&change.effect));
+        any(changes.map(|change| {
+            let (target, _) = target(&change.effect);
+            if is_same_symbol(target, atom) {
+                exists(&change.bound, change.hits(target, atom))
+            } else {
+                falsity()
+            }
+        }))
+    }
+
+    /// Every way in which functions can change: when it is so, and what stands for each function then.
+    fn ways(&self, functions: &[Atom]) -> Result<Vec<Way>, NotRegressable> {
+        let mut ways = vec![(super::simplify::truth(), Vec::new())];
+        for function in functions {
+            let mut values = vec![(super::simplify::truth(), Expression::Fluent(function.clone()))];
+            for change in &self.changes {
+                let Effect::Assign(kind, target, by, _) = &change.effect else { continue };
+                let hits =
+                    if is_same_symbol(target, function) { change.hits(target, function) } else { falsity() };
+                if is_false(&hits) {
+                    continue;
+                }
+                if !change.bound.is_empty() {
+                    return Err(NotRegressable("a number that an effect changes for all objects"));
+                }
+                let mut more = Vec::new();
+                for (condition, value) in values {
+                    more.push((all([condition.clone(), hits.clone()]), changed(*kind, &value, by)));
+                    more.push((all([condition, not(hits.clone())]), value));
+                }
+                more.retain(|(condition, _)| !is_false(condition));
+                values = more;
+            }
+            let longer = ways.iter().flat_map(|(condition, known): &Way| {
+                values.iter().map(|(own, value)| {
+                    let mut known = known.clone();
+                    known.push((function.clone(), value.clone()));
+                    (all([condition.clone(), own.clone()]), known)
+                })
+            });
+            ways = longer.collect();
+            if ways.len() > MAX_CASES {
+                return Err(NotRegressable("a comparison of many functions that one action changes"));
+            }
+        }
+        Ok(ways)
+    }
+}
+
+impl Change {
+    /// When the change takes place and is one of this atom.
+    fn hits(&self, target: &Atom, atom: &Atom) -> Condition {
+        let matches = target.arguments.iter().zip(&atom.arguments).map(|(changed, own)| equal(changed, own));
+        all(self.conditions.iter().cloned().chain(matches))
+    }
+}
+
+fn flatten(effect: &Effect, bound: &[TypedName], conditions: &[Condition], out: &mut Vec<Change>) {
+    match effect {
+        Effect::And(parts) => {
+            for part in parts {
+                flatten(part, bound, conditions, out);
+            }
+        }
+        Effect::ForAll(variables, body) => {
+            let bound: Vec<_> = bound.iter().chain(variables).cloned().collect();
+            flatten(body, &bound, conditions, out);
+        }
+        Effect::When(condition, body) => {
+            let conditions: Vec<_> = conditions.iter().chain([condition]).cloned().collect();
+            flatten(body, bound, &conditions, out);
+        }
+        Effect::Add(_) | Effect::Delete(_) | Effect::Assign(..) => {
+            let (bound, conditions) = (bound.to_vec(), conditions.to_vec());
+            out.push(Change { bound, conditions, effect: effect.clone() });
+        }
+    }
+}
+
+/// What an effect changes, and whether that is a number.
+fn target(effect: &Effect) -> (&Atom, bool) {
+    match effect {
+        Effect::Assign(_, target, ..) => (target, true),
+        Effect::Add(atom) | Effect::Delete(atom) => (atom, false),
+        Effect::And(_) | Effect::ForAll(..) | Effect::When(..) => unreachable!("invariant: changes are flat"),
+    }
+}
+
+fn is_same_symbol(left: &Atom, right: &Atom) -> bool {
+    left.predicate.name == right.predicate.name && left.arguments.len() == right.arguments.len()
+}
+
+fn is_same(left: &Atom, right: &Atom) -> bool {
+    let same = |(left, right): (&Term, &Term)| match (left, right) {
+        (Term::Variable(left), Term::Variable(right)) | (Term::Constant(left), Term::Constant(right)) => {
+            left.name == right.name
+        }
+        _ => false,
+    };
+    is_same_symbol(left, right) && left.arguments.iter().zip(&right.arguments).all(same)
+}
+
+/// The functions in an expression, each once.
+fn functions_of(expression: &Expression, found: &mut Vec<Atom>) {
+    match expression {
+        Expression::Fluent(atom) if !found.iter().any(|known| is_same(known, atom)) => {
+            found.push(atom.clone());
+        }
+        Expression::Operation(_, operands, _) => {
+            for own in operands {
+                functions_of(own, found);
+            }
+        }
+        _ => {}
+    }
+}
+
+fn substitute(expression: &Expression, values: &[(Atom, Expression)]) -> Expression {
+    match expression {
+        Expression::Fluent(atom) => {
+            let value = values.iter().find(|(known, _)| is_same(known, atom));
+            value.map_or_else(|| expression.clone(), |(_, value)| value.clone())
+        }
+        Expression::Operation(operation, operands, span) => {
+            let operands = operands.iter().map(|operand| substitute(operand, values)).collect();
+            Expression::Operation(*operation, operands, *span)
+        }
+        other => other.clone(),
+    }
+}
+
+/// The value after an assignment.
+fn changed(kind: Assignment, value: &Expression, by: &Expression) -> Expression {
+    let with = |operation| Expression::Operation(operation, vec![value.clone(), by.clone()], Span::default());
+    match kind {
+        Assignment::Assign => by.clone(),
+        Assignment::Increase => with(Arithmetic::Add),
+        Assignment::Decrease => with(Arithmetic::Subtract),
+        Assignment::ScaleUp => with(Arithmetic::Multiply),
+        Assignment::ScaleDown => with(Arithmetic::Divide),
+    }
+}

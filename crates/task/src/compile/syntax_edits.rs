@@ -1,0 +1,58 @@
+//! What actions and domains get in addition.
+
+use crate::error::{Error, File, Place};
+use pddl::ast::{
+    Action, ActionBody, Condition, ConditionTime, Declaration, Domain, Effect, EffectTime, Name, Span,
+};
+
+use super::simplify::{all, identifier};
+
+/// An instance of a preference: its name, and what has to hold in the end.
+pub(super) type PreferenceInstance = (Name, Condition);
+
+/// Declares a predicate without parameters.
+pub(super) fn declare(domain: &mut Domain, name: &str) {
+    domain.predicates.push(Declaration { identifier: identifier(name), parameters: Vec::new() });
+}
+
+/// An action without parameters that is none of the domain.
+pub(super) fn hidden(name: &str, body: ActionBody, span: Span) -> Action {
+    Action { identifier: identifier(name), parameters: Vec::new(), body, preferences: Vec::new(), span }
+}
+
+/// Adds a condition to an action, in the state before what it does at a time.
+pub(super) fn require(action: &mut Action, time: EffectTime, condition: Condition) {
+    match &mut action.body {
+        ActionBody::Instantaneous { precondition, .. } => {
+            let own = std::mem::replace(precondition, Condition::And(Vec::new()));
+            *precondition = all([own, condition]);
+        }
+        ActionBody::Durative { conditions, .. } => {
+            let time = match time {
+                EffectTime::AtStart => ConditionTime::AtStart,
+                EffectTime::AtEnd => ConditionTime::AtEnd,
+            };
+            conditions.push((time, condition));
+        }
+    }
+}
+
+/// Adds an effect to an action at a time.
+pub(super) fn happen(action: &mut Action, time: EffectTime, more: Effect) {
+    match &mut action.body {
+        ActionBody::Instantaneous { effect, .. } => {
+            let own = std::mem::replace(effect, Effect::And(Vec::new()));
+            *effect = Effect::And(vec![own, more]);
+        }
+        ActionBody::Durative { effects, .. } => effects.push((time, more)),
+    }
+}
+
+/// A construct that cannot be compiled.
+pub(super) fn unsupported(
+    construct: impl Into<String>,
+    instead: impl Into<String>,
+    (file, span): (File, Span),
+) -> Error {
+    Error::Unsupported { construct: construct.into(), instead: instead.into(), place: Place { file, span } }
+}

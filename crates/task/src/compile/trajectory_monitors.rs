@@ -1,0 +1,473 @@
+//! What has to be remembered of the states so far, for each instance of a constraint, and how actions keep it.
+
+use num_rational::BigRational;
+use num_traits::{Signed, Zero};
+use pddl::ast::{
+    Action, ActionBody, Comparison, Condition, Constraint, Domain, DurationConstraint, Effect, EffectTime,
+    Expression, InitialElement, Problem, Span, Trajectory,
+};
+use rustc_hash::FxHashSet;
+
+use crate::error::{Error, File};
+
+use super::deadline::{self, Deadline};
+use super::initial::Initial;
+use super::instances::{Binding, Objects, instance};
+use super::regress::{Happening, NotRegressable};
+use super::semantics::PlanSemantics;
+use super::simplify::{all, any, assume, flag, holds, is_false, is_true, not, ways};
+use super::syntax_edits::{PreferenceInstance, declare, happen, require, unsupported};
+
+/// Constraints have at most this many instances together.
+const INSTANCES: usize = 20_000;
+
+/// The constraints of a task, as far as they were taken up.
+pub(super) struct Monitors<'t> {
+    domain: &'t Domain,
+    problem: &'t Problem,
+    objects: &'t Objects<'t>,
+    pub(super) initial: Initial<'t>,
+    /// What the actions have in addition, by action and time.
+    additions: Vec<[Addition; 2]>,
+    /// Atoms that remember, and whether they hold at first.
+    memory: Vec<(String, bool)>,
+    /// What has to hold in the end.
+    goals: Vec<Condition>,
+    wanted: Vec<PreferenceInstance>,
+    /// Atoms that timed initial literals add, and when.
+    pub(super) moments: Vec<(String, BigRational)>,
+    pub(super) course: PlanSemantics<'t>,
+    /// What has to be kept in time: the two conditions, and what notes that it was.
+    pub(super) deadlines: Vec<(Deadline, [Condition; 2], Effect)>,
+    /// Whether durations are asked for that the files do not ask for.
+    narrows: bool,
+    instances: usize,
+    fresh: u64,
+}
+
+/// What one happening of an action has in addition.
+#[derive(Default)]
+pub(super) struct Addition {
+    conditions: Vec<Condition>,
+    effects: Vec<Effect>,
+}
+
+const TIMES: [EffectTime; 2] = [EffectTime::AtStart, EffectTime::AtEnd];
+
+impl<'t> Monitors<'t> {
+    pub(super) fn new(
+        domain: &'t Domain,
+        problem: &'t Problem,
+        objects: &'t Objects<'t>,
+        course: PlanSemantics<'t>,
+    ) -> Self {
+        Self {
+            domain,
+            problem,
+            objects,
+            initial: Initial::of(domain, problem, objects),
+            additions: domain.actions.iter().map(|_| Default::default()).collect(),
+            memory: Vec::new(),
+            goals: Vec::new(),
+            wanted: Vec::new(),
+            moments: Vec::new(),
+            course,
+            deadlines: Vec::new(),
+            narrows: false,
+            instances: 0,
+            fresh: 0,
+        }
+    }
+
+    /// Whether a condition of an action always is true or false.
+    pub(super) fn is_defined(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {
+        self.initial.is_defined(condition, place)
+    }
+
+    /// Takes up a constraint.
+    pub(super) fn add_constraint(&mut self, file: File, constraint: &Constraint) -> Result<(), Error> {
+        for binding in self.objects.bindings(&constraint.variables, &Vec::new()) {
+            let place = (file, constraint.span);
+            let last =
+                self.trajectory(&constraint.trajectory, binding, constraint.preference.is_none(), place)?;
+            match &constraint.preference {
+                Some(name) => self.wanted.push((name.name.clone(), last)),
+                None => self.goals.push(last),
+            }
+        }
+        Ok(())
+    }
+
+    /// What has to hold in the last state for a trajectory to be as wanted. One that is `hard` can rule actions out.
+    fn trajectory(
+        &mut self,
+        trajectory: &Trajectory,
+        mut binding: Binding,
+        hard: bool,
+        place: (File, Span),
+    ) -> Result<Condition, Error> {
+        self.instances = self.instances.saturating_add(1);
+        if self.instances > INSTANCES {
+            let construct = format!("more than {INSTANCES} instances of constraints and preferences");
+            return Err(unsupported(construct, "constraints over fewer objects", place));
+        }
+        let (fresh, initial) = (&mut self.fresh, &self.initial);
+        let mut ground = |condition: &Condition| {
+            let ground = instance(condition, &mut binding, fresh);
+            initial.is_defined(&ground, place).map(|()| ground)
+        };
+        match trajectory {
+            Trajectory::And(parts) => {
+                let each = parts.iter().map(|part| self.trajectory(part, binding.clone(), hard, place));
+                Ok(all(each.collect::<Result<Vec<_>, _>>()?))
+            }
+            Trajectory::ForAll(variables, body) => {
+                let instances = self.objects.bindings(variables, &binding);
+                let each = instances.map(|binding| self.trajectory(body, binding, hard, place));
+                Ok(all(each.collect::<Result<Vec<_>, _>>()?))
+            }
+            Trajectory::AtEnd(what) => ground(what),
+            Trajectory::Always(what) => {
+                let what = ground(what)?;
+                self.always(&what, hard, place)
+            }
+            Trajectory::Sometime(what) => {
+                let what = ground(what)?;
+                self.sometime(&what, place)
+            }
+            Trajectory::AtMostOnce(what) => {
+                let what = ground(what)?;
+                self.at_most_once(&what, hard, place)
+            }
+            Trajectory::SometimeAfter(first, second) => {
+                let (first, second) = (ground(first)?, ground(second)?);
+                self.sometime_after(&first, &second, place)
+            }
+            Trajectory::SometimeBefore(first, second) => {
+                let (first, second) = (ground(first)?, ground(second)?);
+                self.sometime_before(&first, &second, hard, place)
+            }
+            Trajectory::Within(time, what) => {
+                let what = ground(what)?;
+                self.within(time, &what, place)
+            }
+            Trajectory::HoldDuring(from, until, what) => {
+                let what = ground(what)?;
+                self.hold((from, Some(until)), &what, hard, place)
+            }
+            Trajectory::HoldAfter(from, what) => {
+                let what = ground(what)?;
+                self.hold((from, None), &what, hard, place)
+            }
+            Trajectory::AlwaysWithin(time, first, second) => {
+                let (first, second) = (ground(first)?, ground(second)?);
+                self.always_within(time, [&first, &second], hard, place)
+            }
+        }
+    }
+
+    /// An atom that remembers something about an instance.
+    pub(super) fn remember(&mut self, what: &str, at_first: bool) -> String {
+        let name = format!("instance {} {what}", self.instances);
+        self.memory.push((name.clone(), at_first));
+        name
+    }
+
+    /// Adds to each happening of each action that may change one of some conditions what is made of the condition that it does,
+    /// and of the conditions after it.
+    pub(super) fn after_each(
+        &mut self,
+        conditions: &[&Condition],
+        place: (File, Span),
+        make: impl Fn(Condition, &[Condition]) -> Addition,
+    ) -> Result<(), Error> {
+        for condition in conditions {
+            self.can_be_watched(condition, place)?;
+        }
+        for (action, additions) in self.domain.actions.iter().zip(&mut self.additions) {
+            let happenings = TIMES.map(|time| Happening::of(action, time));
+            let touched = happenings
+                .each_ref()
+                .map(|one| any(conditions.iter().map(|condition| one.touches(condition))));
+            if touched.iter().all(|touched| !is_false(touched))
+                && !takes_time(self.domain, self.problem, action)
+            {
+                let takes_time =
+                    positive(action).filter(|_| matches!(self.course, PlanSemantics::Overlapping(_)));
+                let takes_time = takes_time.ok_or_else(|| {
+                    let construct = format!(
+                        "a constraint on what `{}` changes both at its start and at its end, which may be one time",
+                        action.identifier.name
+                    );
+                    unsupported(construct, "a duration that is known to be above 0", place)
+                })?;
+                additions[0].conditions.push(takes_time);
+                self.narrows = true;
+            }
+            for ((happening, touched), addition) in happenings.iter().zip(touched).zip(additions) {
+                if is_false(&touched) {
+                    continue;
+                }
+                let after: Result<Vec<_>, NotRegressable> =
+                    conditions.iter().map(|condition| happening.regress(condition)).collect();
+                let after = after.map_err(|NotRegressable(what)| {
+                    unsupported(
+                        format!("a constraint on {what}"),
+                        "constraints on atoms, or on numbers that actions change one by one",
+                        place,
+                    )
+                })?;
+                for way in ways(touched) {
+                    let after: Vec<_> = after.iter().map(|condition| assume(condition, &way)).collect();
+                    let more = make(way, &after);
+                    addition.conditions.extend(more.conditions.into_iter().filter(|own| !is_true(own)));
+                    addition.effects.extend(more.effects);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether what happenings have in addition keeps none of them apart from another one, and rules none out.
+    pub(super) fn keeps_apart_nothing(&self) -> bool {
+        let is_plain = |addition: &Addition| {
+            addition.conditions.is_empty()
+                && addition.effects.iter().all(|effect| match effect {
+                    Effect::When(condition, effect) => {
+                        matches!(**effect, Effect::Add(_)) && reads_nothing(condition)
+                    }
+                    effect => matches!(effect, Effect::Add(_)),
+                })
+        };
+        !self.narrows && self.deadlines.is_empty() && self.additions.iter().flatten().all(is_plain)
+    }
+
+    /// Whether nothing but actions changes a condition.
+    pub(super) fn can_be_watched(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {
+        let mut predicates = FxHashSet::default();
+        predicates_of(condition, &mut predicates);
+        let derived = self.domain.derived.iter().map(|axiom| &axiom.head.identifier.name);
+        if let Some(name) = derived.into_iter().find(|name| predicates.contains(name)) {
+            let construct = format!("a constraint on the derived predicate `{name}`");
+            return Err(unsupported(construct, "the conditions that it is derived from", place));
+        }
+        let timed = self.problem.init.iter().filter_map(|element| match element {
+            InitialElement::Timed(_, atom, ..) => Some(&atom.predicate.name),
+            _ => None,
+        });
+        if let Some(name) = timed.into_iter().find(|name| predicates.contains(name)) {
+            let construct = format!("a constraint on `{name}`, which timed initial literals change");
+            return Err(unsupported(construct, "a constraint on what only actions change", place));
+        }
+        Ok(())
+    }
+
+    fn always(&mut self, what: &Condition, hard: bool, place: (File, Span)) -> Result<Condition, Error> {
+        let at_first = self.initial.holds(what);
+        if hard {
+            self.after_each(&[what], place, |touched, after| {
+                Addition::needs(any([not(touched), after[0].clone()]))
+            })?;
+            return Ok(decided(at_first));
+        }
+        let broken = self.remember("is broken", !at_first);
+        self.after_each(&[what], place, |touched, after| {
+            Addition::notes(all([touched, not(after[0].clone())]), Effect::Add(flag(&broken)))
+        })?;
+        Ok(not(holds(&broken)))
+    }
+
+    fn sometime(&mut self, what: &Condition, place: (File, Span)) -> Result<Condition, Error> {
+        let seen = self.remember("was met", self.initial.holds(what));
+        self.after_each(&[what], place, |touched, after| {
+            Addition::notes(all([touched, after[0].clone()]), Effect::Add(flag(&seen)))
+        })?;
+        Ok(holds(&seen))
+    }
+
+    fn at_most_once(
+        &mut self,
+        what: &Condition,
+        hard: bool,
+        place: (File, Span),
+    ) -> Result<Condition, Error> {
+        let begun = self.remember("has begun", self.initial.holds(what));
+        let broken = if hard { None } else { Some(self.remember("is broken", false)) };
+        self.after_each(&[what], place, |touched, after| {
+            let after = all([touched, after[0].clone()]);
+            let mut addition = Addition::notes(after.clone(), Effect::Add(flag(&begun)));
+            let again = all([after, not(what.clone()), holds(&begun)]);
+            addition.forbid(again, broken.as_deref());
+            addition
+        })?;
+        Ok(broken.map_or(all([]), |broken| not(holds(&broken))))
+    }
+
+    fn sometime_after(
+        &mut self,
+        first: &Condition,
+        second: &Condition,
+        place: (File, Span),
+    ) -> Result<Condition, Error> {
+        let at_first = self.initial.holds(first) && !self.initial.holds(second);
+        let open = self.remember("is open", at_first);
+        self.after_each(&[first, second], place, |touched, after| {
+            let [first, second] = after else { return Addition::default() };
+            let mut addition =
+                Addition::notes(all([touched.clone(), second.clone()]), Effect::Delete(flag(&open)));
+            let opened = all([touched, first.clone(), not(second.clone())]);
+            addition.effects.extend(Addition::notes(opened, Effect::Add(flag(&open))).effects);
+            addition
+        })?;
+        Ok(not(holds(&open)))
+    }
+
+    fn sometime_before(
+        &mut self,
+        first: &Condition,
+        second: &Condition,
+        hard: bool,
+        place: (File, Span),
+    ) -> Result<Condition, Error> {
+        let seen = self.remember("was met", self.initial.holds(second));
+        let at_first = self.initial.holds(first);
+        let broken = if hard { None } else { Some(self.remember("is broken", at_first)) };
+        self.after_each(&[first], place, |touched, after| {
+            let mut addition = Addition::default();
+            addition.forbid(all([touched, after[0].clone(), not(holds(&seen))]), broken.as_deref());
+            addition
+        })?;
+        self.after_each(&[second], place, |touched, after| {
+            Addition::notes(all([touched, after[0].clone()]), Effect::Add(flag(&seen)))
+        })?;
+        Ok(broken.map_or(decided(!at_first), |broken| not(holds(&broken))))
+    }
+
+    /// Changes the task. What is left are the preferences, what has to hold in the last state for each, and what has to be kept in time.
+    pub(super) fn install(
+        self,
+        domain: &mut Domain,
+        problem: &mut Problem,
+    ) -> (Vec<PreferenceInstance>, Vec<Deadline>) {
+        for (name, time) in self.moments {
+            declare(domain, &name);
+            problem.init.push(InitialElement::Timed(time, flag(&name), true, Span::default()));
+        }
+        for (name, at_first) in self.memory {
+            declare(domain, &name);
+            if at_first {
+                problem.init.push(InitialElement::Fact(flag(&name)));
+            }
+        }
+        for (action, additions) in domain.actions.iter_mut().zip(self.additions) {
+            for (time, addition) in TIMES.into_iter().zip(additions) {
+                for condition in addition.conditions {
+                    require(action, time, condition);
+                }
+                for effect in addition.effects {
+                    happen(action, time, effect);
+                }
+            }
+        }
+        let goal = std::mem::replace(&mut problem.goal, Condition::And(Vec::new()));
+        problem.goal = all([goal].into_iter().chain(self.goals));
+        let deadlines = deadline::install(domain, problem, self.deadlines);
+        (self.wanted, deadlines)
+    }
+}
+
+impl Addition {
+    fn needs(condition: Condition) -> Self {
+        Self { conditions: vec![condition], effects: Vec::new() }
+    }
+
+    pub(super) fn notes(condition: Condition, effect: Effect) -> Self {
+        let effect = match condition {
+            condition if is_false(&condition) => return Self::default(),
+            condition if is_true(&condition) => effect,
+            condition => Effect::When(condition, Box::new(effect)),
+        };
+        Self { conditions: Vec::new(), effects: vec![effect] }
+    }
+
+    /// Rules out what must not be, or notes that it was.
+    pub(super) fn forbid(&mut self, what: Condition, broken: Option<&str>) {
+        match broken {
+            None => self.conditions.push(not(what)),
+            Some(broken) => self.effects.extend(Self::notes(what, Effect::Add(flag(broken))).effects),
+        }
+    }
+}
+
+/// Whether a condition is about the objects of an action only.
+fn reads_nothing(condition: &Condition) -> bool {
+    match condition {
+        Condition::And(parts) | Condition::Or(parts) => parts.iter().all(reads_nothing),
+        Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
+            reads_nothing(inner)
+        }
+        Condition::Imply(premise, conclusion) => reads_nothing(premise) && reads_nothing(conclusion),
+        Condition::Equal(..) => true,
+        Condition::Atom(_) | Condition::Compare(..) => false,
+    }
+}
+
+pub(super) fn decided(holds: bool) -> Condition {
+    if holds { all([]) } else { any([]) }
+}
+
+fn predicates_of<'c>(condition: &'c Condition, found: &mut FxHashSet<&'c pddl::ast::Name>) {
+    match condition {
+        Condition::And(parts) | Condition::Or(parts) => {
+            for part in parts {
+                predicates_of(part, found);
+            }
+        }
+        Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
+            predicates_of(inner, found);
+        }
+        Condition::Imply(premise, conclusion) => {
+            predicates_of(premise, found);
+            predicates_of(conclusion, found);
+        }
+        Condition::Atom(atom) => {
+            found.insert(&atom.predicate.name);
+        }
+        Condition::Equal(..) | Condition::Compare(..) => {}
+    }
+}
+
+/// That an action takes time, if its duration is fixed.
+fn positive(action: &Action) -> Option<Condition> {
+    let ActionBody::Durative { duration, .. } = &action.body else { return None };
+    let [DurationConstraint { operator: Comparison::Equal, expression, span, .. }] = &duration[..] else {
+        return None;
+    };
+    let zero = Expression::Number(BigRational::zero(), *span);
+    Some(Condition::Compare(Comparison::Greater, expression.clone(), zero, *span))
+}
+
+/// Whether an action is known to have a start and an end apart.
+fn takes_time(domain: &Domain, problem: &Problem, action: &Action) -> bool {
+    let ActionBody::Durative { duration, .. } = &action.body else { return true };
+    let [DurationConstraint { operator, expression, .. }] = &duration[..] else { return false };
+    let is_lower = matches!(operator, Comparison::Equal | Comparison::Greater | Comparison::GreaterOrEqual);
+    is_lower
+        && match expression {
+            Expression::Number(number, _) => number.is_positive(),
+            Expression::Fluent(function) => {
+                let name = &function.predicate.name;
+                let changes = |action: &Action| {
+                    TIMES.iter().any(|time| Happening::of(action, *time).changes_function(name))
+                };
+                let is_positive = |element: &InitialElement| match element {
+                    InitialElement::Value(atom, value, _) => {
+                        atom.predicate.name != *name || value.is_positive()
+                    }
+                    _ => true,
+                };
+                !domain.actions.iter().any(changes) && problem.init.iter().all(is_positive)
+            }
+            _ => false,
+        }
+}

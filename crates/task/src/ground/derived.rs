@@ -1,0 +1,175 @@
+//! Derived atoms: those of derived predicates, and names for parts of conditions.
+//!
+//! They stay rules over the state [1]: which of them hold follows from the other variables, as the least fixpoint of
+//! their rules, those that are negated first. What is always or never true is folded, and an atom with one rule
+//! is replaced by the body of that rule where it occurs.
+//!
+//! [1] S. Thiébaux, J. Hoffmann, B. Nebel: In defense of PDDL axioms, Artificial Intelligence 168, 2005.
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::ground::vocabulary::atom::AtomId;
+use crate::ground::vocabulary::axiom::{GroundAxiom, components};
+use crate::ground::vocabulary::condition::{GroundCondition, GroundLiteral};
+use crate::ground::vocabulary::task::GroundTask;
+use crate::limits::{Interrupted, Limits};
+use crate::number::dense;
+
+/// Folds what is always or never true, and replaces atoms with one rule.
+pub fn simplify(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
+    let limits = task.world.limits;
+    let mut axioms = std::mem::take(&mut task.axioms);
+    let mut seen = FxHashSet::default();
+    axioms.retain(|axiom| seen.insert(axiom.clone()));
+    fold(task, &mut axioms)?;
+    let bodies = single_bodies(&axioms, limits)?;
+    let mut kept = Vec::with_capacity(axioms.len());
+    for axiom in limits.watch(axioms) {
+        let mut axiom = axiom?;
+        if inline(&mut axiom.body, &bodies) {
+            kept.push(axiom);
+        }
+    }
+    retain(&mut task.operators, limits, |operator| {
+        let conditions = operator.conditional.iter_mut().flat_map(|effect| &mut effect.condition);
+        conditions.for_each(|literal| rename(literal, &bodies));
+        inline(&mut operator.condition, &bodies)
+    })?;
+    if task.goal.as_mut().is_some_and(|goal| !inline(goal, &bodies)) {
+        task.goal = None;
+    }
+    task.axioms = kept;
+    Ok(())
+}
+
+/// Keeps the items that a function says are to be kept, as long as no limit is reached.
+fn retain<T>(
+    items: &mut Vec<T>,
+    limits: &Limits,
+    mut keep: impl FnMut(&mut T) -> bool,
+) -> Result<(), Interrupted> {
+    let (mut pulse, mut outcome) = (limits.pulse(), Ok(()));
+    items.retain_mut(|item| {
+        outcome = outcome.and_then(|()| pulse.beat());
+        outcome.is_err() || keep(item)
+    });
+    outcome
+}
+
+/// Whether each derived atom is known to be true or false, as long as that leads to more.
+fn fold(task: &mut GroundTask<'_>, axioms: &mut Vec<GroundAxiom>) -> Result<(), Interrupted> {
+    let (world, limits) = (&task.world, task.world.limits);
+    let derived: Vec<AtomId> =
+        (0..dense(world.atoms.len())).map(AtomId).filter(|atom| world.is_derived(*atom)).collect();
+    let mut known: FxHashMap<AtomId, bool> = FxHashMap::default();
+    loop {
+        let before = known.len();
+        let mut has_rule = FxHashSet::default();
+        for axiom in limits.watch(axioms.iter()) {
+            let axiom = axiom?;
+            has_rule.insert(axiom.head);
+            if axiom.body == GroundCondition::default() {
+                known.insert(axiom.head, true);
+            }
+        }
+        for atom in derived.iter().filter(|atom| !has_rule.contains(*atom)) {
+            known.entry(*atom).or_insert(false);
+        }
+        if known.len() == before {
+            break;
+        }
+        axioms.retain_mut(|axiom| !known.contains_key(&axiom.head) && substitute(&mut axiom.body, &known));
+    }
+    retain(&mut task.operators, limits, |operator| {
+        operator.conditional.retain_mut(|effect| conjunction(&mut effect.condition, &known));
+        substitute(&mut operator.condition, &known)
+    })?;
+    if task.goal.as_mut().is_some_and(|goal| !substitute(goal, &known)) {
+        task.goal = None;
+    }
+    Ok(())
+}
+
+/// Removes decided literals from a conjunction; false if one of them fails.
+fn conjunction(literals: &mut Vec<GroundLiteral>, known: &FxHashMap<AtomId, bool>) -> bool {
+    let fails =
+        literals.iter().any(|(atom, positive)| known.get(atom).is_some_and(|value| value != positive));
+    literals.retain(|(atom, _)| !known.contains_key(atom));
+    !fails
+}
+
+/// Removes decided literals from a condition; false if it fails.
+fn substitute(condition: &mut GroundCondition, known: &FxHashMap<AtomId, bool>) -> bool {
+    if !conjunction(&mut condition.literals, known) {
+        return false;
+    }
+    let satisfied = |(atom, positive): &GroundLiteral| known.get(atom).is_some_and(|value| value == positive);
+    condition.clauses.retain(|clause| !clause.iter().any(satisfied));
+    for clause in &mut condition.clauses {
+        clause.retain(|(atom, _)| !known.contains_key(atom));
+    }
+    if condition.clauses.iter().any(Vec::is_empty) {
+        return false;
+    }
+    let (units, clauses) = std::mem::take(&mut condition.clauses).into_iter().partition(|c| c.len() == 1);
+    condition.clauses = clauses;
+    let units: Vec<Vec<GroundLiteral>> = units;
+    condition.literals.extend(units.into_iter().flatten());
+    condition.tidy()
+}
+
+/// The body of each atom that has exactly one rule and does not depend on itself, free of such atoms.
+#[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
+fn single_bodies(
+    axioms: &[GroundAxiom],
+    limits: &Limits,
+) -> Result<FxHashMap<AtomId, GroundCondition>, Interrupted> {
+    let mut count: FxHashMap<AtomId, usize> = FxHashMap::default();
+    for axiom in axioms {
+        *count.entry(axiom.head).or_default() += 1;
+    }
+    let mut bodies: FxHashMap<AtomId, GroundCondition> = FxHashMap::default();
+    let rules: FxHashMap<AtomId, &GroundAxiom> =
+        axioms.iter().filter(|axiom| count[&axiom.head] == 1).map(|axiom| (axiom.head, axiom)).collect();
+    for component in limits.watch(components(axioms)) {
+        let [only] = component?[..] else { continue };
+        if let Some(axiom) = rules.get(&only) {
+            let mut body = axiom.body.clone();
+            let depends_on_itself = body.atoms().any(|atom| atom == only);
+            if !depends_on_itself && inline(&mut body, &bodies) {
+                bodies.insert(only, body);
+            }
+        }
+    }
+    Ok(bodies)
+}
+
+/// Replaces literals over atoms with one rule by its body; false if the condition contradicts itself then.
+fn inline(condition: &mut GroundCondition, bodies: &FxHashMap<AtomId, GroundCondition>) -> bool {
+    let mut literals = Vec::with_capacity(condition.literals.len());
+    for mut literal in std::mem::take(&mut condition.literals) {
+        match bodies.get(&literal.0) {
+            Some(body) if literal.1 => {
+                literals.extend(&body.literals);
+                condition.comparisons.extend(body.comparisons.iter().cloned());
+            }
+            _ => {
+                rename(&mut literal, bodies);
+                literals.push(literal);
+            }
+        }
+    }
+    condition.literals = literals;
+    condition.clauses.iter_mut().flatten().for_each(|literal| rename(literal, bodies));
+    condition.tidy()
+}
+
+/// Replaces a literal by the only literal of its atom's only rule.
+fn rename(literal: &mut GroundLiteral, bodies: &FxHashMap<AtomId, GroundCondition>) {
+    if let Some(body) = bodies.get(&literal.0)
+        && let [(atom, positive)] = body.literals[..]
+        && body.comparisons.is_empty()
+    {
+        *literal = (atom, positive == literal.1);
+    }
+}

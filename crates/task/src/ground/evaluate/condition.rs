@@ -1,0 +1,139 @@
+//! Conditions of a schema under a binding of its parameters: what is left once everything static is decided.
+
+use crate::error::Error;
+use crate::ground::evaluate::expression::ground;
+use crate::ground::evaluate::join::{each_binding, guards_of_exists, guards_of_forall};
+use crate::ground::vocabulary::atom::{Binding, arguments};
+use crate::ground::vocabulary::eval_error::Failure;
+use crate::ground::vocabulary::partial_eval::{Residual, compare, truth};
+use crate::ground::vocabulary::world::World;
+use crate::lifted::{Bound, Formula};
+
+/// Evaluates a condition that mentions no open slot. A comparison with a value that is not defined does not hold.
+///
+/// # Errors
+/// When a value is missing, or a limit is reached.
+pub fn residual(
+    world: &mut World<'_>,
+    formula: &Formula,
+    binding: &mut Binding,
+) -> Result<Residual, Failure> {
+    Evaluation { refuses_undefined: false }.residual(world, formula, binding)
+}
+
+/// Evaluates the condition of an effect that mentions no open slot.
+///
+/// # Errors
+/// A comparison with a value that is not defined.
+pub fn residual_of_effect(
+    world: &mut World<'_>,
+    formula: &Formula,
+    binding: &mut Binding,
+) -> Result<Residual, Failure> {
+    Evaluation { refuses_undefined: true }.residual(world, formula, binding)
+}
+
+/// How conditions are evaluated.
+#[derive(Clone, Copy)]
+struct Evaluation {
+    /// Whether values that are compared must be defined.
+    refuses_undefined: bool,
+}
+
+impl Evaluation {
+    fn residual(
+        self,
+        world: &mut World<'_>,
+        formula: &Formula,
+        binding: &mut Binding,
+    ) -> Result<Residual, Failure> {
+        match formula {
+            Formula::And(parts) => self.junction(world, parts, binding, true),
+            Formula::Or(parts) => self.junction(world, parts, binding, false),
+            Formula::Exists(bound, body) => self.quantified(world, bound, body, binding, false),
+            Formula::ForAll(bound, body) => self.quantified(world, bound, body, binding, true),
+            Formula::Equal { positive, left, right } => {
+                let same = arguments(&[*left], binding) == arguments(&[*right], binding);
+                Ok(truth(same == *positive))
+            }
+            Formula::Literal { positive, predicate, terms } => {
+                let arguments = arguments(terms, binding);
+                if !world.lifted.predicates[predicate.index()].fluent {
+                    return Ok(truth(world.holds_initially(*predicate, &arguments) == *positive));
+                }
+                if !world.is_reached(*predicate, &arguments) {
+                    return Ok(truth(!positive));
+                }
+                Ok(Residual::Literal { atom: world.atom(*predicate, &arguments), positive: *positive })
+            }
+            Formula::Compare(comparison, left, right, place) => {
+                let difference = match (ground(world, left, binding), ground(world, right, binding)) {
+                    (Ok(left), Ok(right)) => (left, right),
+                    // PDDL 2.1: an action with an undefined value in an effect cannot be executed…
+                    (Err(Failure::Undefined), _) | (_, Err(Failure::Undefined)) if self.refuses_undefined => {
+                        return Err(Failure::Error(Error::Unsupported {
+                            construct: "a comparison in `when` with a value that is not defined".into(),
+                            instead: "a value for it in `:init`".into(),
+                            place: *place,
+                        }));
+                    }
+                    // … and elsewhere a comparison with one does not hold.
+                    (Err(Failure::Undefined), _) | (_, Err(Failure::Undefined)) => {
+                        return Ok(Residual::False);
+                    }
+                    (Err(failure), _) | (_, Err(failure)) => return Err(failure),
+                };
+                Ok(compare(*comparison, difference.0, difference.1))
+            }
+        }
+    }
+
+    fn junction(
+        self,
+        world: &mut World<'_>,
+        parts: &[Formula],
+        binding: &mut Binding,
+        conjunction: bool,
+    ) -> Result<Residual, Failure> {
+        let mut kept = Vec::new();
+        for part in parts {
+            let part = self.residual(world, part, binding)?;
+            if part == truth(!conjunction) {
+                return Ok(part);
+            }
+            kept.push(part);
+        }
+        Ok(Residual::junction(kept, conjunction))
+    }
+
+    fn quantified(
+        self,
+        world: &mut World<'_>,
+        bound: &[Bound],
+        body: &Formula,
+        binding: &mut Binding,
+        universal: bool,
+    ) -> Result<Residual, Failure> {
+        let guards = if universal { guards_of_forall(body) } else { guards_of_exists(body) };
+        let mut kept = Vec::new();
+        let mut failure = None;
+        let complete = each_binding(world, bound, &guards, binding, &mut |world, binding| match self
+            .residual(world, body, binding)
+        {
+            Ok(part) if part == truth(!universal) => false,
+            Ok(part) => {
+                kept.push(part);
+                true
+            }
+            Err(error) => {
+                failure = Some(error);
+                false
+            }
+        })?;
+        match failure {
+            Some(failure) => Err(failure),
+            None if complete => Ok(Residual::junction(kept, universal)),
+            None => Ok(truth(!universal)),
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! Enumeration of the objects that bound variables can stand for, driven by the facts that must hold.
+//!
+//! `exists` and `forall` range over products of types; most of their elements fail a static atom. So the atoms of the
+//! body are joined, each looked up by the arguments that are bound already, and only what they leave open is tried.
+
+use crate::ground::vocabulary::atom::Binding;
+use crate::ground::vocabulary::world::World;
+use crate::lifted::{Arguments, Bound, Formula, ObjectId, PredicateId, Term};
+use crate::limits::Interrupted;
+
+/// An atom that must be able to hold.
+type Guard<'f> = (PredicateId, &'f [Term]);
+
+/// The atoms without which the body of an existential quantifier fails.
+pub fn guards_of_exists(body: &Formula) -> Vec<Guard<'_>> {
+    let mut guards = Vec::new();
+    match body {
+        Formula::And(parts) => guards.extend(parts.iter().flat_map(guards_of_exists)),
+        Formula::Exists(_, inner) => guards.extend(guards_of_exists(inner)),
+        Formula::Literal { positive: true, predicate, terms } => guards.push((*predicate, terms.as_slice())),
+        _ => {}
+    }
+    guards
+}
+
+/// The atoms without which the body of a universal quantifier holds.
+pub fn guards_of_forall(body: &Formula) -> Vec<Guard<'_>> {
+    let mut guards = Vec::new();
+    match body {
+        Formula::Or(parts) => guards.extend(parts.iter().flat_map(guards_of_forall)),
+        Formula::ForAll(_, inner) => guards.extend(guards_of_forall(inner)),
+        Formula::Literal { positive: false, predicate, terms } => guards.push((*predicate, terms.as_slice())),
+        _ => {}
+    }
+    guards
+}
+
+/// Calls `visit` with every binding of the variables under which all guards can hold, until it returns
+/// false; the variables are unbound again afterwards, unless a limit ends it all. Returns whether `visit` never returned false.
+///
+/// # Errors
+/// When a limit is reached.
+pub fn each_binding<'a>(
+    world: &mut World<'a>,
+    bound: &[Bound],
+    guards: &[Guard<'_>],
+    binding: &mut Binding,
+    visit: &mut dyn FnMut(&mut World<'a>, &mut Binding) -> bool,
+) -> Result<bool, Interrupted> {
+    debug_assert!(bound.is_sorted_by_key(|own| own.variable));
+    let mut join = Join { bound, guards, is_used: vec![false; guards.len()] };
+    // Quantifiers may bind more variables than the call stack has frames.
+    let mut levels: Vec<Level> = Vec::new();
+    loop {
+        world.visit()?;
+        match join.next_level(world, levels.last(), binding) {
+            Some(level) => levels.push(level),
+            None if visit(world, binding) => {}
+            None => {
+                for level in &mut levels {
+                    level.undo(binding);
+                }
+                return Ok(false);
+            }
+        }
+        while let Some(level) = levels.last_mut() {
+            level.undo(binding);
+            if join.advance(world, level, binding)? {
+                break;
+            }
+            join.leave(level);
+            levels.pop();
+        }
+        if levels.is_empty() {
+            return Ok(true);
+        }
+    }
+}
+
+/// The variables and the guards of an enumeration.
+struct Join<'j> {
+    /// Ascending by variable.
+    bound: &'j [Bound],
+    guards: &'j [Guard<'j>],
+    /// `true` for each guard whose rows are being enumerated.
+    is_used: Vec<bool>,
+}
+
+/// Options for some variables, and the variables that the present option has bound.
+struct Level {
+    options: Options,
+    fresh: Vec<u32>,
+}
+
+enum Options {
+    /// The rows that fit a guard, by its position.
+    Rows(usize, std::vec::IntoIter<Arguments>),
+    /// The candidates of a variable, by its place, and the position of the next one.
+    Candidates(usize, usize),
+}
+
+impl Level {
+    fn undo(&mut self, binding: &mut Binding) {
+        for variable in self.fresh.drain(..) {
+            binding[variable as usize] = None;
+        }
+    }
+}
+
+impl Join<'_> {
+    /// The next options: the rows of the guard with the fewest unbound variables, or else the candidates of a variable.
+    fn next_level(
+        &mut self,
+        world: &mut World<'_>,
+        last: Option<&Level>,
+        binding: &Binding,
+    ) -> Option<Level> {
+        let guard = match last {
+            // No guard was left before.
+            Some(Level { options: Options::Candidates(..), .. }) => None,
+            _ => self.next_guard(binding),
+        };
+        let options = if let Some(position) = guard {
+            self.is_used[position] = true;
+            let (predicate, terms) = self.guards[position];
+            Options::Rows(position, world.rows(predicate, terms, binding).into_iter())
+        } else {
+            let first = match last {
+                Some(Level { options: Options::Candidates(place, _), .. }) => *place,
+                _ => 0,
+            };
+            let is_open = |place: &usize| binding[self.bound[*place].variable as usize].is_none();
+            Options::Candidates((first..self.bound.len()).find(is_open)?, 0)
+        };
+        Some(Level { options, fresh: Vec::new() })
+    }
+
+    /// The guard with the fewest open variables, all of which are those of the quantifier.
+    fn next_guard(&self, binding: &Binding) -> Option<usize> {
+        let open_variables = |(position, (_, terms)): (usize, &Guard<'_>)| {
+            let open = terms.iter().filter_map(|term| match term {
+                Term::Parameter(variable) if binding[*variable as usize].is_none() => Some(*variable),
+                _ => None,
+            });
+            let (mut count, mut joins) = (0_usize, !self.is_used[position] && terms.len() <= 64);
+            for variable in open {
+                count = count.saturating_add(1);
+                joins &= self.find(variable).is_some();
+            }
+            (joins && count > 0).then_some((count, position))
+        };
+        self.guards.iter().enumerate().filter_map(open_variables).min().map(|(_, position)| position)
+    }
+
+    /// Binds what the next option binds. Returns `false` after the last option.
+    fn advance(
+        &self,
+        world: &mut World<'_>,
+        level: &mut Level,
+        binding: &mut Binding,
+    ) -> Result<bool, Interrupted> {
+        match &mut level.options {
+            Options::Candidates(place, next) => {
+                let Bound { variable, candidates } = &self.bound[*place];
+                let Some(object) = candidates.get(*next) else { return Ok(false) };
+                *next = next.saturating_add(1);
+                binding[*variable as usize] = Some(*object);
+                level.fresh.push(*variable);
+                Ok(true)
+            }
+            Options::Rows(position, rows) => {
+                let (_, terms) = self.guards[*position];
+                for row in rows {
+                    world.visit()?;
+                    if self.fits(terms, &row, binding, &mut level.fresh) {
+                        return Ok(true);
+                    }
+                    for variable in level.fresh.drain(..) {
+                        binding[variable as usize] = None;
+                    }
+                }
+                Ok(false)
+            }
+        }
+    }
+
+    /// Binds the open variables of terms to the objects of a row. Returns `false` if the row does not fit.
+    fn fits(&self, terms: &[Term], row: &[ObjectId], binding: &mut Binding, fresh: &mut Vec<u32>) -> bool {
+        terms.iter().zip(row).all(|(term, object)| match term {
+            Term::Object(constant) => constant == object,
+            Term::Parameter(variable) => {
+                if let Some(known) = binding[*variable as usize] {
+                    return known == *object;
+                }
+                binding[*variable as usize] = Some(*object);
+                fresh.push(*variable);
+                self.find(*variable).is_some_and(|own| own.candidates.binary_search(object).is_ok())
+            }
+        })
+    }
+
+    fn find(&self, variable: u32) -> Option<&Bound> {
+        let place = self.bound.binary_search_by_key(&variable, |own| own.variable).ok()?;
+        self.bound.get(place)
+    }
+
+    fn leave(&mut self, level: &Level) {
+        if let Options::Rows(position, _) = level.options {
+            self.is_used[position] = false;
+        }
+    }
+}

@@ -1,0 +1,82 @@
+//! Conditions and rules over atoms to those over variables.
+
+use crate::error::Error;
+use crate::ground::finalize::numbers::Numbers;
+use crate::ground::finalize::variables::Atoms;
+use crate::ground::vocabulary::axiom::{GroundAxiom, components};
+use crate::ground::vocabulary::condition::GroundCondition;
+use crate::lifted::Rational;
+use crate::number::checked_lcm;
+use crate::task::number::TaskNumber;
+use crate::task::{Axiom, Condition, Fact, Layer};
+
+/// A condition of the final task.
+#[expect(clippy::arithmetic_side_effects, reason = "above the least number of its type")]
+pub(super) fn condition<N: TaskNumber>(
+    ground: &GroundCondition,
+    atoms: &Atoms,
+    numbers: &mut Numbers<N>,
+) -> Result<Condition<N>, Error> {
+    let mut condition = Condition::default();
+    for literal in &ground.literals {
+        let literal = atoms.literal(*literal);
+        let none = atoms.none[literal.fact.variable.index()];
+        if literal.positive {
+            condition.facts.push(literal.fact);
+        } else if none == 1 {
+            condition.facts.push(Fact { variable: literal.fact.variable, value: none });
+        } else {
+            condition.clauses.push(vec![literal]);
+        }
+    }
+    for clause in &ground.clauses {
+        condition.clauses.push(clause.iter().map(|literal| atoms.literal(*literal)).collect());
+    }
+    for (linear, strict) in &ground.comparisons {
+        if !N::SCALED {
+            let list = if *strict { &mut condition.above } else { &mut condition.comparisons };
+            list.push(numbers.linear(linear)?);
+            continue;
+        }
+        let mut linear = numbers.stored(linear, 1).into_owned();
+        // A comparison may be scaled at will, so fractional factors do no harm here.
+        let mut denominators = linear.coefficients.iter().map(|(_, factor)| factor.denominator());
+        let common = denominators.try_fold(1, |common, next| checked_lcm(common, next?));
+        let common = common.ok_or_else(|| Error::overflow("a factor of a numeric fluent"))?;
+        linear.scale(&Rational::from_integer(common));
+        let mut integers = numbers.linear(&linear)?;
+        if *strict {
+            integers.quantity.constant = integers.quantity.constant + -N::one();
+        }
+        condition.comparisons.push(integers);
+    }
+    condition.facts.sort_unstable();
+    condition.facts.dedup();
+    Ok(condition)
+}
+
+/// Whether two values of one variable are required.
+pub(super) fn contradictory<N>(condition: &Condition<N>) -> bool {
+    condition.facts.windows(2).any(|pair| pair[0].variable == pair[1].variable)
+}
+
+/// The rules of derived variables in layers: what a layer depends on comes before it.
+pub(super) fn axioms<N: TaskNumber>(
+    axioms: &[GroundAxiom],
+    atoms: &Atoms,
+    numbers: &mut Numbers<N>,
+) -> Result<Vec<Layer<N>>, Error> {
+    let mut layers = Vec::new();
+    for component in components(axioms) {
+        let mut layer = Layer { rules: Vec::new(), recursive: component.len() > 1 };
+        for axiom in axioms.iter().filter(|axiom| component.binary_search(&axiom.head).is_ok()) {
+            let Some(head) = atoms.fact(axiom.head) else { continue };
+            layer.recursive |= axiom.body.atoms().any(|atom| atom == axiom.head);
+            layer.rules.push(Axiom { head, body: condition(&axiom.body, atoms, numbers)? });
+        }
+        if !layer.rules.is_empty() {
+            layers.push(layer);
+        }
+    }
+    Ok(layers)
+}

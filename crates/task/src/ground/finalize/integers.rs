@@ -1,0 +1,133 @@
+//! Exact rationals to integers: one factor for all numbers of a kind, and each table converted once.
+
+use std::collections::hash_map::Entry;
+use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
+
+use crate::error::{Error, Place};
+use crate::lifted::Rational;
+use crate::number::{Int, LIMIT, checked_lcm};
+use crate::task::number::TaskNumber;
+use crate::task::quantity::Quantity;
+use crate::task::table_map::TableMap;
+
+/// The least factor that makes all numbers of one kind integers.
+#[derive(Debug)]
+pub(super) struct Denominator {
+    what: &'static str,
+    /// None if it is too large.
+    common: Option<Int>,
+    /// Where the number was that made it so.
+    culprit: Option<(String, Option<Place>)>,
+    /// Tables that have been looked at.
+    seen: FxHashMap<*const Rational, Arc<[Rational]>>,
+}
+
+impl Denominator {
+    /// `what` names the numbers in errors.
+    pub(super) fn new(what: &'static str) -> Self {
+        Self { what, common: Some(1), culprit: None, seen: FxHashMap::default() }
+    }
+
+    pub(super) fn number(&mut self, number: &Rational) {
+        if let Some(common) = self.common
+            && !number.is_integer()
+        {
+            let next = number.denominator().and_then(|denominator| checked_lcm(common, denominator));
+            self.common = next.filter(|next| *next < LIMIT);
+        }
+    }
+
+    pub(super) fn quantity(&mut self, quantity: &Quantity<Rational>) {
+        self.number(&quantity.constant);
+        for table in &quantity.tables {
+            if let Entry::Vacant(new) = self.seen.entry(table.values.as_ptr()) {
+                let values = new.insert(table.values.clone()).clone();
+                values.iter().for_each(|number| self.number(number));
+            }
+        }
+    }
+
+    /// Notes where the last number was, if it made the factor too large.
+    pub(super) fn note(&mut self, place: impl FnOnce() -> (String, Option<Place>)) {
+        if self.common.is_none() && self.culprit.is_none() {
+            self.culprit = Some(place());
+        }
+    }
+
+    /// The conversion.
+    ///
+    /// # Errors
+    /// `Error::Overflow` if the factor is too large.
+    pub(super) fn integers<N: TaskNumber>(self) -> Result<Integers<N>, Error> {
+        let common = if N::SCALED { self.common } else { Some(1) };
+        let overflow = || {
+            let error = Error::overflow(self.what);
+            self.culprit.iter().fold(error, |error, (name, place)| error.within(name, *place))
+        };
+        let scale = common.ok_or_else(overflow)?;
+        Ok(Integers { what: self.what, scale, tables: TableMap::default() })
+    }
+}
+
+/// Turns numbers of one kind into integers, or leaves them as they are.
+#[derive(Debug)]
+pub(super) struct Integers<N> {
+    what: &'static str,
+    pub(super) scale: Int,
+    tables: TableMap<N>,
+}
+
+impl<N: TaskNumber> Integers<N> {
+    pub(super) fn number(&self, number: &Rational) -> Result<N, Error> {
+        integer(number, self.scale, self.what)
+    }
+
+    pub(super) fn quantity(&mut self, quantity: &Quantity<Rational>) -> Result<Quantity<N>, Error> {
+        let (scale, what) = (self.scale, self.what);
+        let scaled = self.tables.map(quantity, &|number| integer(number, scale, what))?;
+        if N::fits(&scaled) { Ok(scaled) } else { Err(Error::overflow(what)) }
+    }
+}
+
+fn integer<N: TaskNumber>(number: &Rational, scale: Int, what: &str) -> Result<N, Error> {
+    N::from_rational(number, scale).ok_or_else(|| Error::overflow(what))
+}
+
+#[cfg(test)]
+mod tests {
+    use num_traits::Zero;
+
+    use super::*;
+    use crate::task::quantity::Table;
+
+    /// A quantity of so many tables over slots of their own, each of 0 and a number.
+    fn quantity(tables: u32, number: Int) -> Quantity<Rational> {
+        let values: Arc<[Rational]> = [Rational::zero(), Rational::from_integer(number)].into();
+        let table = |slot| Table { slots: [slot].into_iter().collect(), values: values.clone() };
+        Quantity { constant: Rational::zero(), tables: (0..tables).map(table).collect() }
+    }
+
+    #[test]
+    fn numbers_that_do_not_fit_together_are_refused() {
+        let number = LIMIT - 1;
+        for (tables, number, fits) in [
+            (1, number, true),
+            (31, number, true),
+            (32, number, true),
+            (33, number, false),
+            (33, -number, false),
+            (600, number, false),
+            (600, 1 << 113, true),
+        ] {
+            let mut integers: Integers<Int> = Denominator::new("costs").integers().expect("a factor");
+            let found = integers.quantity(&quantity(tables, number));
+            assert_eq!(found.is_ok(), fits, "{tables} tables of {number}");
+            if let Ok(found) = found {
+                let (choice, sizes) = (vec![1; tables as usize], vec![2; tables as usize]);
+                assert_eq!(found.at(&choice, &sizes), Int::from(tables) * number);
+            }
+        }
+    }
+}

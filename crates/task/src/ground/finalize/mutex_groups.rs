@@ -1,0 +1,241 @@
+//! Groups of atoms of which at most one holds: what becomes a finite-domain variable.
+//!
+//! Invariant synthesis after Helmert [1]: a candidate is a set of predicates that share some arguments and count
+//! another; it is an invariant if no operator increases the number of true atoms of any instance. Candidates that
+//! an operator breaks are refined by a predicate that the same operator deletes. Checked on ground operators, so that
+//! statically impossible instances do no harm.
+//!
+//! [1] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009, section 5.
+
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BinaryHeap};
+
+use rustc_hash::FxHashSet;
+use smallvec::SmallVec;
+
+use crate::ground::vocabulary::atom::AtomId;
+use crate::ground::vocabulary::condition::GroundLiteral;
+use crate::ground::vocabulary::operator::GroundOperator;
+use crate::ground::vocabulary::task::GroundTask;
+use crate::lifted::{ObjectId, PredicateId};
+use crate::limits::{Interrupted, Limits};
+
+/// One predicate of a candidate: argument positions that make up the key, in order; one more may be counted.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+struct Part {
+    predicate: PredicateId,
+    key: Vec<usize>,
+}
+
+type Candidate = Vec<Part>;
+type Key = SmallVec<[ObjectId; 4]>;
+
+/// How many candidates are tried before the search gives up refining.
+const CANDIDATE_LIMIT: usize = 500;
+
+/// Atoms that become the values of a variable.
+pub struct Group {
+    /// At least two, in no other group.
+    pub(crate) atoms: Vec<AtomId>,
+    /// These and others: at most one of all of them is true at any time. Operators on the variable are right only if that is so.
+    pub(crate) exclusive: Vec<AtomId>,
+}
+
+/// Disjoint groups, largest first.
+#[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
+pub fn groups(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec<Group>, Interrupted> {
+    let limits = task.world.limits;
+    let mut instances: Vec<Vec<AtomId>> = Vec::new();
+    for candidate in invariants(task, relevant)? {
+        let mut by_key: BTreeMap<Key, (usize, Vec<AtomId>)> = BTreeMap::new();
+        for atom in limits.watch(sorted(relevant)) {
+            let atom = atom?;
+            if let Some(key) = key_of(task, &candidate, atom) {
+                let entry = by_key.entry(key).or_default();
+                entry.0 += usize::from(task.world.is_initial(atom));
+                entry.1.push(atom);
+            }
+        }
+        instances.extend(by_key.into_values().filter(|(weight, _)| *weight <= 1).map(|(_, atoms)| atoms));
+    }
+    cover(&instances, limits)
+}
+
+/// Greedy: the group that covers most uncovered atoms first; of equal ones the one that comes first.
+fn cover(instances: &[Vec<AtomId>], limits: &Limits) -> Result<Vec<Group>, Interrupted> {
+    let mut covered: FxHashSet<AtomId> = FxHashSet::default();
+    let mut chosen = Vec::new();
+    // What a group covers only shrinks, so one whose turn comes with as much as it was filed under is the best.
+    let filed = |(index, atoms): (usize, &Vec<AtomId>)| (atoms.len(), Reverse(index));
+    let mut open: BinaryHeap<(usize, Reverse<usize>)> = instances.iter().enumerate().map(filed).collect();
+    let mut pulse = limits.pulse();
+    while let Some((size, Reverse(index))) = open.pop() {
+        pulse.beat()?;
+        let own = &instances[index];
+        let atoms: Vec<AtomId> = own.iter().filter(|atom| !covered.contains(*atom)).copied().collect();
+        if atoms.len() < 2 {
+            continue;
+        }
+        if atoms.len() < size {
+            open.push((atoms.len(), Reverse(index)));
+            continue;
+        }
+        covered.extend(&atoms);
+        chosen.push(Group { atoms, exclusive: own.clone() });
+    }
+    Ok(chosen)
+}
+
+fn sorted(atoms: &FxHashSet<AtomId>) -> Vec<AtomId> {
+    let mut all: Vec<_> = atoms.iter().copied().collect();
+    all.sort_unstable();
+    all
+}
+
+/// The key of an atom under a candidate, if the candidate covers its predicate.
+fn key_of(task: &GroundTask<'_>, candidate: &Candidate, atom: AtomId) -> Option<Key> {
+    let ((predicate, arguments), ()) = task.world.atoms.get_index(atom.index())?;
+    let part = candidate.iter().find(|part| part.predicate == *predicate)?;
+    Some(part.key.iter().map(|position| arguments[*position]).collect())
+}
+
+/// The candidates that hold up.
+#[expect(clippy::arithmetic_side_effects, reason = "no more than the limit on candidates")]
+fn invariants(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec<Candidate>, Interrupted> {
+    let mut arities: BTreeMap<PredicateId, usize> = BTreeMap::new();
+    for atom in relevant {
+        if let Some(((predicate, arguments), ())) = task.world.atoms.get_index(atom.index()) {
+            arities.insert(*predicate, arguments.len());
+        }
+    }
+    let mut open: Vec<Candidate> = Vec::new();
+    for (predicate, arity) in &arities {
+        let all: Vec<usize> = (0..*arity).collect();
+        open.push(vec![Part { predicate: *predicate, key: all.clone() }]);
+        for counted in &all {
+            let key = all.iter().copied().filter(|position| position != counted).collect();
+            open.push(vec![Part { predicate: *predicate, key }]);
+        }
+    }
+    let mut seen: FxHashSet<Candidate> = open.iter().cloned().collect();
+    let mut found = Vec::new();
+    let mut next = 0;
+    while next < open.len() && next < CANDIDATE_LIMIT {
+        let candidate = open[next].clone();
+        next += 1;
+        let mut broken = None;
+        for operator in task.world.limits.watch(&task.operators) {
+            broken = broken_by(task, &candidate, operator?);
+            if broken.is_some() {
+                break;
+            }
+        }
+        match broken {
+            None => found.push(candidate),
+            Some((operator, key)) => {
+                for refined in refinements(task, &candidate, operator, &key, &arities) {
+                    if seen.insert(refined.clone()) {
+                        open.push(refined);
+                    }
+                }
+            }
+        }
+    }
+    Ok(found)
+}
+
+/// Conjuncts under which atoms are added and deleted together.
+struct Change<'o> {
+    conditions: [&'o [GroundLiteral]; 2],
+    adds: &'o [AtomId],
+    deletes: &'o [AtomId],
+}
+
+impl Change<'_> {
+    fn requires(&self, atom: AtomId) -> bool {
+        self.conditions.iter().any(|literals| literals.binary_search(&(atom, true)).is_ok())
+    }
+}
+
+/// The operator itself and a key whose weight it may increase (or decrease without anybody knowing).
+#[expect(clippy::arithmetic_side_effects, reason = "atoms of one operator are counted")]
+fn broken_by<'o>(
+    task: &GroundTask<'_>,
+    candidate: &Candidate,
+    operator: &'o GroundOperator,
+) -> Option<(&'o GroundOperator, Key)> {
+    let literals = &operator.condition.literals[..];
+    let own = Change { conditions: [literals, &[]], adds: &operator.adds, deletes: &operator.deletes };
+    let conditional = operator.conditional.iter().map(|effect| Change {
+        conditions: [literals, &effect.condition],
+        adds: &effect.adds,
+        deletes: &effect.deletes,
+    });
+    let deleted = |atom: &AtomId| {
+        let mut effects = operator.conditional.iter().map(|effect| &effect.deletes);
+        operator.deletes.contains(atom) || effects.any(|deletes| deletes.contains(atom))
+    };
+    // Each entry has to keep the weight by itself, and no two of them may add to one key.
+    let mut adding: Vec<Key> = Vec::new();
+    for change in std::iter::once(own).chain(conditional) {
+        let mut balance: SmallVec<[(Key, i32); 4]> = SmallVec::new();
+        let mut weigh = |key: Key, weight| match balance.iter_mut().find(|(known, _)| *known == key) {
+            Some((_, sum)) => *sum += weight,
+            None => balance.push((key, weight)),
+        };
+        let comes = |atom: &&AtomId| !change.requires(**atom) || deleted(atom);
+        let added = change.adds.iter().filter(comes).filter_map(|atom| key_of(task, candidate, *atom));
+        let added: SmallVec<[Key; 4]> = added.collect();
+        added.iter().for_each(|key| weigh(key.clone(), 1));
+        for atom in change.deletes {
+            if let Some(key) = key_of(task, candidate, *atom) {
+                if !change.requires(*atom) {
+                    return Some((operator, key));
+                }
+                weigh(key, -1);
+            }
+        }
+        let heavy = balance.into_iter().filter(|(_, weight)| *weight > 0).map(|(key, _)| key);
+        let twice = added.iter().filter(|key| adding.contains(*key)).cloned();
+        if let Some(key) = heavy.chain(twice).min() {
+            return Some((operator, key));
+        }
+        if !operator.conditional.is_empty() {
+            adding.extend(added);
+        }
+    }
+    None
+}
+
+/// The candidate plus one predicate that the operator requires and deletes, its arguments matched to the key.
+#[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
+fn refinements(
+    task: &GroundTask<'_>,
+    candidate: &Candidate,
+    operator: &GroundOperator,
+    key: &Key,
+    arities: &BTreeMap<PredicateId, usize>,
+) -> Vec<Candidate> {
+    let mut refined = Vec::new();
+    let conditional = operator.conditional.iter().flat_map(|effect| &effect.deletes);
+    for atom in operator.deletes.iter().chain(conditional) {
+        let Some(((predicate, arguments), ())) = task.world.atoms.get_index(atom.index()) else { continue };
+        if candidate.iter().any(|part| part.predicate == *predicate) || !arities.contains_key(predicate) {
+            continue;
+        }
+        let mut positions = Vec::new();
+        for object in key {
+            let free = (0..arguments.len()).find(|p| arguments[*p] == *object && !positions.contains(p));
+            positions.extend(free);
+        }
+        // What is under way is counted whatever its other arguments are: it stands for where they have left.
+        let is_running = task.world.lifted.predicates.get(predicate.index()).is_some_and(|p| p.running);
+        if positions.len() == key.len() && (arguments.len() <= key.len() + 1 || is_running) {
+            let mut parts = candidate.clone();
+            parts.push(Part { predicate: *predicate, key: positions });
+            parts.sort_unstable();
+            refined.push(parts);
+        }
+    }
+    refined
+}

@@ -1,0 +1,173 @@
+//! Changes of one happening together, in terms of the state before an action.
+
+use std::sync::Arc;
+
+use crate::error::{Error, Place};
+use crate::ground::evaluate::reads::{Reads, matches};
+use crate::ground::vocabulary::atom::AtomId;
+use crate::ground::vocabulary::eval_error::Failure;
+use crate::ground::vocabulary::numbers::Numbers;
+use crate::ground::vocabulary::world::World;
+use crate::lifted::Rational;
+use crate::task::ForbiddenCombinations;
+use crate::task::quantity::{Linear, NumericId};
+use pddl::ast::Assignment;
+
+/// A change of an atom or of a number.
+#[derive(Clone)]
+pub(super) enum GroundChange {
+    Atom(AtomId, bool),
+    Number {
+        variable: NumericId,
+        assignment: Assignment,
+        /// None if it is undefined: the operator does not exist where the change would be made.
+        operand: Option<Linear<Rational>>,
+        /// Combinations of designs for which it is undefined.
+        undefined: Arc<[ForbiddenCombinations]>,
+        place: Place,
+    },
+}
+
+impl GroundChange {
+    pub(super) fn undefined(&self) -> &[ForbiddenCombinations] {
+        match self {
+            Self::Atom(..) => &[],
+            Self::Number { undefined, .. } => undefined,
+        }
+    }
+
+    /// Whether it changes what is read.
+    pub(super) fn disturbs(&self, world: &World<'_>, reads: &Reads) -> bool {
+        match self {
+            Self::Atom(atom, _) => {
+                let (predicate, arguments) = world.atom_key(*atom);
+                reads.atoms.iter().any(|pattern| matches(pattern, predicate, arguments))
+            }
+            Self::Number { variable, .. } => {
+                let (function, arguments) = world.numeric_key(*variable);
+                reads.numbers.iter().any(|pattern| matches(pattern, function, arguments))
+            }
+        }
+    }
+}
+
+/// The atoms that changes make true, and those that they make false; what is both becomes true.
+pub(super) fn atoms<'c>(changes: impl Iterator<Item = &'c GroundChange>) -> (Vec<AtomId>, Vec<AtomId>) {
+    let (mut adds, mut deletes) = (Vec::new(), Vec::new());
+    for change in changes {
+        if let GroundChange::Atom(atom, positive) = change {
+            if *positive { &mut adds } else { &mut deletes }.push(*atom);
+        }
+    }
+    deletes.retain(|atom| !adds.contains(atom));
+    (adds, deletes)
+}
+
+/// How a number changes; two changes of one way commute, unless both assign (0).
+pub(super) fn way_of(assignment: Assignment) -> u8 {
+    match assignment {
+        Assignment::Assign => 0,
+        Assignment::Increase | Assignment::Decrease => 1,
+        Assignment::ScaleUp | Assignment::ScaleDown => 2,
+    }
+}
+
+/// Whether changes of one number at one time go together: additions, scalings, and assignments of the same value do.
+/// `Failure::Undefined` if they do not, which leaves the action inapplicable (PDDL 2.1, section 8).
+fn reconcile(earlier: &GroundChange, later: &GroundChange) -> Result<(), Failure> {
+    let (
+        GroundChange::Number { assignment: kind, operand: known, .. },
+        GroundChange::Number { assignment, operand, place, .. },
+    ) = (earlier, later)
+    else {
+        return Ok(());
+    };
+    match (known, operand) {
+        _ if way_of(*kind) != way_of(*assignment) => Err(Failure::Undefined),
+        (Some(known), Some(value)) if way_of(*kind) == 0 && known != value => {
+            let is_constant =
+                |value: &Linear<Rational>| value.coefficients.is_empty() && value.quantity.tables.is_empty();
+            if is_constant(known) && is_constant(value) {
+                return Err(Failure::Undefined);
+            }
+            Err(Failure::Error(Error::Unsupported {
+                construct: "two different values assigned to one number at one time".into(),
+                instead: "one `assign` of each number".into(),
+                place: *place,
+            }))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// What numeric variables become, in terms of the state before the action; `before` are the changes that
+/// the action has made already.
+pub(super) fn numbers<'c>(
+    changes: impl Iterator<Item = &'c GroundChange>,
+    before: &Numbers,
+) -> Result<Numbers, Failure> {
+    let mut changed = Numbers::default();
+    let mut last: Vec<(NumericId, &GroundChange)> = Vec::new();
+    for change in changes {
+        let GroundChange::Number { variable, assignment, operand, place, .. } = change else { continue };
+        match last.iter_mut().find(|(known, _)| known == variable) {
+            Some((_, earlier)) => {
+                reconcile(earlier, change)?;
+                *earlier = change;
+            }
+            None => last.push((*variable, change)),
+        }
+        let mut operand = operand.clone().ok_or(Failure::Undefined)?;
+        substitute(&mut operand, before);
+        let current = || {
+            let old = changed.get(*variable).or_else(|| before.get(*variable));
+            old.cloned().unwrap_or_else(|| Linear::variable(*variable))
+        };
+        let value = match assignment {
+            Assignment::Assign => operand,
+            Assignment::Increase => sum(current(), &operand),
+            Assignment::Decrease => sum(current(), &operand.negated()),
+            Assignment::ScaleUp | Assignment::ScaleDown => {
+                scaled(current(), &operand, *assignment == Assignment::ScaleDown, *place)?
+            }
+        };
+        changed.insert(*variable, value);
+    }
+    Ok(changed)
+}
+
+fn sum(mut left: Linear<Rational>, right: &Linear<Rational>) -> Linear<Rational> {
+    left.add(right);
+    left
+}
+
+fn scaled(
+    mut value: Linear<Rational>,
+    factor: &Linear<Rational>,
+    inverse: bool,
+    place: Place,
+) -> Result<Linear<Rational>, Failure> {
+    if !factor.coefficients.is_empty() || !factor.quantity.tables.is_empty() {
+        return Err(Failure::Error(Error::NonLinear { place }));
+    }
+    let factor = factor.quantity.constant.clone();
+    if inverse && factor == Rational::from_integer(0) {
+        return Err(Failure::Undefined);
+    }
+    value.scale(&if inverse { factor.recip() } else { factor });
+    Ok(value)
+}
+
+/// Puts what numeric variables have become in their place.
+pub(super) fn substitute(linear: &mut Linear<Rational>, before: &Numbers) {
+    if !linear.coefficients.iter().any(|(variable, _)| before.get(*variable).is_some()) {
+        return;
+    }
+    let mut result = Linear { coefficients: Vec::new(), quantity: linear.quantity.clone() };
+    for (variable, factor) in &linear.coefficients {
+        let mut value = before.get(*variable).cloned().unwrap_or_else(|| Linear::variable(*variable));
+        value.scale(factor);
+        result.add(&value);
+    }
+    *linear = result;
+}

@@ -1,0 +1,292 @@
+//! The cases of an instance: one for each way in which its conditions can turn out.
+
+use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
+
+use crate::error::Error;
+use crate::ground::evaluate::normal_form::Definitions;
+use crate::ground::instantiate::change::{GroundChange, atoms, numbers, substitute};
+use crate::ground::instantiate::design_constraints::{admit_some, forbid};
+use crate::ground::instantiate::simultaneous_effects::SimultaneousEffects;
+use crate::ground::instantiate::timeline_windows::{Interference, TimelineWindow};
+use crate::ground::vocabulary::atom::AtomId;
+use crate::ground::vocabulary::eval_error::{Failure, possible};
+use crate::ground::vocabulary::numbers::Numbers;
+use crate::ground::vocabulary::operator::{GroundConditional, GroundOperator};
+use crate::ground::vocabulary::partial_eval::{Residual, constant_comparison};
+use crate::ground::vocabulary::world::World;
+use crate::lifted::Schema;
+use crate::limits::Limits;
+use crate::task::ForbiddenCombinations;
+
+/// An instance becomes at most this many operators.
+const CASE_LIMIT: usize = 64;
+
+/// One way in which the conditions of an instance can turn out, all its conditions in terms of the state before it.
+pub(super) struct Case {
+    parts: Vec<Residual>,
+    start: Start,
+    end: Vec<(Residual, GroundChange)>,
+}
+
+/// What the start of an instance changes for certain.
+#[derive(Clone)]
+struct Start {
+    adds: Vec<AtomId>,
+    deletes: Vec<AtomId>,
+    numbers: Numbers,
+    /// Combinations of designs for which a number has no value.
+    undefined: Vec<ForbiddenCombinations>,
+}
+
+impl Start {
+    fn change(&mut self, changes: &[(AtomId, bool)]) {
+        for (atom, holds) in changes {
+            self.adds.retain(|known| known != atom);
+            self.deletes.retain(|known| known != atom);
+            if *holds { &mut self.adds } else { &mut self.deletes }.push(*atom);
+        }
+    }
+
+    fn new<'c, I: Iterator<Item = &'c GroundChange>>(changes: impl Fn() -> I) -> Result<Self, Failure> {
+        let (adds, deletes) = atoms(changes());
+        let undefined = changes().flat_map(GroundChange::undefined).cloned().collect();
+        Ok(Self { adds, deletes, numbers: numbers(changes(), &Numbers::default())?, undefined })
+    }
+}
+
+/// What must hold between the start effects and the end effects, and what happens by itself in between.
+pub(super) struct Middle<'m> {
+    /// Hold all the time between start and end.
+    pub(super) over_all: &'m [Residual],
+    /// Hold before the end.
+    pub(super) at_end: &'m [Residual],
+    /// If something happens by itself: when the action starts and ends, and what must not hold then.
+    pub(super) passage: Option<&'m (TimelineWindow<'m>, Interference)>,
+}
+
+impl Middle<'_> {
+    /// Adds the conditions in terms of the state before the start, and to the start what happens until the end.
+    fn pass(&self, start: &mut Start, parts: &mut Vec<Residual>) {
+        let Some((passage, interference)) = self.passage else {
+            let conditions = self.over_all.iter().chain(self.at_end);
+            parts.extend(conditions.map(|residual| after_start(residual, start)));
+            return;
+        };
+        parts.extend(passage.conditions());
+        parts.extend(interference.start.iter().map(Residual::negated));
+        parts.extend(self.over_all.iter().map(|residual| after_start(residual, start)));
+        for event in passage.events() {
+            start.change(event);
+            parts.extend(self.over_all.iter().map(|residual| after_start(residual, start)));
+        }
+        parts.extend(self.at_end.iter().map(|residual| after_start(residual, start)));
+        parts.extend(interference.end.iter().map(|residual| after_start(residual, start).negated()));
+        start.change(passage.event_at_end().unwrap_or_default());
+        start.change(&passage.changes());
+        if let Some((clock, value)) = passage.clock() {
+            start.numbers.insert(clock, value);
+        }
+    }
+}
+
+/// The cases of an instance: one, unless its start is conditional or its numbers are. A case that contradicts itself, or in which
+/// a value is missing, is none; the others stay (PDDL 2.1, section 8: an effect whose condition does not hold is not an effect).
+pub(super) fn cases(
+    schema: &Schema,
+    before: &[Residual],
+    start: &SimultaneousEffects,
+    middle: &Middle<'_>,
+    end: &SimultaneousEffects,
+) -> Result<Vec<Case>, Failure> {
+    let mut all = Vec::new();
+    for (decided, chosen) in split(schema, start.changes.iter().map(|(condition, _)| condition))? {
+        let holds = |(condition, _): &&(Residual, GroundChange)| {
+            *condition == Residual::True || chosen.contains(&condition)
+        };
+        let changes = || start.changes.iter().filter(holds).map(|(_, change)| change);
+        let mut parts: Vec<_> = before.iter().cloned().chain(decided).collect();
+        if contradictory(&parts) {
+            continue;
+        }
+        let Some(mut start) = possible(Start::new(changes))? else { continue };
+        middle.pass(&mut start, &mut parts);
+        let after = |residual: &Residual| after_start(residual, &start);
+        let end: Vec<_> = end
+            .changes
+            .iter()
+            .map(|(condition, change)| (after(condition), change.clone()))
+            .filter(|(condition, _)| *condition != Residual::False)
+            .collect();
+        let numeric = end.iter().filter(|(_, change)| matches!(change, GroundChange::Number { .. }));
+        let numeric: Vec<_> = numeric.map(|(condition, _)| condition.clone()).collect();
+        for (decided, chosen) in split(schema, numeric.iter())? {
+            let settle = |(condition, change): &(Residual, GroundChange)| {
+                let settled = if chosen.contains(&condition) {
+                    Residual::True
+                } else if numeric.contains(condition) && *condition != Residual::True {
+                    Residual::False
+                } else {
+                    condition.clone()
+                };
+                (settled, change.clone())
+            };
+            let parts: Vec<_> = parts.iter().cloned().chain(decided).collect();
+            if !contradictory(&parts) {
+                let end = end.iter().map(settle).filter(|(condition, _)| *condition != Residual::False);
+                all.push(Case { parts, start: start.clone(), end: end.collect() });
+            }
+        }
+    }
+    Ok(all)
+}
+
+/// Whether parts cannot hold together, as far as their literals tell.
+fn contradictory(parts: &[Residual]) -> bool {
+    fn note(parts: &[Residual], known: &mut FxHashMap<AtomId, bool>) -> bool {
+        parts.iter().any(|part| match part {
+            Residual::False => true,
+            Residual::And(parts) => note(parts, known),
+            Residual::Literal { atom, positive } => known.insert(*atom, *positive) == Some(!positive),
+            _ => false,
+        })
+    }
+    note(parts, &mut FxHashMap::default())
+}
+
+/// Every way in which conditions can turn out: what must hold then, and which of them hold.
+#[allow(clippy::type_complexity)]
+#[expect(clippy::arithmetic_side_effects, reason = "cases are at most twice their limit")]
+fn split<'r>(
+    schema: &Schema,
+    conditions: impl Iterator<Item = &'r Residual>,
+) -> Result<Vec<(Vec<Residual>, Vec<&'r Residual>)>, Failure> {
+    let mut distinct: Vec<&Residual> = Vec::new();
+    for condition in conditions.filter(|condition| **condition != Residual::True) {
+        if !distinct.contains(&condition) {
+            distinct.push(condition);
+        }
+    }
+    let mut all: Vec<(Vec<Residual>, Vec<&Residual>)> = vec![(Vec::new(), Vec::new())];
+    for condition in distinct {
+        if all.len() * 2 > CASE_LIMIT {
+            return Err(Failure::Error(Error::Unsupported {
+                construct: format!("an instance of `{}` with more than {CASE_LIMIT} cases", schema.name),
+                instead: "fewer conditions on which its numbers or its start effects depend".into(),
+                place: schema.place,
+            }));
+        }
+        let mut longer = Vec::with_capacity(2 * all.len());
+        for (decided, chosen) in all {
+            let with = |part: Residual| decided.iter().cloned().chain([part]).collect::<Vec<_>>();
+            longer.push((with(condition.clone()), chosen.iter().copied().chain([condition]).collect()));
+            longer.push((with(condition.negated()), chosen));
+        }
+        all = longer;
+    }
+    Ok(all)
+}
+
+impl Case {
+    /// The combinations of designs that the case cannot run with; `Failure::Undefined` if there is no other.
+    fn forbidden(
+        &self,
+        template: &GroundOperator,
+        limits: &Limits,
+    ) -> Result<Arc<[ForbiddenCombinations]>, Failure> {
+        let end = self.end.iter().filter(|(condition, _)| *condition == Residual::True);
+        let rules = end.flat_map(|(_, change)| change.undefined()).chain(&self.start.undefined);
+        let mut rules = rules.peekable();
+        if rules.peek().is_none() {
+            return Ok(template.forbidden.clone());
+        }
+        let mut all = template.forbidden.to_vec();
+        for rule in rules {
+            for combination in &rule.combinations {
+                forbid(&mut all, &rule.slots, combination.clone());
+            }
+        }
+        let sizes: Vec<_> = template.slots.iter().map(|(_, designs)| designs.len()).collect();
+        if admit_some(&all, &sizes, limits)? { Ok(all.into()) } else { Err(Failure::Undefined) }
+    }
+
+    /// The operator of this case; everything but conditions and effects is that of the template.
+    #[expect(clippy::arithmetic_side_effects, reason = "something was pushed before")]
+    pub(super) fn operator(
+        self,
+        world: &mut World<'_>,
+        definitions: &mut Definitions,
+        template: GroundOperator,
+    ) -> Result<GroundOperator, Failure> {
+        let forbidden = self.forbidden(&template, world.limits)?;
+        let start = self.start;
+        let certain = || self.end.iter().filter(|(condition, _)| *condition == Residual::True);
+        let (end_adds, end_deletes) = atoms(certain().map(|(_, change)| change));
+        let mut numeric_effects = numbers(certain().map(|(_, change)| change), &start.numbers)?;
+        numeric_effects.complete(start.numbers);
+        let mut conditional: Vec<GroundConditional> = Vec::new();
+        for (condition, change) in self.end.iter().filter(|(condition, _)| *condition != Residual::True) {
+            let GroundChange::Atom(atom, positive) = change else { continue };
+            let gone = start.deletes.contains(atom) && !start.adds.contains(atom);
+            if !positive && (gone || end_adds.contains(atom)) {
+                continue;
+            }
+            let condition = literals(world, definitions, condition);
+            if condition.windows(2).any(|pair| pair[0].0 == pair[1].0) {
+                continue;
+            }
+            let position = conditional.iter().position(|known| known.condition == condition);
+            let position = position.unwrap_or_else(|| {
+                conditional.push(GroundConditional { condition, adds: Vec::new(), deletes: Vec::new() });
+                conditional.len() - 1
+            });
+            let entry = &mut conditional[position];
+            if *positive { &mut entry.adds } else { &mut entry.deletes }.push(*atom);
+        }
+        for entry in &mut conditional {
+            entry.deletes.retain(|atom| !entry.adds.contains(atom));
+        }
+        let mut adds = end_adds;
+        adds.extend(start.adds.iter().filter(|atom| !end_deletes.contains(atom)));
+        adds.sort_unstable();
+        adds.dedup();
+        let mut deletes: Vec<_> = end_deletes.into_iter().chain(start.deletes).collect();
+        deletes.sort_unstable();
+        deletes.dedup();
+        deletes.retain(|atom| !adds.contains(atom));
+        let condition = definitions.condition(world, &self.parts)?;
+        Ok(GroundOperator { forbidden, condition, adds, deletes, conditional, numeric_effects, ..template })
+    }
+}
+
+/// The literals of a conjunction; parts that are none get a name.
+fn literals(
+    world: &mut World<'_>,
+    definitions: &mut Definitions,
+    condition: &Residual,
+) -> Vec<(AtomId, bool)> {
+    let parts =
+        if let Residual::And(parts) = condition { &parts[..] } else { std::slice::from_ref(condition) };
+    let mut literals: Vec<_> = parts.iter().map(|part| definitions.literal(world, part)).collect();
+    literals.sort_unstable();
+    literals.dedup();
+    literals
+}
+
+/// A condition of the middle or end of a durative action in terms of the state before its start.
+fn after_start(residual: &Residual, Start { adds, deletes, numbers, .. }: &Start) -> Residual {
+    if adds.is_empty() && deletes.is_empty() && numbers.is_empty() {
+        return residual.clone();
+    }
+    residual.clone().mapped(&|leaf| match leaf {
+        Residual::Literal { atom, positive } if adds.contains(&atom) || deletes.contains(&atom) => {
+            if adds.contains(&atom) == positive { Residual::True } else { Residual::False }
+        }
+        Residual::Compare { mut linear, strict } => {
+            substitute(&mut linear, numbers);
+            constant_comparison(&linear, strict).unwrap_or(Residual::Compare { linear, strict })
+        }
+        other => other,
+    })
+}

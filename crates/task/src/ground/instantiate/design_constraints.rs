@@ -1,0 +1,140 @@
+//! Combinations of designs that are forbidden, and whether any is left.
+
+use rustc_hash::FxHashSet;
+
+use crate::limits::{Interrupted, LimitPoll, Limits};
+use crate::task::ForbiddenCombinations;
+use crate::task::quantity::SlotSet;
+
+/// Adds a combination of designs to those that are forbidden.
+pub(super) fn forbid(forbidden: &mut Vec<ForbiddenCombinations>, slots: &SlotSet, combination: SlotSet) {
+    match forbidden.iter_mut().find(|rule| rule.slots == *slots) {
+        Some(rule) if rule.combinations.contains(&combination) => {}
+        Some(rule) => rule.combinations.push(combination),
+        None => {
+            forbidden.push(ForbiddenCombinations { slots: slots.clone(), combinations: vec![combination] })
+        }
+    }
+}
+
+/// Whether some combination of designs is not forbidden; `sizes` counts the designs of each slot.
+///
+/// Only slots that exclusions mention are looked at, those that no exclusion joins apart from each other, and a choice for some of them
+/// that is forbidden already is not extended.
+pub(super) fn admit_some(
+    forbidden: &[ForbiddenCombinations],
+    sizes: &[usize],
+    limits: &Limits,
+) -> Result<bool, Interrupted> {
+    let is_never = |rule: &ForbiddenCombinations| rule.slots.is_empty() && !rule.combinations.is_empty();
+    if sizes.contains(&0) || forbidden.iter().any(is_never) {
+        return Ok(false);
+    }
+    let mut pulse = limits.pulse();
+    for group in joined(forbidden) {
+        let mut rules: Vec<Vec<Rule<'_>>> = group.iter().map(|_| Vec::new()).collect();
+        for rule in forbidden.iter().filter(|rule| rule.slots.iter().any(|slot| group.contains(slot))) {
+            let place = |slot: &u32| group.binary_search(slot).unwrap_or_default();
+            let places: Vec<usize> = rule.slots.iter().map(place).collect();
+            if let Some(last) = places.iter().max() {
+                rules[*last].push((places.clone(), rule.combinations.iter().collect()));
+            }
+        }
+        let sizes: Vec<usize> = group.iter().map(|slot| sizes[*slot as usize]).collect();
+        if !extends(&mut Vec::new(), &sizes, &rules, &mut pulse)? {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Positions of the slots in their group, and what must not be chosen for them together.
+type Rule<'f> = (Vec<usize>, FxHashSet<&'f SlotSet>);
+
+/// Whether designs for the first slots can be extended to all; rules are filed under the last slot that they mention.
+fn extends(
+    chosen: &mut Vec<u32>,
+    sizes: &[usize],
+    rules: &[Vec<Rule<'_>>],
+    pulse: &mut LimitPoll<'_>,
+) -> Result<bool, Interrupted> {
+    let at = chosen.len();
+    let Some(size) = sizes.get(at) else { return Ok(true) };
+    for (_, design) in (0..*size).zip(0..) {
+        pulse.beat()?;
+        chosen.push(design);
+        let is_forbidden = rules[at].iter().any(|(places, combinations)| {
+            combinations.contains(&places.iter().map(|place| chosen[*place]).collect::<SlotSet>())
+        });
+        if !is_forbidden && extends(chosen, sizes, rules, pulse)? {
+            return Ok(true);
+        }
+        chosen.pop();
+    }
+    Ok(false)
+}
+
+/// The slots of the exclusions in groups that no exclusion joins, each ascending.
+fn joined(forbidden: &[ForbiddenCombinations]) -> Vec<Vec<u32>> {
+    let mut groups: Vec<Vec<u32>> = Vec::new();
+    for rule in forbidden {
+        let touches = |group: &Vec<u32>| group.iter().any(|slot| rule.slots.contains(slot));
+        let (together, apart): (Vec<_>, Vec<_>) = groups.into_iter().partition(touches);
+        let mut group: Vec<u32> = together.into_iter().flatten().chain(rule.slots.iter().copied()).collect();
+        group.sort_unstable();
+        group.dedup();
+        groups = apart;
+        groups.push(group);
+    }
+    groups
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn what_is_left_is_what_the_product_has(
+            sizes in proptest::collection::vec(1_usize..4, 1..5),
+            never in proptest::bool::weighted(0.1),
+            rules in proptest::collection::vec((0_u32..4, 0_u32..4, proptest::collection::vec((0_u32..3, 0_u32..3), 0..9)), 0..5),
+        ) {
+            let fits = |slot: u32| (slot as usize) < sizes.len();
+            let rules = rules.into_iter().filter(|(a, b, _)| a < b && fits(*a) && fits(*b));
+            let never = never.then(|| ForbiddenCombinations { slots: SlotSet::new(), combinations: vec![SlotSet::new()] });
+            let forbidden: Vec<ForbiddenCombinations> = rules
+                .map(|(a, b, pairs)| ForbiddenCombinations {
+                    slots: [a, b].into(),
+                    combinations: pairs.into_iter().map(|(x, y)| [x, y].into()).collect(),
+                })
+                .chain(never)
+                .collect();
+            let mut all: Vec<Vec<u32>> = vec![Vec::new()];
+            for size in &sizes {
+                let longer = |known: &Vec<u32>| {
+                    let known = known.clone();
+                    (0..*size).zip(0..).map(move |(_, design)| known.iter().copied().chain([design]).collect())
+                };
+                all = all.iter().flat_map(longer).collect();
+            }
+            let admits = |choice: &Vec<u32>| {
+                forbidden.iter().all(|rule| {
+                    let part: SlotSet = rule.slots.iter().map(|slot| choice[*slot as usize]).collect();
+                    !rule.combinations.contains(&part)
+                })
+            };
+            prop_assert_eq!(admit_some(&forbidden, &sizes, &Limits::none()), Ok(all.iter().any(admits)));
+        }
+    }
+
+    /// Five slots of 100 designs, and none of the first goes with any of the second.
+    #[test]
+    fn a_product_is_not_gone_through() {
+        let pairs = (0..100).flat_map(|a| (0..100).map(move |b| [a, b].into())).collect();
+        let forbidden = [ForbiddenCombinations { slots: [0, 1].into(), combinations: pairs }];
+        assert_eq!(admit_some(&forbidden, &[100; 5], &Limits::none()), Ok(false));
+    }
+}

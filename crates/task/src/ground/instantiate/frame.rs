@@ -1,0 +1,151 @@
+//! What the instances of a schema share: all that depends on the designs of its slots.
+//!
+//! Which designs suit, which combinations are forbidden, and what costs and consumptions are with each combination depends
+//! on few parameters: how much a way drains a battery, but not how full the battery is. So it is worked out once
+//! for each combination of those parameters, and the instances that agree in them share it.
+
+use std::sync::Arc;
+
+use crate::ground::evaluate::condition::residual;
+use crate::ground::evaluate::expression::ground;
+use crate::ground::evaluate::slots::Slots;
+use crate::ground::instantiate::design_constraints::admit_some;
+use crate::ground::instantiate::instance_builder::{Apart, Build};
+use crate::ground::instantiate::slot_split::{SplitSchema, open_operand};
+use crate::ground::vocabulary::atom::{Binding, arguments};
+use crate::ground::vocabulary::eval_error::{Failure, possible};
+use crate::ground::vocabulary::operator::GroundSlots;
+use crate::ground::vocabulary::partial_eval::Residual;
+use crate::ground::vocabulary::world::World;
+use crate::lifted::configuration::{SlotParameter, conjuncts};
+use crate::lifted::{Effect, ObjectId, Rational};
+use crate::number::dense;
+use crate::task::ForbiddenCombinations;
+use crate::task::quantity::{Linear, Quantity};
+
+/// What instances share that agree in the parameters of the key.
+pub(super) struct SharedInstanceData<'a> {
+    pub(super) designs: Slots<'a>,
+    pub(super) slots: Arc<GroundSlots>,
+    pub(super) forbidden: Arc<[ForbiddenCombinations]>,
+    /// What is left of the open conjuncts.
+    pub(super) start: Vec<Residual>,
+    pub(super) over_all: Vec<Residual>,
+    pub(super) at_end: Vec<Residual>,
+    /// By the position of the effect.
+    pub(super) start_operands: Vec<Operand>,
+    pub(super) end_operands: Vec<Operand>,
+    pub(super) duration: Quantity<Rational>,
+}
+
+/// The operand of an effect, as far as a frame knows it.
+pub(super) enum Operand {
+    /// It mentions no slot, or the effect has bound variables, or none.
+    Closed,
+    Undefined,
+    /// With the combinations of designs for which it is undefined, if the effect has a condition.
+    Open(Linear<Rational>, Arc<[ForbiddenCombinations]>),
+}
+
+impl<'a> SharedInstanceData<'a> {
+    /// The frame of an instance; none if no combination of designs suits.
+    pub(super) fn new(
+        world: &mut World<'_>,
+        outline: &SplitSchema<'a>,
+        core: &Binding,
+    ) -> Result<Option<Self>, Failure> {
+        let mut binding = core.clone();
+        let mut designs = Slots { parameters: outline.parameters, designs: Vec::new() };
+        for position in 0..outline.parameters.len() {
+            let suitable = suitable_designs(world, outline, dense(position), &mut binding)?;
+            if suitable.is_empty() {
+                return Ok(None);
+            }
+            designs.designs.push(suitable);
+        }
+        let mut build = Build { world, binding, slots: &designs, forbidden: Vec::new() };
+        let start = build.open_conditions(&outline.start.open)?;
+        let start_operands = operands(&mut build, &outline.schema.start_effects)?;
+        let over_all = build.open_conditions(&outline.over_all.open)?;
+        let at_end = build.open_conditions(&outline.at_end.open)?;
+        let end_operands = operands(&mut build, &outline.schema.end_effects)?;
+        let duration = match &outline.schema.duration {
+            Some(duration) => build.static_quantity(duration, outline.schema)?,
+            None => Quantity::constant(Rational::from_integer(0)),
+        };
+        build.forbid_negative(&duration)?;
+        let forbidden = build.forbidden;
+        if !admit_some(&forbidden, &designs.sizes(), world.limits)? {
+            return Ok(None);
+        }
+        let function = |slot: &SlotParameter| arguments(&[slot.function], core).first().copied();
+        let slots = outline.parameters.iter().zip(&designs.designs);
+        let slots: Option<_> = slots.map(|(slot, own)| Some((function(slot)?, own.clone()))).collect();
+        let slots = slots.expect("invariant: the function of a slot is not a slot");
+        let forbidden = forbidden.into();
+        Ok(Some(Self {
+            designs,
+            slots,
+            forbidden,
+            start,
+            over_all,
+            at_end,
+            start_operands,
+            end_operands,
+            duration,
+        }))
+    }
+}
+
+fn operands(build: &mut Build<'_, '_>, effects: &[Effect]) -> Result<Vec<Operand>, Failure> {
+    let mut operands = Vec::with_capacity(effects.len());
+    for effect in effects {
+        operands.push(match open_operand(effect, build.slots.parameters) {
+            None => Operand::Closed,
+            Some(expression) => {
+                let Apart { operand, undefined } = if conjuncts(&effect.condition).is_empty() {
+                    Apart { operand: possible(build.open(expression))?, undefined: [].into() }
+                } else {
+                    build.open_apart(expression)?
+                };
+                operand.map_or(Operand::Undefined, |operand| Operand::Open(operand, undefined))
+            }
+        });
+    }
+    Ok(operands)
+}
+
+/// The candidates of one slot for which everything that depends on this slot alone is true and defined.
+fn suitable_designs(
+    world: &mut World<'_>,
+    outline: &SplitSchema<'_>,
+    position: u32,
+    binding: &mut Binding,
+) -> Result<Vec<ObjectId>, Failure> {
+    let parameter = outline.parameters[position as usize].parameter as usize;
+    let (conditions, expressions) = outline.about(position);
+    let mut designs = Vec::new();
+    for design in outline.schema.parameters[parameter].candidates.iter() {
+        binding[parameter] = Some(*design);
+        let mut suits = true;
+        for condition in &conditions {
+            suits = suits && !matches!(residual(world, condition, binding)?, Residual::False);
+        }
+        for expression in &expressions {
+            suits = suits && defined(ground(world, expression, binding))?;
+        }
+        if suits {
+            designs.push(*design);
+        }
+    }
+    binding[parameter] = None;
+    Ok(designs)
+}
+
+fn defined<T>(value: Result<T, Failure>) -> Result<bool, Failure> {
+    match value {
+        Ok(_) => Ok(true),
+        Err(Failure::Undefined) => Ok(false),
+        Err(error) => Err(error),
+    }
+}

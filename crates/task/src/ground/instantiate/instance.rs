@@ -1,0 +1,183 @@
+//! One instance of a schema to its operators.
+
+use std::sync::Arc;
+
+use crate::ground::evaluate::normal_form::Definitions;
+use crate::ground::evaluate::reads::Reads;
+use crate::ground::instantiate::conditional_effects::{Middle, cases};
+use crate::ground::instantiate::design_constraints::{admit_some, forbid};
+use crate::ground::instantiate::frame::SharedInstanceData;
+use crate::ground::instantiate::instance_builder::Build;
+use crate::ground::instantiate::simultaneous_effects::{SimultaneousEffects, clashes};
+use crate::ground::instantiate::slot_split::SplitSchema;
+use crate::ground::instantiate::timeline::Timeline;
+use crate::ground::instantiate::timeline_windows::{Conflicts, TimelineWindow};
+use crate::ground::vocabulary::atom::{Binding, arguments};
+use crate::ground::vocabulary::condition::GroundCondition;
+use crate::ground::vocabulary::eval_error::{Failure, possible};
+use crate::ground::vocabulary::numbers::Numbers;
+use crate::ground::vocabulary::operator::GroundOperator;
+use crate::ground::vocabulary::partial_eval::Residual;
+use crate::ground::vocabulary::world::World;
+use crate::lifted::configuration::SlotParameter;
+use crate::lifted::{Effect, Formula, Joint, Lifted, ObjectId, Schema, Term};
+use crate::task::timing::Timing;
+use crate::task::{Argument, ForbiddenCombinations};
+
+/// What all instances are made with.
+pub(super) struct Instantiation<'a> {
+    pub(super) world: World<'a>,
+    pub(super) definitions: Definitions,
+    /// None if nothing happens by itself.
+    pub(super) timeline: Option<Timeline>,
+}
+
+impl<'a> Instantiation<'a> {
+    pub(super) fn new(mut world: World<'a>) -> Self {
+        let timeline = Timeline::new(&mut world);
+        Self { world, definitions: Definitions::default(), timeline }
+    }
+
+    /// The operators of one instance, one for each passage and case. `Failure::Undefined` says that it can never be applied.
+    pub(super) fn operators(
+        &mut self,
+        outline: &SplitSchema<'_>,
+        frame: &SharedInstanceData,
+        core: &Binding,
+    ) -> Result<Vec<GroundOperator>, Failure> {
+        let Self { world, definitions, timeline } = self;
+        let schema = outline.schema;
+        let mut build = Build { world, binding: core.clone(), slots: &frame.designs, forbidden: Vec::new() };
+        let mut before = build.conditions(&outline.start.closed, &frame.start)?;
+        let start = SimultaneousEffects::new(&mut build, &schema.start_effects, &frame.start_operands)?;
+        let over_all = build.conditions(&outline.over_all.closed, &frame.over_all)?;
+        let at_end = build.conditions(&outline.at_end.closed, &frame.at_end)?;
+        let end = SimultaneousEffects::new(&mut build, &schema.end_effects, &frame.end_operands)?;
+        let Some(forbidden) = forbidden(&build, frame)? else { return Ok(Vec::new()) };
+        let template = template(&build, outline, frame, forbidden);
+        if let Some(joint) = &schema.joint {
+            before.extend(joint_clashes(&mut build, schema, joint, frame)?.iter().map(Residual::negated));
+        }
+        let untimed = Middle { over_all: &over_all, at_end: &at_end, passage: None };
+        let mut operators = Vec::new();
+        let Some(timeline) = timeline else {
+            let cases = cases(schema, &before, &start, &untimed, &end)?;
+            // Most instances are one operator, to which the template goes.
+            let templates = std::iter::repeat_n(template, cases.len());
+            for (case, template) in std::iter::zip(cases, templates) {
+                operators.extend(possible(case.operator(world, definitions, template))?);
+            }
+            return Ok(operators);
+        };
+        let conflicts = conflicts(world, timeline, schema, (&start, &end), core);
+        for passage in TimelineWindow::all(timeline, &frame.duration, &conflicts) {
+            let middle = Middle { passage: Some(&passage), ..untimed };
+            let template = GroundOperator { timing: passage.0.timing(), ..template.clone() };
+            for case in cases(schema, &before, &start, &middle, &end)? {
+                operators.extend(possible(case.operator(world, definitions, template.clone()))?);
+            }
+        }
+        Ok(operators)
+    }
+}
+
+/// The combinations of designs that an instance forbids beside those of its frame; none if no other is left.
+fn forbidden(
+    build: &Build<'_, '_>,
+    frame: &SharedInstanceData,
+) -> Result<Option<Arc<[ForbiddenCombinations]>>, Failure> {
+    if build.forbidden.is_empty() {
+        return Ok(Some(frame.forbidden.clone()));
+    }
+    let mut all = frame.forbidden.to_vec();
+    for rule in &build.forbidden {
+        for combination in &rule.combinations {
+            forbid(&mut all, &rule.slots, combination.clone());
+        }
+    }
+    let is_left = admit_some(&all, &frame.designs.sizes(), build.world.limits)?;
+    Ok(is_left.then(|| all.into()))
+}
+
+/// What the operators of an instance have in common.
+fn template(
+    build: &Build<'_, '_>,
+    outline: &SplitSchema<'_>,
+    frame: &SharedInstanceData,
+    forbidden: Arc<[ForbiddenCombinations]>,
+) -> GroundOperator {
+    let arguments = build.arguments(outline.schema);
+    GroundOperator {
+        schema: outline.schema.action,
+        configuration: configuration(&arguments, outline.designs, &build.binding),
+        arguments,
+        slots: frame.slots.clone(),
+        forbidden,
+        condition: GroundCondition::default(),
+        adds: Vec::new(),
+        deletes: Vec::new(),
+        conditional: Vec::new(),
+        numeric_effects: Numbers::default(),
+        costs: Vec::new(),
+        duration: frame.duration.clone(),
+        wait: None,
+        timing: Timing::free(),
+    }
+}
+
+fn configuration(
+    values: &[Argument],
+    designs: &[SlotParameter],
+    binding: &Binding,
+) -> Vec<(ObjectId, Argument)> {
+    let function = |term: Term| arguments(&[term], binding).first().copied();
+    designs
+        .iter()
+        .filter_map(|design| Some((function(design.function)?, values[design.parameter as usize])))
+        .collect()
+}
+
+/// Conditions under which the start and the end of an instance interfere that are one happening.
+fn joint_clashes(
+    build: &mut Build<'_, '_>,
+    schema: &Schema,
+    joint: &Joint,
+    frame: &SharedInstanceData,
+) -> Result<Vec<Residual>, Failure> {
+    let lifted = build.world.lifted;
+    let (first, second) = schema.end_effects.split_at(joint.start_effects);
+    let first_reads = reads(lifted, &joint.start, first, &build.binding);
+    let second_reads = reads(lifted, &joint.end, second, &build.binding);
+    let (own, others) = frame.end_operands.split_at(joint.start_effects);
+    let first = SimultaneousEffects::new(build, first, own)?;
+    let second = SimultaneousEffects::new(build, second, others)?;
+    Ok(clashes(build.world, (&first_reads, &first), (&second_reads, &second)))
+}
+
+/// Where the start and the end of an instance interfere with events.
+fn conflicts(
+    world: &World<'_>,
+    timeline: &Timeline,
+    schema: &Schema,
+    (start, end): (&SimultaneousEffects, &SimultaneousEffects),
+    binding: &Binding,
+) -> Conflicts {
+    let lifted = world.lifted;
+    let at_start = reads(lifted, &schema.start_condition, &schema.start_effects, binding);
+    let mut later = reads(lifted, &schema.at_end, &schema.end_effects, binding);
+    let is_instant = schema.duration.is_none() || schema.joint.is_some();
+    if is_instant {
+        later.condition(lifted, &schema.start_condition, binding);
+        Conflicts::new(world, timeline, (&later, end), (&at_start, &SimultaneousEffects::nothing()))
+    } else {
+        Conflicts::new(world, timeline, (&at_start, start), (&later, end))
+    }
+}
+
+/// What a happening reads.
+fn reads(lifted: &Lifted, condition: &Formula, effects: &[Effect], binding: &Binding) -> Reads {
+    let mut reads = Reads::default();
+    reads.condition(lifted, condition, binding);
+    reads.effects(lifted, effects, binding);
+    reads
+}

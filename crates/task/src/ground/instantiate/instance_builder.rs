@@ -1,0 +1,181 @@
+//! An instance under construction: its conditions and expressions, and which combinations of designs they forbid.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use crate::error::{Error, File, Place};
+use crate::ground::evaluate::condition::residual;
+use crate::ground::evaluate::slots::{Slots, for_each_combination, open};
+use crate::ground::instantiate::design_constraints::forbid;
+use crate::ground::vocabulary::atom::Binding;
+use crate::ground::vocabulary::eval_error::{Failure, possible};
+use crate::ground::vocabulary::partial_eval::{Residual, compare};
+use crate::ground::vocabulary::world::World;
+use crate::lifted::{Expression, Formula, Rational, Schema};
+use crate::number::dense;
+use crate::task::quantity::{Linear, Quantity, SlotSet};
+use crate::task::{Argument, ForbiddenCombinations};
+use pddl::ast::Span;
+
+/// An expression of a conditional effect.
+pub(super) struct Apart {
+    /// None where it is undefined.
+    pub(super) operand: Option<Linear<Rational>>,
+    /// The combinations of designs for which it is undefined.
+    pub(super) undefined: Arc<[ForbiddenCombinations]>,
+}
+
+/// An instance under construction.
+pub(super) struct Build<'w, 'a> {
+    pub(super) world: &'w mut World<'a>,
+    pub(super) binding: Binding,
+    pub(super) slots: &'w Slots<'w>,
+    pub(super) forbidden: Vec<ForbiddenCombinations>,
+}
+
+impl Build<'_, '_> {
+    /// What is left of conjuncts that mention no slot, after what is left of those that do.
+    #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
+    pub(super) fn conditions(
+        &mut self,
+        closed: &[&Formula],
+        open: &[Residual],
+    ) -> Result<Vec<Residual>, Failure> {
+        let mut parts = Vec::with_capacity(open.len() + closed.len());
+        parts.extend_from_slice(open);
+        for conjunct in closed {
+            parts.push(residual(self.world, conjunct, &mut self.binding)?);
+        }
+        Ok(parts)
+    }
+
+    /// What is left of conjuncts that mention slots; combinations of designs that break a static one are forbidden.
+    pub(super) fn open_conditions(&mut self, open: &[(&Formula, SlotSet)]) -> Result<Vec<Residual>, Failure> {
+        let mut parts = Vec::new();
+        for (conjunct, mentioned) in open {
+            if let Formula::Compare(comparison, left, right, _) = conjunct {
+                let (left, right) = (self.open(left)?, self.open(right)?);
+                let static_part = left.coefficients.is_empty() && right.coefficients.is_empty();
+                match compare(*comparison, left, right) {
+                    residual if static_part => self.forbid(mentioned, &residual)?,
+                    residual => parts.push(residual),
+                }
+            } else if mentioned.len() > 1 {
+                self.forbid_unless(conjunct, mentioned)?;
+            }
+        }
+        Ok(parts)
+    }
+
+    /// The expression, or nothing where it is undefined, and apart the combinations of designs for which it is.
+    pub(super) fn open_apart(&mut self, expression: &Expression) -> Result<Apart, Failure> {
+        let own = std::mem::take(&mut self.forbidden);
+        let operand = possible(self.open(expression));
+        let undefined = std::mem::replace(&mut self.forbidden, own);
+        Ok(Apart { operand: operand?, undefined: undefined.into() })
+    }
+
+    pub(super) fn open(&mut self, expression: &Expression) -> Result<Linear<Rational>, Failure> {
+        let forbidden = &mut self.forbidden;
+        let mut undefined = |slots: &SlotSet, combination: SlotSet| forbid(forbidden, slots, combination);
+        open(self.world, expression, &mut self.binding, self.slots, &mut undefined)
+    }
+
+    /// Forbids the combinations of designs for which a static comparison fails.
+    fn forbid(&mut self, mentioned: &SlotSet, residual: &Residual) -> Result<(), Failure> {
+        match residual {
+            Residual::And(parts) => parts.iter().try_for_each(|part| self.forbid(mentioned, part)),
+            Residual::False => self.forbid_where(mentioned, &|_| true),
+            Residual::Compare { linear, strict } => {
+                let sizes = self.slots.sizes();
+                self.forbid_where(mentioned, &|choice| {
+                    let value = linear.quantity.at(choice, &sizes);
+                    value < Rational::from_integer(0) || (*strict && value == Rational::from_integer(0))
+                })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn forbid_where(&mut self, mentioned: &SlotSet, fails: &dyn Fn(&[u32]) -> bool) -> Result<(), Failure> {
+        let mut choice = vec![0; self.slots.designs.len()];
+        let forbidden = &mut self.forbidden;
+        let limits = self.world.limits;
+        for_each_combination(mentioned, self.slots, &mut self.binding, limits, &mut |_, combination| {
+            for (slot, design) in mentioned.iter().zip(combination) {
+                choice[*slot as usize] = *design;
+            }
+            if fails(&choice) {
+                forbid(forbidden, mentioned, SlotSet::from_slice(combination));
+            }
+            Ok(())
+        })
+    }
+
+    /// Forbids the combinations of designs with which the action would end before it begins.
+    pub(super) fn forbid_negative(&mut self, duration: &Quantity<Rational>) -> Result<(), Failure> {
+        let zero = Rational::from_integer(0);
+        let least = duration.tables.iter().filter_map(|table| table.values.iter().min());
+        if least.fold(duration.constant.clone(), |sum, value| sum + value) >= zero {
+            return Ok(());
+        }
+        let slots: BTreeSet<u32> =
+            duration.tables.iter().flat_map(|table| table.slots.iter().copied()).collect();
+        let sizes = self.slots.sizes();
+        self.forbid_where(&slots.into_iter().collect(), &|choice| duration.at(choice, &sizes) < zero)
+    }
+
+    /// Forbids the combinations of designs for which a static condition over several slots fails.
+    fn forbid_unless(&mut self, conjunct: &Formula, mentioned: &SlotSet) -> Result<(), Failure> {
+        let (world, forbidden) = (&mut *self.world, &mut self.forbidden);
+        let limits = world.limits;
+        for_each_combination(mentioned, self.slots, &mut self.binding, limits, &mut |binding, combination| {
+            if matches!(residual(world, conjunct, &mut binding.clone())?, Residual::False) {
+                forbid(forbidden, mentioned, SlotSet::from_slice(combination));
+            }
+            Ok(())
+        })
+    }
+
+    pub(super) fn static_quantity(
+        &mut self,
+        expression: &Expression,
+        schema: &Schema,
+    ) -> Result<Quantity<Rational>, Failure> {
+        let linear = self.open(expression)?;
+        if linear.coefficients.is_empty() {
+            return Ok(linear.quantity);
+        }
+        Err(Failure::Error(Error::Unsupported {
+            construct: format!("a duration of `{}` that depends on the state", schema.name),
+            instead: "a duration over functions that no action changes".into(),
+            place: expression_place(expression),
+        }))
+    }
+
+    pub(super) fn arguments(&self, schema: &Schema) -> Vec<Argument> {
+        let slot =
+            |parameter: usize| self.slots.parameters.iter().position(|s| s.parameter as usize == parameter);
+        self.binding[..schema.parameters.len()]
+            .iter()
+            .enumerate()
+            .filter_map(|(parameter, object)| match object {
+                Some(object) => Some(Argument::Object(*object)),
+                None => slot(parameter).map(|position| Argument::Slot(dense(position))),
+            })
+            .collect()
+    }
+}
+
+fn expression_place(expression: &Expression) -> Place {
+    match expression {
+        Expression::Function(_, _, place)
+        | Expression::Product(_, place)
+        | Expression::Quotient(_, _, place) => *place,
+        Expression::Negate(inner) => expression_place(inner),
+        Expression::Sum(parts) if !parts.is_empty() => expression_place(&parts[0]),
+        Expression::Sum(_) | Expression::Number(_) | Expression::TotalTime => {
+            Place { file: File::Domain, span: Span::default() }
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! Instances of schemas to ground operators, the designs of their slots still open.
+//!
+//! A durative action is composed into one step: conditions of its middle and end that its start effects
+//! provide are dropped, those that they destroy make the instance impossible, and numeric conditions and effects of the
+//! end are rewritten in terms of the state before the start (sequential execution of PDDL 2.1, section 8).
+//!
+//! Conditional effects on atoms stay as they are. An instance whose numbers (cost among them) change under a
+//! condition becomes one operator for each case, and so does one whose start effects are conditional.
+//!
+//! `slot_split` separates the parts of a schema that mention its slots, and `frame` caches what instances with the same design dependencies share.
+//! `simultaneous_effects` are the effects of a start or an end. `timeline_windows` lists the ways in which an action lies between timed initial
+//! literals, and `conditional_effects` splits each into operators.
+
+mod axioms;
+mod change;
+mod conditional_effects;
+mod design_constraints;
+mod frame;
+mod instance;
+mod instance_builder;
+mod simultaneous_effects;
+mod slot_split;
+mod timeline;
+mod timeline_windows;
+use std::collections::hash_map::Entry;
+use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
+
+use crate::error::{Error, Errors};
+use crate::ground::evaluate::condition::residual;
+use crate::ground::instantiate::axioms::instantiate_axioms;
+use crate::ground::instantiate::frame::SharedInstanceData;
+use crate::ground::instantiate::instance::Instantiation;
+use crate::ground::instantiate::slot_split::SplitSchema;
+use crate::ground::instantiate::timeline::Timeline;
+use crate::ground::vocabulary::atom::Row;
+use crate::ground::vocabulary::condition::GroundCondition;
+use crate::ground::vocabulary::eval_error::Failure;
+use crate::ground::vocabulary::operator::GroundOperator;
+use crate::ground::vocabulary::partial_eval::Residual;
+use crate::ground::vocabulary::task::GroundTask;
+use crate::ground::vocabulary::world::World;
+use crate::lifted::Schema;
+use crate::lifted::configuration::{SlotParameter, depends_on_own_start};
+use crate::number::dense;
+
+/// Turns every reached instance into operators, the goal into a condition, and derived atoms that they mention into rules. For each
+/// schema: its design parameters, and those of them that are slots.
+///
+/// # Errors
+/// All expressions and conditions that the planner does not handle.
+pub fn instantiate<'a>(
+    world: World<'a>,
+    designs: &[Vec<SlotParameter>],
+    slots: &[Vec<SlotParameter>],
+) -> Result<GroundTask<'a>, Errors> {
+    let mut errors = Vec::new();
+    let mut instantiation = Instantiation::new(world);
+    let mut operators = operators(&mut instantiation, designs, slots, &mut errors)?;
+    let goal = match goal(&mut instantiation) {
+        Ok(goal) => Some(goal),
+        Err(Failure::Undefined) => None,
+        Err(Failure::Error(error)) => {
+            errors.push(error);
+            None
+        }
+    };
+    if !errors.is_empty() {
+        return Err(errors.into());
+    }
+    let Instantiation { world, definitions, timeline } = instantiation;
+    if let Some(timeline) = &timeline {
+        operators.extend(timeline.waits(dense(world.lifted.schemas.len())));
+        timeline.settle(&mut operators);
+    }
+    Ok(GroundTask { world, operators, axioms: definitions.axioms, goal, objectives: Vec::new() })
+}
+
+/// The operators of all instances; of each schema the first error is noted.
+///
+/// # Errors
+/// `Error::Interrupted` at a limit.
+fn operators(
+    instantiation: &mut Instantiation<'_>,
+    designs: &[Vec<SlotParameter>],
+    slots: &[Vec<SlotParameter>],
+    errors: &mut Vec<Error>,
+) -> Result<Vec<GroundOperator>, Errors> {
+    let (lifted, reached) = (instantiation.world.lifted, instantiation.world.reached);
+    // Growing would move operators that are large and many; most instances become one.
+    let mut operators = Vec::with_capacity(reached.instances.iter().map(Vec::len).sum());
+    let parameters = designs.iter().zip(slots);
+    for ((schema, (designs, slots)), instances) in
+        lifted.schemas.iter().zip(parameters).zip(&reached.instances)
+    {
+        if depends_on_own_start(lifted, schema) {
+            errors.push(own_start(schema));
+            continue;
+        }
+        let outline = SplitSchema::new(lifted, schema, designs, slots);
+        let mut frames: FxHashMap<Row, Option<Arc<SharedInstanceData>>> = FxHashMap::default();
+        for binding in instantiation.world.limits.watch(instances) {
+            let binding = binding?;
+            let frame = match frames.entry(outline.key(binding)) {
+                Entry::Occupied(known) => Ok(known.get().clone()),
+                Entry::Vacant(new) => {
+                    match SharedInstanceData::new(&mut instantiation.world, &outline, binding) {
+                        Ok(frame) => Ok(new.insert(frame.map(Arc::new)).clone()),
+                        Err(error) => Err(error),
+                    }
+                }
+            };
+            let cases = frame.and_then(|frame| match frame {
+                Some(frame) => instantiation.operators(&outline, &frame, binding),
+                None => Ok(Vec::new()),
+            });
+            match cases {
+                Ok(mut cases) => operators.append(&mut cases),
+                Err(Failure::Undefined) => {}
+                Err(Failure::Error(error)) => {
+                    errors.push(error);
+                    break;
+                }
+            }
+        }
+    }
+    Ok(operators)
+}
+
+fn own_start(schema: &Schema) -> Error {
+    Error::Unsupported {
+        construct: format!(
+            "a derived predicate in `{}` that its own start effects or timed literals may change",
+            schema.name
+        ),
+        instead: "the condition of the derived predicate in its place".into(),
+        place: schema.place,
+    }
+}
+
+/// The goal, and the rules of all derived atoms that have been met; `Failure::Undefined` if it is false whatever happens.
+fn goal(instantiation: &mut Instantiation<'_>) -> Result<GroundCondition, Failure> {
+    let Instantiation { world, definitions, timeline } = instantiation;
+    let lifted = world.lifted;
+    let mut binding = vec![None; lifted.goal_variables];
+    let at_rest = timeline.as_ref().map_or(Residual::True, Timeline::at_rest);
+    let goal = residual(world, &lifted.goal, &mut binding)?;
+    let goal = definitions.condition(world, &[goal, at_rest])?;
+    instantiate_axioms(world, definitions)?;
+    Ok(goal)
+}

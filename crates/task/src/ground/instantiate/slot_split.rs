@@ -1,0 +1,123 @@
+//! Lifted schemas, with what mentions their slots apart from the rest.
+
+use crate::ground::vocabulary::atom::{Binding, Row};
+use crate::lifted::configuration::{
+    SlotParameter, conjuncts, expression_terms, formula_terms, slots_of_expression, slots_of_formula,
+};
+use crate::lifted::{Change, Effect, Expression, Formula, Lifted, Schema, Term};
+use crate::task::quantity::SlotSet;
+
+/// A schema with what mentions its slots apart from the rest.
+pub(super) struct SplitSchema<'a> {
+    pub(super) schema: &'a Schema,
+    /// The parameters that are designs, with the function that each solves.
+    pub(super) designs: &'a [SlotParameter],
+    /// Those of them that are slots.
+    pub(super) parameters: &'a [SlotParameter],
+    /// The parameters on which the frame of an instance depends, ascending.
+    key: Vec<u32>,
+    pub(super) start: Conjuncts<'a>,
+    pub(super) over_all: Conjuncts<'a>,
+    pub(super) at_end: Conjuncts<'a>,
+}
+
+/// The conjuncts of a condition.
+pub(super) struct Conjuncts<'a> {
+    /// Those that mention no slot, apart from static atoms that relaxed reachability has settled.
+    pub(super) closed: Vec<&'a Formula>,
+    /// Those that do, with the positions of the slots.
+    pub(super) open: Vec<(&'a Formula, SlotSet)>,
+}
+
+impl<'a> Conjuncts<'a> {
+    fn new(lifted: &Lifted, condition: &'a Formula, slots: &[SlotParameter]) -> Self {
+        let mut own = Self { closed: Vec::new(), open: Vec::new() };
+        for conjunct in conjuncts(condition) {
+            let mentioned = slots_of_formula(conjunct, slots);
+            if !mentioned.is_empty() {
+                own.open.push((conjunct, mentioned));
+            } else if !settled(lifted, conjunct) {
+                own.closed.push(conjunct);
+            }
+        }
+        own
+    }
+}
+
+/// Whether relaxed reachability decides a conjunct exactly.
+fn settled(lifted: &Lifted, conjunct: &Formula) -> bool {
+    match conjunct {
+        Formula::Literal { predicate, .. } => {
+            let predicate = &lifted.predicates[predicate.index()];
+            !predicate.fluent && !predicate.derived
+        }
+        _ => false,
+    }
+}
+
+impl<'a> SplitSchema<'a> {
+    pub(super) fn new(
+        lifted: &Lifted,
+        schema: &'a Schema,
+        designs: &'a [SlotParameter],
+        parameters: &'a [SlotParameter],
+    ) -> Self {
+        let start = Conjuncts::new(lifted, &schema.start_condition, parameters);
+        let over_all = Conjuncts::new(lifted, &schema.over_all, parameters);
+        let at_end = Conjuncts::new(lifted, &schema.at_end, parameters);
+        let mut key = Vec::new();
+        let mut note = |term: Term| {
+            if let Term::Parameter(parameter) = term
+                && (parameter as usize) < schema.parameters.len()
+                && parameters.iter().all(|slot| slot.parameter != parameter)
+            {
+                key.push(parameter);
+            }
+        };
+        for slot in parameters {
+            note(slot.function);
+        }
+        for (conjunct, _) in start.open.iter().chain(&over_all.open).chain(&at_end.open) {
+            formula_terms(conjunct, &mut note);
+        }
+        let effects = schema.start_effects.iter().chain(&schema.end_effects);
+        for expression in
+            effects.filter_map(|effect| open_operand(effect, parameters)).chain(&schema.duration)
+        {
+            expression_terms(expression, &mut note);
+        }
+        key.sort_unstable();
+        key.dedup();
+        Self { schema, designs, parameters, key, start, over_all, at_end }
+    }
+
+    /// The objects on which the frame of an instance depends.
+    pub(super) fn key(&self, binding: &Binding) -> Row {
+        self.key.iter().filter_map(|parameter| binding[*parameter as usize]).collect()
+    }
+
+    /// The conditions and expressions that mention one slot and no other.
+    pub(super) fn about(&self, position: u32) -> (Vec<&'a Formula>, Vec<&'a Expression>) {
+        let only = SlotSet::from_slice(&[position]);
+        let open = self.start.open.iter().chain(&self.over_all.open).chain(&self.at_end.open);
+        let conditions = open.filter(|(_, mentioned)| *mentioned == only).map(|(conjunct, _)| *conjunct);
+        let effects = self.schema.start_effects.iter().chain(&self.schema.end_effects);
+        let unconditional = effects.filter(|effect| conjuncts(&effect.condition).is_empty());
+        let expressions = unconditional.filter_map(|effect| open_operand(effect, self.parameters));
+        let expressions = expressions.chain(&self.schema.duration);
+        let expressions = expressions.filter(|e| slots_of_expression(e, self.parameters) == only);
+        (conditions.collect(), expressions.collect())
+    }
+}
+
+/// The operand of a numeric effect without bound variables, if it mentions slots.
+pub(super) fn open_operand<'a>(effect: &'a Effect, parameters: &[SlotParameter]) -> Option<&'a Expression> {
+    match &effect.change {
+        Change::Assign { expression, .. }
+            if effect.bound.is_empty() && !slots_of_expression(expression, parameters).is_empty() =>
+        {
+            Some(expression)
+        }
+        _ => None,
+    }
+}

@@ -1,0 +1,293 @@
+//! How an action can lie in time, where something happens by itself: in which phases it starts and ends, and under which
+//! conditions events interfere with that (the definition is that of `timeline`).
+
+use num_traits::One;
+
+use crate::ground::evaluate::reads::{Reads, matches};
+use crate::ground::instantiate::change::GroundChange;
+use crate::ground::instantiate::simultaneous_effects::SimultaneousEffects;
+use crate::ground::instantiate::timeline::Timeline;
+use crate::ground::vocabulary::atom::AtomId;
+use crate::ground::vocabulary::partial_eval::{Residual, constant_comparison};
+use crate::ground::vocabulary::world::World;
+use crate::lifted::Rational;
+use crate::task::quantity::{Linear, NumericId, Quantity};
+use crate::task::timing::Timing;
+
+/// When an action starts and ends.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TimelineWindow<'t> {
+    timeline: &'t Timeline,
+    duration: &'t Quantity<Rational>,
+    /// The phases of its start and its end.
+    from: usize,
+    to: usize,
+    start: Start,
+    end: End,
+}
+
+/// What sets the time of the start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Start {
+    /// It is whenever the action before has ended, even at the time of an event.
+    Free,
+    /// The same, but later than the event that begins its phase.
+    Later,
+    /// A moment after that event.
+    AfterEvent,
+    /// So that the action ends when it has to.
+    ByEnd,
+    /// The same, but later than the event that begins the phase of the start.
+    LaterByEnd,
+}
+
+/// Where the end lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum End {
+    /// In its phase, later than the event that begins it; or in the phase of the start.
+    Inside,
+    /// At the very time of that event.
+    AtEvent,
+}
+
+impl<'t> TimelineWindow<'t> {
+    /// The ways in which an action of this duration can lie in time.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
+    )]
+    pub(super) fn all(
+        timeline: &'t Timeline,
+        duration: &'t Quantity<Rational>,
+        conflicts: &Conflicts,
+    ) -> Vec<(Self, Interference)> {
+        let extreme = |pick: fn(std::slice::Iter<'t, Rational>) -> Option<&'t Rational>| {
+            let own = duration.tables.iter().filter_map(|table| pick(table.values.iter()));
+            own.fold(duration.constant.clone(), |sum, value| sum + value)
+        };
+        let (least, most) = (extreme(Iterator::min), extreme(Iterator::max));
+        let mut all = Vec::new();
+        for from in timeline.first..timeline.phases.len() {
+            let before = from.checked_sub(1);
+            let own: &[Residual] = before.map_or(&[], |event| &conflicts.start[event]);
+            for to in from..timeline.phases.len() {
+                let apart = |later: usize, earlier: usize| {
+                    timeline.events[later].0.clone() - &timeline.events[earlier].0
+                };
+                // It starts before its phase ends, and ends in its phase or when that begins.
+                if to > from && most <= apart(to - 1, from) {
+                    break;
+                }
+                let fits = match (before, to < timeline.events.len()) {
+                    (Some(before), true) => least < apart(to, before),
+                    (None, true) => least < timeline.events[to].0,
+                    _ => true,
+                };
+                if !fits {
+                    continue;
+                }
+                let mut add = |start, end| {
+                    let passage = Self { timeline, duration, from, to, start, end };
+                    let at_event = matches!(start, Start::Free | Start::ByEnd);
+                    let start = if at_event { own.to_vec() } else { Vec::new() };
+                    let end = if end == End::AtEvent { conflicts.end[to - 1].clone() } else { Vec::new() };
+                    if !start.contains(&Residual::True) && !end.contains(&Residual::True) {
+                        all.push((passage, Interference { start, end }));
+                    }
+                };
+                if own.is_empty() || from < timeline.events.len() {
+                    add(Start::Free, End::Inside);
+                }
+                if !own.is_empty() {
+                    add(Start::AfterEvent, End::Inside);
+                    if from < timeline.events.len() {
+                        add(Start::Later, End::Inside);
+                    }
+                }
+                if to > from {
+                    // A moment after an event is not the time of an event.
+                    add(if own.is_empty() { Start::ByEnd } else { Start::LaterByEnd }, End::Inside);
+                    add(Start::ByEnd, End::AtEvent);
+                    if !own.is_empty() {
+                        add(Start::LaterByEnd, End::AtEvent);
+                    }
+                }
+            }
+        }
+        all
+    }
+
+    /// The time of the start, in terms of the clock before.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
+    )]
+    fn start(&self) -> Linear<Rational> {
+        let events = &self.timeline.events;
+        match self.start {
+            Start::Free | Start::Later => Linear::variable(self.timeline.clock),
+            Start::AfterEvent => self.later(&events[self.from - 1].0),
+            Start::ByEnd | Start::LaterByEnd => {
+                let mut start = match self.end {
+                    End::Inside => self.later(&events[self.to - 1].0),
+                    End::AtEvent => Linear::constant(events[self.to - 1].0.clone()),
+                };
+                let mut duration = self.duration.clone();
+                duration.scale(&-Rational::one());
+                start.quantity.add(&duration);
+                start
+            }
+        }
+    }
+
+    /// A moment after a time.
+    fn later(&self, time: &Rational) -> Linear<Rational> {
+        let mut later = Linear::variable(self.timeline.moment);
+        later.quantity.constant = time.clone();
+        later
+    }
+
+    /// When an action can start and end so.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
+    )]
+    pub(super) fn conditions(&self) -> Vec<Residual> {
+        let Timeline { clock, phases, events, .. } = self.timeline;
+        let mut conditions = vec![Residual::Literal { atom: phases[self.from], positive: true }];
+        let start = self.start();
+        let mut end = start.clone();
+        end.quantity.add(self.duration);
+        let mut less = |earlier: &Linear<Rational>, mut later: Linear<Rational>, strict: bool| {
+            later.add(&earlier.clone().negated());
+            conditions.push(
+                constant_comparison(&later, strict).unwrap_or(Residual::Compare { linear: later, strict }),
+            );
+        };
+        let time = |event: usize| Linear::constant(events[event].0.clone());
+        if self.from < events.len() {
+            // After the last event any start can be put off.
+            if !matches!(self.start, Start::Free | Start::Later) {
+                less(&Linear::variable(*clock), start.clone(), false);
+            }
+            less(&start, time(self.from), true);
+            if matches!(self.start, Start::Later | Start::LaterByEnd) {
+                less(&time(self.from - 1), start.clone(), true);
+            }
+        }
+        if self.to > self.from && self.end == End::Inside {
+            less(&time(self.to - 1), end.clone(), true);
+        }
+        if self.to < events.len() {
+            less(&end, time(self.to), true);
+        }
+        conditions
+    }
+
+    /// The events strictly between the start and the end, in order.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
+    )]
+    pub(super) fn events(&self) -> impl Iterator<Item = &'t [(AtomId, bool)]> + use<'t> {
+        let last = if self.end == End::AtEvent { self.to - 1 } else { self.to };
+        self.timeline.events[self.from..last].iter().map(|(_, changes)| &changes[..])
+    }
+
+    /// The event at the time of the end.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
+    )]
+    pub(super) fn event_at_end(&self) -> Option<&'t [(AtomId, bool)]> {
+        (self.end == End::AtEvent).then(|| &self.timeline.events[self.to - 1].1[..])
+    }
+
+    /// What the action changes besides its own effects.
+    pub(super) fn changes(&self) -> Vec<(AtomId, bool)> {
+        let phases = &self.timeline.phases;
+        let mut changes = vec![(self.timeline.waited, false)];
+        if self.from != self.to {
+            changes.extend([(phases[self.from], false), (phases[self.to], true)]);
+        }
+        changes
+    }
+
+    /// The clock after the action. It stands still once nothing more happens by itself, so that states do not differ for ever.
+    pub(super) fn clock(&self) -> Option<(NumericId, Linear<Rational>)> {
+        let Timeline { clock, events, .. } = self.timeline;
+        if self.from == events.len() {
+            return None;
+        }
+        if self.to == events.len() {
+            return events.last().map(|(last, _)| (*clock, Linear::constant(last.clone())));
+        }
+        let mut end = self.start();
+        end.quantity.add(self.duration);
+        Some((*clock, end))
+    }
+
+    /// When it starts at the earliest, each time with whether a moment later is meant.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
+    )]
+    pub(super) fn timing(&self) -> Timing<(Rational, bool)> {
+        let events = &self.timeline.events;
+        let by_end = matches!(self.start, Start::ByEnd | Start::LaterByEnd);
+        Timing {
+            start: (self.start == Start::AfterEvent).then(|| (events[self.from - 1].0.clone(), true)),
+            end: by_end.then(|| (events[self.to - 1].0.clone(), self.end == End::Inside)),
+        }
+    }
+}
+
+/// Under which conditions the start and the end of an instance interfere with each event; `True` among them if always.
+pub(super) struct Conflicts {
+    start: Vec<Vec<Residual>>,
+    end: Vec<Vec<Residual>>,
+}
+
+impl Conflicts {
+    /// For what the start and the end read and change.
+    pub(super) fn new(
+        world: &World<'_>,
+        timeline: &Timeline,
+        (start, at_start): (&Reads, &SimultaneousEffects),
+        (end, at_end): (&Reads, &SimultaneousEffects),
+    ) -> Self {
+        let all = |reads: &Reads, moment: &SimultaneousEffects| {
+            let events = timeline.events.iter();
+            events.map(|(_, changes)| interference(world, changes, reads, moment)).collect()
+        };
+        Self { start: all(start, at_start), end: all(end, at_end) }
+    }
+}
+
+/// The conditions before a happening under which it interferes with an event.
+fn interference(
+    world: &World<'_>,
+    event: &[(AtomId, bool)],
+    reads: &Reads,
+    moment: &SimultaneousEffects,
+) -> Vec<Residual> {
+    let is_read = |(atom, _): &(AtomId, bool)| {
+        let (predicate, arguments) = world.atom_key(*atom);
+        reads.atoms.iter().any(|pattern| matches(pattern, predicate, arguments))
+    };
+    if event.iter().any(is_read) {
+        return vec![Residual::True];
+    }
+    let opposite = |change: &GroundChange| match change {
+        GroundChange::Atom(atom, holds) => event.contains(&(*atom, !holds)),
+        GroundChange::Number { .. } => false,
+    };
+    let changes = moment.changes.iter().filter(|(_, change)| opposite(change));
+    changes.map(|(condition, _)| condition.clone()).collect()
+}
+
+/// Conditions that must not hold: before the start, and before the end.
+pub(super) struct Interference {
+    pub(super) start: Vec<Residual>,
+    pub(super) end: Vec<Residual>,
+}

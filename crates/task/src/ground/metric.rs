@@ -1,0 +1,214 @@
+//! Metrics as costs of each operator.
+//!
+//! A metric is linear in fluents and total time. Fluents in it that are changed by sums that do not depend on the state make
+//! an offset plus the sum of its operators' costs. Others are only measured: their values in the end are added, and of such a
+//! metric no plan is called the best. A metric to maximize is
+//! negated. Without a metric, plans of durative actions are measured by total time, others by their length.
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+
+use num_traits::{One, Zero};
+
+use crate::error::{Error, Errors, Place};
+use crate::ground::config::Generality;
+use crate::ground::evaluate::expression::ground;
+use crate::ground::vocabulary::eval_error::Failure;
+use crate::ground::vocabulary::operator::GroundOperator;
+use crate::ground::vocabulary::task::{GroundObjective, GroundTask};
+use crate::ground::vocabulary::world::World;
+use crate::lifted::{Expression, Metric, Rational};
+use crate::task::quantity::{Linear, NumericId, Quantity};
+use crate::task::table_map::TableMap;
+use pddl::ast::Direction;
+
+/// Gives every operator its costs, and the task the rest of the metrics.
+///
+/// # Errors
+/// A metric that is not linear, or over a fluent whose change depends on the state.
+pub fn attach_costs(task: &mut GroundTask<'_>, generality: &Generality) -> Result<(), Errors> {
+    let lifted = task.world.lifted;
+    if lifted.metrics.is_empty() {
+        let temporal = task.operators.iter().any(|operator| !operator.duration.is_zero());
+        for operator in &mut task.operators {
+            // A wait is not an action of the plan.
+            let unit = Quantity::constant(Rational::from_integer(i128::from(operator.wait.is_none())));
+            operator.costs = vec![if temporal { operator.duration.clone() } else { unit }];
+        }
+        task.objectives = vec![GroundObjective::default()];
+        return Ok(());
+    }
+    let mut errors = Vec::new();
+    for metric in &lifted.metrics {
+        attach(task, metric, generality).unwrap_or_else(|error| errors.push(error));
+    }
+    if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
+}
+
+/// Gives every operator its cost by one metric.
+fn attach(task: &mut GroundTask<'_>, metric: &Metric, generality: &Generality) -> Result<(), Error> {
+    let limits = task.world.limits;
+    let (mut linear, mut time) = split(&mut task.world, &metric.expression, metric.place)?;
+    let maximize = metric.direction == Direction::Maximize;
+    if maximize {
+        linear = linear.negated();
+        time = -time;
+    }
+    let rest = rest(task, &mut linear, (metric, generality))?;
+    let initial: Vec<_> = linear
+        .coefficients
+        .iter()
+        .map(|(variable, factor)| task.world.initial_value(*variable) * factor)
+        .collect();
+    let offset = initial.into_iter().fold(linear.quantity.constant.clone(), |sum, value| sum + value);
+    task.objectives.push(GroundObjective { offset, maximize, rest });
+    let mut scaled = ScaledQuantities::default();
+    for operator in limits.watch(&mut task.operators) {
+        let operator = operator?;
+        operator.costs.push(cost(operator, &linear, &time, &mut scaled));
+    }
+    Ok(())
+}
+
+/// Takes the fluents out of a metric whose changes depend on the state.
+///
+/// # Errors
+/// There is one, and the task is to be good for more than for plans.
+fn rest(
+    task: &GroundTask<'_>,
+    linear: &mut Linear<Rational>,
+    (metric, generality): (&Metric, &Generality),
+) -> Result<Vec<(NumericId, Rational)>, Error> {
+    let mut dependent: Vec<NumericId> = Vec::new();
+    for operator in &task.operators {
+        for (variable, factor) in &linear.coefficients {
+            let Some(value) = operator.numeric_effects.get(*variable) else { continue };
+            let is_dependent = value.coefficients[..] != [(*variable, Rational::one())];
+            let is_reward = generality.measures_rewards && lowers(value, factor);
+            if is_dependent && !generality.measures_ends {
+                return Err(Error::Unsupported {
+                    construct: format!(
+                        "a metric over a fluent that `{}` changes depending on the state",
+                        task.world.lifted.schemas[operator.schema as usize].name
+                    ),
+                    instead: "a metric over fluents that are only increased or decreased by constants".into(),
+                    place: metric.place,
+                });
+            }
+            if (is_dependent || is_reward) && !dependent.contains(variable) {
+                dependent.push(*variable);
+            }
+        }
+    }
+    let (rest, kept) = linear.coefficients.drain(..).partition(|(variable, _)| dependent.contains(variable));
+    linear.coefficients = kept;
+    Ok(rest)
+}
+
+/// Whether a change of a fluent that counts by a factor may lower the metric.
+fn lowers(value: &Linear<Rational>, factor: &Rational) -> bool {
+    let mut change = value.quantity.clone();
+    change.scale(factor);
+    change.minimum().is_negative()
+}
+
+/// The part of the metric over fluents, and the factor of total time.
+fn split(
+    world: &mut World<'_>,
+    expression: &Expression,
+    place: Place,
+) -> Result<(Linear<Rational>, Rational), Error> {
+    match expression {
+        Expression::TotalTime => Ok((Linear::constant(Rational::zero()), Rational::from_integer(1))),
+        Expression::Sum(parts) => {
+            let (mut sum, mut time) = (Linear::constant(Rational::zero()), Rational::zero());
+            for part in parts {
+                let (linear, more) = split(world, part, place)?;
+                sum.add(&linear);
+                time += more;
+            }
+            Ok((sum, time))
+        }
+        Expression::Negate(inner) => {
+            split(world, inner, place).map(|(linear, time)| (linear.negated(), -time))
+        }
+        Expression::Product(parts, place) => {
+            let mut product = (Linear::constant(Rational::from_integer(1)), Rational::zero());
+            for part in parts {
+                let (linear, time) = split(world, part, *place)?;
+                product = multiply(product, (linear, time)).ok_or(Error::NonLinear { place: *place })?;
+            }
+            Ok(product)
+        }
+        Expression::Quotient(left, right, place) => {
+            let (mut linear, time) = split(world, left, *place)?;
+            let (divisor, divisor_time) = split(world, right, *place)?;
+            let constant = divisor.quantity.constant.clone();
+            if !divisor.coefficients.is_empty() || !divisor_time.is_zero() || constant.is_zero() {
+                return Err(Error::NonLinear { place: *place });
+            }
+            linear.scale(&constant.recip());
+            Ok((linear, time / constant))
+        }
+        Expression::Number(_) | Expression::Function(..) => match ground(world, expression, &Vec::new()) {
+            Ok(linear) => Ok((linear, Rational::zero())),
+            Err(Failure::Error(error)) => Err(error),
+            Err(Failure::Undefined) => Err(Error::Unsupported {
+                construct: "a metric over a function without a value".into(),
+                instead: "a value for it in `:init`".into(),
+                place,
+            }),
+        },
+    }
+}
+
+fn multiply(
+    left: (Linear<Rational>, Rational),
+    right: (Linear<Rational>, Rational),
+) -> Option<(Linear<Rational>, Rational)> {
+    let constant =
+        |(linear, time): &(Linear<Rational>, Rational)| linear.coefficients.is_empty() && time.is_zero();
+    let ((mut linear, time), (factor, _)) = if constant(&right) {
+        (left, right)
+    } else if constant(&left) {
+        (right, left)
+    } else {
+        return None;
+    };
+    linear.scale(&factor.quantity.constant);
+    Some((linear, time * &factor.quantity.constant))
+}
+
+/// Quantities times the factors of a metric; what operators share, they share afterwards.
+#[derive(Default)]
+struct ScaledQuantities {
+    by_factor: BTreeMap<Rational, TableMap<Rational>>,
+}
+
+impl ScaledQuantities {
+    fn times(&mut self, quantity: &Quantity<Rational>, factor: &Rational) -> Quantity<Rational> {
+        if factor.is_one() {
+            return quantity.clone();
+        }
+        if factor.is_zero() {
+            return Quantity::constant(Rational::zero());
+        }
+        let tables = self.by_factor.entry(factor.clone()).or_default();
+        let Ok(scaled) = tables.map::<Infallible>(quantity, &|number| Ok(number.clone() * factor));
+        scaled
+    }
+}
+
+/// What one application adds to the metric.
+fn cost(
+    operator: &GroundOperator,
+    metric: &Linear<Rational>,
+    time: &Rational,
+    scaled: &mut ScaledQuantities,
+) -> Quantity<Rational> {
+    let mut total = scaled.times(&operator.duration, time);
+    for (variable, factor) in &metric.coefficients {
+        let Some(value) = operator.numeric_effects.get(*variable) else { continue };
+        total.add(&scaled.times(&value.quantity, factor));
+    }
+    total
+}

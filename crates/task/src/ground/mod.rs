@@ -1,0 +1,149 @@
+//! Lifted task to ground task.
+//!
+//! Relaxed reachability (a Datalog program on the rule engine, after Helmert [1]) yields the instances of each
+//! schema, without its separable design parameters; each instance becomes one operator with slots; mutex groups become
+//! finite-domain variables; all numbers become exact integers.
+//!
+//! Each pass turns one thing into the next, and what they hand to each other is in `vocabulary`:
+//!
+//! | pass | from | to |
+//! |---|---|---|
+//! | `relaxed_reachability` | `Lifted`, slots | `RelaxedReachability`: instances of schemas, atoms that can hold |
+//! | `instantiate` | the `World` of these | `GroundTask`: operators, rules and a goal over atoms |
+//! | `derived` | derived atoms that are decided, or have one rule | truth values, and the body of the rule in their place |
+//! | `metric` | metrics | the costs of operators, and objectives |
+//! | `prune` | operators, rules | those that can matter; or why the goal is out of reach |
+//! | `finalize` | `GroundTask` | `Task`: variables for atoms, integers for rationals |
+//!
+//! [1] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009.
+
+mod config;
+mod derived;
+pub mod evaluate;
+mod finalize;
+mod instantiate;
+mod metric;
+mod prune;
+mod relaxed_reachability;
+#[cfg(test)]
+mod tests;
+pub mod vocabulary;
+
+use crate::compile::{PlanSemantics, compile};
+use crate::error::{Error, Errors};
+use crate::lifted::Lifted;
+use crate::lifted::configuration::{SlotParameter, design_parameters, slot_parameters};
+use crate::limits::Limits;
+use crate::normalize::{events, normalize, undefined_fluents, zero_duration};
+use crate::task::Task;
+use crate::task::number::TaskNumber;
+use pddl::ast::{Domain, Problem};
+use tracing::field::Empty;
+use tracing::info_span;
+
+pub use config::Generality;
+pub use config::GroundConfig;
+use vocabulary::reached::RelaxedReachability;
+use vocabulary::world::World;
+
+/// Grounds a domain and a problem that have passed `pddl::check`.
+///
+/// ```
+/// use metaplan_task::ground::{GroundConfig, ground};
+/// # use pddl::{Source, read};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let domain = Source::new("d", "(define (domain d) (:requirements :typing :numeric-fluents) (:types place)
+/// #   (:predicates (at ?p - place) (way ?a ?b - place)) (:functions (time) (energy))
+/// #   (:action walk :parameters (?a ?b - place) :precondition (and (at ?a) (way ?a ?b))
+/// #     :effect (and (not (at ?a)) (at ?b) (increase (time) 5) (increase (energy) 1)))
+/// #   (:action ride :parameters (?a ?b - place) :precondition (and (at ?a) (way ?a ?b))
+/// #     :effect (and (not (at ?a)) (at ?b) (increase (time) 1) (increase (energy) 4))))");
+/// # let problem = Source::new("p", "(define (problem p) (:domain d) (:objects a b c - place)
+/// #   (:init (at a) (way a b) (way b c) (= (time) 0) (= (energy) 0)) (:goal (at c)) (:metric minimize (time)))");
+/// let (domain, problem, _warnings) = read(&domain, &problem)?;
+/// let task = ground(&domain, &problem, &GroundConfig::default())?;
+/// assert!(task.is_timed());
+/// # Ok(())
+/// # }
+/// ```
+///
+/// # Errors
+/// Every construct that the planner does not handle, with its place.
+pub fn ground(domain: &Domain, problem: &Problem, config: &GroundConfig) -> Result<Task, Errors> {
+    let measures_ends = config.objectives.len() <= 1;
+    ground_for(domain, problem, config, &Generality { measures_ends, ..Generality::default() })
+}
+
+/// Grounds a problem so that other initial states can take the place of its own.
+///
+/// # Errors
+/// All constructs that the planner does not support, or the limit that was reached.
+pub fn ground_for<N: TaskNumber>(
+    domain: &Domain,
+    problem: &Problem,
+    config: &GroundConfig,
+    generality: &Generality,
+) -> Result<Task<N>, Errors> {
+    let GroundConfig { objectives, limits, .. } = config;
+    let plain = info_span!("compile")
+        .in_scope(|| compile(domain, problem, objectives, PlanSemantics::Sequence, limits))?;
+    let lifted =
+        || info_span!("normalize").in_scope(|| normalize(&plain.domain, &plain.problem, &plain.objectives));
+    let found = ground_normal(lifted()?, config, generality);
+    match found {
+        Err(errors) if generality.numbers.is_none() && errors.iter().any(Error::is_value_missing) => {
+            let mut lifted = lifted()?;
+            undefined_fluents::guard(&mut lifted);
+            ground_normal(lifted, config, generality)
+        }
+        found => found,
+    }
+}
+
+/// Grounds a task in which start and end of actions of duration 0 are still apart.
+fn ground_normal<N: TaskNumber>(
+    mut lifted: Lifted,
+    config: &GroundConfig,
+    generality: &Generality,
+) -> Result<Task<N>, Errors> {
+    zero_duration::split(&mut lifted)?;
+    events::begin(&mut lifted);
+    let designs: Vec<_> =
+        lifted.schemas.iter().map(|schema| design_parameters(&lifted, schema, &config.solves)).collect();
+    let slots: Vec<_> = lifted
+        .schemas
+        .iter()
+        .zip(&designs)
+        .map(|(schema, designs)| slot_parameters(&lifted, schema, designs))
+        .collect();
+    ground_lifted(&lifted, &designs, &slots, generality, &config.limits).map(|(task, _)| task)
+}
+
+/// Grounds a lifted task. For each schema: its design parameters, and those of them that become slots.
+///
+/// # Errors
+/// As [`ground`].
+pub fn ground_lifted<N: TaskNumber>(
+    lifted: &Lifted,
+    designs: &[Vec<SlotParameter>],
+    slots: &[Vec<SlotParameter>],
+    generality: &Generality,
+    limits: &Limits,
+) -> Result<(Task<N>, RelaxedReachability), Errors> {
+    let span = info_span!("ground", operators = Empty, variables = Empty).entered();
+    let reached = info_span!("reach").in_scope(|| relaxed_reachability::reach(lifted, slots, limits))?;
+    let world = World::new(lifted, &reached, limits);
+    let instantiate = info_span!("instantiate", operators = Empty).entered();
+    let mut ground = instantiate::instantiate(world, designs, slots)?;
+    instantiate.record("operators", ground.operators.len());
+    drop(instantiate);
+    info_span!("derived").in_scope(|| derived::simplify(&mut ground))?;
+    info_span!("metric").in_scope(|| metric::attach_costs(&mut ground, generality))?;
+    if limits.reached() {
+        return Err(vec![Error::Interrupted].into());
+    }
+    let unreachable = info_span!("prune").in_scope(|| prune::prune(&mut ground, generality))?;
+    let task = info_span!("finish").in_scope(|| finalize::finish(ground, unreachable, generality))?;
+    span.record("operators", task.operators.len()).record("variables", task.variables.len());
+    Ok((task, reached))
+}

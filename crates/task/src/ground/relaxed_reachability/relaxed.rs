@@ -1,0 +1,289 @@
+//! Conditions as bodies of rules: relaxed, or exact where everything is static.
+//!
+//! A relaxed body holds wherever the condition can: fluents are never false, numbers never stand in the way. Disjunctions
+//! and negated quantifiers become auxiliary relations over their free variables.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use rules::{Atom, Fact, Rule, RuleIdentity, Symbol, Symbols, Term as RuleTerm, Variable};
+use rustc_hash::FxHashMap;
+
+use crate::ground::evaluate::condition::residual;
+use crate::ground::evaluate::join::each_binding;
+use crate::ground::vocabulary::partial_eval::Residual;
+use crate::ground::vocabulary::reached::RelaxedReachability;
+use crate::ground::vocabulary::world::World;
+use crate::lifted::configuration::{formula_terms, has_numbers, is_static};
+use crate::lifted::{Arguments, Bound, Formula, Lifted, ObjectId, PredicateId, Term};
+use crate::limits::{Interrupted, Limits};
+use crate::number::dense;
+
+/// What variables range over.
+pub(super) type Candidates = BTreeMap<u32, Arc<[ObjectId]>>;
+
+/// The symbols of a program.
+pub(super) struct Names {
+    pub(super) table: Symbols,
+    pub(super) objects: Vec<Symbol>,
+    pub(super) predicates: Vec<Symbol>,
+}
+
+/// A program under construction.
+pub(super) struct ReachabilityProgramBuilder<'a> {
+    pub(super) lifted: &'a Lifted,
+    limits: &'a Limits,
+    names: Names,
+    types: FxHashMap<Arc<[ObjectId]>, Symbol>,
+    facts: Vec<Fact>,
+    rules: Vec<Rule>,
+    relations: usize,
+}
+
+impl<'a> ReachabilityProgramBuilder<'a> {
+    pub(super) fn new(lifted: &'a Lifted, limits: &'a Limits) -> Self {
+        let mut table = Symbols::new();
+        let objects: Vec<_> = (0..lifted.objects.len()).map(|i| table.name(&format!("object {i}"))).collect();
+        let predicates: Vec<_> =
+            (0..lifted.predicates.len()).map(|i| table.name(&format!("predicate {i}"))).collect();
+        let events = lifted.events.iter().flat_map(|event| &event.changes).filter(|(_, _, holds)| *holds);
+        let facts = lifted
+            .facts
+            .iter()
+            .map(|(predicate, arguments)| (predicate, arguments))
+            .chain(events.map(|(predicate, arguments, _)| (predicate, arguments)))
+            .map(|(predicate, arguments)| Fact {
+                predicate: predicates[predicate.index()],
+                arguments: arguments.iter().map(|object| objects[object.index()]).collect(),
+            })
+            .collect();
+        let names = Names { table, objects, predicates };
+        Self { lifted, limits, names, types: FxHashMap::default(), facts, rules: Vec::new(), relations: 0 }
+    }
+
+    pub(super) fn finish(self) -> (Names, Vec<Rule>, Vec<Fact>) {
+        (self.names, self.rules, self.facts)
+    }
+
+    /// A relation that nothing else uses.
+    #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
+    pub(super) fn fresh(&mut self, kind: &str) -> Symbol {
+        self.relations += 1;
+        self.names.table.name(&format!("{kind} {}", self.relations))
+    }
+
+    /// Atoms that keep variables to what they range over.
+    pub(super) fn types(&mut self, variables: &[u32], candidates: &Candidates) -> Vec<Atom> {
+        variables
+            .iter()
+            .filter_map(|variable| {
+                let symbol = self.candidates(candidates.get(variable)?);
+                Some(Self::relation(symbol, &[*variable]))
+            })
+            .collect()
+    }
+
+    /// The unary relation that holds some objects.
+    fn candidates(&mut self, candidates: &Arc<[ObjectId]>) -> Symbol {
+        if let Some(symbol) = self.types.get(candidates) {
+            return *symbol;
+        }
+        let symbol = self.fresh("type");
+        for object in candidates.iter() {
+            let arguments = std::iter::once(self.names.objects[object.index()]).collect();
+            self.facts.push(Fact { predicate: symbol, arguments });
+        }
+        self.types.insert(candidates.clone(), symbol);
+        symbol
+    }
+
+    fn term(&self, term: Term) -> RuleTerm {
+        match term {
+            Term::Parameter(parameter) => variable(parameter),
+            Term::Object(object) => RuleTerm::Constant(self.names.objects[object.index()]),
+        }
+    }
+
+    pub(super) fn atom(&self, predicate: PredicateId, terms: &[Term]) -> Atom {
+        let arguments = terms.iter().map(|term| self.term(*term)).collect();
+        Atom::Relation { predicate: self.names.predicates[predicate.index()], arguments }
+    }
+
+    pub(super) fn relation(predicate: Symbol, parameters: &[u32]) -> Atom {
+        let arguments = parameters.iter().map(|p| variable(*p)).collect();
+        Atom::Relation { predicate, arguments }
+    }
+
+    pub(super) fn rule(&mut self, head: Vec<Atom>, body: Vec<Atom>) {
+        let identity = RuleIdentity::new("relaxed reachability", dense(self.rules.len()));
+        self.rules.push(Rule::new(identity, head, body));
+    }
+
+    /// Adds the atoms that a condition needs. `exact` asks for the condition itself, which must be static then; else
+    /// for something that it implies.
+    pub(super) fn body(
+        &mut self,
+        formula: &Formula,
+        candidates: &Candidates,
+        exact: bool,
+        out: &mut Vec<Atom>,
+    ) -> Result<(), Interrupted> {
+        self.limits.check()?;
+        match formula {
+            Formula::And(parts) => {
+                return parts.iter().try_for_each(|part| self.body(part, candidates, exact, out));
+            }
+            Formula::Literal { positive, predicate, terms } => match self.atom(*predicate, terms) {
+                atom if *positive => out.push(atom),
+                Atom::Relation { predicate: symbol, arguments }
+                    if !self.lifted.predicates[predicate.index()].fluent =>
+                {
+                    out.push(Atom::Not { predicate: symbol, arguments });
+                }
+                _ => {}
+            },
+            Formula::Equal { positive, left, right } => {
+                let (left, right) = (self.term(*left), self.term(*right));
+                out.push(if *positive { Atom::Same(left, right) } else { Atom::Different(left, right) });
+            }
+            Formula::Exists(bound, body) => {
+                let (variables, candidates) = with_bound(candidates, bound);
+                out.extend(self.types(&variables, &candidates));
+                self.body(body, &candidates, exact, out)?;
+            }
+            Formula::Or(parts) => {
+                if exact || !parts.iter().any(|part| self.may_be_free(part)) {
+                    let relation = self.auxiliary(formula, parts, candidates, exact)?;
+                    out.push(Self::relation(relation, &free(formula)));
+                }
+            }
+            Formula::ForAll(..) => {
+                if exact || (is_static(self.lifted, formula) && !has_numbers(formula)) {
+                    let relation = self.auxiliary(formula, &[formula.negated()], candidates, true)?;
+                    let arguments = free(formula).into_iter().map(variable);
+                    out.push(Atom::Not { predicate: relation, arguments: arguments.collect() });
+                }
+            }
+            Formula::Compare(..) => {
+                if exact {
+                    let relation = self.comparison(formula, candidates)?;
+                    out.push(Self::relation(relation, &free(formula)));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A relation over the free variables of a condition that holds where one of the parts does.
+    fn auxiliary(
+        &mut self,
+        formula: &Formula,
+        parts: &[Formula],
+        candidates: &Candidates,
+        exact: bool,
+    ) -> Result<Symbol, Interrupted> {
+        let relation = self.fresh("auxiliary");
+        let variables = free(formula);
+        for part in parts {
+            let mut body = self.types(&variables, candidates);
+            self.body(part, candidates, exact, &mut body)?;
+            self.rule(vec![Self::relation(relation, &variables)], body);
+        }
+        Ok(relation)
+    }
+
+    /// Whether a relaxed condition holds without asking for anything.
+    fn may_be_free(&self, formula: &Formula) -> bool {
+        match formula {
+            Formula::And(parts) => parts.iter().all(|part| self.may_be_free(part)),
+            Formula::Or(parts) => parts.iter().any(|part| self.may_be_free(part)),
+            Formula::Exists(_, body) => self.may_be_free(body),
+            Formula::ForAll(..) => !is_static(self.lifted, formula) || has_numbers(formula),
+            Formula::Literal { positive, predicate, .. } => {
+                !positive && self.lifted.predicates[predicate.index()].fluent
+            }
+            Formula::Equal { .. } => false,
+            Formula::Compare(..) => true,
+        }
+    }
+
+    /// The relation of a static comparison: the objects for which it holds.
+    fn comparison(&mut self, formula: &Formula, candidates: &Candidates) -> Result<Symbol, Interrupted> {
+        let relation = self.fresh("comparison");
+        let variables = free(formula);
+        let rows = satisfying(self.lifted, formula, &variables, candidates, self.limits)?;
+        for row in rows {
+            let arguments = row.iter().map(|object| self.names.objects[object.index()]).collect();
+            self.facts.push(Fact { predicate: relation, arguments });
+        }
+        Ok(relation)
+    }
+}
+
+/// The variable of a rule for a parameter or bound variable.
+fn variable(number: u32) -> RuleTerm {
+    RuleTerm::Variable(Variable(u16::try_from(number).expect("invariant: `reach` refuses more variables")))
+}
+
+/// The objects for which a static comparison holds, one for each variable.
+#[expect(clippy::arithmetic_side_effects, reason = "variables of a condition are numbered in memory")]
+fn satisfying(
+    lifted: &Lifted,
+    comparison: &Formula,
+    variables: &[u32],
+    candidates: &Candidates,
+    limits: &Limits,
+) -> Result<Vec<Arguments>, Interrupted> {
+    let reached = RelaxedReachability::default();
+    let mut world = World::new(lifted, &reached, limits);
+    let bound: Vec<_> = variables
+        .iter()
+        .filter_map(|v| Some(Bound { variable: *v, candidates: candidates.get(v)?.clone() }))
+        .collect();
+    let mut binding = vec![None; variables.iter().max().map_or(0, |v| *v as usize + 1)];
+    let mut rows = Vec::new();
+    each_binding(&mut world, &bound, &[], &mut binding, &mut |world, binding| {
+        if matches!(residual(world, comparison, binding), Ok(Residual::True)) {
+            rows.push(variables.iter().filter_map(|v| binding[*v as usize]).collect());
+        }
+        true
+    })?;
+    // What was cut short above counts as not satisfied.
+    limits.check()?;
+    Ok(rows)
+}
+
+/// The variables that a quantifier binds, and all candidates in its scope.
+pub(super) fn with_bound(candidates: &Candidates, bound: &[Bound]) -> (Vec<u32>, Candidates) {
+    let mut inner = candidates.clone();
+    inner.extend(bound.iter().map(|b| (b.variable, b.candidates.clone())));
+    (bound.iter().map(|b| b.variable).collect(), inner)
+}
+
+/// The variables of a condition that no quantifier in it binds, ascending.
+pub(super) fn free(formula: &Formula) -> Vec<u32> {
+    fn bound_in(formula: &Formula, out: &mut Vec<u32>) {
+        match formula {
+            Formula::And(parts) | Formula::Or(parts) => parts.iter().for_each(|part| bound_in(part, out)),
+            Formula::Exists(bound, body) | Formula::ForAll(bound, body) => {
+                out.extend(bound.iter().map(|b| b.variable));
+                bound_in(body, out);
+            }
+            _ => {}
+        }
+    }
+    let mut bound = Vec::new();
+    bound_in(formula, &mut bound);
+    bound.sort_unstable();
+    let mut free = Vec::new();
+    formula_terms(formula, &mut |term| {
+        if let Term::Parameter(variable) = term
+            && bound.binary_search(&variable).is_err()
+        {
+            free.push(variable);
+        }
+    });
+    free.sort_unstable();
+    free.dedup();
+    free
+}

@@ -1,0 +1,138 @@
+//! Each pass of grounding by itself: what it gets, and what it hands on.
+
+use crate::ground::vocabulary::reached::RelaxedReachability;
+use crate::ground::vocabulary::task::GroundTask;
+use crate::ground::vocabulary::world::World;
+use crate::ground::{Generality, derived, finalize, instantiate, metric, prune, relaxed_reachability};
+use crate::lifted::configuration::SlotParameter;
+use crate::lifted::{Lifted, Rational};
+use crate::limits::Limits;
+use crate::normalize::normalize;
+use crate::task::Task;
+use crate::task::quantity::Quantity;
+use pddl::{Source, read};
+
+/// Two ways, a lamp without which nobody walks, and a jump for which there is never enough fuel.
+const DOMAIN: &str = "(define (domain d)
+  (:predicates (at ?p) (way ?a ?b) (lit) (ready))
+  (:functions (fuel))
+  (:derived (ready) (lit))
+  (:action go :parameters (?a ?b) :precondition (and (at ?a) (way ?a ?b) (ready))
+    :effect (and (not (at ?a)) (at ?b)))
+  (:action light :parameters () :precondition (not (lit)) :effect (lit))
+  (:action jump :parameters (?a) :precondition (and (at ?a) (way ?a ?a) (ready)) :effect (lit))
+  (:action fly :parameters (?a ?b) :precondition (and (at ?a) (>= (fuel) 5))
+    :effect (and (not (at ?a)) (at ?b) (decrease (fuel) 1))))";
+
+const PROBLEM: &str = "(define (problem p) (:domain d) (:objects a b)
+  (:init (at a) (way a b) (way b a) (= (fuel) 3)) (:goal (at b)))";
+
+fn lifted() -> Lifted {
+    let (domain, problem, _) =
+        read(&Source::new("domain", DOMAIN), &Source::new("problem", PROBLEM)).expect("PDDL");
+    normalize(&domain, &problem, &[]).expect("a lifted task")
+}
+
+/// No parameter is a design.
+fn none(lifted: &Lifted) -> Vec<Vec<SlotParameter>> {
+    vec![Vec::new(); lifted.schemas.len()]
+}
+
+fn reached(lifted: &Lifted) -> RelaxedReachability {
+    relaxed_reachability::reach(lifted, &none(lifted), &Limits::none()).expect("no limit")
+}
+
+/// How many operators each schema has.
+fn counts(lifted: &Lifted, task: &GroundTask<'_>) -> Vec<(String, usize)> {
+    let schemas = lifted.schemas.iter().zip(0_u32..);
+    let count = |schema| task.operators.iter().filter(|operator| operator.schema == schema).count();
+    schemas.map(|(schema, number)| (schema.name.to_string(), count(number))).collect()
+}
+
+/// Calls `check` with what all passes before the costs have made of the task.
+fn instantiated(check: impl FnOnce(&Lifted, GroundTask<'_>)) {
+    let (lifted, limits) = (lifted(), Limits::none());
+    let reached = reached(&lifted);
+    let world = World::new(&lifted, &reached, &limits);
+    let none = none(&lifted);
+    check(&lifted, instantiate::instantiate(world, &none, &none).expect("operators"));
+}
+
+#[test]
+fn reach_finds_instances_and_atoms_as_if_nothing_were_deleted() {
+    let lifted = lifted();
+    let reached = reached(&lifted);
+    let instances: Vec<usize> = reached.instances.iter().map(Vec::len).collect();
+    // Nobody asks for numbers, and nothing leads from a place to itself.
+    assert_eq!(instances, [2, 1, 0, 4]);
+    let name = |predicate: usize| lifted.predicates[predicate].name.to_string();
+    let mut atoms: Vec<String> = reached.atoms.iter().map(|(predicate, _)| name(predicate.index())).collect();
+    atoms.sort();
+    assert_eq!(atoms, ["at", "at", "lit", "ready"]);
+}
+
+#[test]
+fn instantiate_makes_operators_and_rules() {
+    instantiated(|lifted, task| {
+        let expected = [("go", 2), ("light", 1), ("jump", 0), ("fly", 4)];
+        assert_eq!(counts(lifted, &task), expected.map(|(name, count)| (name.to_owned(), count)));
+        assert_eq!(task.axioms.len(), 1);
+        assert!(task.world.is_derived(task.axioms[0].head));
+        assert!(task.operators.iter().all(|operator| operator.costs.is_empty()));
+    });
+}
+
+#[test]
+fn derived_atoms_with_one_rule_are_replaced_by_its_body() {
+    instantiated(|_, mut task| {
+        let derived = task.axioms[0].head;
+        let asks = |task: &GroundTask<'_>| {
+            let conditions = task.operators.iter().flat_map(|operator| operator.condition.atoms());
+            conditions.filter(|atom| *atom == derived).count()
+        };
+        assert_eq!(asks(&task), 2);
+        derived::simplify(&mut task).expect("no limit");
+        assert_eq!(asks(&task), 0);
+    });
+}
+
+#[test]
+fn without_a_metric_each_step_costs_one() {
+    instantiated(|_, mut task| {
+        metric::attach_costs(&mut task, &Generality::default()).expect("costs");
+        let one = [Quantity::constant(Rational::from_integer(1))];
+        assert!(task.operators.iter().all(|operator| operator.costs == one));
+        assert_eq!(task.objectives.len(), 1);
+    });
+}
+
+#[test]
+fn prune_drops_what_numbers_rule_out_and_finish_makes_variables() {
+    instantiated(|lifted, mut task| {
+        derived::simplify(&mut task).expect("no limit");
+        metric::attach_costs(&mut task, &Generality::default()).expect("costs");
+        let generality = Generality::default();
+        assert_eq!(prune::prune(&mut task, &generality).expect("no limit"), None);
+        // Nothing asks for the head of the rule any more.
+        assert!(task.axioms.is_empty());
+        let expected = [("go", 2), ("light", 1), ("jump", 0), ("fly", 0)];
+        assert_eq!(counts(lifted, &task), expected.map(|(name, count)| (name.to_owned(), count)));
+        let task: Task = finalize::finish(task, None, &generality).expect("integers");
+        let mut values: Vec<Vec<&str>> =
+            task.variables.iter().map(|own| own.values.iter().map(String::as_str).collect()).collect();
+        values.sort();
+        assert_eq!(values, [vec!["(at a)", "(at b)", "none of these"], vec!["(lit)", "none of these"]]);
+        assert!(task.initial.numbers.is_empty());
+    });
+}
+
+#[test]
+fn where_other_numbers_are_to_come_prune_concludes_nothing_from_those_of_the_problem() {
+    instantiated(|lifted, mut task| {
+        derived::simplify(&mut task).expect("no limit");
+        metric::attach_costs(&mut task, &Generality::default()).expect("costs");
+        let generality = Generality { numbers: Some(1), ..Generality::default() };
+        assert_eq!(prune::prune(&mut task, &generality).expect("no limit"), None);
+        assert_eq!(counts(lifted, &task)[3], ("fly".to_owned(), 4));
+    });
+}

@@ -1,0 +1,38 @@
+//! The rules of derived atoms.
+
+use petgraph::algo::tarjan_scc;
+use petgraph::graph::DiGraph;
+use rustc_hash::FxHashMap;
+
+use crate::ground::vocabulary::atom::AtomId;
+use crate::ground::vocabulary::condition::GroundCondition;
+
+/// A rule: the head holds where the body does. The body has no clauses.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct GroundAxiom {
+    pub(crate) head: AtomId,
+    pub(crate) body: GroundCondition,
+}
+
+/// Derived atoms in components of mutual dependence, what a component depends on before it.
+pub fn components(axioms: &[GroundAxiom]) -> Vec<Vec<AtomId>> {
+    let mut graph: DiGraph<AtomId, ()> = DiGraph::new();
+    let mut nodes: FxHashMap<AtomId, _> = FxHashMap::default();
+    for axiom in axioms {
+        nodes.entry(axiom.head).or_insert_with(|| graph.add_node(axiom.head));
+    }
+    for axiom in axioms {
+        for atom in axiom.body.atoms() {
+            if let Some(node) = nodes.get(&atom) {
+                graph.add_edge(nodes[&axiom.head], *node, ());
+            }
+        }
+    }
+    // Tarjan's algorithm yields components in reverse topological order: what has no successors first.
+    let sorted = |component: Vec<_>| {
+        let mut atoms: Vec<AtomId> = component.into_iter().map(|node| graph[node]).collect();
+        atoms.sort_unstable();
+        atoms
+    };
+    tarjan_scc(&graph).into_iter().map(sorted).collect()
+}

@@ -1,0 +1,32 @@
+//! Conditions of ground operators in conjunctive normal form.
+
+use crate::ground::vocabulary::atom::AtomId;
+use crate::lifted::Rational;
+use crate::task::quantity::Linear;
+
+/// An atom or its negation.
+pub type GroundLiteral = (AtomId, bool);
+
+/// A conjunction of literals, clauses and comparisons.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
+pub struct GroundCondition {
+    pub(crate) literals: Vec<GroundLiteral>,
+    pub(crate) clauses: Vec<Vec<GroundLiteral>>,
+    pub(crate) comparisons: Vec<(Linear<Rational>, bool)>,
+}
+
+impl GroundCondition {
+    /// Sorts and removes repetitions; false if literals contradict each other.
+    pub(crate) fn tidy(&mut self) -> bool {
+        self.literals.sort_unstable();
+        self.literals.dedup();
+        self.clauses.sort_unstable();
+        self.clauses.dedup();
+        self.literals.windows(2).all(|pair| pair[0].0 != pair[1].0)
+    }
+
+    /// All atoms that occur.
+    pub(crate) fn atoms(&self) -> impl Iterator<Item = AtomId> + '_ {
+        self.literals.iter().chain(self.clauses.iter().flatten()).map(|(atom, _)| *atom)
+    }
+}

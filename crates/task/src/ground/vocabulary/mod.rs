@@ -1,0 +1,12 @@
+//! What the passes of grounding hand to each other. No file here imports a pass.
+
+pub mod atom;
+pub mod axiom;
+pub mod condition;
+pub mod eval_error;
+pub mod numbers;
+pub mod operator;
+pub mod partial_eval;
+pub mod reached;
+pub mod task;
+pub mod world;

@@ -1,0 +1,102 @@
+//! What is left of a condition once everything static is decided.
+
+use crate::ground::vocabulary::atom::AtomId;
+use crate::lifted::Rational;
+use crate::task::quantity::Linear;
+use pddl::ast::Comparison;
+
+/// What is left of a condition once everything static is decided.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub enum Residual {
+    True,
+    False,
+    And(Vec<Residual>),
+    Or(Vec<Residual>),
+    Literal {
+        atom: AtomId,
+        positive: bool,
+    },
+    /// The expression is ≥ 0, or > 0 if strict.
+    Compare {
+        linear: Linear<Rational>,
+        strict: bool,
+    },
+}
+
+impl Residual {
+    /// A conjunction, or a disjunction, of parts, simplified.
+    pub(crate) fn junction(parts: impl IntoIterator<Item = Self>, conjunction: bool) -> Self {
+        let mut kept = Vec::new();
+        for part in parts {
+            match (part, conjunction) {
+                (Self::True, true) | (Self::False, false) => {}
+                (Self::False, true) => return Self::False,
+                (Self::True, false) => return Self::True,
+                (Self::And(more), true) | (Self::Or(more), false) => kept.extend(more),
+                (other, _) => kept.push(other),
+            }
+        }
+        match (kept.len(), conjunction) {
+            (0, _) => truth(conjunction),
+            (1, _) => kept.swap_remove(0),
+            (_, true) => Self::And(kept),
+            (_, false) => Self::Or(kept),
+        }
+    }
+
+    /// The negation. A comparison of what is undefined has been decided before: it does not hold.
+    pub(crate) fn negated(&self) -> Self {
+        match self {
+            Self::True => Self::False,
+            Self::False => Self::True,
+            Self::And(parts) => Self::junction(parts.iter().map(Self::negated), false),
+            Self::Or(parts) => Self::junction(parts.iter().map(Self::negated), true),
+            Self::Literal { atom, positive } => Self::Literal { atom: *atom, positive: !positive },
+            Self::Compare { linear, strict } => {
+                Self::Compare { linear: linear.clone().negated(), strict: !strict }
+            }
+        }
+    }
+
+    /// The condition with other literals and comparisons, simplified.
+    pub(crate) fn mapped(self, leaf: &dyn Fn(Self) -> Self) -> Self {
+        match self {
+            Self::And(parts) => Self::junction(parts.into_iter().map(|part| part.mapped(leaf)), true),
+            Self::Or(parts) => Self::junction(parts.into_iter().map(|part| part.mapped(leaf)), false),
+            other => leaf(other),
+        }
+    }
+}
+
+/// A comparison of two expressions as `difference ≥ 0` or `difference > 0`; decided if it is constant.
+pub fn compare(comparison: Comparison, left: Linear<Rational>, right: Linear<Rational>) -> Residual {
+    match comparison {
+        Comparison::Less => at_least_zero(right, left, true),
+        Comparison::LessOrEqual => at_least_zero(right, left, false),
+        Comparison::Greater => at_least_zero(left, right, true),
+        Comparison::GreaterOrEqual => at_least_zero(left, right, false),
+        Comparison::Equal => {
+            let above = at_least_zero(left.clone(), right.clone(), false);
+            Residual::junction([above, at_least_zero(right, left, false)], true)
+        }
+    }
+}
+
+fn at_least_zero(mut linear: Linear<Rational>, subtrahend: Linear<Rational>, strict: bool) -> Residual {
+    linear.add(&subtrahend.negated());
+    constant_comparison(&linear, strict).unwrap_or(Residual::Compare { linear, strict })
+}
+
+/// The truth of a comparison in which nothing is variable.
+pub fn constant_comparison(linear: &Linear<Rational>, strict: bool) -> Option<Residual> {
+    if !linear.coefficients.is_empty() || !linear.quantity.tables.is_empty() {
+        return None;
+    }
+    let (value, zero) = (&linear.quantity.constant, &Rational::from_integer(0));
+    Some(truth(if strict { value > zero } else { value >= zero }))
+}
+
+/// The residual that is always so.
+pub fn truth(value: bool) -> Residual {
+    if value { Residual::True } else { Residual::False }
+}

@@ -1,0 +1,58 @@
+//! The task over atoms, as passes change it one after another.
+
+use rustc_hash::{FxHashMap, FxHashSet};
+
+use crate::ground::vocabulary::atom::AtomId;
+use crate::ground::vocabulary::axiom::GroundAxiom;
+use crate::ground::vocabulary::condition::GroundCondition;
+use crate::ground::vocabulary::operator::GroundOperator;
+use crate::ground::vocabulary::world::World;
+use crate::lifted::Rational;
+use crate::task::quantity::NumericId;
+
+/// The task over atoms.
+pub struct GroundTask<'a> {
+    pub(crate) world: World<'a>,
+    pub(crate) operators: Vec<GroundOperator>,
+    /// The rules of derived atoms.
+    pub(crate) axioms: Vec<GroundAxiom>,
+    /// None if the goal is false whatever happens.
+    pub(crate) goal: Option<GroundCondition>,
+    /// What plans are measured by; empty until operators have their costs.
+    pub(crate) objectives: Vec<GroundObjective>,
+}
+
+/// How operator costs relate to the metric.
+#[derive(Debug, Clone, Default)]
+pub struct GroundObjective {
+    /// The metric of the initial state (negated if to be maximized).
+    pub(crate) offset: Rational,
+    pub(crate) maximize: bool,
+    /// Fluents whose changes depend on the state, with their factors (negated if to be maximized): they count in the end.
+    pub(crate) rest: Vec<(NumericId, Rational)>,
+}
+
+impl GroundTask<'_> {
+    /// The atoms that conditions read, directly or through rules.
+    pub(crate) fn read_atoms(&self) -> FxHashSet<AtomId> {
+        let conditions = self.operators.iter().map(|operator| &operator.condition).chain(&self.goal);
+        let conditional = self.operators.iter().flat_map(|operator| &operator.conditional);
+        let conditional = conditional.flat_map(|effect| effect.condition.iter().map(|(atom, _)| *atom));
+        let mut direct = vec![false; self.world.atoms.len()];
+        for atom in conditions.flat_map(GroundCondition::atoms).chain(conditional) {
+            direct[atom.index()] = true;
+        }
+        let direct = direct.into_iter().zip(0..).filter(|(read, _)| *read);
+        let mut read: FxHashSet<AtomId> = direct.map(|(_, atom)| AtomId(atom)).collect();
+        let mut bodies: FxHashMap<AtomId, Vec<&GroundCondition>> = FxHashMap::default();
+        for axiom in &self.axioms {
+            bodies.entry(axiom.head).or_default().push(&axiom.body);
+        }
+        let mut open: Vec<AtomId> = read.iter().copied().collect();
+        while let Some(atom) = open.pop() {
+            let below = bodies.get(&atom).into_iter().flatten().flat_map(|body| body.atoms());
+            open.extend(below.filter(|atom| read.insert(*atom)));
+        }
+        read
+    }
+}

@@ -1,0 +1,282 @@
+//! Which parameters of an action schema are function designs that need not be grounded.
+//!
+//! In the explicit way of modelling (Metaplan paper, Listings 1 and 2) a schema has parameters `?fd` with
+//! `(fd_solve_f ?fd ?f)`. Such a parameter is *separable*, and becomes a slot that is filled step by step, if no fluent
+//! mentions it: then the designs of one action instance do not multiply the ground operators.
+
+use rustc_hash::FxHashSet;
+use smallvec::SmallVec;
+
+use crate::lifted::task::{Change, Expression, Formula, Lifted, PredicateId, Schema, Term};
+use crate::number::dense;
+use crate::task::quantity::SlotSet;
+use pddl::ast::Name;
+
+/// A parameter that stands for a function design, and the function that the design solves.
+#[derive(Debug, Clone, Copy)]
+pub struct SlotParameter {
+    pub(crate) parameter: u32,
+    pub(crate) function: Term,
+}
+
+/// The design parameters of a schema with the function that each solves, ascending. `solves` names the
+/// predicates whose first argument is a design and whose second is the function that it solves.
+pub fn design_parameters(lifted: &Lifted, schema: &Schema, solves: &[Name]) -> Vec<SlotParameter> {
+    let conjuncts = conjuncts(&schema.start_condition).into_iter().chain(conjuncts(&schema.middle_condition));
+    let mut designs: Vec<SlotParameter> = Vec::new();
+    for conjunct in conjuncts {
+        if let Formula::Literal { positive: true, predicate, terms } = conjunct
+            && solves.contains(&lifted.predicates[predicate.index()].name)
+            && let [Term::Parameter(parameter), function] = terms[..]
+            && function != Term::Parameter(parameter)
+            && designs.iter().all(|slot| {
+                // No function is a design itself: it has to be known before the designs are chosen.
+                slot.parameter != parameter
+                    && Term::Parameter(slot.parameter) != function
+                    && slot.function != Term::Parameter(parameter)
+            })
+        {
+            designs.push(SlotParameter { parameter, function });
+        }
+    }
+    designs.sort_by_key(|slot| slot.parameter);
+    designs
+}
+
+/// Those design parameters that are separable.
+pub fn slot_parameters(lifted: &Lifted, schema: &Schema, designs: &[SlotParameter]) -> Vec<SlotParameter> {
+    designs.iter().filter(|design| is_separable(lifted, schema, design.parameter)).copied().collect()
+}
+
+/// The parts of a conjunction, flattened.
+pub fn conjuncts(formula: &Formula) -> Vec<&Formula> {
+    match formula {
+        Formula::And(parts) => parts.iter().flat_map(conjuncts).collect(),
+        other => vec![other],
+    }
+}
+
+fn is_separable(lifted: &Lifted, schema: &Schema, parameter: u32) -> bool {
+    let conditions =
+        conjuncts(&schema.start_condition).into_iter().chain(conjuncts(&schema.middle_condition));
+    let effects = schema.start_effects.iter().chain(&schema.end_effects);
+    let is = |term: &Term| *term == Term::Parameter(parameter);
+    conditions.into_iter().all(|conjunct| match conjunct {
+        Formula::Compare(_, left, right, _) => {
+            expression_separable(lifted, left, parameter) && expression_separable(lifted, right, parameter)
+        }
+        other => !mentions(other, parameter) || is_static(lifted, other),
+    }) && effects.into_iter().all(|effect| {
+        !mentions(&effect.condition, parameter)
+            && match &effect.change {
+                Change::Add(_, terms) | Change::Delete(_, terms) => !terms.iter().any(is),
+                Change::Assign { terms, expression, .. } => {
+                    !terms.iter().any(is) && expression_separable(lifted, expression, parameter)
+                }
+            }
+    }) && schema.duration.as_ref().is_none_or(|duration| expression_separable(lifted, duration, parameter))
+}
+
+/// Whether the parameter occurs only below static functions, and not as a factor of a fluent.
+fn expression_separable(lifted: &Lifted, expression: &Expression, parameter: u32) -> bool {
+    match expression {
+        Expression::Sum(parts) => parts.iter().all(|part| expression_separable(lifted, part, parameter)),
+        Expression::Negate(inner) => expression_separable(lifted, inner, parameter),
+        other => !expression_mentions(other, parameter) || is_static_expression(lifted, other),
+    }
+}
+
+/// Whether no fluent occurs in a condition.
+pub fn is_static(lifted: &Lifted, formula: &Formula) -> bool {
+    match formula {
+        Formula::And(parts) | Formula::Or(parts) => parts.iter().all(|part| is_static(lifted, part)),
+        Formula::Exists(_, body) | Formula::ForAll(_, body) => is_static(lifted, body),
+        Formula::Literal { predicate, .. } => !lifted.predicates[predicate.index()].fluent,
+        Formula::Equal { .. } => true,
+        Formula::Compare(_, left, right, _) => {
+            is_static_expression(lifted, left) && is_static_expression(lifted, right)
+        }
+    }
+}
+
+fn is_static_expression(lifted: &Lifted, expression: &Expression) -> bool {
+    match expression {
+        Expression::Number(_) | Expression::TotalTime => true,
+        Expression::Function(function, _, _) => !lifted.functions[function.index()].fluent,
+        Expression::Negate(inner) => is_static_expression(lifted, inner),
+        Expression::Sum(parts) | Expression::Product(parts, _) => {
+            parts.iter().all(|part| is_static_expression(lifted, part))
+        }
+        Expression::Quotient(left, right, _) => {
+            is_static_expression(lifted, left) && is_static_expression(lifted, right)
+        }
+    }
+}
+
+fn mentions(formula: &Formula, parameter: u32) -> bool {
+    let mut found = false;
+    formula_terms(formula, &mut |term| found |= term == Term::Parameter(parameter));
+    found
+}
+
+fn expression_mentions(expression: &Expression, parameter: u32) -> bool {
+    let mut found = false;
+    expression_terms(expression, &mut |term| found |= term == Term::Parameter(parameter));
+    found
+}
+
+/// The positions (in `slots`) of the slot parameters that a condition mentions.
+pub fn slots_of_formula(formula: &Formula, slots: &[SlotParameter]) -> SlotSet {
+    let mut set = SmallVec::new();
+    formula_terms(formula, &mut |term| insert(&mut set, term, slots));
+    set
+}
+
+/// The positions (in `slots`) of the slot parameters that an expression mentions.
+pub fn slots_of_expression(expression: &Expression, slots: &[SlotParameter]) -> SlotSet {
+    let mut set = SmallVec::new();
+    expression_terms(expression, &mut |term| insert(&mut set, term, slots));
+    set
+}
+
+fn insert(set: &mut SlotSet, term: Term, slots: &[SlotParameter]) {
+    if let Term::Parameter(parameter) = term
+        && let Some(position) = slots.iter().position(|slot| slot.parameter == parameter)
+        && let Err(place) = set.binary_search(&dense(position))
+    {
+        set.insert(place, dense(position));
+    }
+}
+
+/// Whether a condition after the start effects of a durative action asks for a derived predicate that they, or what
+/// happens by itself, may change.
+pub fn depends_on_own_start(lifted: &Lifted, schema: &Schema) -> bool {
+    let (mut open, mut seen, mut numbers) = (Vec::new(), FxHashSet::default(), false);
+    let conditions =
+        schema.end_effects.iter().map(|effect| &effect.condition).chain([&schema.middle_condition]);
+    for condition in conditions {
+        atoms(condition, &mut |predicate| open.push(predicate));
+    }
+    open.retain(|predicate| lifted.predicates[predicate.index()].derived);
+    while let Some(predicate) = open.pop() {
+        for axiom in lifted.axioms.iter().filter(|axiom| axiom.predicate == predicate) {
+            numbers |= has_numbers(&axiom.condition);
+            atoms(&axiom.condition, &mut |below| {
+                if seen.insert(below) {
+                    open.push(below);
+                }
+            });
+        }
+    }
+    let own = schema.start_effects.iter().any(|effect| match &effect.change {
+        Change::Add(predicate, _) | Change::Delete(predicate, _) => seen.contains(predicate),
+        Change::Assign { .. } => numbers,
+    });
+    let changes = lifted.events.iter().flat_map(|event| &event.changes);
+    own || changes.into_iter().any(|(predicate, ..)| schema.duration.is_some() && seen.contains(predicate))
+}
+
+/// Derived predicates that depend on themselves through a universal quantifier.
+pub fn recursive_through_forall(lifted: &Lifted) -> Vec<PredicateId> {
+    let depends = |from: PredicateId, on: PredicateId| {
+        let (mut open, mut seen) = (vec![from], FxHashSet::default());
+        while let Some(predicate) = open.pop() {
+            if predicate == on {
+                return true;
+            }
+            for axiom in lifted.axioms.iter().filter(|axiom| axiom.predicate == predicate) {
+                atoms(&axiom.condition, &mut |below| {
+                    if seen.insert(below) {
+                        open.push(below);
+                    }
+                });
+            }
+        }
+        false
+    };
+    let mut found = Vec::new();
+    for axiom in &lifted.axioms {
+        let mut inside = Vec::new();
+        universal_atoms(&axiom.condition, &mut |predicate| inside.push(predicate));
+        if inside.into_iter().any(|predicate| depends(predicate, axiom.predicate)) {
+            found.push(axiom.predicate);
+        }
+    }
+    found
+}
+
+/// Calls `visit` with the predicate of every atom below a universal quantifier.
+fn universal_atoms(formula: &Formula, visit: &mut dyn FnMut(PredicateId)) {
+    match formula {
+        Formula::And(parts) | Formula::Or(parts) => {
+            for part in parts {
+                universal_atoms(part, visit);
+            }
+        }
+        Formula::Exists(_, body) => universal_atoms(body, visit),
+        Formula::ForAll(_, body) => atoms(body, visit),
+        _ => {}
+    }
+}
+
+/// Calls `visit` with the predicate of every atom of a condition.
+pub fn atoms(formula: &Formula, visit: &mut dyn FnMut(PredicateId)) {
+    match formula {
+        Formula::And(parts) | Formula::Or(parts) => {
+            for part in parts {
+                atoms(part, visit);
+            }
+        }
+        Formula::Exists(_, body) | Formula::ForAll(_, body) => atoms(body, visit),
+        Formula::Literal { predicate, .. } => visit(*predicate),
+        Formula::Equal { .. } | Formula::Compare(..) => {}
+    }
+}
+
+/// Whether a condition compares numbers.
+pub fn has_numbers(formula: &Formula) -> bool {
+    match formula {
+        Formula::And(parts) | Formula::Or(parts) => parts.iter().any(has_numbers),
+        Formula::Exists(_, body) | Formula::ForAll(_, body) => has_numbers(body),
+        Formula::Compare(..) => true,
+        Formula::Literal { .. } | Formula::Equal { .. } => false,
+    }
+}
+
+/// Calls `visit` with every term of a condition.
+pub fn formula_terms(formula: &Formula, visit: &mut dyn FnMut(Term)) {
+    match formula {
+        Formula::Exists(_, body) | Formula::ForAll(_, body) => formula_terms(body, visit),
+        Formula::And(parts) | Formula::Or(parts) => {
+            for part in parts {
+                formula_terms(part, visit);
+            }
+        }
+        Formula::Literal { terms, .. } => terms.iter().for_each(|term| visit(*term)),
+        Formula::Equal { left, right, .. } => {
+            visit(*left);
+            visit(*right);
+        }
+        Formula::Compare(_, left, right, _) => {
+            expression_terms(left, visit);
+            expression_terms(right, visit);
+        }
+    }
+}
+
+pub fn expression_terms(expression: &Expression, visit: &mut dyn FnMut(Term)) {
+    match expression {
+        Expression::Number(_) | Expression::TotalTime => {}
+        Expression::Function(_, terms, _) => terms.iter().for_each(|term| visit(*term)),
+        Expression::Negate(inner) => expression_terms(inner, visit),
+        Expression::Sum(parts) | Expression::Product(parts, _) => {
+            for part in parts {
+                expression_terms(part, visit);
+            }
+        }
+        Expression::Quotient(left, right, _) => {
+            expression_terms(left, visit);
+            expression_terms(right, visit);
+        }
+    }
+}

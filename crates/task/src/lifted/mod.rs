@@ -1,0 +1,10 @@
+//! The lifted task, and which of its parameters are function designs.
+
+pub mod configuration;
+mod task;
+
+pub use crate::number::Rational;
+pub use task::{
+    Arguments, Axiom, Bound, Change, Effect, Event, Expression, Formula, Function, FunctionId, Joint, Lifted,
+    Metric, ObjectId, Parameter, Predicate, PredicateId, Schema, Term, Time,
+};

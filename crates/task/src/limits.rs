@@ -1,0 +1,241 @@
+//! When a long search has to stop: a deadline, and a flag that Ctrl-C sets.
+//!
+//! What takes long goes through its items by [`Limits::watch`], or beats a [`LimitPoll`] each time round. Both yield [`Interrupted`] when
+//! a limit is reached, which has to be handed on (`?`): a function that was cut short has no result that could be taken for an
+//! answer. Where to stop is thus seen at each loop, and that the callers stop, too, is checked by the compiler.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use rules::Interrupt;
+
+use crate::thresholds::Thresholds;
+
+/// The limits of one planning run. Clones share the flag.
+#[derive(Debug, Clone, Default)]
+pub struct Limits {
+    deadline: Option<Instant>,
+    /// The time from the start to the deadline.
+    time: Duration,
+    interrupt: Arc<AtomicBool>,
+    room: Option<usize>,
+    thresholds: Thresholds,
+}
+
+/// Time after the deadline in which an answer can be completed, in addition to a tenth of the time limit. It is shorter than the 0.2 s
+/// that a command may take, since the process has to start and to print.
+const GRACE: Duration = Duration::from_millis(120);
+
+/// What a search may store, in bytes, unless it is told.
+const DEFAULT_MEMORY: usize = 1 << 31;
+
+impl Limits {
+    /// No limit but the flag.
+    pub fn none() -> Self {
+        Self::default()
+    }
+
+    /// Stops after this long, counted from now.
+    #[must_use]
+    pub fn with_time(mut self, time: Duration) -> Self {
+        self.deadline = Instant::now().checked_add(time);
+        self.time = time;
+        self
+    }
+
+    /// Returns the same limits with half of the remaining time, so that time remains for a later task. The flag is
+    /// shared.
+    #[must_use]
+    pub fn half(&self) -> Self {
+        let left = self.deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
+        match left {
+            Some(left) => self.clone().with_time(left.mul_f64(0.5)),
+            None => self.clone(),
+        }
+    }
+
+    /// Returns the same limits with a deadline at most this long from now.
+    #[must_use]
+    pub fn within(&self, time: Duration) -> Self {
+        let own = self.clone().with_time(time);
+        match self.deadline {
+            Some(deadline) if own.deadline.is_none_or(|own| deadline < own) => self.clone(),
+            _ => own,
+        }
+    }
+
+    /// Returns limits for the completion of an answer: the deadline is a tenth of the time and a little more later, and
+    /// neither the flag nor the memory counts.
+    #[must_use]
+    pub fn extended(&self) -> Self {
+        let grace = self.time.mul_f64(0.1).saturating_add(GRACE);
+        let deadline = self.deadline.and_then(|deadline| deadline.checked_add(grace));
+        Self { deadline, time: self.time, ..Self::default() }
+    }
+
+    /// Lets a search store so many bytes, as it estimates them.
+    #[must_use]
+    pub fn with_room(mut self, bytes: usize) -> Self {
+        self.room = Some(bytes);
+        self
+    }
+
+    /// Lets parts of the search begin at other sizes than usual.
+    #[doc(hidden)]
+    #[must_use]
+    pub fn with_thresholds(mut self, thresholds: Thresholds) -> Self {
+        self.thresholds = thresholds;
+        self
+    }
+
+    /// The sizes at which parts of the search begin.
+    pub fn thresholds(&self) -> &Thresholds {
+        &self.thresholds
+    }
+
+    /// How many bytes a search may store.
+    pub fn room(&self) -> usize {
+        self.room.unwrap_or(DEFAULT_MEMORY)
+    }
+
+    /// The flag that stops the run when it is set.
+    pub fn interrupt(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.interrupt)
+    }
+
+    /// An error once a limit is reached.
+    ///
+    /// # Errors
+    /// When a limit is reached.
+    pub fn check(&self) -> Result<(), Interrupted> {
+        if self.reached() { Err(Interrupted) } else { Ok(()) }
+    }
+
+    /// Each item, as long as no limit is reached; then the error, and nothing more.
+    pub fn watch<I: IntoIterator>(&self, items: I) -> LimitedIter<'_, I::IntoIter> {
+        LimitedIter { items: items.into_iter(), pulse: self.pulse(), is_over: false }
+    }
+
+    /// For loops that go through nothing that could be watched.
+    pub fn pulse(&self) -> LimitPoll<'_> {
+        LimitPoll { limits: self, left: 0, stride: 1, last: None }
+    }
+
+    /// Whether the run has to stop.
+    pub fn reached(&self) -> bool {
+        self.interrupt.load(Ordering::Relaxed)
+            || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
+    }
+}
+
+/// Stops a rule engine at the limits.
+impl From<&Limits> for Interrupt {
+    fn from(limits: &Limits) -> Self {
+        let limits = limits.clone();
+        Self::new(move || limits.reached())
+    }
+}
+
+/// That a limit was reached: what was being worked out is not known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Interrupted;
+
+/// Looks at the limits every so many beats: often where a beat takes long, seldom where looking would take longer than
+/// what lies between.
+#[derive(Debug)]
+pub struct LimitPoll<'a> {
+    limits: &'a Limits,
+    /// Beats until the clock is looked at again.
+    left: u32,
+    stride: u32,
+    last: Option<Instant>,
+}
+
+/// Beats between two looks at the clock, at most.
+const LONGEST_STRIDE: u32 = 1 << 14;
+/// The time between two looks at the clock that is aimed at.
+const POLL_INTERVAL: Duration = Duration::from_millis(2);
+
+impl LimitPoll<'_> {
+    /// An error once a limit is reached.
+    ///
+    /// # Errors
+    /// When a limit is reached.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "above 0 where it is taken from; a stride is at most twice the longest"
+    )]
+    pub fn beat(&mut self) -> Result<(), Interrupted> {
+        if self.left > 0 {
+            self.left -= 1;
+            return Ok(());
+        }
+        if self.limits.interrupt.load(Ordering::Relaxed) {
+            return Err(Interrupted);
+        }
+        let now = Instant::now();
+        if self.limits.deadline.is_some_and(|deadline| now >= deadline) {
+            return Err(Interrupted);
+        }
+        self.stride = match self.last.map(|last| now.duration_since(last)) {
+            Some(passed) if passed > POLL_INTERVAL => (self.stride / 4).max(1),
+            Some(passed) if passed < POLL_INTERVAL / 4 => (self.stride * 2).min(LONGEST_STRIDE),
+            _ => self.stride,
+        };
+        self.last = Some(now);
+        self.left = self.stride;
+        Ok(())
+    }
+}
+
+/// Items under limits; see [`Limits::watch`].
+#[derive(Debug)]
+pub struct LimitedIter<'a, I> {
+    items: I,
+    pulse: LimitPoll<'a>,
+    is_over: bool,
+}
+
+impl<I: Iterator> Iterator for LimitedIter<'_, I> {
+    type Item = Result<I::Item, Interrupted>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.is_over {
+            return None;
+        }
+        if let Err(interrupted) = self.pulse.beat() {
+            self.is_over = true;
+            return Some(Err(interrupted));
+        }
+        self.items.next().map(Ok)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_watched_ends_with_an_error_and_never_early_without_one() {
+        let limits = Limits::none();
+        assert_eq!(limits.watch(0..100_000).filter_map(Result::ok).count(), 100_000);
+        let mut watched = limits.watch(0..);
+        assert_eq!(watched.next(), Some(Ok(0)));
+        limits.interrupt().store(true, Ordering::Relaxed);
+        // A stride of beats may pass before the flag is looked at; then there is the error, once.
+        let rest: Vec<_> = watched.collect();
+        assert_eq!(rest.iter().filter(|item| item.is_err()).count(), 1);
+        assert_eq!(rest.last(), Some(&Err(Interrupted)));
+        let late = Limits::none().with_time(Duration::ZERO);
+        assert_eq!(late.watch(0..3).collect::<Vec<_>>(), [Err(Interrupted)]);
+    }
+
+    #[test]
+    fn slow_items_are_watched_one_by_one() {
+        let limits = Limits::none().with_time(Duration::from_millis(60));
+        let slow = |_| std::thread::sleep(Duration::from_millis(5));
+        let passed = limits.watch(0..1_000).map_while(Result::ok).map(slow).count();
+        assert!((1..=14).contains(&passed), "{passed}");
+    }
+}

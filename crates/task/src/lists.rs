@@ -1,0 +1,58 @@
+//! Many short lists of numbers in one piece of memory.
+
+use crate::number::dense;
+
+/// Lists of numbers, one after the other.
+#[derive(Debug, Clone, Default)]
+pub struct Lists {
+    /// Where each list ends.
+    ends: Vec<u32>,
+    items: Vec<u32>,
+}
+
+impl Lists {
+    pub fn push(&mut self, list: &[u32]) {
+        self.items.extend_from_slice(list);
+        self.ends.push(dense(self.items.len()));
+    }
+
+    /// Number of lists.
+    pub fn count(&self) -> usize {
+        self.ends.len()
+    }
+
+    pub fn of(&self, index: u32) -> &[u32] {
+        let index = index as usize;
+        let start = index.checked_sub(1).map_or(0, |before| self.ends[before]);
+        &self.items[start as usize..self.ends[index] as usize]
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = &[u32]> {
+        (0..dense(self.count())).map(|index| self.of(index))
+    }
+
+    /// For each number below `count` the lists that have it.
+    #[must_use]
+    pub fn inverse(&self, count: usize) -> Self {
+        let mut ends = vec![0_u32; count];
+        for item in &self.items {
+            ends[*item as usize] = ends[*item as usize].saturating_add(1);
+        }
+        let mut sum = 0_u32;
+        let mut next = Vec::with_capacity(count);
+        for end in &mut ends {
+            next.push(sum);
+            sum = sum.saturating_add(*end);
+            *end = sum;
+        }
+        let mut items = vec![0; self.items.len()];
+        for (list, own) in self.iter().zip(0..) {
+            for item in list {
+                let place = &mut next[*item as usize];
+                items[*place as usize] = own;
+                *place = place.saturating_add(1);
+            }
+        }
+        Self { ends, items }
+    }
+}

@@ -1,0 +1,137 @@
+//! Durations that are constrained rather than fixed.
+//!
+//! Actions execute one after another, and nothing happens by itself. So an action may as well take as little time
+//! as it must, or as much as it may where the metric rewards time, provided that no effect depends on how long it takes. Where
+//! actions overlap, a duration that is not fixed is a number that the planner chooses when the action starts.
+
+use crate::error::{File, Place};
+use crate::lifted::{Expression, Formula, Function, FunctionId, Metric, Rational, Term};
+use crate::normalize::condition::expression;
+use crate::normalize::names::{Duration, Names, Scope};
+use crate::number::dense;
+use pddl::ast::{self, Comparison, Direction, Name, Span};
+
+/// What the names of chosen durations begin with: no name in a file has a blank.
+pub const CHOSEN: &str = "chosen duration of ";
+
+/// Whether the metrics reward time; nothing if that cannot be told from the metrics alone, or if they disagree.
+pub(super) fn rewards_time(metrics: &[Metric]) -> Option<bool> {
+    let zero = Rational::from_integer(0);
+    let mut rewards = Vec::new();
+    for metric in metrics {
+        let factor = time_factor(&metric.expression)?;
+        let sign = if metric.direction == Direction::Minimize { factor } else { -factor };
+        if sign != zero {
+            rewards.push(sign < zero);
+        }
+    }
+    let rewarded = rewards.first().copied().unwrap_or(false);
+    rewards.iter().all(|other| *other == rewarded).then_some(rewarded)
+}
+
+/// The factor of total time in an expression.
+pub fn time_factor(expression: &Expression) -> Option<Rational> {
+    let number = |expression: &Expression| match expression {
+        Expression::Number(number) => Some(number.clone()),
+        _ => None,
+    };
+    match expression {
+        Expression::TotalTime => Some(Rational::from_integer(1)),
+        Expression::Number(_) | Expression::Function(..) => Some(Rational::from_integer(0)),
+        Expression::Sum(parts) => parts.iter().map(time_factor).sum(),
+        Expression::Negate(inner) => time_factor(inner).map(|factor| -factor),
+        Expression::Product(parts, _) => {
+            let factors = parts.iter().map(time_factor).collect::<Option<Vec<_>>>()?;
+            let timed: Vec<_> =
+                (0..parts.len()).filter(|i| factors[*i] != Rational::from_integer(0)).collect();
+            match timed[..] {
+                [] => Some(Rational::from_integer(0)),
+                [only] => (0..parts.len())
+                    .filter(|i| *i != only)
+                    .map(|i| number(&parts[i]))
+                    .try_fold(factors[only].clone(), |product, number| Some(product * number?)),
+                _ => None,
+            }
+        }
+        Expression::Quotient(left, right, _) => match (time_factor(left)?, number(right)) {
+            (factor, _) if factor == Rational::from_integer(0) => Some(factor),
+            (factor, Some(divisor)) if divisor != Rational::from_integer(0) => Some(factor / divisor),
+            _ => None,
+        },
+    }
+}
+
+/// The duration of the action at a place, chosen if it is not fixed, and what the choice rests on. `longest` says whether the metric
+/// rewards time, so that actions should take as long as they may.
+pub(super) fn duration(
+    names: &mut Names,
+    (constraints, span): (&[ast::DurationConstraint], Span),
+    action: (&Name, usize),
+    longest: Option<bool>,
+    scope: &mut Scope,
+) -> (Expression, Vec<Formula>) {
+    let mut bounds = [Vec::new(), Vec::new()];
+    let mut fixed = Vec::new();
+    for constraint in constraints {
+        let value = expression(names, &constraint.expression, scope);
+        match constraint.operator {
+            Comparison::Equal => fixed.push((value, constraint.span)),
+            Comparison::Greater | Comparison::GreaterOrEqual => bounds[0].push((value, constraint)),
+            Comparison::Less | Comparison::LessOrEqual => bounds[1].push((value, constraint)),
+        }
+    }
+    if let [(duration, _)] = &fixed[..]
+        && bounds.iter().all(Vec::is_empty)
+    {
+        scope.duration = Duration::Fixed(duration.clone());
+        return (duration.clone(), Vec::new());
+    }
+    let [lower, upper] = bounds;
+    let span = constraints.first().map_or(span, |constraint| constraint.span);
+    if names.is_free {
+        let number = chosen(names, action, scope.place(span));
+        let fixed = fixed.into_iter().map(|(bound, span)| (Comparison::Equal, bound, span));
+        let open = lower.into_iter().chain(upper);
+        let all = open.map(|(bound, constraint)| (constraint.operator, bound, constraint.span)).chain(fixed);
+        let compare =
+            |(operator, bound, span)| Formula::Compare(operator, number.clone(), bound, scope.place(span));
+        let conditions = all.map(compare).collect();
+        scope.duration = Duration::Fixed(number.clone());
+        return (number, conditions);
+    }
+    scope.duration = Duration::Open;
+    let taken = match longest {
+        Some(longest) if fixed.is_empty() => match if longest { &upper[..] } else { &lower[..] } {
+            [(expression, constraint)]
+                if matches!(constraint.operator, Comparison::GreaterOrEqual | Comparison::LessOrEqual) =>
+            {
+                Some(expression.clone())
+            }
+            _ => None,
+        },
+        _ => None,
+    };
+    let Some(chosen) = taken else {
+        names.unsupported(
+            "a duration without one bound that the metric makes it take",
+            "one `(= ?duration …)`, one `(>= ?duration …)` and a metric that does not reward time, or `--concurrent`",
+            File::Domain,
+            span,
+        );
+        return (Expression::Number(Rational::from_integer(0)), Vec::new());
+    };
+    let conditions = lower.into_iter().chain(upper).map(|(bound, constraint)| {
+        let place = scope.place(constraint.span);
+        Formula::Compare(constraint.operator, chosen.clone(), bound, place)
+    });
+    let conditions = conditions.collect();
+    (chosen, conditions)
+}
+
+/// The number that is the duration of an action with so many parameters.
+fn chosen(names: &mut Names, (action, parameters): (&Name, usize), place: Place) -> Expression {
+    let id = FunctionId(dense(names.functions.len()));
+    let name = Name::new(&format!("{CHOSEN}{action}"));
+    names.functions.push(Function { name, fluent: true, partial: true });
+    Expression::Function(id, (0..dense(parameters)).map(Term::Parameter).collect(), place)
+}

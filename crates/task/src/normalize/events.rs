@@ -1,0 +1,23 @@
+//! Timed initial literals of time 0.
+
+use crate::lifted::{Arguments, Lifted, ObjectId};
+
+/// Lets the events of time 0 take place in the initial state.
+#[expect(clippy::arithmetic_side_effects, reason = "phases are objects, which are held in memory")]
+pub fn begin(lifted: &mut Lifted) {
+    let phases = (lifted.time.first_phase.0..).map(ObjectId);
+    for (event, phase) in lifted.events.iter().take_while(|event| !event.time.is_positive()).zip(phases) {
+        let before: (_, Arguments) = (lifted.time.phase, [phase].into());
+        let after: (_, Arguments) = (lifted.time.phase, [ObjectId(phase.0 + 1)].into());
+        let own = event
+            .changes
+            .iter()
+            .map(|(predicate, arguments, holds)| ((*predicate, arguments.clone()), *holds));
+        for (fact, holds) in own.chain([(before, false), (after, true)]) {
+            lifted.facts.retain(|known| *known != fact);
+            if holds {
+                lifted.facts.push(fact);
+            }
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! Syntax tree to lifted task: names become ids, negation moves inwards to the atoms, and the two times of
+//! durative conditions and effects are sorted apart.
+//!
+//! The files have passed `pddl::check`; what the planner does not handle (such as durations that effects depend on and
+//! that are not fixed) is refused here, with its place.
+
+mod condition;
+pub mod duration;
+pub mod events;
+mod fluents;
+mod initial;
+mod names;
+pub mod undefined_fluents;
+pub mod zero_duration;
+
+use crate::error::{Errors, File, Place};
+use crate::lifted::{Axiom, Formula, Lifted, Metric, Schema};
+use names::{Duration, Names, Scope};
+use pddl::ast::{self, ConditionTime, EffectTime};
+
+/// Resolves and simplifies a domain and a problem, to be measured by `objectives` (the most important first) or, if
+/// there are none, by the metric of the problem.
+///
+/// # Errors
+/// All constructs that the planner does not handle, and all names that are declared nowhere.
+pub fn normalize(
+    domain: &ast::Domain,
+    problem: &ast::Problem,
+    objectives: &[ast::Metric],
+) -> Result<Lifted, Errors> {
+    named(Names::new(domain, problem), (domain, problem), objectives)
+}
+
+/// As [`normalize`], where a duration that is not fixed stays open: it is a number of its own ([`duration::CHOSEN`]), which its bounds
+/// and all that mention `?duration` read.
+///
+/// # Errors
+/// As [`normalize`].
+pub fn normalize_freely(
+    domain: &ast::Domain,
+    problem: &ast::Problem,
+    objectives: &[ast::Metric],
+) -> Result<Lifted, Errors> {
+    let mut names = Names::new(domain, problem);
+    names.is_free = true;
+    named(names, (domain, problem), objectives)
+}
+
+fn named(
+    mut names: Names,
+    (domain, problem): (&ast::Domain, &ast::Problem),
+    objectives: &[ast::Metric],
+) -> Result<Lifted, Errors> {
+    let written = if objectives.is_empty() { problem.metric.as_slice() } else { objectives };
+    let metrics: Vec<_> = written
+        .iter()
+        .map(|metric| Metric {
+            direction: metric.direction,
+            expression: condition::expression(&mut names, &metric.expression, &mut Scope::new(File::Problem)),
+            place: Place { file: File::Problem, span: metric.span },
+        })
+        .collect();
+    let has_events = problem.init.iter().any(|element| matches!(element, ast::InitialElement::Timed(..)));
+    // What happens by itself may be worth waiting for, in the midst of an action, too.
+    let longest = if has_events { None } else { duration::rewards_time(&metrics) };
+    let schemas = domain.actions.iter().zip(0..);
+    let schemas = schemas.map(|(action, index)| schema(&mut names, longest, action, index)).collect();
+    let axioms = domain.derived.iter().map(|axiom| self::axiom(&mut names, axiom)).collect();
+    let (mut facts, values) = initial::initial_state(&mut names, problem);
+    let events = initial::events(&mut names, problem);
+    let mut scope = Scope::new(File::Problem);
+    let goal = condition::condition(&mut names, &problem.goal, true, &mut scope);
+    if !names.errors.is_empty() {
+        return Err(names.errors.into());
+    }
+    let time = initial::time(&mut names, &events);
+    if !events.is_empty() {
+        facts.push((time.phase, [time.first_phase].into()));
+    }
+    let mut lifted = Lifted {
+        objects: names.objects,
+        predicates: names.predicates,
+        functions: names.functions,
+        schemas,
+        axioms,
+        facts,
+        values,
+        events,
+        time,
+        goal,
+        goal_variables: scope.bound as usize,
+        metrics,
+    };
+    fluents::mark_fluents(&mut lifted);
+    Ok(lifted)
+}
+
+/// An action with its conditions and effects sorted by time.
+fn schema(names: &mut Names, longest: Option<bool>, action: &ast::Action, index: u32) -> Schema {
+    let mut scope = Scope::new(File::Domain);
+    let mut schema = Schema {
+        name: action.identifier.name.clone(),
+        parameters: names.parameters(&action.parameters, &mut scope),
+        variables: 0,
+        start_condition: Formula::truth(),
+        start_effects: Vec::new(),
+        middle_condition: Formula::truth(),
+        over_all: Formula::truth(),
+        at_end: Formula::truth(),
+        end_effects: Vec::new(),
+        duration: None,
+        is_chosen: false,
+        joint: None,
+        action: index,
+        place: scope.place(action.span),
+    };
+    match &action.body {
+        ast::ActionBody::Instantaneous { precondition, effect } => {
+            schema.start_condition = condition::condition(names, precondition, true, &mut scope);
+            condition::effect(names, effect, &mut scope, &mut schema.end_effects);
+        }
+        ast::ActionBody::Durative { duration, conditions, effects } => {
+            let mut middle = Vec::new();
+            let (mut over_all, mut at_end) = (Vec::new(), Vec::new());
+            let own = (&action.identifier.name, schema.parameters.len());
+            let (chosen, mut start) =
+                duration::duration(names, (duration, action.span), own, longest, &mut scope);
+            schema.duration = Some(chosen);
+            schema.is_chosen = matches!(scope.duration, Duration::Open) && longest == Some(false);
+            for (time, condition) in conditions {
+                let formula = condition::condition(names, condition, true, &mut scope);
+                match time {
+                    ConditionTime::OverAll => over_all.push(formula.clone()),
+                    ConditionTime::AtEnd => at_end.push(formula.clone()),
+                    ConditionTime::AtStart => {}
+                }
+                if *time == ConditionTime::AtStart { &mut start } else { &mut middle }.push(formula);
+            }
+            (schema.start_condition, schema.middle_condition) = (Formula::And(start), Formula::And(middle));
+            (schema.over_all, schema.at_end) = (Formula::And(over_all), Formula::And(at_end));
+            for (time, effect) in effects {
+                let target = match time {
+                    EffectTime::AtStart => &mut schema.start_effects,
+                    EffectTime::AtEnd => &mut schema.end_effects,
+                };
+                condition::effect(names, effect, &mut scope, target);
+            }
+        }
+    }
+    schema.variables = scope.bound as usize;
+    schema
+}
+
+/// A derived predicate with the condition under which it holds.
+fn axiom(names: &mut Names, axiom: &ast::Derived) -> Axiom {
+    let mut scope = Scope::new(File::Domain);
+    let parameters = names.parameters(&axiom.head.parameters, &mut scope);
+    let predicate = names.predicate(&axiom.head.identifier, File::Domain);
+    let condition = condition::condition(names, &axiom.condition, true, &mut scope);
+    Axiom { predicate, parameters, variables: scope.bound as usize, condition }
+}

@@ -1,0 +1,67 @@
+//! A plan over operators, and what it comes to.
+
+use crate::number::Int;
+use crate::task::number::TaskNumber;
+use crate::task::{OperatorId, State, Task};
+
+/// One step of a plan over operators.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct GroundStep {
+    pub operator: OperatorId,
+    /// An index into `SlotUse::designs` for each slot of the operator.
+    pub choice: Vec<u32>,
+}
+
+/// A plan and the sum of its operators' costs, in the task's integer unit.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GroundPlan<N = Int> {
+    pub steps: Vec<GroundStep>,
+    pub cost: N,
+}
+
+impl GroundPlan {
+    /// The limit on the cost of cheaper plans.
+    pub fn below(&self) -> Int {
+        self.cost.saturating_sub(1)
+    }
+}
+
+/// The states that a plan passes through, the initial one first, and its cost; none if a step is not applicable, the last
+/// state is not a goal state, or the cost does not fit.
+pub fn replay<N: TaskNumber>(task: &Task<N>, plan: &[GroundStep]) -> Option<(Vec<State<N>>, N)> {
+    replay_from(task, &task.initial, plan)
+}
+
+/// The same from a state of its own.
+pub fn replay_from<N: TaskNumber>(
+    task: &Task<N>,
+    initial: &State<N>,
+    plan: &[GroundStep],
+) -> Option<(Vec<State<N>>, N)> {
+    let states = pass(task, initial, plan)?;
+    Some((states, cost(task, plan)?))
+}
+
+/// The sum of the costs of steps; none if it does not fit.
+pub fn cost<N: TaskNumber>(task: &Task<N>, plan: &[GroundStep]) -> Option<N> {
+    plan.iter().try_fold(N::zero(), |sum, step| {
+        let operator = &task.operators[step.operator.index()];
+        sum.plus(&operator.cost.at(&step.choice, &operator.sizes())).filter(N::is_moderate)
+    })
+}
+
+/// The states that a plan passes through from a state on; none if a step is not applicable, or the last state is not a goal
+/// state.
+pub fn pass<N: TaskNumber>(task: &Task<N>, initial: &State<N>, plan: &[GroundStep]) -> Option<Vec<State<N>>> {
+    let mut states = vec![initial.clone()];
+    for step in plan {
+        let operator = &task.operators[step.operator.index()];
+        let state = states.last()?;
+        if !operator.admits(&step.choice) || !operator.applicable(state, &step.choice) {
+            return None;
+        }
+        let next = task.successor(operator, state, &step.choice)?;
+        states.push(next);
+    }
+    task.is_goal(states.last()?).then_some(states)
+}

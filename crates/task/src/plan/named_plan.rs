@@ -1,0 +1,300 @@
+//! Plans: sequences of operators with the designs they run with, and how they read to people and programs.
+
+use std::borrow::Cow;
+use std::str::FromStr;
+
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::{ToPrimitive, Zero};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use crate::compile::is_hidden;
+use crate::context::Context;
+use crate::lifted::ObjectId;
+use crate::number::{Int, Rational};
+use crate::plan::ground::GroundPlan;
+use crate::plan::reschedule::{earliest, starts};
+use crate::task::number::TaskNumber;
+use crate::task::{Argument, Objective, Operator, OperatorId, State, Task};
+use pddl::to_decimal;
+
+/// An exact number of any size, in the units of the PDDL files.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Exact(Rational);
+
+impl Exact {
+    /// A number of a ground task that is so many times what the files write.
+    pub fn scaled<N: TaskNumber>(value: &N, scale: Int) -> Self {
+        Self(value.to_rational() / Rational::from_integer(scale))
+    }
+
+    #[must_use]
+    pub fn plus(&self, other: &Self) -> Self {
+        Self(self.0.clone() + &other.0)
+    }
+
+    /// The numerator of the reduced fraction.
+    pub fn numerator(&self) -> BigInt {
+        self.0.to_big().numer().clone()
+    }
+
+    /// The denominator of the reduced fraction, positive.
+    pub fn denominator(&self) -> BigInt {
+        self.0.to_big().denom().clone()
+    }
+
+    /// Whether it is 0.
+    pub fn is_zero(&self) -> bool {
+        self.0.is_zero()
+    }
+
+    /// As a rational.
+    pub fn to_rational(&self) -> BigRational {
+        self.0.to_big()
+    }
+
+    /// The nearest double.
+    pub fn to_f64(&self) -> f64 {
+        self.to_rational().to_f64().unwrap_or(f64::NAN)
+    }
+}
+
+impl From<BigRational> for Exact {
+    fn from(number: BigRational) -> Self {
+        Self(Rational::from_big(number))
+    }
+}
+
+/// Reads a decimal or a fraction: `2.5`, `-7/3`.
+impl FromStr for Exact {
+    type Err = NotANumber;
+
+    fn from_str(text: &str) -> Result<Self, NotANumber> {
+        let wrong = || NotANumber(text.to_owned());
+        let digits = |part: &str| !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_digit());
+        let unsigned = text.strip_prefix('-').unwrap_or(text);
+        let number = match (unsigned.split_once('/'), unsigned.split_once('.')) {
+            (Some((numerator, denominator)), _) if digits(numerator) && digits(denominator) => {
+                let denominator: BigInt = denominator.parse().map_err(|_| wrong())?;
+                if denominator.is_zero() {
+                    return Err(wrong());
+                }
+                BigRational::new(numerator.parse().map_err(|_| wrong())?, denominator)
+            }
+            (None, Some((whole, decimals))) if digits(whole) && digits(decimals) => {
+                let scale = num_traits::pow(BigInt::from(10), decimals.len());
+                BigRational::new(format!("{whole}{decimals}").parse().map_err(|_| wrong())?, scale)
+            }
+            (None, None) if digits(unsigned) => {
+                BigRational::from_integer(unsigned.parse().map_err(|_| wrong())?)
+            }
+            _ => return Err(wrong()),
+        };
+        Ok(Self::from(if text.starts_with('-') { -number } else { number }))
+    }
+}
+
+/// A text that is neither a decimal nor a fraction.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{0}` is not a number: a decimal such as `2.5` or a fraction such as `7/3` would be one")]
+pub struct NotANumber(String);
+
+/// As text, because the numbers of most formats are binary: `"2.5"`, `"7/3"`.
+impl Serialize for Exact {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for Exact {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = <Cow<'_, str>>::deserialize(deserializer)?;
+        text.parse().map_err(serde::de::Error::custom)
+    }
+}
+
+/// Writes an exact decimal where there is one, else a fraction.
+impl std::fmt::Display for Exact {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let exact = self.to_rational();
+        f.write_str(&to_decimal(&exact).unwrap_or_else(|| exact.to_string()))
+    }
+}
+
+/// One action of a plan as users see it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Step {
+    /// The name of the action schema.
+    pub action: String,
+    /// All arguments in the order of the schema's parameters, designs among them.
+    pub arguments: Vec<String>,
+    /// The function and the design chosen for it, in the order of the parameters.
+    pub configuration: Vec<(String, String)>,
+    /// Functions whose design differs from the one that the last step with this function used.
+    pub reconfigured: Vec<String>,
+    /// When the action starts, in the domain's time unit, actions executing one after another. There is nothing between
+    /// them but time to wait for timed initial literals.
+    pub start: Exact,
+    /// How long it takes; none for an instantaneous action.
+    pub duration: Exact,
+    /// What it adds to the metric.
+    pub cost: Exact,
+}
+
+/// A plan as users see it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Plan {
+    /// The actions, in order of execution.
+    pub steps: Vec<Step>,
+    /// The metric of the problem file.
+    pub cost: Exact,
+}
+
+/// The plan in the names of the task, each action as early as can be found within the limits.
+pub fn decode<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> Plan {
+    let (task, plan) = (context.task, earliest(context, plan));
+    let mut steps = Vec::new();
+    let steps_of = plan.steps.iter().map(|step| (step.operator, &step.choice[..]));
+    let (measured, rest) = measured(task, steps_of);
+    let actions = plan.steps.iter().zip(measured);
+    let actions = actions.filter(|(step, _)| task.operators[step.operator.index()].wait.is_none());
+    for ((step, measured), start) in actions.zip(starts(task, &plan.steps)) {
+        let operator = &task.operators[step.operator.index()];
+        if is_hidden(&task.schema_names[operator.schema as usize]) {
+            continue;
+        }
+        let sizes = operator.sizes();
+        let duration = operator.duration.at(&step.choice, &sizes).to_rational();
+        let cost = operator.cost.at(&step.choice, &sizes).to_rational() + measured;
+        let cost = task.objective.signed(&cost);
+        steps.push(Step::new(task, operator, &step.choice, (start, duration, cost)));
+    }
+    let mut plan = Plan { steps, cost: metric(task, &(plan.cost.to_rational() + rest)) };
+    plan.note_reconfigured();
+    plan
+}
+
+/// What the fluents that are only measured come to in a state, in the unit of costs.
+pub fn rest<N: TaskNumber>(task: &Task<N>, state: &State<N>) -> Rational {
+    let unit = Rational::from_integer(task.objective.scale) / Rational::from_integer(task.number_scale);
+    let terms = task.objective.rest.iter();
+    let terms = terms.map(|(variable, factor)| state.numbers[variable.index()].to_rational() * factor);
+    terms.fold(Rational::zero(), |sum, term| sum + term) * &unit
+}
+
+/// What each step adds to the fluents that are only measured, and what they come to in the end, in the unit of costs.
+pub fn measured<'s, N: TaskNumber>(
+    task: &Task<N>,
+    steps: impl Iterator<Item = (OperatorId, &'s [u32])>,
+) -> (Vec<Rational>, Rational) {
+    if task.objective.rest.is_empty() {
+        return (steps.map(|_| Rational::zero()).collect(), Rational::zero());
+    }
+    let (mut state, mut added) = (task.initial.clone(), Vec::new());
+    let mut before = rest(task, &state);
+    for (operator, choice) in steps {
+        // What stands for one step alone may be out of reach here.
+        if let Some(next) = task.successor(&task.operators[operator.index()], &state, choice) {
+            state = next;
+        }
+        let after = rest(task, &state);
+        added.push(after.clone() - &before);
+        before = after;
+    }
+    (added, before)
+}
+
+impl Plan {
+    /// When the last action ends, in the domain's time unit.
+    pub fn makespan(&self) -> Exact {
+        let ends = self.steps.iter().map(|step| step.start.0.clone() + &step.duration.0);
+        Exact(ends.max().unwrap_or_default())
+    }
+
+    /// Says of each step anew which functions have another design than in the last step with them.
+    pub fn note_reconfigured(&mut self) {
+        let mut current = Vec::new();
+        for step in &mut self.steps {
+            step.reconfigured.clear();
+            step.note_reconfigured(&mut current);
+        }
+    }
+}
+
+impl Step {
+    /// An operator in names, with its start and duration in the task's time unit and its cost in the task's cost unit.
+    pub fn new<N: TaskNumber>(
+        task: &Task<N>,
+        operator: &Operator<N>,
+        choice: &[u32],
+        (start, duration, cost): (Rational, Rational, Rational),
+    ) -> Self {
+        Self {
+            action: task.schema_names[operator.schema as usize].clone(),
+            arguments: arguments(task, operator, choice),
+            configuration: configuration(task, operator, choice),
+            reconfigured: Vec::new(),
+            start: Exact::scaled(&start, task.time_scale),
+            duration: Exact::scaled(&duration, task.time_scale),
+            cost: Exact::scaled(&cost, task.objective.scale),
+        }
+    }
+
+    /// Notes the functions whose design is not the one in `current`, which has the last design of each; and updates it.
+    fn note_reconfigured(&mut self, current: &mut Vec<(String, String)>) {
+        for (function, design) in &self.configuration {
+            match current.iter_mut().find(|(known, _)| known == function) {
+                Some((_, known)) if known == design => {}
+                Some((_, known)) => {
+                    known.clone_from(design);
+                    self.reconfigured.push(function.clone());
+                }
+                None => current.push((function.clone(), design.clone())),
+            }
+        }
+    }
+}
+
+/// The metric of the problem file for a sum of operator costs.
+pub fn metric<N: TaskNumber>(task: &Task<N>, cost: &impl TaskNumber) -> Exact {
+    task.objective.metric(cost)
+}
+
+impl<N: TaskNumber> Objective<N> {
+    /// The metric as the file writes it for a sum of operator costs.
+    pub fn metric(&self, cost: &impl TaskNumber) -> Exact {
+        Exact::scaled(&self.signed(&(cost.to_rational() + self.offset.to_rational())), self.scale)
+    }
+
+    /// A cost as the file counts it.
+    fn signed(&self, cost: &impl TaskNumber) -> Rational {
+        let cost = cost.to_rational();
+        if self.maximize { -cost } else { cost }
+    }
+}
+
+/// The object that an argument stands for, with a combination of designs.
+pub fn resolve<N>(task: &Task<N>, operator: &Operator<N>, choice: &[u32], argument: Argument) -> ObjectId {
+    match argument {
+        Argument::Object(object) => object,
+        Argument::Slot(position) => {
+            let slot = &operator.slots[position as usize];
+            let design = slot.designs[choice[position as usize] as usize];
+            task.slots[slot.slot.index()].designs[design as usize]
+        }
+    }
+}
+
+fn argument<N>(task: &Task<N>, operator: &Operator<N>, choice: &[u32], argument: Argument) -> String {
+    task.object_names[resolve(task, operator, choice, argument).index()].clone()
+}
+
+pub fn arguments<N>(task: &Task<N>, operator: &Operator<N>, choice: &[u32]) -> Vec<String> {
+    operator.arguments.iter().map(|a| argument(task, operator, choice, *a)).collect()
+}
+
+fn configuration<N>(task: &Task<N>, operator: &Operator<N>, choice: &[u32]) -> Vec<(String, String)> {
+    let name = |function: ObjectId| task.object_names[function.index()].clone();
+    let pairs = operator.configuration.iter();
+    pairs.map(|(function, design)| (name(*function), argument(task, operator, choice, *design))).collect()
+}

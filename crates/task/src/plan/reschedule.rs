@@ -1,0 +1,105 @@
+//! A plan to the same plan with earlier starts.
+//!
+//! Waiting is free, so that a cheapest plan may put an action off until an event that only a later one needs. Nobody wants a robot to
+//! do that. So each action in turn is tried at its earlier passages, with waits before the next one where that needs events;
+//! what still is a plan, and costs no more, is kept.
+
+use num_traits::Zero;
+
+use crate::context::Context;
+use crate::number::Rational;
+use crate::plan::ground::{GroundPlan, GroundStep, replay};
+use crate::task::number::TaskNumber;
+use crate::task::{Operator, OperatorId, Task};
+
+/// The same actions, each as early as the ones before it and the rest of the plan admit; as far as the limits let it.
+pub fn earliest<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> GroundPlan<N> {
+    let Context { task, limits } = context;
+    let mut plan = plan.clone();
+    if task.operators.iter().all(|operator| operator.wait.is_none()) {
+        return plan;
+    }
+    let mut position = 0;
+    while position < plan.steps.len() && !limits.reached() {
+        let id = plan.steps[position].operator;
+        if task.operators[id.index()].wait.is_none() {
+            let own = starts(task, &plan.steps);
+            let tried = same_action(task, id).filter_map(|other| with(task, &plan, position, other));
+            let best = tried.map(|tried| (starts(task, &tried.steps), tried)).min_by(|a, b| a.0.cmp(&b.0));
+            if let Some((_, tried)) = best.filter(|(times, _)| *times < own) {
+                plan = tried;
+                // Waits may have gone or come before it.
+                position = 0;
+                continue;
+            }
+        }
+        position = position.saturating_add(1);
+    }
+    plan
+}
+
+/// The other operators of the action of an operator.
+fn same_action<N: TaskNumber>(task: &Task<N>, id: OperatorId) -> impl Iterator<Item = OperatorId> + '_ {
+    let own = &task.operators[id.index()];
+    let same = move |other: &Operator<N>| {
+        other.schema == own.schema && other.arguments == own.arguments && other.slots == own.slots
+    };
+    let all = task.operators.iter().zip((0..).map(OperatorId));
+    all.filter(move |(other, other_id)| *other_id != id && same(other)).map(|(_, id)| id)
+}
+
+/// The plan with another operator at a position, and waits where they are needed; none if that is not a plan, or a dearer one.
+fn with<N: TaskNumber>(
+    task: &Task<N>,
+    plan: &GroundPlan<N>,
+    position: usize,
+    other: OperatorId,
+) -> Option<GroundPlan<N>> {
+    let waits: Vec<OperatorId> = task
+        .operators
+        .iter()
+        .zip((0..).map(OperatorId))
+        .filter(|(operator, _)| operator.wait.is_some())
+        .map(|(_, id)| id)
+        .collect();
+    let is_wait = |step: &GroundStep| task.operators[step.operator.index()].wait.is_some();
+    let mut steps: Vec<GroundStep> = Vec::new();
+    let mut state = task.initial.clone();
+    for (at, step) in plan.steps.iter().enumerate().filter(|(_, step)| !is_wait(step)) {
+        let step = if at == position { GroundStep { operator: other, ..step.clone() } } else { step.clone() };
+        let operator = &task.operators[step.operator.index()];
+        // At most one wait is possible at a time, and each leads to a later event.
+        while !operator.applicable(&state, &step.choice) {
+            let wait = waits.iter().find(|wait| task.operators[wait.index()].applicable(&state, &[]))?;
+            state = task.successor(&task.operators[wait.index()], &state, &[])?;
+            steps.push(GroundStep { operator: *wait, choice: Vec::new() });
+        }
+        if !operator.admits(&step.choice) {
+            return None;
+        }
+        state = task.successor(operator, &state, &step.choice)?;
+        steps.push(step);
+    }
+    let (_, cost) = replay(task, &steps)?;
+    (cost <= plan.cost).then_some(GroundPlan { steps, cost })
+}
+
+/// When the actions start, in the task's time unit.
+pub fn starts<N: TaskNumber>(task: &Task<N>, steps: &[GroundStep]) -> Vec<Rational> {
+    let mut clock = Rational::zero();
+    let mut all = Vec::new();
+    for step in steps {
+        let operator = &task.operators[step.operator.index()];
+        if let Some(time) = &operator.wait {
+            clock = clock.max(time.to_rational());
+            continue;
+        }
+        let duration = operator.duration.at(&step.choice, &operator.sizes()).to_rational();
+        let by_end = operator.timing.end.as_ref().map(|end| end.to_rational() - &duration);
+        let by_start = operator.timing.start.as_ref().map(TaskNumber::to_rational);
+        let start = by_start.into_iter().chain(by_end).fold(clock, Rational::max);
+        all.push(start.clone());
+        clock = start + &duration;
+    }
+    all
+}

@@ -1,0 +1,50 @@
+//! The numbers of quantities to others; tables that operators share stay shared.
+
+use std::collections::hash_map::Entry;
+use std::sync::Arc;
+
+use rustc_hash::FxHashMap;
+
+use crate::number::Rational;
+use crate::task::quantity::{Quantity, Table};
+
+/// The values of a table, and what they are mapped to.
+type MappedTable<M> = (Arc<[Rational]>, Arc<[M]>);
+
+/// Maps numbers of quantities; tables that operators share stay shared.
+#[derive(Debug)]
+pub struct TableMap<M> {
+    /// By where a table lies; it is kept, so that nothing else can come to lie there.
+    done: FxHashMap<*const Rational, MappedTable<M>>,
+}
+
+impl<M> Default for TableMap<M> {
+    fn default() -> Self {
+        Self { done: FxHashMap::default() }
+    }
+}
+
+impl<M> TableMap<M> {
+    /// Maps the numbers of a quantity; tables that quantities share are mapped once.
+    ///
+    /// # Errors
+    /// The first failure of `f`.
+    pub fn map<E>(
+        &mut self,
+        quantity: &Quantity<Rational>,
+        f: &dyn Fn(&Rational) -> Result<M, E>,
+    ) -> Result<Quantity<M>, E> {
+        let mut tables = Vec::with_capacity(quantity.tables.len());
+        for table in &quantity.tables {
+            let values = match self.done.entry(table.values.as_ptr()) {
+                Entry::Occupied(known) => &known.into_mut().1,
+                Entry::Vacant(new) => {
+                    let values = table.values.iter().map(f).collect::<Result<_, _>>()?;
+                    &new.insert((table.values.clone(), values)).1
+                }
+            };
+            tables.push(Table { slots: table.slots.clone(), values: values.clone() });
+        }
+        Ok(Quantity { constant: f(&quantity.constant)?, tables })
+    }
+}

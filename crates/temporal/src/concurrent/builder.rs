@@ -1,0 +1,418 @@
+//! The operators of a split task: which halves belong together, and what each reads and writes.
+
+use rustc_hash::{FxHashMap, FxHashSet};
+use task::context::Context;
+use task::error::{Error, Errors};
+use task::ground::evaluate::reads::Reads;
+use task::ground::vocabulary::atom::{AtomId, Binding};
+use task::ground::vocabulary::reached::RelaxedReachability;
+use task::ground::vocabulary::world::World;
+use task::lifted::{Change, Effect, Expression, ObjectId, Rational};
+use task::limits::Limits;
+use task::number::{Int, dense};
+use task::task::quantity::NumericId;
+use task::task::{Argument, Operator, OperatorId, Task};
+
+use crate::concurrent::duration_fluents::{DURATION_PREFIX, FLEXIBLE_DURATION_PREFIX};
+use crate::concurrent::footprint::{Footprint, Footprints};
+use crate::concurrent::happening::{Happening, Instance, Role};
+use crate::concurrent::interference::{Designs, Keys, prune};
+use crate::concurrent::split::{Half, Split};
+use crate::concurrent::unit::{Divisors, Unit};
+
+/// The halves of an instance that the ground task has: several starts, and ends, where effects on numbers have conditions.
+#[derive(Clone, Default)]
+struct Halves {
+    starts: Vec<OperatorId>,
+    over_all: Option<OperatorId>,
+    ends: Vec<OperatorId>,
+}
+
+fn object(argument: Argument) -> Option<ObjectId> {
+    if let Argument::Object(object) = argument { Some(object) } else { None }
+}
+
+fn designs(task: &Task, operator: OperatorId) -> Designs {
+    let configuration = &task.operators[operator.index()].configuration;
+    let mut designs: Designs =
+        configuration.iter().filter_map(|(function, design)| Some((*function, object(*design)?))).collect();
+    designs.sort_unstable();
+    designs
+}
+
+/// The objects of an operator, and a gap for each variable of a quantifier.
+fn binding(operator: &Operator, variables: usize) -> Binding {
+    let mut binding: Binding = operator.arguments.iter().copied().map(object).collect();
+    binding.resize(variables, None);
+    binding
+}
+
+/// A schema of the domain with arguments.
+type InstanceKey = (usize, Vec<ObjectId>);
+
+pub(super) struct Builder<'a> {
+    footprints: Footprints<'a>,
+    split: &'a Split,
+    /// In the unit of all times, once that is known.
+    pub(super) separation: Int,
+    /// What each operator writes.
+    written: Vec<Footprint>,
+    /// What the start and the end of an operator write that are one happening.
+    joined: Vec<(OperatorId, [Footprint; 2])>,
+    instances: FxHashMap<InstanceKey, Halves>,
+    order: Vec<InstanceKey>,
+    /// The schemas that have a condition over all which can change.
+    held: FxHashSet<usize>,
+}
+
+impl<'a> Builder<'a> {
+    pub(super) fn new(split: &'a Split, reached: &'a RelaxedReachability, limits: &'a Limits) -> Self {
+        let held = split.origins.iter().filter(|origin| origin.half == Half::OverAll);
+        Self {
+            footprints: Footprints::new(World::new(&split.lifted, reached, limits)),
+            split,
+            separation: 0,
+            written: Vec::new(),
+            joined: Vec::new(),
+            instances: FxHashMap::default(),
+            order: Vec::new(),
+            held: held.map(|origin| origin.schema).collect(),
+        }
+    }
+
+    /// Pairs the halves of instances, and collects what operators write.
+    pub(super) fn collect(&mut self, context: Context<'_>) -> Result<(), Errors> {
+        let Context { task, limits } = context;
+        let mut errors = Vec::new();
+        let mut refused = FxHashSet::default();
+        for item in limits.watch(task.operators.iter().zip((0..).map(OperatorId))) {
+            let (operator, id) = item?;
+            let origin = self.split.origins[operator.schema as usize];
+            let schema = &self.split.lifted.schemas[operator.schema as usize];
+            let arguments: Vec<ObjectId> = operator.arguments.iter().copied().filter_map(object).collect();
+            let mut binding: Binding = arguments.iter().map(|object| Some(*object)).collect();
+            binding.resize(schema.variables, None);
+            let is_none = matches!(origin.half, Half::OverAll | Half::Choice | Half::Judge);
+            let effects = if is_none { &[] } else { &schema.end_effects[..] };
+            // What is under way, how many events there were and whether they were waited for has no place in the files.
+            let time = (!self.split.events.is_empty()).then_some(self.split.lifted.time);
+            let own = |predicate| time.is_some_and(|time| [time.phase, time.waited].contains(&predicate));
+            let effects: Vec<Effect> = effects
+                .iter()
+                .filter(|effect| match effect.change {
+                    Change::Add(predicate, _) | Change::Delete(predicate, _) => {
+                        !own(predicate) && !self.split.lifted.predicates[predicate.index()].running
+                    }
+                    Change::Assign { function, .. } => !self.split.durations.contains(&function),
+                })
+                .cloned()
+                .collect();
+            let written = self.footprints.writes(&effects, &binding).and_then(|footprint| {
+                if origin.half == Half::Whole {
+                    self.join(id, origin.schema, &binding)?;
+                }
+                Ok(footprint)
+            });
+            match written {
+                Ok(footprint) => self.written.push(footprint),
+                Err(error) => {
+                    if refused.insert(origin.schema) {
+                        errors.push(error);
+                    }
+                    self.written.push(Footprint::default());
+                }
+            }
+            if matches!(origin.half, Half::Whole | Half::Timed(_) | Half::Choice | Half::Judge) {
+                continue;
+            }
+            let key = (origin.schema, arguments);
+            if !self.instances.contains_key(&key) {
+                self.order.push(key.clone());
+            }
+            let halves = self.instances.entry(key).or_default();
+            match origin.half {
+                Half::Start => halves.starts.push(id),
+                Half::End => halves.ends.push(id),
+                _ => halves.over_all = Some(id),
+            }
+        }
+        if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
+    }
+
+    /// Gives each way in which an instance can start and end a start and an end of its own. Returns whether there are several: they are not
+    /// looked for under way together.
+    pub(super) fn pair(&mut self, task: &mut Task) -> bool {
+        let before = task.operators.len();
+        for key in &self.order {
+            let Some(halves) = self.instances.get_mut(key) else { continue };
+            let mut copy = |own: OperatorId| {
+                task.operators.push(task.operators[own.index()].clone());
+                self.written.push(self.written[own.index()].clone());
+                OperatorId(dense(task.operators.len().saturating_sub(1)))
+            };
+            let (mut starts, mut ends) = (Vec::new(), Vec::new());
+            for (first, start) in halves.starts.iter().enumerate() {
+                for (second, end) in halves.ends.iter().enumerate() {
+                    starts.push(if second == 0 { *start } else { copy(*start) });
+                    ends.push(if first == 0 { *end } else { copy(*end) });
+                }
+            }
+            (halves.starts, halves.ends) = (starts, ends);
+        }
+        task.operators.len() > before
+    }
+
+    /// The instances that can be executed, and which operators are their starts and ends.
+    pub(super) fn instances(
+        &self,
+        context: Context<'_>,
+        unit: Unit,
+        divisors: &Divisors,
+        roles: &mut [Role],
+    ) -> Result<Vec<Instance>, Error> {
+        let Context { task, limits } = context;
+        let mut instances = Vec::new();
+        let pairs = self.order.iter().flat_map(|key| {
+            let Halves { starts, over_all, ends } = &self.instances[key];
+            starts.iter().zip(ends).map(move |(start, end)| (key, *start, *over_all, *end))
+        });
+        for pair in limits.watch(pairs) {
+            let (key, start, over_all, end) = pair?;
+            // What must hold over all is out of reach.
+            if self.held.contains(&key.0) && over_all.is_none() {
+                continue;
+            }
+            let one = Rational::from_integer(1);
+            let divisor = divisors.get(&start).unwrap_or(&one);
+            let schema = &self.split.schemas[key.0];
+            let placed = |error: Error| error.within(&format!("`{}`", schema.name), Some(schema.place));
+            let factor = |timer| unit.factor(task, timer, divisor).map(|factor| (timer, factor));
+            let is_chosen = self.split.chosen[key.0];
+            // Those that the planner chooses are cleared at the end, and set by no happening.
+            let timer = timer(task, if is_chosen { end } else { start });
+            let timer = timer.map(factor).transpose().map_err(placed)?;
+            // One that the state decides is looked at when it starts.
+            let duration = match timer {
+                None if !is_chosen => unit.duration(task, start).map_err(placed)?,
+                _ => self.separation,
+            };
+            if duration < self.separation {
+                let construct =
+                    format!("an instance of `{}` that takes less time than the separation", schema.name);
+                let instead = "a smaller `--epsilon`".into();
+                return Err(Error::Unsupported { construct, instead, place: schema.place });
+            }
+            roles[start.index()] = Role::Start(dense(instances.len()));
+            roles[end.index()] = Role::End(dense(instances.len()));
+            let designs = designs(task, start);
+            let joint = Vec::new();
+            instances.push(Instance {
+                start,
+                end,
+                over_all,
+                duration,
+                timer,
+                is_chosen,
+                designs,
+                joint,
+                most: 1,
+                under_way: None,
+                counts_by_end: false,
+                compressible: false,
+            });
+        }
+        Ok(instances)
+    }
+
+    /// Notes what the start and the end of a durative action write that takes no time.
+    fn join(&mut self, id: OperatorId, schema: usize, binding: &Binding) -> Result<(), Error> {
+        let schema = &self.split.schemas[schema];
+        if schema.duration.is_some() {
+            let start = self.footprints.writes(&schema.start_effects, binding)?;
+            let end = self.footprints.writes(&schema.end_effects, binding)?;
+            self.joined.push((id, [start, end]));
+        }
+        Ok(())
+    }
+
+    /// What the numbers are divided by that hold durations.
+    ///
+    /// # Errors
+    /// One that is not positive.
+    pub(super) fn divisors(&mut self, Context { task, limits }: Context<'_>) -> Result<Divisors, Error> {
+        let mut divisors = Divisors::default();
+        for key in limits.watch(&self.order) {
+            let key = key?;
+            let schema = &self.split.schemas[key.0];
+            let starts = &self.instances[key].starts;
+            let (Some(start), Some(divisor)) = (starts.first(), &self.split.divisors[key.0]) else {
+                continue;
+            };
+            let binding = binding(&task.operators[start.index()], schema.variables);
+            let divisor = self.footprints.constant(divisor, &binding)?.filter(Rational::is_positive);
+            let divisor = divisor.ok_or_else(|| Error::Unsupported {
+                construct: format!("a duration of `{}` that is divided by no positive number", schema.name),
+                instead: "a positive divisor".into(),
+                place: schema.place,
+            })?;
+            divisors.extend(starts.iter().map(|start| (*start, divisor.clone())));
+        }
+        Ok(divisors)
+    }
+
+    /// The operators whose start and end are one happening although they interfere.
+    pub(super) fn contradictory(&self, context: Context<'_>) -> Result<FxHashSet<OperatorId>, Error> {
+        let Context { task, limits } = context;
+        let index = self.footprints.index();
+        let contradicts = |(id, [start, end]): &(OperatorId, [Footprint; 2])| {
+            let operator = &task.operators[id.index()];
+            let schema = &self.split.schemas[self.split.origins[operator.schema as usize].schema];
+            let binding = binding(operator, schema.variables);
+            let complete = |written: &Footprint, condition, effects, duration: Option<&Expression>| {
+                let mut reads = Reads::default();
+                reads.condition(&self.split.lifted, condition, &binding);
+                reads.effects(&self.split.lifted, effects, &binding);
+                if let Some(duration) = duration {
+                    reads.expression(duration, &binding);
+                }
+                let (reads, reads_numbers) = index.look_up(&reads);
+                Footprint { reads, reads_numbers, ..written.clone() }
+            };
+            let duration = schema.duration.as_ref();
+            let start = complete(start, &schema.start_condition, &schema.start_effects, duration);
+            start.interferes(&complete(end, &schema.at_end, &schema.end_effects, None)).then_some(*id)
+        };
+        let contradictory = limits.watch(&self.joined).filter_map(|pair| match pair {
+            Ok(pair) => contradicts(pair).map(Ok),
+            Err(interrupted) => Some(Err(interrupted.into())),
+        });
+        contradictory.collect()
+    }
+
+    /// Whether happenings are kept apart that need not be in some states.
+    pub(super) fn assumes_conflicts(&self) -> bool {
+        self.footprints.supposes
+    }
+
+    /// What each operator waits for and lets others wait for, and how many kinds of access there are.
+    pub(super) fn happenings(
+        mut self,
+        context: Context<'_>,
+        roles: &[Role],
+        instances: &mut [Instance],
+    ) -> Result<(Vec<Happening>, usize), Error> {
+        let Context { task, limits } = context;
+        let whole = (0..roles.len()).filter(|id| roles[*id] == Role::Whole);
+        let whole = whole.flat_map(|id| designs(task, OperatorId::of(id)));
+        let used = instances.iter().flat_map(|instance| instance.designs.iter().copied());
+        let mut keys = Keys::new(self.separation, used.chain(whole).collect());
+        let index = self.footprints.index();
+        let mut happenings = Vec::new();
+        let written = std::mem::take(&mut self.written);
+        for item in limits.watch((0..).map(OperatorId).zip(roles.iter().zip(written))) {
+            let (id, (role, mut written)) = item?;
+            let mut happening = Happening { role: *role, ..Happening::default() };
+            if let Role::Timed(_) = role {
+                happening.accesses = keys.of(&written);
+                happening.writes = writes(&written);
+            } else if let Some((reads, over_all)) = self.reads(task, id, *role) {
+                (written.reads, written.reads_numbers) = index.look_up(&reads);
+                let over_all = index.look_up(&over_all);
+                happening.accesses = keys.of(&written);
+                join(&mut happening, &mut keys, &over_all, instances, (task, id));
+                happening.writes = writes(&written);
+            }
+            happenings.push(happening);
+        }
+        prune(happenings.iter_mut().map(|happening| &mut happening.accesses));
+        Ok((happenings, keys.len()))
+    }
+
+    /// What an operator reads when it happens, and what its condition over all reads; none if it never happens, or by itself.
+    fn reads(&self, task: &Task, id: OperatorId, role: Role) -> Option<(Reads, Reads)> {
+        let operator = &task.operators[id.index()];
+        let origin = self.split.origins[operator.schema as usize];
+        let schema = self.split.schemas.get(origin.schema).filter(|_| role != Role::Never)?;
+        let lifted = &self.split.lifted;
+        let binding = binding(operator, schema.variables);
+        let (mut reads, mut over_all) = (Reads::default(), Reads::default());
+        if !matches!(role, Role::End(_)) {
+            reads.condition(lifted, &schema.start_condition, &binding);
+            reads.effects(lifted, &schema.start_effects, &binding);
+            if let Some(duration) = &schema.duration {
+                reads.expression(duration, &binding);
+            }
+        }
+        if !matches!(role, Role::Start(_)) {
+            reads.condition(lifted, &schema.at_end, &binding);
+            reads.effects(lifted, &schema.end_effects, &binding);
+        }
+        over_all.condition(lifted, &schema.over_all, &binding);
+        Some((reads, over_all))
+    }
+}
+
+/// The number that says how long an instance takes, which a happening sets or clears.
+fn timer(task: &Task, id: OperatorId) -> Option<NumericId> {
+    let mut changed = task.operators[id.index()].numeric_effects.iter().map(|effect| effect.variable);
+    changed.find(|number| {
+        let name = &task.number_names[number.index()];
+        name.starts_with(DURATION_PREFIX) || name.starts_with(FLEXIBLE_DURATION_PREFIX)
+    })
+}
+
+/// Adds what comes from conditions over all and from designs.
+fn join(
+    happening: &mut Happening,
+    keys: &mut Keys,
+    over_all: &(Vec<AtomId>, Vec<NumericId>),
+    instances: &mut [Instance],
+    (task, id): (&Task, OperatorId),
+) {
+    let accesses = &mut happening.accesses;
+    match happening.role {
+        Role::Start(instance) => {
+            let instance = &mut instances[instance as usize];
+            accesses.join(&keys.over_all(over_all));
+            accesses.after.extend(keys.designs(&instance.designs));
+            happening.designs.clone_from(&instance.designs);
+            if instance.over_all.is_some_and(|id| is_joint(task, id)) {
+                instance.joint = ids(&over_all.0, over_all.1.iter().copied());
+            }
+        }
+        Role::End(instance) => {
+            accesses.marks.extend(keys.over_all(over_all).marks);
+            accesses.marks.extend(keys.used(&instances[instance as usize].designs, false));
+        }
+        _ => {
+            happening.designs = designs(task, id);
+            accesses.after.extend(keys.designs(&happening.designs));
+            accesses.marks.extend(keys.used(&happening.designs, true));
+        }
+    }
+}
+
+/// Whether several happenings can keep up a condition together.
+fn is_joint(task: &Task, over_all: OperatorId) -> bool {
+    let condition = &task.operators[over_all.index()].condition;
+    !condition.clauses.is_empty()
+        || !condition.comparisons.is_empty()
+        || condition.facts.iter().any(|fact| fact.variable.index() >= task.basic)
+}
+
+fn writes(written: &Footprint) -> Vec<u32> {
+    let atoms: Vec<AtomId> = written.added.iter().chain(&written.deleted).copied().collect();
+    ids(&atoms, written.numbers.iter().map(|(number, _)| *number))
+}
+
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "atoms and numbers are held in memory with their names: there are fewer than 2^31"
+)]
+fn ids(atoms: &[AtomId], numbers: impl Iterator<Item = NumericId>) -> Vec<u32> {
+    let atoms = atoms.iter().map(|atom| 2 * atom.0);
+    let mut all: Vec<u32> = atoms.chain(numbers.map(|number| 2 * number.0 + 1)).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}

@@ -1,0 +1,198 @@
+//! Facts that nothing brings back, and what has to hold together with them.
+//!
+//! A relaxed plan takes no fact away, so what deletes a fact that is needed later looks like a way, even if nothing adds the fact again. For each such
+//! fact the relaxed task gets conjunctions of it with what is needed at the same time: only what leaves the fact alone brings them about.
+//! These are conjunctions of two facts as in the task Π^C [1], for few, chosen facts.
+//!
+//! [1] E. Keyder, J. Hoffmann, P. Haslum: Improving delete relaxation heuristics through explicitly represented conjunctions, JAIR 50, 2014.
+
+use rustc_hash::{FxHashMap, FxHashSet};
+use task::lists::Lists;
+use task::number::dense;
+
+use crate::concurrent::rule::{Proposition, Rule};
+
+/// There are no more rules for conjunctions than this by rule of the task, and some.
+const MAX_RULES_PER_RULE: usize = 2;
+const EXTRA_RULES: usize = 1_000;
+/// Rules are looked at this many times each, at most, to find what conjunctions are worth while.
+const MAX_VISITS_PER_RULE: usize = 64;
+
+/// A conjunction, and its two facts.
+pub(super) type Conjunction = [Proposition; 3];
+
+/// The rules of a relaxed task, its goal, and its facts.
+pub(super) struct Scope<'a> {
+    pub(super) rules: &'a mut Vec<Rule>,
+    pub(super) goal: &'a mut Vec<Proposition>,
+    /// The propositions of each variable that happenings set.
+    pub(super) variables: &'a [std::ops::Range<Proposition>],
+    pub(super) propositions: &'a mut u32,
+}
+
+/// Which rules have which propositions.
+struct Index {
+    /// What rules need, and then the goal.
+    needs: Lists,
+    adding: Lists,
+    needing: Lists,
+    /// By variable: the rules that set it, ascending.
+    setting: Vec<Vec<u32>>,
+}
+
+/// Adds conjunctions to a relaxed task. Returns them with their facts; they hold from the beginning where these do.
+#[expect(clippy::arithmetic_side_effects, reason = "propositions and rules are held in memory")]
+pub(super) fn add_conjunctions(scope: &mut Scope<'_>) -> Vec<Conjunction> {
+    let index = Index::new(scope);
+    let count = scope.rules.len();
+    let (mut copies, mut looks) = (count * MAX_RULES_PER_RULE + EXTRA_RULES, count * MAX_VISITS_PER_RULE);
+    let mut conjunctions = Vec::new();
+    for (variable, range) in scope.variables.iter().enumerate() {
+        let setting = &index.setting[variable];
+        for fact in range.clone() {
+            let is_needed = !index.needing.of(fact).is_empty();
+            if setting.is_empty() || !is_needed || !index.adding.of(fact).is_empty() {
+                continue;
+            }
+            // All that set the variable, set it to another value.
+            let together = index.together(fact, setting, scope, &mut looks);
+            let is_open = |rule: &u32| setting.binary_search(rule).is_err();
+            let mut rules: Vec<u32> =
+                together.iter().flat_map(|own| index.adding.of(*own)).copied().filter(is_open).collect();
+            rules.sort_unstable();
+            rules.dedup();
+            if together.is_empty() || rules.len() > copies {
+                continue;
+            }
+            copies -= rules.len();
+            let first = *scope.propositions;
+            let numbers: FxHashMap<Proposition, Proposition> =
+                together.iter().copied().zip(first..).collect();
+            *scope.propositions += dense(together.len());
+            conjunctions.extend(together.iter().map(|own| [numbers[own], fact, *own]));
+            for rule in rules {
+                let copy = scope.rules[rule as usize].with(fact, index.needs.of(rule), &numbers);
+                scope.rules.push(copy);
+            }
+            for rule in index.needing.of(fact) {
+                let needs = scope.rules[..count].get_mut(*rule as usize).map(|rule| &mut rule.needs);
+                let needs = needs.unwrap_or(scope.goal);
+                needs.retain(|need| !numbers.contains_key(need));
+                needs.extend(index.needs.of(*rule).iter().filter_map(|need| numbers.get(need)));
+                needs.sort_unstable();
+            }
+        }
+    }
+    conjunctions
+}
+
+impl Index {
+    fn new(scope: &Scope<'_>) -> Self {
+        let propositions = *scope.propositions as usize;
+        let (mut adds, mut needs) = (Lists::default(), Lists::default());
+        let mut setting = vec![Vec::new(); scope.variables.len()];
+        for (rule, own) in (0..).zip(scope.rules.iter()) {
+            adds.push(&own.adds);
+            needs.push(&own.needs);
+            for fact in &own.sets {
+                let variable = scope.variables.partition_point(|range| range.end <= *fact);
+                if setting[variable].last() != Some(&rule) {
+                    setting[variable].push(rule);
+                }
+            }
+        }
+        needs.push(scope.goal);
+        let (adding, needing) = (adds.inverse(propositions), needs.inverse(propositions));
+        Self { needs, adding, needing, setting }
+    }
+
+    /// What is needed together with a fact, itself or for something that is, and may come from a rule that deletes the fact, ascending.
+    fn together(
+        &self,
+        fact: Proposition,
+        deleting: &[u32],
+        scope: &Scope<'_>,
+        looks: &mut usize,
+    ) -> Vec<Proposition> {
+        let rules = &scope.rules;
+        let mut needed = FxHashSet::default();
+        let mut stack: Vec<Proposition> =
+            self.needing.of(fact).iter().flat_map(|rule| self.needs.of(*rule)).copied().collect();
+        while let Some(own) = stack.pop() {
+            if own == fact || !needed.insert(own) {
+                continue;
+            }
+            let open = self.adding.of(own).iter().filter(|rule| deleting.binary_search(rule).is_err());
+            for rule in open {
+                *looks = looks.saturating_sub(1);
+                stack.extend(self.needs.of(*rule));
+            }
+            if *looks == 0 {
+                return Vec::new();
+            }
+        }
+        let mut spoilt = FxHashSet::default();
+        let mut stack: Vec<Proposition> =
+            deleting.iter().flat_map(|rule| &rules[*rule as usize].adds).copied().collect();
+        while let Some(own) = stack.pop() {
+            if !needed.contains(&own) || !spoilt.insert(own) {
+                continue;
+            }
+            for rule in self.needing.of(own) {
+                *looks = looks.saturating_sub(1);
+                stack.extend(rules.get(*rule as usize).into_iter().flat_map(|rule| &rule.adds));
+            }
+        }
+        let mut together: Vec<Proposition> = spoilt.into_iter().collect();
+        together.sort_unstable();
+        together
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use num_rational::BigRational;
+    use pddl::{Source, read};
+
+    use crate::concurrent::ground_concurrent;
+    use crate::concurrent::relaxed_plan_heuristic::RelaxedPlanHeuristic;
+    use crate::concurrent::successors::Expansion;
+    use crate::concurrent::temporal_relaxation::TemporalRelaxation;
+    use task::ground::GroundConfig;
+
+    /// A lock needs the key again after the door, and `break` opens the door by the key.
+    const DOMAIN: &str =
+        "(define (domain d) (:requirements :durative-actions) (:predicates (key) (window) (inside) (open) (locked))
+        (:durative-action climb :parameters () :duration (= ?duration 1) :condition (at start (window)) :effect (at end (inside)))
+        (:durative-action unlock :parameters () :duration (= ?duration 1) :condition (at start (inside)) :effect (at end (open)))
+        (:durative-action break :parameters () :duration (= ?duration 1) :condition (at start (key))
+          :effect (and (at start (not (key))) (at end (open))))
+        (:durative-action lock :parameters () :duration (= ?duration 1)
+          :condition (and (at start (key)) (at start (open))) :effect (at end (locked))))";
+
+    /// The happenings that a relaxed plan begins with; none if there is no such plan.
+    fn guide(facts: &str, goal: &str) -> Option<Vec<String>> {
+        let problem = format!("(define (problem p) (:domain d) (:init {facts}) (:goal {goal}))");
+        let (domain, problem, _) =
+            read(&Source::new("domain", DOMAIN), &Source::new("problem", problem)).expect("PDDL");
+        let separation = BigRational::new(1.into(), 1000.into());
+        let concurrent =
+            ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation).expect("a task");
+        let relaxed = TemporalRelaxation::new(&concurrent);
+        let guide = RelaxedPlanHeuristic::new(&relaxed).guide(&Expansion::new(&concurrent).root())?;
+        let schema = |id: &task::task::OperatorId| concurrent.task.operators[id.index()].schema;
+        let name = |id| concurrent.task.schema_names[schema(id) as usize].clone();
+        Some(guide.preferred.iter().map(name).collect())
+    }
+
+    #[test]
+    fn what_takes_the_key_away_is_no_way_to_where_it_is_needed() {
+        let begins = |actions: &[&str]| Some(actions.iter().map(|own| (*own).to_owned()).collect());
+        assert_eq!(guide("(key) (window)", "(open)"), begins(&["break"]));
+        assert_eq!(guide("(key) (window)", "(locked)"), begins(&["climb"]));
+        assert_eq!(guide("(key)", "(locked)"), None);
+        // The goal needs the key, too.
+        assert_eq!(guide("(key)", "(and (open) (key))"), None);
+        assert_eq!(guide("(key)", "(open)"), begins(&["break"]));
+    }
+}

@@ -1,0 +1,51 @@
+//! What has to follow in time: judged by the times of a plan, once it is found.
+
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::ToPrimitive;
+
+use task::compile;
+use task::number::Int;
+use task::task::{OperatorId, State, Task};
+
+/// After each state in which one of `begins` can be applied there is, at most so much later, one in which one of `ends` can. Neither happens.
+#[derive(Debug, Clone)]
+pub(super) struct Deadline {
+    /// In the unit of all times.
+    within: Int,
+    pub(super) is_hard: bool,
+    begins: Vec<OperatorId>,
+    /// The first of them notes that it was kept, if it need not be.
+    pub(super) ends: Vec<OperatorId>,
+}
+
+impl Deadline {
+    pub(super) fn new(task: &Task, deadline: &compile::Deadline) -> Self {
+        let [begins, ends] = deadline.actions().map(|name| {
+            let named = |id: &OperatorId| {
+                task.schema_names[task.operators[id.index()].schema as usize].as_ref() == name
+            };
+            OperatorId::all(task.operators.len()).filter(named).collect()
+        });
+        let units = &deadline.within * BigRational::from(BigInt::from(task.time_scale));
+        let within = units.floor().to_integer().to_i128();
+        Self { within: within.unwrap_or(Int::MAX), is_hard: deadline.is_hard, begins, ends }
+    }
+
+    /// Whether the states of a plan, with their times, keep it.
+    pub(super) fn is_kept(&self, task: &Task, trajectory: &[(Int, State)]) -> bool {
+        let holds = |ways: &[OperatorId], state: &State| {
+            ways.iter().any(|id| task.operators[id.index()].applicable(state, &[]))
+        };
+        // The next state in which it is over, from the last one backwards.
+        let mut next: Option<Int> = None;
+        trajectory.iter().rev().all(|(time, state)| {
+            if holds(&self.ends, state) {
+                next = Some(*time);
+            }
+            let is_in_time =
+                next.and_then(|next| next.checked_sub(*time)).is_some_and(|after| after <= self.within);
+            is_in_time || !holds(&self.begins, state)
+        })
+    }
+}

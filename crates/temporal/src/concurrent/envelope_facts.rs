@@ -1,0 +1,48 @@
+//! The variables that link a condition over all to an end are taken out of the task once both are paired.
+
+use task::task::{Condition, Fact, Task, VariableId};
+
+use crate::concurrent::happening::Instance;
+
+/// Takes out the variables that only link a condition over all to an end.
+#[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
+pub(super) fn drop_links(task: &mut Task, instances: &[Instance]) {
+    let mut held = vec![false; task.variables.len()];
+    for id in instances.iter().filter_map(|instance| instance.over_all) {
+        for fact in std::mem::take(&mut task.operators[id.index()].effects) {
+            held[fact.variable.index()] = true;
+        }
+    }
+    let mut numbers = Vec::with_capacity(held.len());
+    let mut next = 0;
+    for held in &held {
+        numbers.push(VariableId(next));
+        next += u32::from(!held);
+    }
+    let is_held = |variable: VariableId| held[variable.index()];
+    let fact = |fact: &mut Fact| fact.variable = numbers[fact.variable.index()];
+    let condition = |condition: &mut Condition| {
+        condition.facts.retain(|fact| !is_held(fact.variable));
+        condition.facts.iter_mut().for_each(fact);
+        condition.clauses.iter_mut().flatten().for_each(|literal| fact(&mut literal.fact));
+    };
+    for operator in &mut task.operators {
+        condition(&mut operator.condition);
+        operator.effects.retain(|fact| !is_held(fact.variable));
+        operator.effects.iter_mut().for_each(fact);
+        for effect in &mut operator.conditional {
+            effect.condition.iter_mut().for_each(|literal| fact(&mut literal.fact));
+            effect.effects.iter_mut().for_each(fact);
+        }
+    }
+    condition(&mut task.goal);
+    for rule in task.axioms.iter_mut().flat_map(|layer| &mut layer.rules) {
+        fact(&mut rule.head);
+        condition(&mut rule.body);
+    }
+    let mut keep = held.iter().map(|held| !held);
+    task.variables.retain(|_| keep.next().unwrap_or(true));
+    let mut keep = held.iter().map(|held| !held);
+    task.initial.values.retain(|_| keep.next().unwrap_or(true));
+    task.basic -= held[..task.basic].iter().filter(|held| **held).count();
+}

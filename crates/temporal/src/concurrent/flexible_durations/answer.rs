@@ -1,0 +1,159 @@
+//! A sequence of happenings that reaches the goal to a plan: the best durations, then the earliest times.
+
+use num_traits::One;
+use pddl::to_decimal;
+use task::number::Rational;
+use task::plan::{Plan, Step};
+
+use crate::concurrent::flexible_durations::affine::Affine;
+use crate::concurrent::flexible_durations::linear_program::Program;
+use crate::concurrent::flexible_durations::partial_plan_lp::{Course, MAKESPAN, duration_of};
+use crate::concurrent::happening::Role;
+use crate::concurrent::temporal_task::TemporalTask;
+
+/// A plan.
+#[derive(Debug, Clone)]
+pub(super) struct Answer {
+    /// The metric, as integers of [`crate::concurrent::measure::Measure`] count it.
+    pub(super) value: Rational,
+    /// What the same sequence could come to if durations need not be decimals.
+    pub(super) least: Rational,
+    pub(super) plan: Plan,
+}
+
+/// The best plan of a sequence; none if its numbers do not reach the goal.
+///
+/// The metric comes first, then the makespan, then how long actions take, then when they start. A metric without a best value has none here,
+/// either: what comes first then is the makespan. Durations are decimals if that is possible, even where that costs a little.
+pub(super) fn answer(concurrent: &TemporalTask, course: &Course) -> Option<Answer> {
+    let mut program = course.program.clone();
+    if !program.constrain(&course.goal(concurrent)?) {
+        return None;
+    }
+    let value = course.value_of_plan(concurrent);
+    let durations: Vec<Affine> =
+        course.chosen(concurrent).map(|position| Affine::column(duration_of(position))).collect();
+    let exact = best(&program, &[&value, &Affine::column(MAKESPAN), &sum(&durations)]);
+    let least = exact.value(&value);
+    let fixed = fix(&exact, &durations);
+    let is_decimal = durations.iter().all(|own| is_decimal(concurrent, &exact.value(own)));
+    let rounded = if is_decimal { None } else { rounded(concurrent, &program, &value, &durations) };
+    let times: Vec<Affine> = course.passed.iter().map(|passed| passed.time.clone()).collect();
+    let program = best(&rounded.unwrap_or(fixed), &[&Affine::column(MAKESPAN), &sum(&times)]);
+    let at = |expression: &Affine| program.value(expression);
+    let value = at(&value);
+    Some(Answer { plan: in_names(concurrent, course, &value, &at), value, least })
+}
+
+fn sum(all: &[Affine]) -> Affine {
+    all.iter().fold(Affine::default(), |sum, own| sum.plus(own, &Rational::one()))
+}
+
+/// The best values by some objectives, the most important first; one without a best value counts for nothing.
+fn best(program: &Program, objectives: &[&Affine]) -> Program {
+    let mut best = program.clone();
+    for objective in objectives {
+        let mut next = best.clone();
+        if next.minimise(objective) {
+            let most = Affine::constant(next.least().clone()).minus(objective);
+            if next.constrain([&most]) {
+                best = next;
+            }
+        }
+    }
+    best
+}
+
+/// With durations that are what they are at the optimum.
+fn fix(program: &Program, durations: &[Affine]) -> Program {
+    let mut fixed = program.clone();
+    for duration in durations {
+        let own = Affine::constant(program.value(duration));
+        let kept = fixed.constrain(&[own.minus(duration), duration.minus(&own)]);
+        debug_assert!(kept, "an optimum has values");
+    }
+    fixed
+}
+
+/// Whether a time can be written as a decimal.
+fn is_decimal(concurrent: &TemporalTask, time: &Rational) -> bool {
+    let unit = Rational::from_integer(concurrent.task.time_scale);
+    to_decimal(&(time.clone() / unit).to_big()).is_some()
+}
+
+/// With durations that are decimals, one after another the best that is near: plans are written so, and have to be valid as they are
+/// written. None if no such durations will do.
+fn rounded(
+    concurrent: &TemporalTask,
+    program: &Program,
+    value: &Affine,
+    durations: &[Affine],
+) -> Option<Program> {
+    let grain = grain(concurrent)?;
+    let mut rounded = best(program, &[]);
+    for duration in durations {
+        let exact = best(&rounded, &[value, &Affine::column(MAKESPAN)]).value(duration);
+        let low = Rational::from_big((exact.clone() / grain.clone()).to_big().floor()) * &grain;
+        let near = if is_decimal(concurrent, &exact) { vec![exact] } else { vec![low.clone() + &grain, low] };
+        let with = |own: &Rational| {
+            let own = Affine::constant(own.clone());
+            let mut with = rounded.clone();
+            with.constrain(&[own.minus(duration), duration.minus(&own)]).then_some(with)
+        };
+        let worth = |with: &Program| best(with, &[value]).value(value);
+        rounded = near.iter().filter_map(with).min_by_key(worth)?;
+    }
+    Some(rounded)
+}
+
+/// A power of ten of the files' time unit, at most a thousandth of the separation.
+fn grain(concurrent: &TemporalTask) -> Option<Rational> {
+    let unit = Rational::from_integer(concurrent.task.time_scale);
+    let most = Rational::from_integer(concurrent.separation) / Rational::from_integer(1000);
+    let powers = std::iter::successors(Some(1_i128), |power| power.checked_mul(10));
+    let mut grains = powers.map(|power| unit.clone() / Rational::from_integer(power));
+    grains.find(|grain| *grain <= most)
+}
+
+fn in_names(
+    concurrent: &TemporalTask,
+    course: &Course,
+    value: &Rational,
+    at: &dyn Fn(&Affine) -> Rational,
+) -> Plan {
+    let task = &concurrent.task;
+    let mut steps = Vec::new();
+    let mut before = at(&Course::new(concurrent).measured(concurrent));
+    // By instance the step that it is, in the order of the starts.
+    let mut open: Vec<(u32, usize)> = Vec::new();
+    for passed in &course.passed {
+        let operator = &task.operators[passed.operator.index()];
+        let measured = at(&passed.measured);
+        let cost = Rational::from_integer(operator.cost.constant) + &(measured.clone() - &before);
+        before = measured;
+        let step = (at(&passed.time), passed.operator, at(&passed.duration), cost.clone());
+        match concurrent.happenings[passed.operator.index()].role {
+            Role::Start(instance) => {
+                open.push((instance, steps.len()));
+                steps.push(step);
+            }
+            Role::Whole => steps.push(step),
+            Role::End(instance) => {
+                let mut runs = (0..open.len()).filter(|position| open[*position].0 == instance);
+                if let Some(position) = runs.nth(passed.run as usize) {
+                    let (_, start) = open.remove(position);
+                    steps[start].3 += cost;
+                }
+            }
+            _ => {}
+        }
+    }
+    steps.sort_by(|one, other| (&one.0, one.1).cmp(&(&other.0, other.1)));
+    let steps = steps.into_iter().map(|(start, id, duration, cost)| {
+        let cost = if task.objective.maximize { -cost } else { cost };
+        Step::new(task, &task.operators[id.index()], &[], (start, duration, cost))
+    });
+    let mut plan = Plan { steps: steps.collect(), cost: concurrent.measure.metric(value) };
+    plan.note_reconfigured();
+    plan
+}

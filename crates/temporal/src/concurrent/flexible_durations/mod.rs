@@ -1,0 +1,180 @@
+//! Tasks in which the planner chooses how long actions take: sequences of happenings, and a linear program for each.
+//!
+//! The bounds of a duration are conditions at the start of its action, and effects may depend on it. A sequence of happenings has a plan if there
+//! are times and durations for which all that is asked holds: a linear program, as in COLIN [1], solved here in exact numbers (`linear_program`), since no plan may be wrong by
+//! a rounded epsilon and what is infeasible takes part in proofs. A search that leaves nothing out and a greedy one take turns
+//! (`search`); where all actions can be as short as they may be, the searches for fixed durations look at that, too.
+//!
+//! [1] A. Coles, A. Coles, M. Fox, D. Long: COLIN: planning with continuous linear numeric change, JAIR 44, 2012.
+
+mod affine;
+mod answer;
+mod linear_program;
+mod mazurkiewicz_trace;
+mod partial_plan_lp;
+mod search;
+
+use task::error::{Error, Errors};
+use task::limits::Limits;
+use task::number::Rational;
+use task::plan::solution::{PlannerPart, Proof, Solution, Status};
+use tracing::info_span;
+
+use crate::concurrent::happening::Instance;
+use crate::concurrent::interleave::interleave_searches;
+use crate::concurrent::relaxed_plan_heuristic::RelaxedPlanHeuristic;
+use crate::concurrent::search_log::Record;
+use crate::concurrent::solution::{ended, in_names};
+use crate::concurrent::successors::Expansion;
+use crate::concurrent::temporal_relaxation::TemporalRelaxation;
+use crate::concurrent::temporal_task::TemporalTask;
+
+use answer::Answer;
+use partial_plan_lp::Course;
+use search::{Outcome, Search};
+
+/// The task, if such durations can be planned with.
+///
+/// # Errors
+/// Derived predicates that compare numbers: what they are depends on durations.
+pub(super) fn check(concurrent: TemporalTask) -> Result<TemporalTask, Errors> {
+    let mut rules = concurrent.task.axioms.iter().flat_map(|layer| &layer.rules);
+    if rules.all(|rule| rule.body.linears().next().is_none()) {
+        return Ok(concurrent);
+    }
+    Err(vec![Error::Unsupported {
+        construct: "a derived predicate over numbers, where durations are chosen".into(),
+        instead: "the comparison itself, or durations that are fixed".into(),
+        place: task::error::Place { file: task::error::File::Domain, span: pddl::ast::Span::default() },
+    }]
+    .into())
+}
+
+/// Whether every plan is among those that an exhaustive search goes through, with the times and durations that it can have.
+///
+/// Not so where an action may take less time than the separation, or none, which makes one happening of it, where several happenings can keep up a condition together at one
+/// time, and where a plan ends right before timed initial literals.
+pub(super) fn is_exact(concurrent: &TemporalTask) -> bool {
+    let takes_time = |own: &Instance| {
+        let condition = &concurrent.task.operators[own.start.index()].condition;
+        !own.is_chosen
+            || condition.comparisons.iter().any(|linear| {
+                let [(number, factor)] = linear.coefficients[..] else { return false };
+                let Some((_, times)) = own.timer.filter(|(timer, _)| *timer == number) else { return false };
+                let least = linear.quantity.constant.saturating_neg().checked_mul(times);
+                let short = concurrent.separation.checked_mul(factor);
+                factor > 0 && least.zip(short).is_some_and(|(least, short)| least >= short)
+            })
+    };
+    let is_decided = |own: &Instance| own.timer.is_none() || own.is_chosen;
+    concurrent.is_exact
+        && concurrent.events.is_empty()
+        && concurrent.instances.iter().all(|own| own.joint.is_empty() && is_decided(own) && takes_time(own))
+}
+
+/// Finds a best plan; of those, one with the least makespan and the shortest durations.
+pub(super) fn optimize(concurrent: &TemporalTask, limits: &Limits, mut record: Record<'_>) -> Solution {
+    let span = info_span!("optimize", operators = concurrent.task.operators.len());
+    let (is_over, lower, best) = span.in_scope(|| take_turns_choosing(concurrent, limits, &mut record));
+    // Durations that are decimals may cost a little.
+    let is_proved = is_over && concurrent.is_exact && best.as_ref().is_none_or(|best| lower >= best.value);
+    let status = match (&best, is_proved) {
+        (Some(_), true) => Status::Optimal,
+        (Some(_), false) => Status::Feasible,
+        (None, true) => Status::Unsolvable,
+        (None, false) => Status::Unknown,
+    };
+    let lower = match &best {
+        Some(best) if is_proved => Some(best.value.clone()),
+        _ => Some(lower).filter(|_| !is_proved),
+    };
+    let plan = best.map(|best| best.plan);
+    Solution {
+        horizon: plan.as_ref().filter(|_| is_proved).map_or(0, |plan| plan.steps.len()),
+        plan,
+        lower_bound: lower.filter(|_| concurrent.is_whole).map(|lower| concurrent.measure.metric(&lower)),
+        ..ended(status, is_proved.then_some(Proof::Search), record)
+    }
+}
+
+/// Whether nothing is left, what no plan can get below, and the best plan.
+fn take_turns_choosing(
+    concurrent: &TemporalTask,
+    limits: &Limits,
+    record: &mut Record<'_>,
+) -> (bool, Rational, Option<Answer>) {
+    let expansion = Expansion::new(concurrent);
+    let mut best: Option<Answer> = None;
+    let mut exhaustive = Search::exhaustive(concurrent, &expansion);
+    let least = || Course::new(concurrent).least(concurrent);
+    let mut lower = if concurrent.is_bounded { least() } else { Rational::from_integer(0) };
+    record.begin(lower.clone());
+    let mut turn =
+        |search: &mut Search<'_>, best: &mut Option<Answer>, work, part, record: &mut Record<'_>| {
+            let before = search.figures;
+            let mut left: u64 = work;
+            let outcome = loop {
+                let looked_at = search.figures.evaluated;
+                let outcome = search.run(best, limits, left);
+                if outcome != Outcome::Found {
+                    break outcome;
+                }
+                left = left.saturating_sub(search.figures.evaluated.saturating_sub(looked_at));
+                let found = best.iter().map(|best| (best.value.clone(), best.plan.steps.len()));
+                found.for_each(|(value, steps)| record.improve(&value, steps, lower.clone(), part));
+            };
+            search.figures.add_to(before, &mut record.statistics);
+            if part == PlannerPart::Search && concurrent.is_exact {
+                let known = search.lower().or_else(|| best.as_ref().map(|best| best.value.clone()));
+                lower = record.report_lower_bound(known.unwrap_or_else(|| lower.clone()));
+            }
+            (outcome, lower.clone())
+        };
+    let soon = limits.thresholds().chosen;
+    let (mut ended, mut known) = turn(&mut exhaustive, &mut best, soon, PlannerPart::Search, record);
+    if ended == Outcome::Exhausted || limits.reached() {
+        return (ended == Outcome::Exhausted, known, best);
+    }
+    let relaxed = TemporalRelaxation::new(concurrent);
+    let mut greedy = Search::greedy(concurrent, &expansion, RelaxedPlanHeuristic::new(&relaxed));
+    let (mut work, mut rounds) = (soon.max(1), 1..);
+    while ended != Outcome::Exhausted && !limits.reached() {
+        // These begin anew each time, for twice as long: not where there is a plan that they need not find.
+        if let Some(rounds) = rounds.next().filter(|rounds| *rounds == 1 || best.is_none()) {
+            shortest(concurrent, (limits, rounds), &mut best, (record, &known));
+        }
+        let (greedily, _) = turn(&mut greedy, &mut best, work, PlannerPart::Satisficing, record);
+        if exhaustive.is_full(limits) && (greedily == Outcome::Exhausted || greedy.is_full(limits)) {
+            break;
+        }
+        (ended, known) = turn(&mut exhaustive, &mut best, work, PlannerPart::Search, record);
+        work = work.saturating_mul(2);
+    }
+    (ended == Outcome::Exhausted, known, best)
+}
+
+/// Looks for a plan in which every action is as short as it may be, where that can be planned with, for so many rounds.
+fn shortest(
+    concurrent: &TemporalTask,
+    (limits, rounds): (&Limits, usize),
+    best: &mut Option<Answer>,
+    (record, lower): (&mut Record<'_>, &Rational),
+) {
+    let Some(shortest) = concurrent.shortest.as_deref() else { return };
+    let mut unheard = |_| {};
+    let mut own = Record::new(shortest, std::time::Instant::now(), &mut unheard);
+    let (_, found) = interleave_searches(shortest, None, limits, &mut own, rounds);
+    let (figures, part) = (own.statistics, PlannerPart::Satisficing);
+    let statistics = &mut record.statistics;
+    statistics.expanded = statistics.expanded.saturating_add(figures.expanded);
+    statistics.generated = statistics.generated.saturating_add(figures.generated);
+    statistics.evaluated = statistics.evaluated.saturating_add(figures.evaluated);
+    statistics.restarts = statistics.restarts.saturating_add(figures.restarts);
+    let Some(plan) = found.map(|sequence| in_names(shortest, &sequence)) else { return };
+    let value = concurrent.measure.total_of(&plan.cost);
+    if best.as_ref().is_none_or(|best| value < best.value) {
+        let steps = plan.steps.len();
+        *best = Some(Answer { value: value.clone(), least: value.clone(), plan });
+        record.improve(&value, steps, lower.clone(), figures.found_by.unwrap_or(part));
+    }
+}

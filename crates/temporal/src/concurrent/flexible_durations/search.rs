@@ -1,0 +1,240 @@
+//! Sequences of happenings to a plan whose durations are chosen by linear programs: a greedy search, and one that leaves nothing out.
+//!
+//! Both are lazy: a sequence is looked at, and its program solved, when it is taken up, in the order of what the one before it promised. The greedy
+//! search goes by relaxed plans, in which a number is as good as the bounds of the durations allow, and pursues only one of the sequences
+//! with the same values, actions under way and ranges of numbers. The exhaustive one goes by the least metric that the program leaves, and pursues one
+//! sequence of each trace.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::hash::{Hash, Hasher};
+
+use num_traits::ToPrimitive;
+use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
+use search::search::SearchStatistics;
+use task::limits::Limits;
+use task::number::{Int, Rational, dense};
+use task::task::OperatorId;
+use task::task::quantity::Linear;
+
+use crate::concurrent::flexible_durations::affine::Affine;
+use crate::concurrent::flexible_durations::answer::{Answer, answer};
+use crate::concurrent::flexible_durations::mazurkiewicz_trace::Traces;
+use crate::concurrent::flexible_durations::partial_plan_lp::Course;
+use crate::concurrent::relaxed_plan_heuristic::{HeuristicValue, RelaxedPlanHeuristic};
+use crate::concurrent::successors::Expansion;
+use crate::concurrent::temporal_task::TemporalTask;
+
+/// So many more times preferred happenings come first after each progress.
+const BOOST: i64 = 1_000;
+
+/// What was left before it, the least metric, the order, the sequence before, and the happening with the run that it ends.
+type QueueEntry = Reverse<(u64, Rational, Reverse<u32>, u32, u32, (OperatorId, u32))>;
+
+/// Why the search came to its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Outcome {
+    /// A plan that is better than the incumbent.
+    Found,
+    /// Nothing is left.
+    Exhausted,
+    /// At a limit of time, room or work.
+    Stopped,
+}
+
+/// What a sequence has to be new in.
+enum Kind<'a> {
+    Greedy { guidance: Box<RelaxedPlanHeuristic<'a>>, seen: FxHashMap<u64, Rational> },
+    Exhaustive { traces: Traces<'a>, seen: FxHashSet<Vec<(OperatorId, u32)>> },
+}
+
+pub(super) struct Search<'a> {
+    concurrent: &'a TemporalTask,
+    expansion: &'a Expansion<'a>,
+    kind: Kind<'a>,
+    nodes: Vec<Course>,
+    /// Of all happenings, and of preferred ones.
+    queues: [BinaryHeap<QueueEntry>; 2],
+    priorities: [i64; 2],
+    order: u32,
+    nearest: u64,
+    bytes: usize,
+    /// The least that a plan which was found could come to if its durations need not be decimals.
+    reached: Option<Rational>,
+    pub(super) figures: SearchStatistics,
+}
+
+impl<'a> Search<'a> {
+    /// By relaxed plans; it proves nothing.
+    pub(super) fn greedy(
+        concurrent: &'a TemporalTask,
+        expansion: &'a Expansion<'a>,
+        guidance: RelaxedPlanHeuristic<'a>,
+    ) -> Self {
+        let kind = Kind::Greedy { guidance: Box::new(guidance), seen: FxHashMap::default() };
+        Self::new(concurrent, expansion, kind)
+    }
+
+    /// Through all sequences.
+    pub(super) fn exhaustive(concurrent: &'a TemporalTask, expansion: &'a Expansion<'a>) -> Self {
+        let kind = Kind::Exhaustive { traces: Traces::new(concurrent), seen: FxHashSet::default() };
+        Self::new(concurrent, expansion, kind)
+    }
+
+    fn new(concurrent: &'a TemporalTask, expansion: &'a Expansion<'a>, kind: Kind<'a>) -> Self {
+        Self {
+            concurrent,
+            expansion,
+            kind,
+            nodes: Vec::new(),
+            queues: Default::default(),
+            priorities: [0; 2],
+            order: 0,
+            nearest: u64::MAX,
+            bytes: 0,
+            reached: None,
+            figures: SearchStatistics::default(),
+        }
+    }
+
+    /// No plan that is not known has a lower metric than this, if the search leaves nothing out.
+    pub(super) fn lower(&self) -> Option<Rational> {
+        let open = self.queues[0].peek().map(|Reverse((_, least, ..))| least);
+        open.into_iter().chain(&self.reached).min().cloned()
+    }
+
+    /// Whether it takes a quarter of the room that there is.
+    pub(super) fn is_full(&self, limits: &Limits) -> bool {
+        let queued = self.queues.iter().map(BinaryHeap::len).fold(0, usize::saturating_add);
+        let queued = queued.saturating_mul(size_of::<QueueEntry>());
+        self.bytes.saturating_add(queued) > limits.room() / 4
+    }
+
+    /// Searches for a plan that is better than the incumbent, until `work` is used up: each sequence that is looked at is one unit of it.
+    pub(super) fn run(&mut self, best: &mut Option<Answer>, limits: &Limits, work: u64) -> Outcome {
+        if self.nodes.is_empty()
+            && let Some(outcome) = self.take_up(Course::new(self.concurrent), best)
+        {
+            return outcome;
+        }
+        let mut pulse = limits.pulse();
+        for _ in 0..work {
+            if pulse.beat().is_err() || self.is_full(limits) {
+                return Outcome::Stopped;
+            }
+            let Some((least, parent, operator)) = self.pop() else { return Outcome::Exhausted };
+            if best.as_ref().is_some_and(|best| is_lost(self.concurrent, &least, best)) {
+                continue;
+            }
+            let Some(course) = self.nodes[parent as usize].after(self.concurrent, operator) else { continue };
+            if let Some(outcome) = self.take_up(course, best) {
+                return outcome;
+            }
+        }
+        Outcome::Stopped
+    }
+
+    /// Looks at a sequence, and queues what can follow it.
+    fn take_up(&mut self, course: Course, best: &mut Option<Answer>) -> Option<Outcome> {
+        self.figures.evaluated = self.figures.evaluated.saturating_add(1);
+        let least = course.least(self.concurrent);
+        if best.as_ref().is_some_and(|best| is_lost(self.concurrent, &least, best)) {
+            return None;
+        }
+        let HeuristicValue { left, preferred } = self.judge(&course, &least)?;
+        let mut outcome = None;
+        if course.is_goal(self.concurrent)
+            && let Some(found) = answer(self.concurrent, &course)
+        {
+            self.note_reached(&found.least);
+            if best.as_ref().is_none_or(|best| found.value < best.value) {
+                *best = Some(found);
+                outcome = Some(Outcome::Found);
+            }
+        }
+        if left < self.nearest {
+            self.nearest = left;
+            self.priorities[1] = self.priorities[1].saturating_sub(BOOST);
+        }
+        let starts =
+            self.expansion.starts(&course.state(self.concurrent)).into_iter().map(|start| (start, 0));
+        let candidates: Vec<(OperatorId, u32)> = starts.chain(course.ends(self.concurrent)).collect();
+        let own = SearchStatistics { expanded: 1, generated: candidates.len() as u64, evaluated: 0 };
+        self.figures = self.figures.plus(own);
+        let (id, depth) = (dense(self.nodes.len()), dense(course.passed.len()));
+        for operator in candidates {
+            self.order = self.order.wrapping_add(1);
+            let entrance = Reverse((left, least.clone(), Reverse(depth), self.order, id, operator));
+            if preferred.binary_search(&operator.0).is_ok() {
+                self.queues[1].push(entrance.clone());
+            }
+            self.queues[0].push(entrance);
+        }
+        self.bytes = self.bytes.saturating_add(course.bytes());
+        self.nodes.push(course);
+        outcome
+    }
+
+    /// Notes what a plan could come to if its durations need not be decimals.
+    fn note_reached(&mut self, least: &Rational) {
+        if self.reached.as_ref().is_none_or(|reached| least < reached) {
+            self.reached = Some(least.clone());
+        }
+    }
+
+    /// How far the goal is from a sequence; none if it is nothing new, or a dead end.
+    fn judge(&mut self, course: &Course, least: &Rational) -> Option<HeuristicValue> {
+        match &mut self.kind {
+            Kind::Exhaustive { traces, seen } => {
+                let sequence: Vec<_> =
+                    course.passed.iter().map(|passed| (passed.operator, passed.run)).collect();
+                let is_new = seen.insert(traces.first(&sequence));
+                is_new.then(|| HeuristicValue { left: 0, preferred: Vec::new() })
+            }
+            Kind::Greedy { guidance, seen } => {
+                let known = seen.entry(signature(course));
+                let mut is_new = false;
+                let sooner = known.or_insert_with(|| {
+                    is_new = true;
+                    least.clone()
+                });
+                if !is_new && *least >= *sooner {
+                    return None;
+                }
+                sooner.clone_from(least);
+                let most = |linear: &Linear<Int>| {
+                    course.highest(&course.value(linear))?.to_big().floor().to_integer().to_i128()
+                };
+                guidance.guide_from(&course.values, course.instances(), &most)
+            }
+        }
+    }
+
+    fn pop(&mut self) -> Option<(Rational, u32, (OperatorId, u32))> {
+        let filled = (0..self.queues.len()).filter(|queue| !self.queues[*queue].is_empty());
+        let queue = filled.min_by_key(|queue| self.priorities[*queue])?;
+        self.priorities[queue] = self.priorities[queue].saturating_add(1);
+        let Reverse((_, least, _, _, parent, operator)) = self.queues[queue].pop()?;
+        Some((least, parent, operator))
+    }
+}
+
+/// Whether nothing with such a least metric is better than the incumbent.
+fn is_lost(concurrent: &TemporalTask, least: &Rational, best: &Answer) -> bool {
+    concurrent.is_whole && *least >= best.value
+}
+
+/// A hash of what tells sequences apart for the greedy search: values, actions under way, and the ranges of numbers. Two sequences with one
+/// hash are taken for the same: this search claims nothing.
+fn signature(course: &Course) -> u64 {
+    let mut hasher = FxHasher::default();
+    course.values.hash(&mut hasher);
+    course.instances().for_each(|instance| instance.hash(&mut hasher));
+    for number in &course.numbers {
+        course.highest(number).hash(&mut hasher);
+        if number.known().is_none() {
+            course.highest(&Affine::default().minus(number)).hash(&mut hasher);
+        }
+    }
+    hasher.finish()
+}

@@ -1,0 +1,207 @@
+//! What a happening reads and writes, by the rule of PDDL 2.1 that there are no moving targets [1].
+//!
+//! Everything that a condition or an effect mentions counts as read, whether or not it matters in a state: below a quantifier all
+//! instances of an atom, below a derived predicate all that its axioms depend on.
+//!
+//! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.4.
+
+use rustc_hash::FxHashMap;
+
+use pddl::ast::Assignment;
+use task::error::Error;
+use task::ground::evaluate::condition::residual;
+use task::ground::evaluate::expression::ground;
+use task::ground::evaluate::join::each_binding;
+use task::ground::evaluate::reads::{Reads, Slot, fits};
+use task::ground::vocabulary::atom::{AtomId, Binding, arguments};
+use task::ground::vocabulary::eval_error::Failure;
+use task::ground::vocabulary::partial_eval::Residual;
+use task::ground::vocabulary::world::World;
+use task::lifted::{Change, Effect, Expression, FunctionId, ObjectId, PredicateId, Rational};
+use task::number::dense;
+use task::task::quantity::NumericId;
+
+/// How a number changes: two changes of one way commute, unless both assign.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(super) enum Way {
+    Assign,
+    Add,
+    Scale,
+}
+
+/// Atoms and numbers, ascending. The ids are those of this module alone.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Footprint {
+    pub(super) reads: Vec<AtomId>,
+    pub(super) reads_numbers: Vec<NumericId>,
+    pub(super) added: Vec<AtomId>,
+    pub(super) deleted: Vec<AtomId>,
+    pub(super) numbers: Vec<(NumericId, Way)>,
+}
+
+impl Footprint {
+    /// Whether the order of two happenings would matter: one writes what the other reads, or both write in ways that do not commute.
+    pub(super) fn interferes(&self, other: &Self) -> bool {
+        let clash = |(number, way): &(NumericId, Way)| {
+            let mut others = other.numbers.iter().filter(|(other, _)| other == number);
+            others.any(|(_, other)| other != way || *way == Way::Assign)
+        };
+        self.disturbs(other) || other.disturbs(self) || self.numbers.iter().any(clash)
+    }
+
+    /// Whether this writes what the other one reads, or adds what it deletes.
+    fn disturbs(&self, other: &Self) -> bool {
+        let mut written = self.added.iter().chain(&self.deleted);
+        written.any(|atom| other.reads.binary_search(atom).is_ok())
+            || self.added.iter().any(|atom| other.deleted.binary_search(atom).is_ok())
+            || self.numbers.iter().any(|(number, _)| other.reads_numbers.binary_search(number).is_ok())
+    }
+}
+
+/// Collects what is written, then looks up what is read of it.
+pub(super) struct Footprints<'a> {
+    world: World<'a>,
+    /// Whether more is written somewhere than will be in some state.
+    pub(super) supposes: bool,
+}
+
+impl<'a> Footprints<'a> {
+    pub(super) fn new(world: World<'a>) -> Self {
+        Self { world, supposes: false }
+    }
+
+    /// What effects write, or may write.
+    ///
+    /// # Errors
+    /// A number without a value.
+    pub(super) fn writes(&mut self, effects: &[Effect], binding: &Binding) -> Result<Footprint, Error> {
+        let mut footprint = Footprint::default();
+        for effect in effects {
+            let mut bindings = Vec::new();
+            let mut own = binding.clone();
+            each_binding(&mut self.world, &effect.bound, &[], &mut own, &mut |_, binding| {
+                bindings.push(binding.clone());
+                true
+            })?;
+            for mut binding in bindings {
+                match residual(&mut self.world, &effect.condition, &mut binding) {
+                    Ok(Residual::True) => self.write(&effect.change, &binding, &mut footprint)?,
+                    Ok(Residual::False) | Err(Failure::Undefined) => {}
+                    // Whether it applies depends on the state. That it may is enough to keep others away.
+                    Ok(_) => {
+                        self.supposes = true;
+                        self.write(&effect.change, &binding, &mut footprint)?;
+                    }
+                    Err(Failure::Error(error)) => return Err(error),
+                }
+            }
+        }
+        let Footprint { added, deleted, numbers, .. } = &mut footprint;
+        for atoms in [added, deleted] {
+            atoms.sort_unstable();
+            atoms.dedup();
+        }
+        numbers.sort_unstable();
+        // The ground operator exists, so its changes of one number go together.
+        numbers.dedup();
+        Ok(footprint)
+    }
+
+    /// The value of an expression that no action changes; none if it has none.
+    pub(super) fn constant(
+        &mut self,
+        expression: &Expression,
+        binding: &Binding,
+    ) -> Result<Option<Rational>, Error> {
+        match ground(&mut self.world, expression, binding) {
+            Ok(linear) => Ok(linear.coefficients.is_empty().then_some(linear.quantity.constant)),
+            Err(Failure::Undefined) => Ok(None),
+            Err(Failure::Error(error)) => Err(error),
+        }
+    }
+
+    fn write(&mut self, change: &Change, binding: &Binding, into: &mut Footprint) -> Result<(), Error> {
+        match change {
+            Change::Add(predicate, terms) | Change::Delete(predicate, terms) => {
+                let atom = self.world.atom(*predicate, &arguments(terms, binding));
+                let target =
+                    if matches!(change, Change::Add(..)) { &mut into.added } else { &mut into.deleted };
+                target.push(atom);
+            }
+            Change::Assign { assignment, function, terms, place, .. } => {
+                let way = match assignment {
+                    Assignment::Assign => Way::Assign,
+                    Assignment::Increase | Assignment::Decrease => Way::Add,
+                    Assignment::ScaleUp | Assignment::ScaleDown => Way::Scale,
+                };
+                match self.world.numeric(*function, &arguments(terms, binding), *place) {
+                    Ok(number) => into.numbers.push((number, way)),
+                    Err(Failure::Undefined) => {}
+                    Err(Failure::Error(error)) => return Err(error),
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// An index of all that has been written so far.
+    pub(super) fn index(&self) -> WriteIndex {
+        let mut written = WriteIndex::default();
+        for (index, (predicate, arguments)) in self.world.atoms.keys().enumerate() {
+            let entry = written.atoms.entry(*predicate).or_default();
+            entry.push((arguments.clone(), AtomId(dense(index))));
+        }
+        for (index, (function, arguments)) in self.world.numerics.keys().enumerate() {
+            let entry = written.numbers.entry(*function).or_default();
+            entry.push((arguments.clone(), NumericId(dense(index))));
+        }
+        written.exact = written
+            .atoms
+            .iter()
+            .flat_map(|(predicate, rows)| {
+                rows.iter().map(|(arguments, atom)| ((*predicate, arguments.to_vec()), *atom))
+            })
+            .collect();
+        written
+    }
+}
+
+/// Rows with what they stand for.
+type Rows<V> = Vec<(Box<[ObjectId]>, V)>;
+
+/// Atoms and numbers by their symbols.
+#[derive(Default)]
+pub(super) struct WriteIndex {
+    atoms: FxHashMap<PredicateId, Rows<AtomId>>,
+    numbers: FxHashMap<FunctionId, Rows<NumericId>>,
+    exact: FxHashMap<(PredicateId, Vec<ObjectId>), AtomId>,
+}
+
+impl WriteIndex {
+    /// What of all that is written is read.
+    pub(super) fn look_up(&self, reads: &Reads) -> (Vec<AtomId>, Vec<NumericId>) {
+        let (mut atoms, mut numbers) = (Vec::new(), Vec::new());
+        for (predicate, pattern) in &reads.atoms {
+            let object = |slot: &Slot| if let Slot::Object(object) = slot { Some(*object) } else { None };
+            let whole =
+                pattern.as_ref().and_then(|pattern| pattern.iter().map(object).collect::<Option<Vec<_>>>());
+            match whole {
+                Some(arguments) => atoms.extend(self.exact.get(&(*predicate, arguments))),
+                None => matching(self.atoms.get(predicate), pattern.as_deref(), &mut atoms),
+            }
+        }
+        for (function, pattern) in &reads.numbers {
+            matching(self.numbers.get(function), pattern.as_deref(), &mut numbers);
+        }
+        atoms.sort_unstable();
+        atoms.dedup();
+        numbers.sort_unstable();
+        numbers.dedup();
+        (atoms, numbers)
+    }
+}
+
+fn matching<V: Copy>(rows: Option<&Rows<V>>, pattern: Option<&[Slot]>, into: &mut Vec<V>) {
+    let fits = |arguments: &[ObjectId]| pattern.is_none_or(|pattern| fits(pattern, arguments));
+    into.extend(rows.into_iter().flatten().filter(|(arguments, _)| fits(arguments)).map(|(_, value)| *value));
+}

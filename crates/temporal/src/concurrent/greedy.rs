@@ -1,0 +1,389 @@
+//! Lazy greedy best-first search over sequences of happenings: a plan soon, then better ones.
+//!
+//! Situations are evaluated when they are taken up, not when they are found, and stand in the order of what was left before them;
+//! happenings that the relaxed plan begins with have a queue of their own [1]. In a third one those come first that follow a situation with a fact
+//! which no other one had before with as many goals to go [2]: a way that the relaxed plan does not see is found there. Where ends come right
+//! after starts in the sequence, far fewer situations are left, and most tasks have a plan among them; times overlap all the same. Of situations with the same state and the same actions under
+//! way only the first is pursued, so that this search may miss plans and proves nothing.
+//!
+//! [1] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010. [2] N. Lipovetzky, H. Geffner: Best-first width search, AAAI 2017.
+
+use std::collections::hash_map::Entry;
+use std::hash::{Hash, Hasher};
+
+use rustc_hash::{FxHashMap, FxHashSet, FxHasher};
+use search::bounds::Bounds;
+use search::satisfice::alternating_open_list::AlternatingOpenList;
+use search::search::SearchStatistics;
+use smallvec::SmallVec;
+use task::limits::Limits;
+use task::number::{Int, dense, words};
+use task::task::OperatorId;
+
+use crate::concurrent::makespan_heuristic::Estimate;
+use crate::concurrent::relaxed_plan_heuristic::{HeuristicValue, RelaxedPlanHeuristic};
+use crate::concurrent::search::Sequence;
+use crate::concurrent::store::{PackedNode, Packing};
+use crate::concurrent::successors::{DeadEnd, Expansion, TemporalState};
+use crate::concurrent::temporal_task::TemporalTask;
+
+/// What a node takes besides its situation, about: itself, its places in queues, and that it was seen.
+const OVERHEAD: usize = size_of::<Node>() + 80;
+
+/// A happening, and whether it takes place at the time of the one before.
+type Link = (OperatorId, bool);
+pub(super) type Links = SmallVec<[Link; 2]>;
+
+/// What the search goes through.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Mode {
+    /// Actions one after another in the sequence; their times may overlap all the same, where they do not interfere.
+    Sequential,
+    /// Starts and ends by themselves.
+    Overlapping,
+    /// The same, and what is reached again, but sooner, is pursued again.
+    Sooner,
+}
+
+impl Mode {
+    /// What follows a situation by a happening. Timed initial literals that come before it come first.
+    pub(super) fn apply_happening(
+        self,
+        concurrent: &TemporalTask,
+        expansion: &Expansion<'_>,
+        situation: &TemporalState,
+        operator: OperatorId,
+        links: &mut Links,
+    ) -> Option<TemporalState> {
+        let mut waited: Option<TemporalState> = None;
+        loop {
+            let before = waited.as_ref().unwrap_or(situation);
+            let together = before.clocks.unsettled();
+            match expansion.after(before, operator, false) {
+                // That others make up for it at the same time is rare.
+                Ok((situation, _)) if situation.clocks.unsettled() && self != Self::Sooner => return None,
+                Ok((situation, compressed)) => {
+                    links.push((operator, together));
+                    if compressed {
+                        links.push((concurrent.end_of(operator), false));
+                    }
+                    return Some(situation);
+                }
+                Err(DeadEnd::TooLate) => {
+                    let (_, event) = expansion.next_event(&before.clocks)?;
+                    let next = expansion.step(before, event).ok()?;
+                    links.push((event, together));
+                    waited = Some(next);
+                }
+                Err(DeadEnd::Impossible | DeadEnd::Unfit) => return None,
+            }
+        }
+    }
+}
+
+struct Node {
+    packed: PackedNode,
+    parent: u32,
+    /// What has happened since the parent.
+    links: Links,
+}
+
+/// Whether it is nothing new, what is left, and the least makespan.
+type Value = (bool, u64, Int);
+
+/// Why the search came to its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Outcome {
+    /// A plan that is better than the incumbent.
+    Found,
+    /// Nothing is left.
+    Exhausted,
+    /// At a limit.
+    Stopped,
+}
+
+pub(super) struct Greedy<'a> {
+    concurrent: &'a TemporalTask,
+    expansion: &'a Expansion<'a>,
+    estimate: &'a Estimate,
+    bounds: Option<&'a Bounds>,
+    guidance: RelaxedPlanHeuristic<'a>,
+    packing: Packing<'a>,
+    nodes: Vec<Node>,
+    /// The node that was looked at last, unpacked.
+    latest: Option<(u32, TemporalState)>,
+    /// By a hash of what must agree: the least makespan with which it was reached.
+    seen: FxHashMap<u64, Int>,
+    /// About how many bytes the nodes take.
+    bytes: usize,
+    /// By what is left, preferred ones by that, and all again, what follows something new first.
+    open: AlternatingOpenList<Value>,
+    /// The facts that have held, by how many goals were to go.
+    known: Vec<FxHashSet<(u32, u32)>>,
+    pub(super) mode: Mode,
+    nearest: u64,
+    pub(super) figures: SearchStatistics,
+}
+
+/// Two situations with one hash are taken for the same: this search claims nothing.
+fn hash_of(key: &[u32]) -> u64 {
+    let mut hasher = FxHasher::default();
+    key.hash(&mut hasher);
+    hasher.finish()
+}
+
+impl<'a> Greedy<'a> {
+    pub(super) fn new(
+        concurrent: &'a TemporalTask,
+        expansion: &'a Expansion<'a>,
+        estimate: &'a Estimate,
+        bounds: Option<&'a Bounds>,
+        guidance: RelaxedPlanHeuristic<'a>,
+        mode: Mode,
+    ) -> Self {
+        let (nodes, seen) = (Vec::new(), FxHashMap::default());
+        let (packing, latest) = (Packing::new(concurrent), None);
+        let open = AlternatingOpenList::new([false, true, false]);
+        let bytes = 0;
+        Self {
+            bytes,
+            concurrent,
+            expansion,
+            estimate,
+            bounds,
+            guidance,
+            packing,
+            nodes,
+            latest,
+            seen,
+            open,
+            known: Vec::new(),
+            mode,
+            nearest: u64::MAX,
+            figures: SearchStatistics::default(),
+        }
+    }
+
+    /// Searches for a plan that is better than the incumbent, until `work` is used up: each evaluation is one unit of it.
+    #[expect(clippy::arithmetic_side_effects, reason = "counted down from what was given")]
+    pub(super) fn run(
+        &mut self,
+        incumbent: &mut Option<Sequence>,
+        limits: &Limits,
+        mut work: usize,
+    ) -> Outcome {
+        if self.nodes.is_empty() {
+            let root = self.expansion.root();
+            if let Some(outcome) = self.take_up(&root, 0, Links::new(), incumbent) {
+                return outcome;
+            }
+        }
+        let mut pulse = limits.pulse();
+        loop {
+            if work == 0 || pulse.beat().is_err() {
+                return Outcome::Stopped;
+            }
+            // A quarter of the room is for this.
+            if self.bytes.saturating_add(self.open.size().saturating_mul(8)) > limits.room() / 4 {
+                return Outcome::Exhausted;
+            }
+            let Some((parent, operator)) = self.open.pop() else { return Outcome::Exhausted };
+            let Some((situation, links)) = self.follow(parent, OperatorId(operator)) else { continue };
+            work -= 1;
+            if let Some(outcome) = self.take_up(&situation, parent, links, incumbent) {
+                return outcome;
+            }
+        }
+    }
+
+    /// What follows a node by a happening, or by a whole action; timed initial literals that come before it come first.
+    fn follow(&mut self, parent: u32, operator: OperatorId) -> Option<(TemporalState, Links)> {
+        let known = self.latest.take().filter(|(own, _)| *own == parent);
+        let unpack = || (parent, self.packing.unpack(&self.nodes[parent as usize].packed));
+        let (_, situation) = self.latest.insert(known.unwrap_or_else(unpack));
+        let mut links = Links::new();
+        let next =
+            self.mode.apply_happening(self.concurrent, self.expansion, situation, operator, &mut links)?;
+        let is_over = next.clocks.opens().is_empty();
+        if self.mode != Mode::Sequential || is_over {
+            return Some((next, links));
+        }
+        let end = self.concurrent.end_of(operator);
+        let next = self.mode.apply_happening(self.concurrent, self.expansion, &next, end, &mut links)?;
+        Some((next, links))
+    }
+
+    /// Evaluates a situation, and queues what can follow it.
+    fn take_up(
+        &mut self,
+        situation: &TemporalState,
+        parent: u32,
+        links: Links,
+        incumbent: &mut Option<Sequence>,
+    ) -> Option<Outcome> {
+        let value = self.value(situation)?;
+        if incumbent.as_ref().is_some_and(|incumbent| value >= incumbent.value)
+            || !self.is_new(situation, value.1)
+        {
+            return None;
+        }
+        let found = if self.expansion.is_goal(situation) {
+            let better = self
+                .sequence(situation, parent, &links)
+                .filter(|own| incumbent.as_ref().is_none_or(|known| own.value < known.value));
+            let found = better.is_some().then_some(Outcome::Found);
+            *incumbent = better.or_else(|| incumbent.take());
+            found
+        } else {
+            None
+        };
+        // Where preferences are violated in the end, a longer plan may be better.
+        if found.is_some() && self.concurrent.violations.is_empty() {
+            return found;
+        }
+        self.figures.evaluated = self.figures.evaluated.saturating_add(1);
+        let Some(HeuristicValue { left, preferred }) = self.guidance.guide(situation) else { return found };
+        if left < self.nearest {
+            self.nearest = left;
+            self.open.boost();
+        }
+        let is_old = !self.has_news(situation);
+        let id = dense(self.nodes.len());
+        let candidates: Vec<u32> = self.expansion.candidates(situation).iter().map(|own| own.0).collect();
+        let own = SearchStatistics { expanded: 1, generated: candidates.len() as u64, evaluated: 0 };
+        self.figures = self.figures.plus(own);
+        let is_preferred = |own: &u32| preferred.binary_search(&OperatorId(*own)).is_ok();
+        let preferred: Vec<u32> = candidates.iter().copied().filter(is_preferred).collect();
+        let values = [false, false, is_old].map(|is_old| (is_old, left, value.1));
+        self.open.push(id, values, &candidates, &preferred);
+        let packed = self.packing.pack(situation);
+        self.bytes = self.bytes.saturating_add(OVERHEAD).saturating_add(packed.bytes());
+        self.nodes.push(Node { packed, parent, links });
+        found
+    }
+
+    /// A lower bound of the metric of plans that go on from here, and of their makespan. None if there is none.
+    fn value(&self, situation: &TemporalState) -> Option<(Int, Int)> {
+        let TemporalState { state, clocks, cost } = situation;
+        let makespan = self.estimate.left(state, clocks)?.makespan;
+        let costs = self.bounds.map_or(Some(0), |bounds| bounds.estimate(state))?;
+        Some((self.concurrent.measure.total(makespan, cost.checked_add(costs)?)?, makespan))
+    }
+
+    /// Whether a fact holds that has not held in a situation with as many goals to go.
+    fn has_news(&mut self, TemporalState { state, .. }: &TemporalState) -> bool {
+        let task = &self.concurrent.task;
+        let to_go = task.goal.facts.iter().filter(|fact| !fact.holds(&state.values)).count();
+        if self.known.len() <= to_go {
+            self.known.resize(to_go.saturating_add(1), FxHashSet::default());
+        }
+        let known = &mut self.known[to_go];
+        let facts = (0..).zip(&state.values[..task.basic]);
+        facts.fold(false, |news, (variable, value)| known.insert((variable, *value)) || news)
+    }
+
+    fn is_new(&mut self, situation: &TemporalState, makespan: Int) -> bool {
+        let TemporalState { state, clocks, .. } = situation;
+        let mut key = state.values[..self.concurrent.task.basic].to_vec();
+        // What is only measured makes no difference to what can follow.
+        let rest = &self.concurrent.task.objective.rest;
+        let is_read = |variable: u32| rest.iter().all(|(own, _)| own.0 != variable);
+        let numbers = (0..).zip(&state.numbers).filter(|(variable, _)| is_read(*variable));
+        key.extend(numbers.flat_map(|(_, number)| words(*number)));
+        key.extend(clocks.opens().iter().map(|open| open.instance));
+        key.push(u32::from(clocks.unsettled()));
+        match self.seen.entry(hash_of(&key)) {
+            Entry::Vacant(entry) => {
+                entry.insert(makespan);
+                true
+            }
+            Entry::Occupied(mut entry) => {
+                let is_sooner = self.mode == Mode::Sooner && makespan < *entry.get();
+                if is_sooner {
+                    entry.insert(makespan);
+                }
+                is_sooner
+            }
+        }
+    }
+
+    /// The sequence that leads to a goal; none if its metric does not fit, or it does not keep what it has to.
+    fn sequence(&self, situation: &TemporalState, parent: u32, links: &Links) -> Option<Sequence> {
+        let value = self.concurrent.value(situation)?;
+        let mut all: Vec<Link> = links.iter().rev().copied().collect();
+        let mut at = parent as usize;
+        while let Some(node) = self.nodes.get(at) {
+            all.extend(node.links.iter().rev());
+            if node.links.is_empty() {
+                break;
+            }
+            at = node.parent as usize;
+        }
+        all.reverse();
+        let (happenings, together) = all.into_iter().unzip();
+        self.concurrent.judge(Sequence { value, happenings, together }, situation.cost)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use num_rational::BigRational;
+    use pddl::{Source, read};
+
+    use super::*;
+    use crate::concurrent::ground_concurrent;
+    use crate::concurrent::happening::Role;
+    use crate::concurrent::temporal_relaxation::TemporalRelaxation;
+    use task::ground::GroundConfig;
+
+    /// Robots on three cells in a row and three beside them change places, and none enters a cell before it has been left.
+    const DOMAIN: &str = "(define (domain crowd) (:requirements :strips :typing :durative-actions)
+        (:types robot cell) (:predicates (at ?r - robot ?c - cell) (clear ?c - cell) (next ?a ?b - cell))
+        (:durative-action move :parameters (?r - robot ?from ?to - cell) :duration (= ?duration 1)
+          :condition (and (at start (at ?r ?from)) (at start (clear ?to)) (over all (next ?from ?to)))
+          :effect (and (at start (not (at ?r ?from))) (at start (not (clear ?to)))
+            (at end (at ?r ?to)) (at end (clear ?from)))))";
+    const PROBLEM: &str = "(define (problem swap) (:domain crowd) (:objects r1 r2 r3 - robot a1 a2 a3 b1 b2 b3 - cell)
+        (:init (at r1 a1) (at r2 a2) (at r3 a3) (clear b1) (clear b2) (clear b3)
+          (next a1 a2) (next a2 a1) (next a2 a3) (next a3 a2) (next b1 b2) (next b2 b1) (next b2 b3) (next b3 b2)
+          (next a1 b1) (next b1 a1) (next a2 b2) (next b2 a2) (next a3 b3) (next b3 a3))
+        (:goal (and (at r1 a3) (at r2 a2) (at r3 a1))))";
+
+    fn first(mode: Mode) -> (Sequence, Vec<Role>) {
+        let (domain, problem, _) =
+            read(&Source::new("domain", DOMAIN), &Source::new("problem", PROBLEM)).expect("PDDL");
+        let separation = BigRational::new(1.into(), 1000.into());
+        let concurrent =
+            ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation).expect("a task");
+        let (estimate, expansion) = (Estimate::new(&concurrent), Expansion::new(&concurrent));
+        let relaxed = TemporalRelaxation::new(&concurrent);
+        let mut greedy =
+            Greedy::new(&concurrent, &expansion, &estimate, None, RelaxedPlanHeuristic::new(&relaxed), mode);
+        let mut incumbent = None;
+        let outcome = greedy.run(&mut incumbent, &Limits::none(), 100_000);
+        assert_eq!(outcome, Outcome::Found);
+        let sequence = incumbent.expect("a plan");
+        let roles = sequence.happenings.iter().map(|id| concurrent.happenings[id.index()].role);
+        (sequence.clone(), roles.collect())
+    }
+
+    #[test]
+    fn whole_actions_follow_each_other_and_overlap_in_time() {
+        let (sequence, roles) = first(Mode::Sequential);
+        assert!(roles.len() > 6, "{roles:?}");
+        for pair in roles.chunks(2) {
+            let [Role::Start(start), Role::End(end)] = pair else { panic!("{roles:?}") };
+            assert_eq!(start, end);
+        }
+        let actions = Int::try_from(roles.len() / 2).expect("few");
+        assert!(sequence.value.1 < actions * 1000, "{:?}", sequence.value);
+    }
+
+    #[test]
+    fn starts_and_ends_by_themselves_reach_the_goal_too() {
+        for mode in [Mode::Overlapping, Mode::Sooner] {
+            let (sequence, roles) = first(mode);
+            assert_eq!(sequence.together.len(), roles.len());
+        }
+    }
+}

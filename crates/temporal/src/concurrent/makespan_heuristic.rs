@@ -1,0 +1,159 @@
+//! How much time is left, at least, by each variable of the goal alone.
+//!
+//! A variable changes its values one after another: whatever changes one has read it, so it comes a separation after the change
+//! before, and an action that holds the variable from its start to its end takes its time. The shortest path to the value of
+//! the goal is counted from when the variable got its value.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use task::number::{Int, dense};
+use task::task::{Fact, State, VariableId};
+
+use crate::concurrent::happening::Role;
+use crate::concurrent::simple_temporal_network::SimpleTemporalNetwork;
+use crate::concurrent::temporal_task::TemporalTask;
+
+/// The time to the goal for each value of a variable; none if there is no way.
+struct Path {
+    variable: usize,
+    left: Vec<Option<Int>>,
+}
+
+/// Paths of the variables of the goal.
+pub(super) struct Estimate {
+    paths: Vec<Path>,
+    separation: Int,
+}
+
+/// A change of a variable: from a value, or from any, to a value, so long after the value before.
+type Edge = (Option<u32>, u32, Int);
+
+/// What is left in a node of the search.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RemainingTime {
+    /// The least time at which the goal can be reached.
+    pub(super) makespan: Int,
+    /// The sum over variables, which may be too much.
+    pub(super) sum: Int,
+}
+
+impl Estimate {
+    pub(super) fn new(concurrent: &TemporalTask) -> Self {
+        let task = &concurrent.task;
+        let goals = task.goal.facts.iter().filter(|fact| fact.variable.index() < task.basic);
+        let paths = goals.map(|goal| path(concurrent, *goal)).collect();
+        Self { paths, separation: concurrent.separation }
+    }
+
+    /// None if the goal is out of reach.
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "fewer than 2^32 happenings, less than 2^91 apart, and a variable has fewer than 2^32 values"
+    )]
+    pub(super) fn left(&self, state: &State, clocks: &SimpleTemporalNetwork) -> Option<RemainingTime> {
+        // No plan ends with waiting for what happens by itself.
+        let mut left = RemainingTime { makespan: clocks.latest().max(clocks.floor()), sum: 0 };
+        for open in clocks.opens() {
+            let end = clocks.start(open) + open.duration;
+            left.makespan = left.makespan.max(end);
+        }
+        for path in &self.paths {
+            let more = path.left[state.values[path.variable] as usize]?;
+            if more > 0 {
+                let since = clocks.changed(dense(path.variable)).unwrap_or(-self.separation);
+                left.makespan = left.makespan.max(since + more);
+                left.sum += more;
+            }
+        }
+        Some(left)
+    }
+}
+
+/// Dijkstra's algorithm from the value of the goal backwards.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "a path takes fewer steps than the variable has values, each less than 2^91"
+)]
+fn path(concurrent: &TemporalTask, goal: Fact) -> Path {
+    let variable = goal.variable;
+    let values = concurrent.task.variables[variable.index()].values.len();
+    let edges = edges(concurrent, variable);
+    let mut into: Vec<Vec<usize>> = vec![Vec::new(); values];
+    for (index, (_, to, _)) in edges.iter().enumerate() {
+        into[*to as usize].push(index);
+    }
+    let mut left = vec![None; values];
+    let mut open = BinaryHeap::from([Reverse((0, goal.value))]);
+    while let Some(Reverse((distance, value))) = open.pop() {
+        if left[value as usize].is_some() {
+            continue;
+        }
+        left[value as usize] = Some(distance);
+        for (from, _, weight) in into[value as usize].iter().map(|index| edges[*index]) {
+            let all = 0..dense(values);
+            let sources = from.map_or(all, |from| from..from + 1);
+            for source in sources.filter(|source| left[*source as usize].is_none()) {
+                open.push(Reverse((distance + weight, source)));
+            }
+        }
+    }
+    Path { variable: variable.index(), left }
+}
+
+/// All changes of a variable.
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "durations and the separation are below 2^90; setters are counted in memory"
+)]
+fn edges(concurrent: &TemporalTask, variable: VariableId) -> Vec<Edge> {
+    let task = &concurrent.task;
+    let operators = || task.operators.iter().zip(&concurrent.happenings);
+    let of = |facts: &[Fact]| facts.iter().find(|fact| fact.variable == variable).map(|fact| fact.value);
+    let apart = concurrent.separation;
+    let mut setters = vec![0_u32; task.variables[variable.index()].values.len()];
+    for operator in &task.operators {
+        let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
+        let effects = operator.effects.iter().chain(conditional);
+        for fact in effects.filter(|fact| fact.variable == variable) {
+            setters[fact.value as usize] += 1;
+        }
+    }
+    let mut edges = Vec::new();
+    for (operator, happening) in operators().filter(|(_, happening)| happening.role != Role::Never) {
+        let conditional = operator.conditional.iter().filter_map(|effect| of(&effect.effects));
+        edges.extend(conditional.map(|to| (None, to, 0)));
+        let Some(to) = of(&operator.effects) else { continue };
+        let from = of(&operator.condition.facts);
+        match happening.role {
+            Role::Never => {}
+            Role::Timed(_) => edges.push((from, to, 0)),
+            Role::Start(_) | Role::Whole => edges.push((from, to, from.map_or(0, |_| apart))),
+            Role::End(instance) => {
+                let instance = &concurrent.instances[instance as usize];
+                let start = &task.operators[instance.start.index()];
+                let held = instance.over_all.map(|id| &task.operators[id.index()]);
+                let kept = held.and_then(|over_all| of(&over_all.condition.facts));
+                edges.push(match (of(&start.effects), from) {
+                    // The value that the start has set stays until the end: it is required all along, or nothing else sets it, not even another run.
+                    (Some(set), Some(from))
+                        if set == from
+                            && (kept == Some(set)
+                                || instance.under_way.is_none() && setters[set as usize] == 1) =>
+                    {
+                        (Some(from), to, instance.duration)
+                    }
+                    // The value stays from before the start to the end.
+                    (None, None) => {
+                        match of(&start.condition.facts).filter(|required| kept == Some(*required)) {
+                            Some(value) => (Some(value), to, instance.duration + apart),
+                            None => (None, to, 0),
+                        }
+                    }
+                    (_, from) => (from, to, from.map_or(0, |_| apart)),
+                });
+            }
+        }
+    }
+    edges
+}

@@ -1,0 +1,285 @@
+//! A PDDL task to a plan whose actions overlap, with the least makespan or the best weighted sum of makespan and costs.
+//!
+//! What a plan is, the definition at the head of [`validate`](pddl::validate) says. Besides, at any time each function that the
+//! running actions require has one design, and no duration is above 0 and below the *separation* (epsilon).
+//!
+//! `split` makes two schemas of a durative action, `temporal_task` finds what each happening waits for, and `search` goes
+//! through all sequences of happenings that matter, with what is left of their simple temporal network in `simple_temporal_network`.
+
+mod action_invariants;
+mod builder;
+mod compression_safe;
+mod conjunctions;
+mod deadline;
+mod duration_fluents;
+mod envelope_facts;
+mod flexible_durations;
+mod footprint;
+mod greedy;
+mod happening;
+mod interference;
+mod interleave;
+mod makespan_heuristic;
+mod measure;
+mod monotone_metric;
+mod plan_metric;
+mod relaxed_plan_heuristic;
+mod relevant_effects;
+mod rule;
+mod schedule;
+mod search;
+mod search_log;
+mod self_overlap;
+mod sequential_first;
+mod simple_temporal_network;
+mod solution;
+mod source_task;
+mod split;
+mod store;
+mod strict_comparisons;
+mod successors;
+mod temporal_relaxation;
+mod temporal_task;
+mod time;
+mod unit;
+
+use std::time::Instant;
+
+use num_rational::BigRational;
+use num_traits::Signed;
+use tracing::info_span;
+
+use ::search::bounds::Bounds;
+use pddl::ast::{self, ActionBody, Comparison, Direction, Domain, EffectTime, Problem, Span};
+use task::compile::{CompiledTask, PlanSemantics, compile as compile_away, is_hidden};
+use task::context::Context;
+use task::error::{Error, Errors, File, Place};
+use task::ground::{Generality, GroundConfig, ground_lifted};
+use task::lifted::{Expression, Lifted, Metric, Rational};
+use task::limits::Limits;
+use task::normalize::{normalize, normalize_freely, undefined_fluents};
+use task::number::Int;
+use task::plan::solution::{Improvement, Proof, Solution, Status};
+
+pub use temporal_task::TemporalTask;
+
+use deadline::Deadline;
+use interleave::interleave_searches;
+use search::SearchEnd;
+use search_log::Record;
+use solution::{ended, in_names};
+use source_task::SourceTask;
+
+/// Where durations are chosen, what has to be more than a number is so much more: one part in so many.
+const PRECISION: Int = 1_000_000;
+
+/// Grounds a domain and a problem that have passed `pddl::check`, for plans whose actions overlap. Interfering happenings are
+/// to lie `separation` apart, in the domain's time unit.
+///
+/// # Errors
+/// Every construct that cannot be planned with, with its place.
+pub fn ground_concurrent(
+    domain: &Domain,
+    problem: &Problem,
+    config: &GroundConfig,
+    separation: &BigRational,
+) -> Result<TemporalTask, Errors> {
+    let overflow = || vec![Error::overflow("the separation")];
+    if !separation.is_positive() {
+        return Err(overflow().into());
+    }
+    let separation = Rational::from_big(separation.clone());
+    let own = PlanSemantics::Overlapping(&separation.to_big());
+    let GroundConfig { objectives, limits, .. } = config;
+    let plain = info_span!("compile").in_scope(|| compile_away(domain, problem, objectives, own, limits))?;
+    let kept = SourceTask::new(domain, problem, config);
+    let config = config.clone().with_objectives(plain.objectives.to_vec());
+    let mut task = ground_plain((&plain.domain, &plain.problem, &config, &separation))?;
+    let shortest = task.shortest.take().map(|shortest| {
+        let shortest = shortest.judged_by(&plain);
+        Box::new(TemporalTask { kept: kept.clone(), ..shortest })
+    });
+    Ok(TemporalTask { shortest, kept, ..task.judged_by(&plain) })
+}
+
+impl TemporalTask {
+    /// The same where constraints on trajectories were compiled away.
+    fn judged_by(self, plain: &CompiledTask<'_>) -> Self {
+        Self {
+            deadlines: plain.deadlines.iter().map(|own| Deadline::new(&self.task, own)).collect(),
+            is_exact: self.is_exact && plain.is_exact,
+            is_bounded: plain.is_exact,
+            ..self
+        }
+    }
+}
+
+/// Grounds a task without constraints on trajectories.
+fn ground_plain(own: Files<'_>) -> Result<TemporalTask, Errors> {
+    let shortest = ground_with(own, &normalize);
+    let is_judged = own.0.actions.iter().any(|action| is_hidden(action.identifier.name.as_str()));
+    if shortest.is_ok() && (is_fixed(own.0) || is_judged) {
+        return shortest;
+    }
+    match (ground_with(own, &normalize_freely), shortest) {
+        (Ok(mut free), shortest) => {
+            free.is_exact = free.is_exact && flexible_durations::is_exact(&free);
+            free.shortest = shortest.ok().map(Box::new);
+            Ok(free)
+        }
+        (Err(_), Ok(shortest)) => Ok(shortest),
+        (Err(errors), Err(_)) => Err(errors),
+    }
+}
+
+/// A domain, a problem, and how to ground them with a separation.
+type Files<'f> = (&'f Domain, &'f Problem, &'f GroundConfig, &'f Rational);
+
+/// The files to a lifted task.
+type Normalize = dyn Fn(&Domain, &Problem, &[ast::Metric]) -> Result<Lifted, Errors>;
+
+/// Grounds a task; numbers without a value are guarded where they need be.
+fn ground_with(
+    (domain, problem, config, separation): Files<'_>,
+    normalize: &Normalize,
+) -> Result<TemporalTask, Errors> {
+    let lifted = || normalize(domain, problem, &config.objectives);
+    let ground = |lifted| {
+        let task = ground_normal(domain, lifted, config, separation)?;
+        let is_open = task.instances.iter().any(|own| own.is_chosen);
+        if is_open { flexible_durations::check(task) } else { Ok(task) }
+    };
+    match ground(lifted()?) {
+        Err(errors) if errors.iter().any(Error::is_value_missing) => {
+            let mut lifted = lifted()?;
+            undefined_fluents::guard(&mut lifted);
+            ground(lifted)
+        }
+        found => found,
+    }
+}
+
+/// Grounds a normalised task.
+fn ground_normal(
+    domain: &Domain,
+    mut lifted: Lifted,
+    config: &GroundConfig,
+    separation: &Rational,
+) -> Result<TemporalTask, Errors> {
+    let place = Place { file: File::Problem, span: Span::default() };
+    let number = |number| Expression::Number(Rational::from_integer(number));
+    let (weight, metric) = match lifted.metrics.first() {
+        Some(metric) => measure::split(metric).ok_or_else(|| {
+            vec![Error::Unsupported {
+                construct: "a metric that rewards time, or is not linear in it, where actions overlap".into(),
+                instead: "a metric that grows with `total-time`, or does not mention it".into(),
+                place: metric.place,
+            }]
+        })?,
+        None => (
+            Rational::from_integer(1),
+            Metric { direction: Direction::Minimize, expression: number(0), place },
+        ),
+    };
+    lifted.metrics = vec![metric];
+    let is_strict = strict_comparisons::compares_strictly(&lifted);
+    let mut split = split::split(lifted, &config.solves, &|action| mentions_duration(domain, action));
+    // Where durations are chosen, more than some number is this much more, at least.
+    let is_chosen = split.chosen.contains(&true);
+    split.is_exact = if is_chosen { !is_strict } else { is_fixed(domain) };
+    let none = vec![Vec::new(); split.designs.len()];
+    let (lifted, designs) = (&split.lifted, &split.designs);
+    let precision = (is_chosen && is_strict).then_some(PRECISION);
+    let generality =
+        Generality { measures_ends: true, measures_rewards: true, precision, ..Generality::default() };
+    let (task, reached) = ground_lifted(lifted, designs, &none, &generality, &config.limits)?;
+    let _span = info_span!("happenings", operators = task.operators.len()).entered();
+    temporal_task::compile(task, &split, &reached, separation, weight, &config.limits)
+}
+
+/// Whether no action has a duration that could be another one.
+fn is_fixed(domain: &Domain) -> bool {
+    let number = |constraint: &ast::DurationConstraint| match &constraint.expression {
+        ast::Expression::Number(number, _) => Some(number.clone()),
+        _ => None,
+    };
+    domain.actions.iter().all(|action| match &action.body {
+        ActionBody::Durative { duration, .. } => match &duration[..] {
+            [only] => only.operator == Comparison::Equal,
+            [one, other] => {
+                let bounds = [one.operator, other.operator];
+                let both = [Comparison::GreaterOrEqual, Comparison::LessOrEqual];
+                both.iter().all(|bound| bounds.contains(bound))
+                    && number(one).is_some_and(|one| number(other) == Some(one))
+            }
+            _ => false,
+        },
+        ActionBody::Instantaneous { .. } => true,
+    })
+}
+
+/// Whether the end of an action mentions `?duration`.
+fn mentions_duration(domain: &Domain, action: u32) -> bool {
+    let Some(action) = domain.actions.get(action as usize) else { return false };
+    let ActionBody::Durative { effects, .. } = &action.body else { return false };
+    effects.iter().any(|(time, effect)| *time == EffectTime::AtEnd && measures(effect))
+}
+
+fn measures(effect: &ast::Effect) -> bool {
+    fn mentioned(expression: &ast::Expression) -> bool {
+        match expression {
+            ast::Expression::Duration(_) => true,
+            ast::Expression::Operation(_, operands, _) => operands.iter().any(mentioned),
+            _ => false,
+        }
+    }
+    match effect {
+        ast::Effect::And(parts) => parts.iter().any(measures),
+        ast::Effect::ForAll(_, inner) | ast::Effect::When(_, inner) => measures(inner),
+        ast::Effect::Assign(_, _, value, _) => mentioned(value),
+        ast::Effect::Add(_) | ast::Effect::Delete(_) => false,
+    }
+}
+
+/// Finds a best plan whose actions overlap; of those, one with the least makespan if it is proved by search. `report` hears of every
+/// improvement.
+pub fn optimize_concurrent(
+    concurrent: &TemporalTask,
+    limits: &Limits,
+    report: &mut dyn FnMut(Improvement),
+) -> Solution {
+    let task = &concurrent.task;
+    let mut record = Record::new(concurrent, Instant::now(), report);
+    if let Some(reason) = &task.unreachable {
+        return ended(Status::Unsolvable, Some(Proof::Relaxation(reason.clone())), record);
+    }
+    if concurrent.instances.iter().any(|own| own.is_chosen) {
+        return flexible_durations::optimize(concurrent, limits, record);
+    }
+    let costs = task.operators.iter().any(|operator| operator.cost.constant > 0);
+    let bounds = (costs || !task.initial.numbers.is_empty())
+        .then(|| Bounds::new(Context::new(task, limits)).ok())
+        .flatten();
+    let span = info_span!("optimize", operators = task.operators.len());
+    let (how, incumbent) =
+        span.in_scope(|| interleave_searches(concurrent, bounds.as_ref(), limits, &mut record, usize::MAX));
+    let plan = incumbent.as_ref().map(|sequence| in_names(concurrent, sequence));
+    let (status, lower) = match (&how, &incumbent) {
+        (SearchEnd::Exhausted, Some(incumbent)) => (Status::Optimal, Some(incumbent.value.0)),
+        (SearchEnd::Exhausted, None) => (Status::Unsolvable, None),
+        (SearchEnd::Stopped(lower), Some(incumbent)) => {
+            (Status::Feasible, Some(*lower.min(&incumbent.value.0)))
+        }
+        (SearchEnd::Stopped(lower), None) => (Status::Unknown, Some(*lower)),
+    };
+    let metric = |total| concurrent.measure.metric(&Rational::from_integer(total));
+    let proved = || if concurrent.is_exact { Proof::Search } else { Proof::Bound };
+    let proof = matches!(how, SearchEnd::Exhausted).then(proved);
+    let steps = plan.as_ref().filter(|_| proof.is_some()).map_or(0, |plan| plan.steps.len());
+    Solution {
+        horizon: steps,
+        plan,
+        lower_bound: lower.filter(|_| concurrent.is_whole).map(metric),
+        ..ended(status, proof, record)
+    }
+}

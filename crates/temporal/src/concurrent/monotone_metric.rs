@@ -1,0 +1,28 @@
+//! Whether numbers that only count in the end only grow: then what they have come to bounds what a plan is worth.
+
+use rustc_hash::FxHashSet;
+use task::number::{Int, Rational};
+use task::task::{NumericId, Operator, Task};
+
+use crate::concurrent::happening::Instance;
+
+/// Whether no happening lowers what numbers that only count in the end come to, whatever the durations.
+pub(super) fn only_grows(task: &Task, instances: &[Instance]) -> bool {
+    let timers: FxHashSet<NumericId> = instances.iter().filter_map(|own| Some(own.timer?.0)).collect();
+    let grows = |operator: &Operator, variable: NumericId, factor: &Rational| {
+        let mut effects = operator.numeric_effects.iter().filter(|effect| effect.variable == variable);
+        effects.all(|effect| {
+            let value = &effect.value;
+            let has_sign = |number: Int| !(Rational::from_integer(number) * factor).is_negative();
+            let others = value.coefficients.iter().filter(|(own, _)| *own != variable);
+            value.coefficients.contains(&(variable, 1))
+                && value.quantity.tables.is_empty()
+                && has_sign(value.quantity.constant)
+                && others.clone().all(|(own, by)| timers.contains(own) && has_sign(*by))
+        })
+    };
+    task.objective
+        .rest
+        .iter()
+        .all(|(variable, factor)| task.operators.iter().all(|operator| grows(operator, *variable, factor)))
+}

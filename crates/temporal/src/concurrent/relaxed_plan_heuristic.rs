@@ -1,0 +1,214 @@
+//! A situation to how far the goal is, by a relaxed plan, and which happenings that plan begins with.
+//!
+//! Costs add up over what a rule needs [1], and the cheapest rule for each proposition makes the relaxed plan [2]. Its goals are those of the task,
+//! and the ends of all actions under way.
+//!
+//! [1] B. Bonet, H. Geffner: Planning as heuristic search, Artificial Intelligence 129, 2001.
+//! [2] J. Hoffmann, B. Nebel: The FF planning system, JAIR 14, 2001; E. Keyder, H. Geffner: Heuristics for planning with action costs
+//! revisited, ECAI 2008.
+
+use std::cmp::Reverse;
+
+use search::satisfice::bucket_queue::Queue;
+use task::number::Int;
+use task::task::OperatorId;
+use task::task::quantity::Linear;
+
+use crate::concurrent::rule::Proposition;
+use crate::concurrent::successors::TemporalState;
+use crate::concurrent::temporal_relaxation::TemporalRelaxation;
+
+/// A cost that stands for being out of reach.
+const UNREACHABLE: u32 = u32::MAX;
+/// Costs do not grow beyond this.
+const MAX_COST: u32 = 1 << 30;
+/// No relaxed plan counts more than this of one rule.
+const MAX_REPETITIONS: u32 = 1 << 20;
+
+/// How far the goal is.
+#[derive(Debug, Clone)]
+pub(super) struct HeuristicValue {
+    /// The weight of a relaxed plan.
+    pub(super) left: u64,
+    /// The happenings of the relaxed plan that need nothing else, ascending.
+    pub(super) preferred: Vec<OperatorId>,
+}
+
+/// A relaxed task with room for one evaluation at a time.
+pub(super) struct RelaxedPlanHeuristic<'a> {
+    relaxed: &'a TemporalRelaxation,
+    /// By proposition.
+    costs: Vec<u32>,
+    /// By proposition: the rule that brings it about, and how many times.
+    supporters: Vec<Option<(u32, u32)>>,
+    /// By rule: how many of its needs are out of reach, and the sum of the costs of the others.
+    unmet: Vec<u32>,
+    sums: Vec<u32>,
+    marked: Vec<bool>,
+    /// By numeric condition: how much is missing.
+    missing: Vec<Option<Int>>,
+    open: Queue,
+    /// What a relaxed plan has to reach.
+    targets: Vec<Proposition>,
+}
+
+impl<'a> RelaxedPlanHeuristic<'a> {
+    pub(super) fn new(relaxed: &'a TemporalRelaxation) -> Self {
+        let (propositions, rules) = (relaxed.propositions, relaxed.unmet.len());
+        Self {
+            relaxed,
+            costs: vec![UNREACHABLE; propositions],
+            supporters: vec![None; propositions],
+            unmet: vec![0; rules],
+            sums: vec![0; rules],
+            marked: vec![false; rules],
+            missing: vec![None; relaxed.numeric.len()],
+            open: Queue::default(),
+            targets: Vec::new(),
+        }
+    }
+
+    /// None if the goal is out of reach, or the end of an action under way.
+    pub(super) fn guide(
+        &mut self,
+        TemporalState { state, clocks, .. }: &TemporalState,
+    ) -> Option<HeuristicValue> {
+        let value = |linear: &Linear<Int>| linear.value(&state.numbers, &[], &[]);
+        self.guide_from(&state.values, clocks.opens().iter().map(|open| open.instance), &value)
+    }
+
+    /// As [`Self::guide`], from values of variables, the instances under way, and what linear expressions are at most; none if they can be
+    /// anything.
+    pub(super) fn guide_from(
+        &mut self,
+        values: &[u32],
+        instances: impl Iterator<Item = u32>,
+        most: &dyn Fn(&Linear<Int>) -> Option<Int>,
+    ) -> Option<HeuristicValue> {
+        let relaxed = self.relaxed;
+        let ends: Vec<u32> = instances.map(|instance| relaxed.ends[instance as usize]).collect();
+        self.targets.clone_from(&relaxed.goal);
+        self.targets.extend(ends.iter().flat_map(|end| relaxed.needs.of(*end)));
+        self.reach(values, most);
+        let is_reached = |target: &Proposition| self.costs[*target as usize] < UNREACHABLE;
+        self.targets.iter().all(is_reached).then(|| self.extract(&ends))
+    }
+
+    /// Dijkstra's algorithm over propositions, until no target can cost less.
+    #[expect(clippy::arithmetic_side_effects, reason = "values of variables are held in memory")]
+    fn reach(&mut self, values: &[u32], most: &dyn Fn(&Linear<Int>) -> Option<Int>) {
+        let relaxed = self.relaxed;
+        self.costs.fill(UNREACHABLE);
+        self.supporters.fill(None);
+        self.sums.fill(0);
+        self.unmet.copy_from_slice(&relaxed.unmet);
+        self.open.clear();
+        for (missing, numeric) in self.missing.iter_mut().zip(&relaxed.numeric) {
+            // What does not fit can be anything.
+            *missing = most(&numeric.linear).map(Int::saturating_neg);
+        }
+        for (first, value) in relaxed.first.iter().zip(values) {
+            self.improve(first + value, 0, None);
+        }
+        for default in &relaxed.defaults {
+            self.improve(*default, 0, None);
+        }
+        for position in 0..relaxed.numeric.len() {
+            if self.missing[position].is_none_or(|missing| missing <= 0) {
+                self.improve(relaxed.numeric[position].proposition, 0, None);
+            }
+        }
+        for [conjunction, first, second] in &relaxed.conjunctions {
+            if self.costs[*first as usize] == 0 && self.costs[*second as usize] == 0 {
+                self.improve(*conjunction, 0, None);
+            }
+        }
+        for rule in &relaxed.free {
+            self.fire(*rule);
+        }
+        let mut level = 0;
+        while let Some((cost, proposition)) = self.open.pop_first() {
+            if cost > self.costs[proposition as usize] {
+                continue;
+            }
+            if cost > level {
+                level = cost;
+                if self.targets.iter().all(|target| self.costs[*target as usize] <= level) {
+                    return;
+                }
+            }
+            for rule in relaxed.needing.of(proposition) {
+                let sum = &mut self.sums[*rule as usize];
+                *sum = sum.saturating_add(cost);
+                let unmet = &mut self.unmet[*rule as usize];
+                *unmet -= 1;
+                if *unmet == 0 {
+                    self.fire(*rule);
+                }
+            }
+        }
+    }
+
+    fn improve(&mut self, proposition: Proposition, cost: u32, by: Option<(u32, u32)>) {
+        let known = &mut self.costs[proposition as usize];
+        if cost < *known {
+            *known = cost;
+            self.supporters[proposition as usize] = by;
+            self.open.push(cost, proposition);
+        }
+    }
+
+    fn fire(&mut self, rule: u32) {
+        let relaxed = self.relaxed;
+        let (weight, sum) = (relaxed.weights[rule as usize], self.sums[rule as usize]);
+        let cost = sum.saturating_add(weight).min(MAX_COST);
+        for add in relaxed.adds.of(rule) {
+            self.improve(*add, cost, Some((rule, 1)));
+        }
+        for (position, by) in &relaxed.raises[rule as usize] {
+            let times = times(self.missing[*position as usize], *by);
+            let cost = sum.saturating_add(weight.saturating_mul(times)).min(MAX_COST);
+            let proposition = relaxed.numeric[*position as usize].proposition;
+            self.improve(proposition, cost, Some((rule, times)));
+        }
+    }
+
+    fn extract(&mut self, ends: &[u32]) -> HeuristicValue {
+        let relaxed = self.relaxed;
+        self.marked.fill(false);
+        let mut used: Vec<(OperatorId, u64)> = Vec::new();
+        let mut preferred = Vec::new();
+        let mut stack = relaxed.goal.clone();
+        let mut rules: Vec<(u32, u32)> = ends.iter().map(|end| (*end, 1)).collect();
+        loop {
+            while let Some((rule, times)) = rules.pop() {
+                let (index, origin) = (rule as usize, relaxed.origins[rule as usize]);
+                if let Some(origin) = origin {
+                    used.push((origin, u64::from(times).saturating_mul(relaxed.weights[index].into())));
+                }
+                if std::mem::replace(&mut self.marked[index], true) {
+                    continue;
+                }
+                let needs = relaxed.needs.of(rule);
+                stack.extend(needs);
+                if needs.iter().all(|need| self.costs[*need as usize] == 0) {
+                    preferred.extend(origin);
+                }
+            }
+            let Some(proposition) = stack.pop() else { break };
+            rules.extend(self.supporters[proposition as usize].take());
+        }
+        used.sort_unstable_by_key(|(origin, times)| (*origin, Reverse(*times)));
+        used.dedup_by_key(|(origin, _)| *origin);
+        preferred.sort_unstable();
+        preferred.dedup();
+        HeuristicValue { left: used.iter().fold(0, |sum, (_, times)| times.saturating_add(sum)), preferred }
+    }
+}
+
+/// How many applications add what is missing.
+fn times(missing: Option<Int>, by: Option<Int>) -> u32 {
+    let (Some(missing), Some(by)) = (missing, by) else { return 1 };
+    let times = missing.checked_add(by.saturating_sub(1)).and_then(|all| all.checked_div(by));
+    times.and_then(|times| u32::try_from(times).ok()).unwrap_or(MAX_REPETITIONS).clamp(1, MAX_REPETITIONS)
+}

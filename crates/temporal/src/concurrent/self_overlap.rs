@@ -1,0 +1,419 @@
+//! How many runs of an instance, the same action with the same arguments, can be under way at a time so that it makes a difference.
+//!
+//! PDDL 2.1 lets an action start while it is under way. Most cannot: their start needs what it takes away itself. And where a run begins and ends
+//! without changing anything, a plan is as good without it. Both are shown here by facts that hold as long as the action is under way; the arguments
+//! are in docs/decisions/runs-that-overlap.md.
+
+use std::collections::BTreeMap;
+
+use rustc_hash::FxHashSet;
+use task::limits::{Interrupted, Limits};
+use task::number::Int;
+use task::task::{Fact, NumericEffect, NumericId, Operator, OperatorId, Task, VariableId};
+
+use crate::concurrent::action_invariants::{Index, Invariant, MAX_PAIR_CHECKS};
+use crate::concurrent::happening::{Happening, Instance, Role};
+use crate::concurrent::relevant_effects::{Change, RelevanceContext, asked, change, needed};
+use crate::concurrent::split::UNDER_WAY;
+
+/// How often it is asked again what follows for others.
+const FIXPOINT_ROUNDS: usize = 2;
+
+/// Sets for each instance how many runs at a time can make a difference, and the fact that it is under way where that is more than one.
+pub(super) fn bound_self_overlap(
+    task: &Task,
+    happenings: &[Happening],
+    instances: &mut [Instance],
+    separation: Int,
+    limits: &Limits,
+) -> Result<(), Interrupted> {
+    for own in &mut *instances {
+        own.under_way = under_way(task, own);
+    }
+    let known = instances.to_vec();
+    let index = Index::new(task, happenings, &known);
+    let mut left = MAX_PAIR_CHECKS;
+    for own in limits.watch(&mut *instances) {
+        let own = own?;
+        // Other atoms of its variable are false, and the start requires one of them: that is how such variables come about.
+        let is_alone = |fact: Fact| task.variables[fact.variable.index()].values.len() == 2;
+        let is_single =
+            !own.under_way.is_some_and(is_alone) || index.excludes_itself(own, &mut left) == Some(true);
+        own.most = if is_single { 1 } else { u32::MAX };
+    }
+    let (needed, asked) = (needed(task), asked(task, &known));
+    for _ in 0..FIXPOINT_ROUNDS {
+        let most: Vec<u32> = instances.iter().map(|own| own.most).collect();
+        let known = RelevanceContext { most: &most, separation, needed: &needed, asked: &asked };
+        for own in limits.watch(&mut *instances) {
+            let own = own?;
+            if own.most > 1
+                && let Some(bound) = index.most(own, &known, &mut left)
+            {
+                own.most = own.most.min(bound);
+            }
+        }
+        if instances.iter().zip(&most).all(|(own, most)| own.most == *most) {
+            break;
+        }
+    }
+    let known = RelevanceContext { most: &[], separation, needed: &needed, asked: &[] };
+    for own in instances {
+        own.under_way = own.under_way.filter(|_| own.most > 1);
+        own.counts_by_end =
+            own.under_way.is_some_and(|under_way| counts_by_end(task, own, under_way, &known));
+    }
+    Ok(())
+}
+
+/// The fact that an instance is under way.
+fn under_way(task: &Task, own: &Instance) -> Option<Fact> {
+    let name = |fact: &Fact| &task.variables[fact.variable.index()].values[fact.value as usize];
+    let required = &task.operators[own.end.index()].condition.facts;
+    required.iter().find(|fact| name(fact).starts_with(UNDER_WAY)).copied()
+}
+
+fn clashes(fact: Fact, others: &[Fact]) -> bool {
+    others.iter().any(|other| other.variable == fact.variable && other.value != fact.value)
+}
+
+/// What can happen while runs of an instance are under way.
+#[derive(Clone, Copy)]
+struct Inside<'i> {
+    own: &'i Instance,
+    invariant: &'i Invariant,
+    known: &'i RelevanceContext<'i>,
+}
+
+impl Index<'_> {
+    /// Whether no run can start while another one is under way. None if that takes too long to find out.
+    fn excludes_itself(&self, own: &Instance, left: &mut usize) -> Option<bool> {
+        let invariant = self.invariant(own, true, left)?;
+        if self.excludes(&invariant, own, own.start) {
+            return Some(true);
+        }
+        let start = &self.task.operators[own.start.index()];
+        if !start.conditional.is_empty() {
+            return Some(false);
+        }
+        for fact in &start.effects {
+            let required = start.condition.facts.iter().find(|own| own.variable == fact.variable);
+            let Some(required) = required.filter(|required| required.value != fact.value) else { continue };
+            if !self.is_reached(own, &invariant, (*fact, required.value), left)? {
+                return Some(true);
+            }
+        }
+        Some(false)
+    }
+
+    /// Whether others can bring a variable from a value that the start has set to another one.
+    fn is_reached(
+        &self,
+        own: &Instance,
+        invariant: &Invariant,
+        (from, to): (Fact, u32),
+        left: &mut usize,
+    ) -> Option<bool> {
+        let variable = from.variable;
+        let setting: Vec<&Operator> = self
+            .setting(own, variable)
+            .filter(|id| !self.is_outside(invariant, own, *id))
+            .map(|id| &self.task.operators[id.index()])
+            .collect();
+        *left = left.checked_sub(self.setting(own, variable).count())?;
+        let mut reached = vec![from.value];
+        let mut next = 0;
+        while let Some(value) = reached.get(next).copied() {
+            next = next.saturating_add(1);
+            *left = left.checked_sub(setting.len())?;
+            for operator in &setting {
+                let mut facts = operator.condition.facts.iter();
+                if facts.any(|fact| fact.variable == variable && fact.value != value) {
+                    continue;
+                }
+                let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
+                for fact in operator.effects.iter().chain(conditional) {
+                    if fact.variable == variable && !reached.contains(&fact.value) {
+                        reached.push(fact.value);
+                    }
+                }
+            }
+        }
+        Some(reached.contains(&to))
+    }
+
+    /// How many runs at a time can make a difference; none if that is not known, or takes too long to find out.
+    fn most(&self, own: &Instance, known: &RelevanceContext<'_>, left: &mut usize) -> Option<u32> {
+        let [start, end] = [own.start, own.end].map(|id| &self.task.operators[id.index()]);
+        if own.is_chosen || ![start, end].into_iter().all(is_plain) {
+            return None;
+        }
+        let mut numbers = Vec::new();
+        for effect in end.numeric_effects.iter().filter(|effect| !is_timer(own, effect.variable)) {
+            match change(effect) {
+                Some(Change::Sets(value)) => numbers.push((effect.variable, value)),
+                _ if known.is_loss(effect) => {}
+                _ => return None,
+            }
+        }
+        let alone = self.invariant(own, true, left)?;
+        if !self.lasts_as_long(own, start, &alone) {
+            return None;
+        }
+        let under_way = own.under_way?.variable;
+        let [starts, ends] = [start, end].map(|operator| -> Vec<Fact> {
+            operator.effects.iter().filter(|fact| fact.variable != under_way).copied().collect()
+        });
+        // The one that ends first takes away what the other one needs all along: they start and end together, and one does for both.
+        if ends.iter().any(|fact| clashes(*fact, &alone.over_all)) {
+            return Some(1);
+        }
+        let invariant = self.invariant(own, false, left)?;
+        let wanted = known.relevant_effects(&ends);
+        let hidden = wanted.iter().filter(|fact| clashes(**fact, &starts)).map(|fact| fact.variable);
+        let hidden: Vec<VariableId> = hidden.collect();
+        for variable in &hidden {
+            *left = left.checked_sub(self.task.operators.len())?;
+            if !self.is_hidden(own, &invariant, &starts, *variable) {
+                return None;
+            }
+        }
+        let set = known.relevant_effects(&starts);
+        let inside = Inside { own, invariant: &invariant, known };
+        let mut all: Int = 1;
+        for (facts, numbers) in [(&set, &[][..]), (&wanted, &numbers)] {
+            let facts: Vec<Fact> =
+                facts.iter().filter(|fact| !hidden.contains(&fact.variable)).copied().collect();
+            let undoing = self.undoing(inside, (&facts, numbers), left)?;
+            all = all.saturating_add(self.times_together(inside, undoing, left)?);
+        }
+        // Ends of earlier runs undo what starts have set: then it is known only that two runs, the first of all that overlap, need not do so.
+        let is_cut = set.iter().any(|fact| clashes(*fact, &ends) && !hidden.contains(&fact.variable));
+        u32::try_from(all).ok().filter(|all| *all == 1 || !is_cut)
+    }
+
+    /// The happenings of others that undo effects while a run is under way.
+    fn undoing(
+        &self,
+        Inside { own, invariant, known }: Inside<'_>,
+        (facts, numbers): (&[Fact], &[(NumericId, Int)]),
+        left: &mut usize,
+    ) -> Option<FxHashSet<OperatorId>> {
+        let mut all = FxHashSet::default();
+        for fact in facts {
+            *left = left.checked_sub(self.setting(own, fact.variable).count())?;
+            all.extend(self.setting(own, fact.variable).filter(|id| self.changes(*id, *fact)));
+        }
+        for (number, value) in numbers {
+            *left = left.checked_sub(self.changing(own, *number).count())?;
+            all.extend(self.changing(own, *number).filter(|id| {
+                let mut effects = self.task.operators[id.index()].numeric_effects.iter();
+                effects.any(|effect| effect.variable == *number && !known.keeps(effect, *value))
+            }));
+        }
+        all.retain(|id| !self.is_outside(invariant, own, *id));
+        Some(all)
+    }
+
+    /// How often happenings can take place in less time than a run takes, all of them together; none if there is no such bound. Of those that are good for the
+    /// same facts only, the first one makes a difference, and one after each happening that undoes it: a plan is no worse without the others.
+    fn times_together(
+        &self,
+        inside: Inside<'_>,
+        happenings: FxHashSet<OperatorId>,
+        left: &mut usize,
+    ) -> Option<Int> {
+        let mut all: Int = 0;
+        let mut groups: BTreeMap<Vec<Fact>, Option<Int>> = BTreeMap::new();
+        for id in happenings {
+            let times = self.times(id, inside.own, inside.known);
+            if let Some(facts) = self.purpose(id, inside.known) {
+                let sum = groups.entry(facts).or_insert(Some(0));
+                *sum = sum.zip(times).map(|(sum, times)| sum.saturating_add(times));
+            } else {
+                all = all.saturating_add(times?);
+            }
+        }
+        for (facts, times) in groups {
+            let undoing = self.undoing(inside, (&facts, &[]), left)?;
+            // Runs of the instance itself may be any number.
+            let is_undone = facts
+                .iter()
+                .any(|fact| [inside.own.start, inside.own.end].iter().any(|id| self.changes(*id, *fact)));
+            let undoing = if is_undone { None } else { Some(undoing) };
+            let again = undoing.and_then(|undoing| {
+                undoing.into_iter().try_fold(1, |sum: Int, id| {
+                    Some(sum.saturating_add(self.times(id, inside.own, inside.known)?))
+                })
+            });
+            all = all.saturating_add(match (times, again) {
+                (Some(times), Some(again)) => times.min(again),
+                (times, again) => times.or(again)?,
+            });
+        }
+        Some(all)
+    }
+
+    /// The facts that a run is good for whose end a happening is; none if it is good for anything else.
+    fn purpose(&self, id: OperatorId, known: &RelevanceContext<'_>) -> Option<Vec<Fact>> {
+        let Role::End(instance) = self.happenings[id.index()].role else { return None };
+        let other = &self.instances[instance as usize];
+        let [start, end] = [other.start, other.end].map(|id| &self.task.operators[id.index()]);
+        let wanted = |operator: &Operator| -> Vec<Fact> {
+            // One of two values only says that it is under way.
+            let is_own = |fact: &Fact| {
+                let is_alone = self.task.variables[fact.variable.index()].values.len() == 2;
+                is_alone && other.under_way.is_some_and(|own| own.variable == fact.variable)
+            };
+            known.relevant_effects(&operator.effects).into_iter().filter(|fact| !is_own(fact)).collect()
+        };
+        let is_good_for_facts = !other.is_chosen
+            && [start, end].into_iter().all(is_plain)
+            && wanted(start).is_empty()
+            && [start, end]
+                .into_iter()
+                .flat_map(|operator| &operator.numeric_effects)
+                .all(|effect| is_timer(other, effect.variable) || known.is_loss(effect));
+        is_good_for_facts.then(|| wanted(end))
+    }
+
+    /// How often a happening can take place in less time than a run takes, at most; none if there is no such bound, or the time is not known.
+    fn times(&self, id: OperatorId, own: &Instance, known: &RelevanceContext<'_>) -> Option<Int> {
+        let happening = &self.happenings[id.index()];
+        let apart = match happening.role {
+            Role::Never => return Some(0),
+            Role::Timed(_) => return Some(1),
+            Role::Start(other) | Role::End(other) if known.most[other as usize] == 1 => self.duration(other),
+            _ => {
+                let marks = &happening.accesses.marks;
+                let mut after = happening.accesses.after.iter();
+                let is_apart = after.any(|(key, by)| *by > 0 && marks.binary_search(key).is_ok());
+                is_apart.then_some(known.separation)?
+            }
+        };
+        let duration = own.timer.is_none().then_some(own.duration)?;
+        duration.checked_div(apart)?.checked_add(1)
+    }
+
+    /// Whether a run that starts while another one is under way takes as long.
+    fn lasts_as_long(&self, own: &Instance, start: &Operator, invariant: &Invariant) -> bool {
+        start.numeric_effects.iter().all(|effect| {
+            let mut numbers =
+                effect.value.coefficients.iter().flat_map(|(number, _)| self.changing(own, *number));
+            is_timer(own, effect.variable) && numbers.all(|id| self.is_outside(invariant, own, id))
+        })
+    }
+
+    /// Whether nothing else has to do with a variable as long as a run is under way.
+    fn is_hidden(
+        &self,
+        own: &Instance,
+        invariant: &Invariant,
+        starts: &[Fact],
+        variable: VariableId,
+    ) -> bool {
+        let task = self.task;
+        let is_derived_from = task.axioms.iter().flat_map(|layer| &layer.rules).any(|rule| {
+            let facts = rule.body.facts.iter().map(|fact| fact.variable);
+            let clauses = rule.body.clauses.iter().flatten().map(|literal| literal.fact.variable);
+            facts.chain(clauses).any(|own| own == variable)
+        });
+        let mut operators = OperatorId::all(task.operators.len());
+        !is_derived_from
+            && operators.all(|id| {
+                let mentions = mentions(&task.operators[id.index()], variable);
+                [own.start, own.end].contains(&id)
+                    || self.happenings[id.index()].role == Role::Never
+                    || !mentions
+                    || self.is_outside(invariant, own, id)
+            })
+            && self.holding().all(|(other, over_all)| {
+                let operator = &task.operators[over_all.index()];
+                let is_own = own.over_all == Some(over_all);
+                let required = operator.condition.facts.iter().find(|fact| fact.variable == variable);
+                !mentions(operator, variable)
+                    || !is_own
+                        && required.is_some_and(|fact| clashes(*fact, starts))
+                        && self.is_outside(invariant, own, other)
+            })
+    }
+}
+
+/// Whether a happening reads or sets a variable.
+fn mentions(operator: &Operator, variable: VariableId) -> bool {
+    let facts = operator.condition.facts.iter().chain(&operator.effects);
+    let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
+    let conditions = operator.conditional.iter().flat_map(|effect| &effect.condition);
+    let literals = operator.condition.clauses.iter().flatten().chain(conditions);
+    let all = facts.chain(conditional).copied().chain(literals.map(|literal| literal.fact));
+    all.into_iter().any(|fact| fact.variable == variable)
+}
+
+/// Whether the effects of a happening on facts do not depend on the state, and it earns nothing.
+fn is_plain(operator: &Operator) -> bool {
+    operator.conditional.is_empty() && operator.cost.tables.is_empty() && operator.cost.constant >= 0
+}
+
+/// Whether only the end of a run changes anything that somebody may need, and another end does the same again.
+fn counts_by_end(task: &Task, own: &Instance, under_way: Fact, known: &RelevanceContext<'_>) -> bool {
+    let [start, end] = [own.start, own.end].map(|id| &task.operators[id.index()]);
+    let starts = known.relevant_effects(&start.effects);
+    !own.is_chosen
+        && [start, end].into_iter().all(is_plain)
+        && starts.iter().all(|fact| fact.variable == under_way.variable)
+        && start.numeric_effects.iter().all(|effect| is_timer(own, effect.variable))
+        && assigns_constants(own, end)
+}
+
+/// Whether a number holds how long an instance takes.
+fn is_timer(own: &Instance, number: NumericId) -> bool {
+    own.timer.is_some_and(|(timer, _)| timer == number)
+}
+
+/// Whether an end sets numbers to what they are after another end, too.
+fn assigns_constants(own: &Instance, end: &Operator) -> bool {
+    let is_set = |effect: &NumericEffect| matches!(change(effect), Some(Change::Sets(_)));
+    end.numeric_effects.iter().all(|effect| is_timer(own, effect.variable) || is_set(effect))
+}
+
+#[cfg(test)]
+mod tests {
+    use num_rational::BigRational;
+    use pddl::{Source, read};
+
+    use crate::concurrent::ground_concurrent;
+    use task::ground::GroundConfig;
+
+    /// How many runs of `charge` at a time can make a difference. It also does `more`; `pump` needs it, and is good for `p`, which others need to be either way.
+    fn charges(more: &str) -> u32 {
+        let domain = format!(
+            "(define (domain d) (:requirements :durative-actions :fluents) (:predicates (p) (q) (r)) (:functions (battery))
+               (:durative-action charge :parameters () :duration (= ?duration 10)
+                 :condition () :effect (and (at end (assign (battery) 1)) {more}))
+               (:durative-action pump :parameters () :duration (= ?duration 1) :condition (at start (>= (battery) 1))
+                 :effect (and (at end (p)) (at end (decrease (battery) 1))))
+               (:durative-action full :parameters () :duration (= ?duration 1) :condition (at start (p)) :effect (at end (q)))
+               (:durative-action empty :parameters () :duration (= ?duration 1)
+                 :condition (and (at start (not (p))) (at start (q))) :effect (at end (r))))"
+        );
+        let problem = "(define (problem p) (:domain d) (:init (= (battery) 0)) (:goal (and (q) (r) (p))) (:metric minimize (total-time)))";
+        let (domain, problem, _) =
+            read(&Source::new("domain", domain), &Source::new("problem", problem)).expect("PDDL");
+        let separation = BigRational::new(1.into(), 1000.into());
+        let task =
+            ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation).expect("a task");
+        let name = |own: &super::Instance| {
+            let schema = task.task.operators[own.start.index()].schema;
+            task.task.schema_names[schema as usize].as_str()
+        };
+        let charge = task.instances.iter().find(|own| name(own) == "charge").expect("an instance");
+        charge.most
+    }
+
+    #[test]
+    fn what_is_good_for_one_fact_undoes_once_unless_the_runs_undo_it_themselves() {
+        assert_eq!(charges(""), 2);
+        // Each end lets the pump make a difference again: no bound is known.
+        assert_eq!(charges("(at end (not (p)))"), u32::MAX);
+    }
+}

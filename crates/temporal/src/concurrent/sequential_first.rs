@@ -1,0 +1,226 @@
+//! Sequential plans, moved to the earliest times: the first plan of a task that does not require overlap, and an
+//! upper bound on the cost of a best plan for all other tasks.
+//!
+//! These plans solve the task in which actions do not overlap. Searches for that task are better informed: it has
+//! fewer variables with more values, landmarks, mutexes and interchangeable objects. Each resulting sequence is
+//! executed like any other sequence, so that its actions overlap where they can. So every plan that is returned is
+//! one of the overlapping task. A sequence that is not, for example because a timed initial literal would interrupt
+//! an action, is dropped.
+
+use std::cell::OnceCell;
+
+use rustc_hash::FxHashMap;
+use search::bounds::Bounds;
+use search::satisfice::{Satisficer, StepResult};
+use search::search::{InterleavedSearch, SearchOutcome, SearchProblem, SearchTask};
+use task::compile::is_hidden;
+use task::context::Context;
+use task::ground::{GroundConfig, ground};
+use task::limits::Limits;
+use task::number::Int;
+use task::plan::arguments;
+use task::plan::ground::GroundPlan;
+use task::plan::solution::Statistics;
+use task::task::{Operator, OperatorId, Task};
+
+use crate::concurrent::greedy::{Links, Mode};
+use crate::concurrent::happening::Role;
+use crate::concurrent::search::Sequence;
+use crate::concurrent::successors::{Expansion, TemporalState};
+use crate::concurrent::temporal_task::TemporalTask;
+
+/// Tasks with more operators are not ground twice.
+const OPERATORS: usize = 100_000;
+
+/// For each situation of the greedy search, what the search by estimates goes through, in nodes and propositions, and how many states the
+/// other one stores.
+const WORK: u64 = 1_000;
+const STATES: usize = 4;
+/// That one ends with so many states.
+const MOST_STATES: usize = 1_000_000;
+
+/// A name of an action, and its arguments.
+type Call = (String, Vec<String>);
+
+/// The task of actions one after another.
+pub(super) struct SequentialTask {
+    task: Task,
+    /// The happenings with which an action begins.
+    begins: FxHashMap<Call, Vec<OperatorId>>,
+    /// What the search for a best plan goes by, from its first turn on.
+    parts: OnceCell<Option<(Bounds, SearchTask)>>,
+}
+
+impl SequentialTask {
+    /// None if there is no such task, or if it is large.
+    pub(super) fn new(concurrent: &TemporalTask, limits: &Limits) -> Option<Self> {
+        let split = &concurrent.task;
+        if split.operators.len() > OPERATORS {
+            return None;
+        }
+        let (domain, problem, config) = concurrent.kept.as_ref()?.files();
+        let config = GroundConfig { limits: limits.clone(), ..config.clone() };
+        let task = ground(domain, problem, &config).ok().filter(|task| task.unreachable.is_none())?;
+        let mut begins: FxHashMap<Call, Vec<OperatorId>> = FxHashMap::default();
+        for ((operator, happening), id) in
+            split.operators.iter().zip(&concurrent.happenings).zip((0..).map(OperatorId))
+        {
+            if matches!(happening.role, Role::Start(_) | Role::Whole) {
+                begins.entry(call(split, operator, &[])).or_default().push(id);
+            }
+        }
+        Some(Self { task, begins, parts: OnceCell::new() })
+    }
+
+    fn space<'w>(&'w self, limits: &'w Limits) -> Option<SearchProblem<'w, Int, Bounds>> {
+        let context = Context::new(&self.task, limits);
+        let make = || Bounds::new(context).ok().zip(SearchTask::new(context).ok().flatten());
+        let (bounds, prepared) = self.parts.get_or_init(make).as_ref()?;
+        Some(SearchProblem { context, bounds, prepared, orbits: None })
+    }
+
+    /// The sequence of a plan; none if it cannot be executed, or if its metric does not fit.
+    fn sequence(
+        &self,
+        concurrent: &TemporalTask,
+        expansion: &Expansion<'_>,
+        plan: &GroundPlan,
+    ) -> Option<Sequence> {
+        let mut situation = expansion.root();
+        let mut links = Links::new();
+        for step in &plan.steps {
+            let operator = &self.task.operators[step.operator.index()];
+            if let Some(until) = operator.wait {
+                let until = until.checked_mul(concurrent.task.time_scale)?;
+                while let Some((time, event)) = expansion.next_event(&situation.clocks)
+                    && time.checked_mul(self.task.time_scale)? <= until
+                {
+                    let together = situation.clocks.unsettled();
+                    situation = expansion.step(&situation, event).ok()?;
+                    links.push((event, together));
+                }
+                continue;
+            }
+            // What is violated in the end is found by looking at the last state.
+            if is_hidden(&self.task.schema_names[operator.schema as usize]) {
+                continue;
+            }
+            let begins = self.begins.get(&call(&self.task, operator, &step.choice))?;
+            let mut executed = begins.iter().filter_map(|begin| {
+                let mut own = Links::new();
+                let mut happen = |situation: &TemporalState, id| {
+                    Mode::Sequential.apply_happening(concurrent, expansion, situation, id, &mut own)
+                };
+                let mut next = happen(&situation, *begin)?;
+                if !next.clocks.opens().is_empty() {
+                    next = happen(&next, concurrent.end_of(*begin))?;
+                }
+                Some((next, own))
+            });
+            let (next, own) = executed.next()?;
+            links.extend(own);
+            situation = next;
+        }
+        let value = concurrent.value(&situation).filter(|_| expansion.is_goal(&situation))?;
+        let (happenings, together) = links.into_iter().unzip();
+        concurrent.judge(Sequence { value, happenings, together }, situation.cost)
+    }
+}
+
+fn call(task: &Task, operator: &Operator, choice: &[u32]) -> Call {
+    (task.schema_names[operator.schema as usize].clone(), arguments(task, operator, choice))
+}
+
+/// Searches for a plan of actions one after another: by estimates, and for a best one, which is quicker where estimates lead astray.
+pub(super) struct SequentialPlanner<'w> {
+    whole: &'w SequentialTask,
+    limits: &'w Limits,
+    satisficer: Option<Satisficer<'w, Int>>,
+    exact: Exact<'w>,
+    /// How many states the latter may store by now.
+    stored: usize,
+    /// Lowest known cost of a plan without overlap.
+    known: Option<Int>,
+}
+
+enum Exact<'w> {
+    /// Its bounds may take longer than a plan.
+    Later,
+    Begun(Box<InterleavedSearch<'w, Int, Bounds>>),
+    Over,
+}
+
+impl<'w> SequentialPlanner<'w> {
+    pub(super) fn new(whole: &'w SequentialTask, limits: &'w Limits) -> Self {
+        let satisficer = Satisficer::new(Context::new(&whole.task, limits)).ok().flatten();
+        Self { whole, limits, satisficer, exact: Exact::Later, stored: 0, known: None }
+    }
+
+    /// Continues both searches for as much work as `situations` of the greedy search are worth. Returns the better one of their plans whose sequences can
+    /// be executed.
+    pub(super) fn run(
+        &mut self,
+        of: (&TemporalTask, &Expansion<'_>),
+        situations: usize,
+        statistics: &mut Statistics,
+    ) -> Option<Sequence> {
+        let some = self.estimate(of, situations, statistics);
+        if self.limits.reached() {
+            return some;
+        }
+        let best = self.search(of, situations, statistics);
+        some.into_iter().chain(best).min_by_key(|sequence| sequence.value)
+    }
+
+    fn estimate(
+        &mut self,
+        (concurrent, expansion): (&TemporalTask, &Expansion<'_>),
+        situations: usize,
+        statistics: &mut Statistics,
+    ) -> Option<Sequence> {
+        let satisficer = self.satisficer.as_mut()?;
+        let before = satisficer.figures;
+        let advance = satisficer.run(self.known.as_ref(), WORK.saturating_mul(situations as u64));
+        satisficer.figures.add_to(before, statistics);
+        match advance {
+            Ok(StepResult::Plan(plan)) => {
+                self.known = Some(plan.cost);
+                self.whole.sequence(concurrent, expansion, &plan)
+            }
+            Ok(StepResult::Paused) => None,
+            Ok(StepResult::Unsolvable | StepResult::Ended) | Err(_) => {
+                self.satisficer = None;
+                None
+            }
+        }
+    }
+
+    fn search(
+        &mut self,
+        (concurrent, expansion): (&TemporalTask, &Expansion<'_>),
+        situations: usize,
+        statistics: &mut Statistics,
+    ) -> Option<Sequence> {
+        if matches!(self.exact, Exact::Later) {
+            let space = self.whole.space(self.limits);
+            let begin =
+                |space| Exact::Begun(Box::new(InterleavedSearch::new(space, &self.whole.task.initial)));
+            self.exact = space.map_or(Exact::Over, begin);
+        }
+        let Exact::Begun(exact) = &mut self.exact else { return None };
+        self.stored = self.stored.saturating_add(STATES.saturating_mul(situations));
+        let before = exact.figures();
+        let found = exact.run(self.stored, &mut |_, _| {});
+        exact.figures().add_to(before, statistics);
+        let plan = match &found {
+            Some(SearchOutcome::Optimal(plan)) => Some(plan.clone()),
+            Some(SearchOutcome::Unknown(plan)) => plan.clone(),
+            Some(SearchOutcome::None) => None,
+            None => exact.best_plan(),
+        };
+        if found.is_some() || self.stored > MOST_STATES {
+            self.exact = Exact::Over;
+        }
+        plan.and_then(|plan| self.whole.sequence(concurrent, expansion, &plan))
+    }
+}

@@ -1,0 +1,192 @@
+//! SimpleTemporalNetwork in few bytes and back: each number takes seven bits a byte, as long as it is.
+
+use smallvec::SmallVec;
+use task::number::{Int, dense};
+
+use crate::concurrent::simple_temporal_network::{RunningAction, SimpleTemporalNetwork, Start};
+use crate::concurrent::time::TimeExpression;
+
+/// Writes numbers one after another.
+#[derive(Default)]
+struct Writer(Vec<u8>);
+
+/// Reads them again.
+struct Reader<'a>(std::slice::Iter<'a, u8>);
+
+impl Writer {
+    /// Small magnitudes take little, whatever their sign.
+    fn number(&mut self, number: Int) {
+        let mut rest = ((number << 1) ^ (number >> (Int::BITS - 1))).cast_unsigned();
+        loop {
+            let byte = (rest & 0x7f) as u8;
+            rest >>= 7;
+            if rest == 0 {
+                self.0.push(byte);
+                return;
+            }
+            self.0.push(byte | 0x80);
+        }
+    }
+
+    fn index(&mut self, index: u32) {
+        self.number(index.into());
+    }
+
+    fn length(&mut self, length: usize) {
+        self.index(dense(length));
+    }
+
+    fn time(&mut self, time: &TimeExpression) {
+        self.number(time.base);
+        self.length(time.lags.len());
+        for (float, lag) in &time.lags {
+            self.index(*float);
+            self.number(*lag);
+        }
+    }
+
+    fn maybe<T>(&mut self, item: Option<T>, write: impl FnOnce(&mut Self, T)) {
+        self.length(usize::from(item.is_some()));
+        if let Some(item) = item {
+            write(self, item);
+        }
+    }
+}
+
+impl Reader<'_> {
+    fn number(&mut self) -> Int {
+        let (mut number, mut shift) = (0_u128, 0_u32);
+        for byte in self.0.by_ref() {
+            number |= u128::from(byte & 0x7f) << shift;
+            if byte & 0x80 == 0 {
+                break;
+            }
+            shift = shift.saturating_add(7);
+        }
+        let half = (number >> 1).cast_signed();
+        if number & 1 == 0 { half } else { !half }
+    }
+
+    fn index(&mut self) -> u32 {
+        u32::try_from(self.number()).expect("invariant: an index was written")
+    }
+
+    fn list<T>(&mut self, mut read: impl FnMut(&mut Self) -> T) -> Vec<T> {
+        (0..self.index()).map(|_| read(self)).collect()
+    }
+
+    fn time(&mut self) -> TimeExpression {
+        let base = self.number();
+        let lags: SmallVec<_> = (0..self.index()).map(|_| (self.index(), self.number())).collect();
+        TimeExpression { base, lags }
+    }
+
+    fn maybe<T>(&mut self, read: impl FnOnce(&mut Self) -> T) -> Option<T> {
+        (self.index() > 0).then(|| read(self))
+    }
+}
+
+impl SimpleTemporalNetwork {
+    pub(in crate::concurrent) fn pack(&self) -> Box<[u8]> {
+        let mut writer = Writer::default();
+        writer.number(self.floor);
+        writer.time(&self.latest);
+        writer.length(self.floats.len());
+        for Start { lower, upper } in &self.floats {
+            writer.time(lower);
+            writer.maybe(Some(*upper).filter(|upper| *upper < Int::MAX), Writer::number);
+        }
+        writer.length(self.opens.len());
+        for open in &self.opens {
+            writer.index(open.instance);
+            writer.index(open.float);
+            writer.number(open.offset);
+            writer.number(open.duration);
+            writer.maybe(open.last.as_ref(), Writer::time);
+        }
+        writer.maybe(self.group, |writer, (float, offset)| {
+            writer.index(float);
+            writer.number(offset);
+        });
+        for list in [&self.entries, &self.changed] {
+            writer.length(list.len());
+            for (key, time) in list {
+                writer.index(*key);
+                writer.time(time);
+            }
+        }
+        writer.0.into_boxed_slice()
+    }
+
+    pub(in crate::concurrent) fn unpack(bytes: &[u8]) -> Self {
+        let mut packed = Self::unpack_head(bytes);
+        packed.finish();
+        packed.clocks
+    }
+
+    /// Only what [`SimpleTemporalNetwork::dominates_ignoring_accesses`] looks at, which is little and rules most comparisons out.
+    pub(in crate::concurrent) fn unpack_head(bytes: &[u8]) -> PackedStn<'_> {
+        let mut reader = Reader(bytes.iter());
+        let (floor, latest) = (reader.number(), reader.time());
+        let floats = reader.list(|reader| {
+            let lower = reader.time();
+            Start { lower, upper: reader.maybe(Reader::number).unwrap_or(Int::MAX) }
+        });
+        let opens = reader.list(|reader| {
+            let (instance, float) = (reader.index(), reader.index());
+            let (offset, duration) = (reader.number(), reader.number());
+            RunningAction { instance, float, offset, duration, last: reader.maybe(Reader::time) }
+        });
+        let group = reader.maybe(|reader| (reader.index(), reader.number()));
+        let (entries, changed) = (Vec::new(), Vec::new());
+        PackedStn { clocks: Self { entries, changed, floats, opens, group, latest, floor }, rest: reader }
+    }
+}
+
+/// SimpleTemporalNetwork of which the head is unpacked.
+pub(in crate::concurrent) struct PackedStn<'a> {
+    pub(in crate::concurrent) clocks: SimpleTemporalNetwork,
+    rest: Reader<'a>,
+}
+
+impl PackedStn<'_> {
+    /// Unpacks the rest.
+    pub(in crate::concurrent) fn finish(&mut self) {
+        let rest = &mut self.rest;
+        let mut times = || rest.list(|reader| (reader.index(), reader.time()));
+        (self.clocks.entries, self.clocks.changed) = (times(), times());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn time() -> impl Strategy<Value = TimeExpression> {
+        let lags = proptest::collection::vec((0_u32..9, -(1_i128 << 91)..1 << 91), 0..3);
+        (-1..1_i128 << 100, lags).prop_map(|(base, lags)| TimeExpression { base, lags: lags.into() })
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_packed_is_unpacked(
+            entries in proptest::collection::vec((any::<u32>(), time()), 0..4),
+            changed in proptest::collection::vec((any::<u32>(), time()), 0..4),
+            floats in proptest::collection::vec((time(), prop_oneof![Just(Int::MAX), -9_i128..1 << 99]), 0..3),
+            opens in proptest::collection::vec((any::<u32>(), 0_u32..9, -9_i128..1 << 99, proptest::option::of(time())), 0..3),
+            group in proptest::option::of((0_u32..9, -9_i128..1 << 99)),
+            latest in time(),
+            floor in -1_i128..1 << 99,
+        ) {
+            let floats = floats.into_iter().map(|(lower, upper)| Start { lower, upper }).collect();
+            let opens = opens.into_iter().map(|(instance, float, offset, last)| {
+                RunningAction { instance, float, offset, duration: offset ^ 5, last }
+            });
+            let clocks = SimpleTemporalNetwork { entries, changed, floats, opens: opens.collect(), group, latest, floor };
+            let unpacked = SimpleTemporalNetwork::unpack(&clocks.pack());
+            prop_assert_eq!(format!("{unpacked:?}"), format!("{clocks:?}"));
+        }
+    }
+}

@@ -1,0 +1,26 @@
+//! The files of a task whose actions may be planned one after another as well.
+
+use std::sync::Arc;
+
+use pddl::ast::{Domain, Problem};
+
+use task::ground::GroundConfig;
+
+/// Problems with more initial facts and values are not kept.
+const MAX_INITIAL_FACTS: usize = 20_000;
+
+/// The files of a task.
+#[derive(Debug, Clone)]
+pub(super) struct SourceTask(Arc<(Domain, Problem, GroundConfig)>);
+
+impl SourceTask {
+    /// Clones the files. Returns `None` if the problem has too many initial elements.
+    pub(super) fn new(domain: &Domain, problem: &Problem, config: &GroundConfig) -> Option<Self> {
+        let is_small = problem.init.len() <= MAX_INITIAL_FACTS;
+        is_small.then(|| Self(Arc::new((domain.clone(), problem.clone(), config.clone()))))
+    }
+
+    pub(super) fn files(&self) -> &(Domain, Problem, GroundConfig) {
+        &self.0
+    }
+}

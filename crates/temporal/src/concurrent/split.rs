@@ -1,0 +1,243 @@
+//! Durative actions to their starts and ends: a lifted task whose every schema is a single happening.
+//!
+//! A durative action becomes two instantaneous ones, after Fox and Long's *snap actions* [1], joined by an atom that says
+//! that the instance is under way. What must hold over all becomes a third schema, which never happens: its condition is looked
+//! up while the instance is under way. An instance that takes no time is one happening, and nothing holds over all of it. Timed
+//! initial literals become schemas without parameters, one after another.
+//!
+//! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.
+
+use task::compile::is_hidden;
+use task::error::{File, Place};
+use task::lifted::configuration::{SlotParameter, conjuncts, design_parameters, is_static};
+use task::lifted::{
+    Bound, Change, Effect, Event, Expression, Formula, FunctionId, Lifted, ObjectId, Predicate, PredicateId,
+    Rational, Schema, Term,
+};
+use task::number::dense;
+
+use crate::concurrent::duration_fluents::{Timer, depends_on_state};
+use pddl::ast::{Comparison, Name, Span};
+
+/// Which happening of a schema another schema stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Half {
+    Start,
+    /// No happening: what must hold between the start and the end.
+    OverAll,
+    End,
+    /// All of it at once: an instantaneous action, or one that takes no time.
+    Whole,
+    /// Timed initial literals, by position.
+    Timed(usize),
+    /// No happening: that the planner can choose how long an instance takes.
+    Choice,
+    /// No happening: a condition by which the trajectory of a plan is judged.
+    Judge,
+}
+
+/// What the names of atoms begin with that say what is under way: no name in a file has a parenthesis.
+pub(super) const UNDER_WAY: &str = "((running) ";
+
+/// Where a schema of the split task comes from.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Origin {
+    /// The schema of the domain; of no meaning for timed initial literals.
+    pub(super) schema: usize,
+    pub(super) half: Half,
+}
+
+/// A lifted task that is split into happenings.
+pub(super) struct Split {
+    pub(super) lifted: Lifted,
+    /// The schemas as the domain has them.
+    pub(super) schemas: Vec<Schema>,
+    /// By schema of the split task.
+    pub(super) origins: Vec<Origin>,
+    /// The design parameters of each schema of the split task.
+    pub(super) designs: Vec<Vec<SlotParameter>>,
+    pub(super) events: Vec<Event>,
+    /// The functions that hold durations.
+    pub(super) durations: Vec<FunctionId>,
+    /// By schema of the domain, whether the planner chooses how long it takes.
+    pub(super) chosen: Vec<bool>,
+    /// By schema of the domain, what such a number is divided by.
+    pub(super) divisors: Vec<Option<Expression>>,
+    /// Whether no duration was chosen where another one could be better.
+    pub(super) is_exact: bool,
+}
+
+/// Splits a task. `solves` names the predicates that say which design solves which function.
+/// `mentions` says whether the end of the action at a position mentions `?duration`.
+pub(super) fn split(mut lifted: Lifted, solves: &[Name], mentions: &dyn Fn(u32) -> bool) -> Split {
+    let mut schemas = std::mem::take(&mut lifted.schemas);
+    let (mut durations, mut divisors, mut chosen) = (Vec::new(), Vec::new(), Vec::new());
+    let events = std::mem::take(&mut lifted.events);
+    let (mut origins, mut designs) = (Vec::new(), Vec::new());
+    let waited = lifted.time.waited;
+    if !events.is_empty() {
+        // A plan lasts until its last action ends, so it does not end with what happens by itself. Any action may be worth its
+        // time then, also one that changes nothing.
+        let done = Formula::Literal { positive: false, predicate: waited, terms: Vec::new() };
+        let goal = std::mem::replace(&mut lifted.goal, Formula::truth());
+        lifted.goal = Formula::And(vec![goal, done]);
+    }
+    for (index, schema) in schemas.iter_mut().enumerate() {
+        let duration = schema.duration.as_ref().filter(|duration| depends_on_state(&lifted, duration));
+        let duration = duration.cloned();
+        let timer = duration.map(|duration| Timer::new(&mut lifted, schema, &duration));
+        chosen.push(timer.as_ref().is_some_and(Timer::is_chosen));
+        divisors.push(timer.as_ref().and_then(|timer| timer.divisor.clone()));
+        if let Some(timer) = &timer {
+            durations.push(timer.function);
+            if !timer.is_chosen() && mentions(schema.action) {
+                *schema = timer.with_end(schema);
+            }
+        }
+        let own = design_parameters(&lifted, schema, solves);
+        for (half, mut part) in parts(&mut lifted, schema, timer.as_ref()) {
+            if !events.is_empty() && matches!(half, Half::End | Half::Whole) {
+                part.end_effects.push(effect(Change::Delete(waited, Vec::new())));
+            }
+            part.action = dense(lifted.schemas.len());
+            lifted.schemas.push(part);
+            origins.push(Origin { schema: index, half });
+            designs.push(own.clone());
+        }
+    }
+    for (index, event) in events.iter().enumerate() {
+        let schema = timed(&lifted, dense(index), event);
+        lifted.schemas.push(schema);
+        origins.push(Origin { schema: usize::MAX, half: Half::Timed(index) });
+        designs.push(Vec::new());
+    }
+    Split { lifted, schemas, origins, designs, events, durations, chosen, divisors, is_exact: true }
+}
+
+fn effect(change: Change) -> Effect {
+    Effect { bound: Vec::<Bound>::new(), condition: Formula::truth(), change }
+}
+
+fn literal(predicate: PredicateId, terms: &[Term]) -> Formula {
+    Formula::Literal { positive: true, predicate, terms: terms.to_vec() }
+}
+
+/// The happenings of a schema.
+fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Half, Schema)> {
+    let instantaneous = |condition: Vec<Formula>, effects: Vec<Effect>| Schema {
+        start_condition: Formula::And(condition),
+        start_effects: Vec::new(),
+        middle_condition: Formula::truth(),
+        over_all: Formula::truth(),
+        at_end: Formula::truth(),
+        end_effects: effects,
+        duration: None,
+        ..schema.clone()
+    };
+    let Some(duration) = &schema.duration else {
+        let half = if is_hidden(schema.name.as_str()) { Half::Judge } else { Half::Whole };
+        return vec![(half, schema.clone())];
+    };
+    let known = if let Expression::Number(number) = duration { Some(number) } else { None };
+    let zero = &Rational::from_integer(0);
+    let compare = |comparison| {
+        Formula::Compare(comparison, duration.clone(), Expression::Number(zero.clone()), schema.place)
+    };
+    let choice = timer.and_then(|timer| timer.relaxed_increase(schema));
+    let mut all = Vec::new();
+    if choice.is_none() && known.is_none_or(|known| known == zero) {
+        let condition =
+            vec![compare(Comparison::Equal), schema.start_condition.clone(), schema.at_end.clone()];
+        let effects = schema.start_effects.iter().chain(&schema.end_effects).cloned().collect();
+        all.push((Half::Whole, instantaneous(condition, effects)));
+    }
+    if known == Some(zero) {
+        return all;
+    }
+    let parameters: Vec<Term> = (0..dense(schema.parameters.len())).map(Term::Parameter).collect();
+    let running = symbol(lifted, &format!("(running) {}", schema.name), parameters.len(), true);
+    let later = [&schema.over_all, &schema.at_end].into_iter().flat_map(conjuncts);
+    let settled: Vec<Formula> = later.filter(|conjunct| is_static(lifted, conjunct)).cloned().collect();
+    let changing: Vec<&Formula> =
+        conjuncts(&schema.over_all).into_iter().filter(|conjunct| !is_static(lifted, conjunct)).collect();
+
+    let mut condition = vec![schema.start_condition.clone()];
+    condition.extend((known.is_none() && choice.is_none()).then(|| compare(Comparison::Greater)));
+    condition.extend(settled);
+    let choice = choice.map(|choice| instantaneous(settled_of(lifted, &condition), vec![choice]));
+    all.extend(choice.map(|choice| (Half::Choice, choice)));
+    let mut effects = schema.start_effects.clone();
+    effects.push(effect(Change::Add(running, parameters.clone())));
+    effects.extend(timer.and_then(|timer| timer.set(schema)));
+    let fixed = schema.duration.clone().filter(|_| timer.is_none());
+    all.push((Half::Start, Schema { duration: fixed, ..instantaneous(condition, effects) }));
+
+    let mut condition = vec![literal(running, &parameters), schema.at_end.clone()];
+    condition.extend(timer.and_then(|timer| timer.is_set(schema)));
+    if !changing.is_empty() {
+        let held = symbol(lifted, &format!("held {}", schema.name), parameters.len(), false);
+        let own = [literal(running, &parameters)].into_iter().chain(changing.into_iter().cloned()).collect();
+        let change = effect(Change::Add(held, parameters.clone()));
+        all.push((Half::OverAll, instantaneous(own, vec![change])));
+        condition.push(literal(held, &parameters));
+    }
+    let mut effects = schema.end_effects.clone();
+    effects.push(effect(Change::Delete(running, parameters)));
+    effects.extend(timer.map(|timer| timer.clear(schema)));
+    all.push((Half::End, instantaneous(condition, effects)));
+    all
+}
+
+/// What no action changes of some conditions.
+fn settled_of(lifted: &Lifted, conditions: &[Formula]) -> Vec<Formula> {
+    let all = conditions.iter().flat_map(conjuncts);
+    all.filter(|conjunct| is_static(lifted, conjunct)).cloned().collect()
+}
+
+/// What happens by itself at one time, after what happened before.
+#[expect(clippy::arithmetic_side_effects, reason = "phases are objects, which are held in memory")]
+fn timed(lifted: &Lifted, index: u32, event: &Event) -> Schema {
+    let phase = |number: u32| vec![Term::Object(ObjectId(lifted.time.first_phase.0 + number))];
+    let mut changes: Vec<(PredicateId, &[ObjectId], bool)> = Vec::new();
+    for (predicate, arguments, holds) in &event.changes {
+        changes.retain(|(other, known, _)| (other, *known) != (predicate, arguments));
+        changes.push((*predicate, arguments, *holds));
+    }
+    let mut effects: Vec<Effect> = changes
+        .into_iter()
+        .map(|(predicate, arguments, holds)| {
+            let terms = arguments.iter().map(|object| Term::Object(*object)).collect();
+            effect(if holds { Change::Add(predicate, terms) } else { Change::Delete(predicate, terms) })
+        })
+        .collect();
+    // A plan without actions ends at 0.
+    if event.time.is_positive() {
+        effects.push(effect(Change::Add(lifted.time.waited, Vec::new())));
+    }
+    effects.push(effect(Change::Delete(lifted.time.phase, phase(index))));
+    effects.push(effect(Change::Add(lifted.time.phase, phase(index + 1))));
+    Schema {
+        name: Name::new("timed initial literals"),
+        parameters: Vec::new(),
+        variables: 0,
+        start_condition: literal(lifted.time.phase, &phase(index)),
+        start_effects: Vec::new(),
+        middle_condition: Formula::truth(),
+        over_all: Formula::truth(),
+        at_end: Formula::truth(),
+        end_effects: effects,
+        duration: None,
+        is_chosen: false,
+        joint: None,
+        action: dense(lifted.schemas.len()),
+        place: Place { file: File::Problem, span: Span::default() },
+    }
+}
+
+/// A new predicate; `running` if it says what is under way.
+fn symbol(lifted: &mut Lifted, name: &str, arity: usize, running: bool) -> PredicateId {
+    let id = PredicateId(dense(lifted.predicates.len()));
+    let name = Name::new(name);
+    lifted.predicates.push(Predicate { name, arity, fluent: true, derived: false, running });
+    id
+}

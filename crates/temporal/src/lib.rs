@@ -1,0 +1,23 @@
+//! Search for concurrent plans: A* over happenings with a simple temporal network.
+//!
+//! What is absent: SAT and OWL.
+
+#![warn(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    clippy::arithmetic_side_effects
+)]
+#![cfg_attr(
+    test,
+    allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_possible_wrap,
+        clippy::cast_sign_loss,
+        clippy::arithmetic_side_effects
+    )
+)]
+
+mod concurrent;
+
+pub use concurrent::{TemporalTask, ground_concurrent, optimize_concurrent};

@@ -1,0 +1,138 @@
+//! Designs of a slot that no operator tells apart, found by hashing.
+//!
+//! Each design has a signature: a hash of what every table and every exclusion of the task says of it. Only designs with the same
+//! signature are compared. So the time is linear in the size of the tables, however many designs there are.
+
+use std::hash::{BuildHasher, Hash};
+
+use rustc_hash::{FxBuildHasher, FxHashMap, FxHashSet};
+
+use task::context::Context;
+use task::limits::Interrupted;
+use task::number::Int;
+use task::task::quantity::{Quantity, SlotSet};
+use task::task::{Operator, SlotId};
+
+/// Something of a task that may tell designs of a slot apart: it speaks of those that one operator admits, in their order.
+struct Witness<'t> {
+    /// Indices into the slot's designs, ascending.
+    designs: &'t [u32],
+    says: WitnessKind<'t>,
+}
+
+enum WitnessKind<'t> {
+    /// That the operator admits them.
+    Admitted,
+    /// The entries of a table in rows of `stride`, of which every `designs.len()`-th belongs to a design.
+    Table { values: &'t [Int], stride: usize },
+    /// For each design what must not be chosen with it, sorted.
+    Forbidden(Vec<Vec<SlotSet>>),
+}
+
+impl Witness<'_> {
+    /// Rows of a table that belong to the design at a position.
+    fn rows<'v>(&self, values: &'v [Int], stride: usize, position: usize) -> impl Iterator<Item = &'v [Int]> {
+        values.chunks(stride).skip(position).step_by(self.designs.len())
+    }
+
+    fn signature(&self, position: usize) -> u64 {
+        match &self.says {
+            WitnessKind::Admitted => 1,
+            WitnessKind::Table { values, stride } => {
+                hash(&self.rows(values, *stride, position).collect::<Vec<_>>())
+            }
+            WitnessKind::Forbidden(others) => hash(&others[position]),
+        }
+    }
+
+    fn tells_apart(&self, a: u32, b: u32) -> bool {
+        let (a, b) = match (self.designs.binary_search(&a), self.designs.binary_search(&b)) {
+            (Ok(a), Ok(b)) => (a, b),
+            (a, b) => return a.is_ok() != b.is_ok(),
+        };
+        match &self.says {
+            WitnessKind::Admitted => false,
+            WitnessKind::Table { values, stride } => {
+                !self.rows(values, *stride, a).eq(self.rows(values, *stride, b))
+            }
+            WitnessKind::Forbidden(others) => others[a] != others[b],
+        }
+    }
+}
+
+fn hash<T: Hash>(value: &T) -> u64 {
+    FxBuildHasher.hash_one(value)
+}
+
+/// Designs of a slot that are equal to an earlier one, ascending.
+pub(super) fn equal_designs(context: Context<'_>, slot: SlotId) -> Result<Vec<u32>, Interrupted> {
+    let Context { task, limits } = context;
+    let witnesses = witnesses(context, slot)?;
+    let mut signatures = vec![0_u64; task.slots[slot.index()].designs.len()];
+    for (witness, number) in witnesses.iter().zip(0_u64..) {
+        for item in limits.watch(witness.designs.iter().enumerate()) {
+            let (position, design) = item?;
+            let own = &mut signatures[*design as usize];
+            *own = hash(&(*own, number, witness.signature(position)));
+        }
+    }
+    let mut different: FxHashMap<u64, Vec<u32>> = FxHashMap::default();
+    let mut equal = Vec::new();
+    for (signature, design) in limits.watch(signatures).zip(0..) {
+        let known = different.entry(signature?).or_default();
+        let is_equal = |other: &u32| !witnesses.iter().any(|witness| witness.tells_apart(*other, design));
+        if known.iter().any(is_equal) { equal.push(design) } else { known.push(design) }
+    }
+    Ok(equal)
+}
+
+/// All that speaks of the designs of a slot; what operators share is there once.
+#[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
+fn witnesses(context: Context<'_>, slot: SlotId) -> Result<Vec<Witness<'_>>, Interrupted> {
+    let Context { task, limits } = context;
+    let mut seen: FxHashSet<(*const u32, *const u8, SlotSet)> = FxHashSet::default();
+    let mut found = Vec::new();
+    for operator in limits.watch(&task.operators) {
+        let operator = operator?;
+        let Some(position) = operator.slots.iter().position(|usage| usage.slot == slot) else { continue };
+        let designs = &operator.slots[position].designs[..];
+        let mut is_new =
+            |address: *const u8, slots: &SlotSet| seen.insert((designs.as_ptr(), address, slots.clone()));
+        if is_new(std::ptr::null(), &SlotSet::new()) {
+            found.push(Witness { designs, says: WitnessKind::Admitted });
+        }
+        for table in quantities(operator).flat_map(|quantity| &quantity.tables) {
+            let Some(own) = table.slots.iter().position(|slot| *slot as usize == position) else { continue };
+            if is_new(table.values.as_ptr().cast(), &table.slots) {
+                let later =
+                    table.slots[own + 1..].iter().map(|slot| operator.slots[*slot as usize].designs.len());
+                let says = WitnessKind::Table { values: &table.values, stride: later.product() };
+                found.push(Witness { designs, says });
+            }
+        }
+        for rule in operator.forbidden.iter() {
+            let Some(own) = rule.slots.iter().position(|slot| *slot as usize == position) else { continue };
+            if is_new(rule.combinations.as_ptr().cast(), &rule.slots) {
+                let mut others: Vec<Vec<SlotSet>> = vec![Vec::new(); designs.len()];
+                for combination in limits.watch(&rule.combinations) {
+                    let mut rest = combination?.clone();
+                    let design = rest.remove(own);
+                    others[design as usize].push(rest);
+                }
+                for rests in &mut others {
+                    rests.sort_unstable();
+                    rests.dedup();
+                }
+                found.push(Witness { designs, says: WitnessKind::Forbidden(others) });
+            }
+        }
+    }
+    Ok(found)
+}
+
+/// What plans depend on.
+fn quantities(operator: &Operator) -> impl Iterator<Item = &Quantity<Int>> {
+    let effects = operator.numeric_effects.iter().map(|effect| &effect.value.quantity);
+    let comparisons = operator.condition.comparisons.iter().map(|comparison| &comparison.quantity);
+    effects.chain(comparisons).chain([&operator.cost])
+}

@@ -1,0 +1,185 @@
+//! Formulas against an oracle: for every number of steps, a formula has a plan at the oracle's cost, and none one below.
+
+use std::cell::OnceCell;
+
+use metaplan_encodings::encode::{CostEncoding, CostLimit, Encoding, PlanConstraints, StepSemantics};
+use metaplan_encodings::sat::{Answer, Backend};
+use pddl::{Source, read};
+use search::bounds::Bounds;
+use task::context::Context;
+use task::ground::{GroundConfig, ground};
+use task::limits::Limits;
+use task::number::Int;
+use task::plan::ground::replay;
+use task::task::Task;
+use testing::missions::Mission;
+use testing::{costs_by_steps, depot, fleet, ground_text, optimum};
+
+/// Plans of so many steps are looked for at least.
+const STEPS: usize = 6;
+
+/// Longer ones, up to the step bound, only to this number.
+const MOST_STEPS: usize = 16;
+
+/// More than any plan of the small tasks below costs.
+const MUCH: Int = 200;
+
+/// Whether there is a plan with at most so many steps and at most this cost; if so, it is one.
+fn is_solvable(
+    task: &Task,
+    bounds: &Bounds,
+    steps: usize,
+    limit: Int,
+    semantics: StepSemantics,
+    backend: &Backend,
+) -> bool {
+    let window =
+        bounds.window(Context::new(task, &Limits::none()), Some(limit), Some(steps)).expect("no limit");
+    let cost = CostLimit { limit, bounds, counting: CostEncoding::Sum };
+    let limits = Limits::none();
+    let encoding = Encoding::new(
+        Context::new(task, &limits),
+        PlanConstraints { allowed: &window.allowed, cost: Some(cost), semantics, max_clauses: usize::MAX },
+        &OnceCell::new(),
+    )
+    .expect("no limit");
+    let mut solver = backend.start(&Limits::none(), u64::MAX);
+    for (_, clause) in encoding.formula.clauses() {
+        solver.add_clause(clause);
+    }
+    let answer = solver.solve(&[]);
+    assert_ne!(answer, Answer::Interrupted, "{backend:?}: {:?}", solver.failure());
+    if answer == Answer::Satisfiable {
+        let plan = encoding.decode(solver.as_ref());
+        let replayed = replay(task, &plan);
+        assert!(replayed.is_some_and(|(_, cost)| cost <= limit), "{backend:?}: no plan: {plan:?}");
+    }
+    answer == Answer::Satisfiable
+}
+
+fn check(seed: u64, backend: &Backend) {
+    let mission = Mission::random(seed);
+    let (domain, problem) = (Source::new("d", mission.domain()), Source::new("p", mission.problem()));
+    let (domain, problem, _) = read(&domain, &problem).expect("PDDL");
+    let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");
+    let optimum = mission.oracle().map(Int::from);
+    if task.unreachable.is_some() {
+        assert!(optimum.is_none(), "seed {seed}");
+        return;
+    }
+    let (scale, offset) = (task.objective.scale, task.objective.offset);
+    let bounds = Bounds::new(Context::new(&task, &Limits::none())).expect("no limit");
+    let below = optimum.map_or(MUCH, |optimum| optimum * scale - offset - 1);
+    let step_bound = bounds
+        .window(Context::new(&task, &Limits::none()), Some(below), None)
+        .expect("no limit")
+        .steps
+        .unwrap_or(STEPS);
+    let costs = mission.oracle_by_steps(step_bound.clamp(STEPS, MOST_STEPS));
+    let costs: Vec<_> = costs.into_iter().map(|cost| cost.map(Int::from)).collect();
+    assert!(
+        costs.iter().flatten().all(|cost| optimum.is_some_and(|optimum| optimum <= *cost)),
+        "seed {seed}"
+    );
+    for bounds in [&bounds, &Bounds::trivial(Context::new(&task, &Limits::none())).expect("no limit")] {
+        for (steps, cost) in costs.iter().enumerate() {
+            let solvable =
+                |limit| is_solvable(&task, bounds, steps, limit, StepSemantics::Sequential, backend);
+            let context = || format!("seed {seed}, {backend:?}, {steps} steps: {mission:?}");
+            match cost {
+                Some(cost) => {
+                    assert!(solvable(cost * scale - offset), "{}", context());
+                    assert!(!solvable(cost * scale - offset - 1), "{}", context());
+                }
+                None => assert!(!solvable(Int::from(i32::MAX)), "{}", context()),
+            }
+        }
+    }
+}
+
+#[test]
+fn formulas_have_plans_at_the_cost_of_the_oracle_and_none_below() {
+    for backend in Backend::built_in() {
+        (0..25).for_each(|seed| check(seed, &backend));
+    }
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn many_formulas_have_plans_at_the_cost_of_the_oracle_and_none_below() {
+    for backend in crate::solvers::backends() {
+        (25..2_100).for_each(|seed| check(seed, &backend));
+    }
+}
+
+/// What a task's formulas say in all semantics. Returns whether several operators stood at a step, and whether anything
+/// was equal.
+fn check_all(text: (String, String), backend: &Backend) -> (bool, bool) {
+    let task = ground_text(text.clone());
+    let text = text.1;
+    if task.unreachable.is_some() {
+        return (false, false);
+    }
+    let most = 4;
+    let (costs, optimum) = (costs_by_steps(&task, most), optimum(&task));
+    let bounds = Bounds::new(Context::new(&task, &Limits::none())).expect("no limit");
+    let mut together = false;
+    for bounds in [&bounds, &Bounds::trivial(Context::new(&task, &Limits::none())).expect("no limit")] {
+        for (steps, cost) in costs.iter().enumerate() {
+            let context = |semantics| format!("{backend:?}, {steps} steps, {semantics:?}, {cost:?}: {text}");
+            for semantics in [StepSemantics::Sequential, StepSemantics::ForAllStep, StepSemantics::ExistsStep]
+            {
+                let solvable = |limit| is_solvable(&task, bounds, steps, limit, semantics, backend);
+                if let Some(cost) = cost {
+                    assert!(solvable(*cost), "{}", context(semantics));
+                }
+                let below = cost.unwrap_or(MUCH) - 1;
+                match (semantics, optimum) {
+                    (StepSemantics::Sequential, _) => assert!(!solvable(below), "{}", context(semantics)),
+                    (_, Some(optimum)) => {
+                        assert!(!solvable(optimum - 1), "{}", context(semantics));
+                        together |= below >= optimum && solvable(below);
+                    }
+                    (_, None) => assert!(!solvable(MUCH), "{}", context(semantics)),
+                }
+            }
+        }
+    }
+    let allowed = vec![vec![true; task.operators.len()]; most];
+    let limits = Limits::none();
+    let encoding = Encoding::new(
+        Context::new(&task, &limits),
+        PlanConstraints {
+            allowed: &allowed,
+            cost: None,
+            semantics: StepSemantics::Sequential,
+            max_clauses: usize::MAX,
+        },
+        &OnceCell::new(),
+    );
+    let counts = encoding.expect("no limit").formula.counts();
+    (together, !counts.contains(&("symmetry", 0)))
+}
+
+#[test]
+fn neither_parallel_steps_nor_broken_symmetries_change_an_optimum() {
+    for backend in Backend::built_in() {
+        let fleets = (0..8).map(|seed| check_all(fleet(seed), &backend));
+        let together = fleets.filter(|(together, _)| *together).count();
+        assert!(together > 1, "{backend:?}: operators stand together in {together} tasks only");
+        let depots = (0..8).map(|seed| check_all(depot(seed), &backend));
+        let equal = depots.filter(|(_, equal)| *equal).count();
+        assert!(equal > 3, "{backend:?}: something is equal in {equal} tasks only");
+    }
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn neither_parallel_steps_nor_broken_symmetries_change_the_optimum_of_many() {
+    for backend in Backend::built_in() {
+        for seed in 8..1_100 {
+            check_all(fleet(seed), &backend);
+            check_all(depot(seed), &backend);
+        }
+    }
+}

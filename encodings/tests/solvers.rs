@@ -1,0 +1,257 @@
+//! What every back end has to do: one suite over all of them.
+
+use std::time::{Duration, Instant};
+
+use metaplan_encodings::sat::{Answer, Backend, BackendError, Lit, Solver};
+use task::limits::Limits;
+use testing::random::Random;
+
+/// Programs that distributions ship, as a user would name them.
+const PROGRAMS: [&str; 6] = [
+    "minisat -verb=0 /dev/stdin /dev/stdout",
+    "glucose -verb=0 /dev/stdin /dev/stdout",
+    "cadical -q",
+    "kissat -q",
+    "picosat",
+    "cryptominisat5 --verb 0",
+];
+
+/// The built-in ones, and the programs that are there.
+#[allow(clippy::print_stdout)]
+pub fn backends() -> Vec<Backend> {
+    let built_in = Backend::BUILT_IN.iter().map(|name| name.parse().expect("a name"));
+    let mut found: Vec<Backend> = built_in.collect();
+    for program in PROGRAMS {
+        let mut words = program.split(' ').map(str::to_owned);
+        let backend =
+            Backend::Program { command: words.next().expect("a command"), arguments: words.collect() };
+        match backend.check() {
+            Ok(()) => found.push(backend),
+            Err(error) => println!("skipped: {error}"),
+        }
+    }
+    found
+}
+
+fn literals(numbers: &[i32]) -> Vec<Lit> {
+    numbers.iter().map(|number| Lit::new(number.unsigned_abs() - 1, *number > 0)).collect()
+}
+
+fn solver(backend: &Backend, clauses: &[Vec<i32>]) -> Box<dyn Solver> {
+    let mut solver = backend.start(&Limits::none(), u64::MAX);
+    for clause in clauses {
+        solver.add_clause(&literals(clause));
+    }
+    solver
+}
+
+/// All back ends answer as expected, and their assignments satisfy the clauses.
+fn check(backends: &[Backend], clauses: &[Vec<i32>], expected: Answer) {
+    for backend in backends {
+        let mut solver = solver(backend, clauses);
+        assert_eq!(solver.solve(&[]), expected, "{backend:?}: {clauses:?}: {:?}", solver.failure());
+        if expected == Answer::Satisfiable {
+            let holds = |literal: &i32| solver.value(literal.unsigned_abs() - 1) == (*literal > 0);
+            assert!(clauses.iter().all(|clause| clause.iter().any(holds)), "{backend:?}: {clauses:?}");
+        }
+    }
+}
+
+/// No `holes + 1` pigeons fit: hard for all that only resolve.
+fn pigeons(holes: i32) -> Vec<Vec<i32>> {
+    let inside = |pigeon: i32, hole: i32| pigeon * holes + hole + 1;
+    let mut clauses: Vec<Vec<i32>> =
+        (0..=holes).map(|pigeon| (0..holes).map(|hole| inside(pigeon, hole)).collect()).collect();
+    for hole in 0..holes {
+        for a in 0..=holes {
+            clauses.extend((0..a).map(|b| vec![-inside(a, hole), -inside(b, hole)]));
+        }
+    }
+    clauses
+}
+
+#[test]
+fn special_formulas() {
+    use Answer::{Satisfiable, Unsatisfiable};
+    let backends = backends();
+    check(&backends, &[], Satisfiable);
+    check(&backends, &[vec![]], Unsatisfiable);
+    check(&backends, &[vec![3]], Satisfiable);
+    check(&backends, &[vec![1, 2], vec![]], Unsatisfiable);
+    check(&backends, &[vec![1], vec![-1]], Unsatisfiable);
+    check(&backends, &[vec![1, 1], vec![-2, -2]], Satisfiable);
+    check(&backends, &[vec![1, -1]], Satisfiable);
+    check(&backends, &pigeons(4), Unsatisfiable);
+}
+
+/// Formulas with three literals in each clause.
+struct Formulas(Random);
+
+impl Formulas {
+    fn literal(&mut self, variables: u64) -> i32 {
+        let variable = 1 + self.0.below(variables) as i32;
+        if self.0.below(2) == 0 { variable } else { -variable }
+    }
+
+    fn clauses(&mut self, variables: u64, count: u64) -> Vec<Vec<i32>> {
+        (0..count).map(|_| (0..3).map(|_| self.literal(variables)).collect()).collect()
+    }
+}
+
+/// Whether some assignment satisfies the clauses and the assumptions.
+fn by_enumeration(variables: u64, clauses: &[Vec<i32>], assumptions: &[i32]) -> bool {
+    (0..1_u32 << variables).any(|bits| {
+        let literal = |l: &i32| (bits >> (l.unsigned_abs() - 1) & 1 == 1) == (*l > 0);
+        assumptions.iter().all(literal) && clauses.iter().all(|clause| clause.iter().any(literal))
+    })
+}
+
+#[test]
+fn random_formulas_as_enumeration() {
+    let backends = backends();
+    let mut formulas = Formulas(Random(1));
+    let mut satisfiable = 0;
+    for _ in 0..60 {
+        let variables = 3 + formulas.0.below(6) as u64;
+        let count = variables * 4 + formulas.0.below(variables) as u64;
+        let clauses = formulas.clauses(variables, count);
+        let any = by_enumeration(variables, &clauses, &[]);
+        satisfiable += usize::from(any);
+        check(&backends, &clauses, if any { Answer::Satisfiable } else { Answer::Unsatisfiable });
+    }
+    assert!((10..50).contains(&satisfiable), "the formulas are of one kind: {satisfiable} of 60");
+}
+
+/// Clauses come in portions, each followed by calls under several sets of assumptions. Returns how many of these calls found
+/// an assignment, how many a contradiction, and how often a core left assumptions out.
+fn check_growing(backend: &Backend, seed: u64) -> (usize, usize, usize) {
+    let mut formulas = Formulas(Random(seed));
+    let variables = 4 + formulas.0.below(7) as u64;
+    let mut known: Vec<Vec<i32>> = Vec::new();
+    let mut solver = solver(backend, &[]);
+    let (mut satisfiable, mut unsatisfiable, mut smaller) = (0, 0, 0);
+    for _ in 0..5 {
+        let clauses = formulas.clauses(variables, variables);
+        for clause in &clauses {
+            solver.add_clause(&literals(clause));
+        }
+        known.extend(clauses);
+        for _ in 0..4 {
+            let count = formulas.0.below(6);
+            // Some contradict each other, some come twice, and one is of a variable that no clause has.
+            let mut assumptions: Vec<i32> = (0..count).map(|_| formulas.literal(variables)).collect();
+            assumptions.push(variables as i32 + 1);
+            let context = || format!("{backend:?}, seed {seed}: {known:?} under {assumptions:?}");
+            let answer = solver.solve(&literals(&assumptions));
+            if answer == Answer::Satisfiable {
+                let holds = |l: &i32| solver.value(l.unsigned_abs() - 1) == (*l > 0);
+                assert!(known.iter().all(|clause| clause.iter().any(holds)), "{}", context());
+                assert!(assumptions.iter().all(holds), "{}", context());
+                satisfiable += 1;
+            } else {
+                assert_eq!(answer, Answer::Unsatisfiable, "{}: {:?}", context(), solver.failure());
+                let core: Vec<i32> = solver.core().iter().map(|literal| literal.dimacs()).collect();
+                assert!(core.iter().all(|literal| assumptions.contains(literal)), "{}: {core:?}", context());
+                assert!(!by_enumeration(variables + 1, &known, &core), "{}: {core:?}", context());
+                unsatisfiable += 1;
+                smaller += usize::from(core.len() < assumptions.len());
+            }
+        }
+    }
+    (satisfiable, unsatisfiable, smaller)
+}
+
+/// Here a solver that is asked again named assumptions that do not contradict each other.
+#[test]
+fn cores_of_later_calls_are_contradictory() {
+    for backend in backends() {
+        check_growing(&backend, 666);
+    }
+}
+
+fn check_many_growing(seeds: std::ops::Range<u64>) {
+    for backend in backends() {
+        let (mut satisfiable, mut unsatisfiable, mut smaller) = (0, 0, 0);
+        for seed in seeds.clone() {
+            let counts = check_growing(&backend, seed);
+            satisfiable += counts.0;
+            unsatisfiable += counts.1;
+            smaller += counts.2;
+        }
+        assert!(satisfiable > 100 && unsatisfiable > 100, "{backend:?}: {satisfiable}, {unsatisfiable}");
+        assert!(matches!(backend, Backend::Program { .. }) || smaller > 100, "{backend:?}: {smaller}");
+    }
+}
+
+#[test]
+fn clauses_and_assumptions_come_and_cores_are_contradictory() {
+    check_many_growing(0..30);
+}
+
+#[test]
+#[ignore = "takes minutes"]
+fn many_clauses_and_assumptions_come_and_cores_are_contradictory() {
+    check_many_growing(30..3_000);
+}
+
+/// Pigeons with a literal for each hole that closes it: what was learnt must not outlive the assumptions that it rests on.
+#[test]
+fn answers_do_not_depend_on_what_was_asked_before() {
+    let holes = 6;
+    for backend in backends() {
+        let mut clauses = pigeons(holes);
+        // One pigeon may stay outside.
+        clauses[0].push(100);
+        let mut solver = solver(&backend, &clauses);
+        for _ in 0..2 {
+            assert_eq!(solver.solve(&literals(&[-100])), Answer::Unsatisfiable, "{backend:?}");
+            assert_eq!(solver.core(), literals(&[-100]), "{backend:?}");
+            assert_eq!(solver.solve(&literals(&[100])), Answer::Satisfiable, "{backend:?}");
+            assert_eq!(solver.solve(&[]), Answer::Satisfiable, "{backend:?}");
+        }
+        solver.add_clause(&literals(&[-100]));
+        assert_eq!(solver.solve(&[]), Answer::Unsatisfiable, "{backend:?}");
+        assert!(solver.core().is_empty(), "{backend:?}");
+    }
+}
+
+#[test]
+fn limits_interrupt() {
+    let clauses = pigeons(13);
+    for backend in backends() {
+        let mut limited = backend.start(&Limits::none().with_time(Duration::from_millis(50)), u64::MAX);
+        let mut counted = backend.start(&Limits::none(), 200);
+        for clause in &clauses {
+            let clause = literals(clause);
+            limited.add_clause(&clause);
+            counted.add_clause(&clause);
+        }
+        let started = Instant::now();
+        assert_eq!(limited.solve(&[]), Answer::Interrupted, "{backend:?}, by time");
+        assert_eq!(counted.solve(&[]), Answer::Interrupted, "{backend:?}, by conflicts");
+        assert!(started.elapsed() < Duration::from_secs(20), "{backend:?}");
+        assert!(counted.failure().is_none());
+        // Time stays up, and who asks once more hears so.
+        for solver in [&mut limited, &mut counted] {
+            solver.add_clause(&literals(&[1, 1_000]));
+            assert_ne!(solver.solve(&literals(&[-1])), Answer::Satisfiable, "{backend:?}");
+        }
+        assert_eq!(limited.solve(&[]), Answer::Interrupted, "{backend:?}, asked again");
+    }
+}
+
+#[test]
+fn names_and_programs_that_do_not_serve() {
+    assert_eq!("batsat".parse(), Ok(Backend::Batsat));
+    assert_eq!(" ".parse::<Backend>(), Err(BackendError::Empty));
+    let message = |name: &str| match name.parse::<Backend>().and_then(|backend| backend.check()) {
+        Ok(()) => "serves".to_owned(),
+        Err(error) => error.to_string(),
+    };
+    assert_eq!(message("varisat"), "serves");
+    for (name, part) in [("no-such-solver", "cannot be started"), ("true", "neither SATISFIABLE")] {
+        assert!(message(name).contains(part), "{}", message(name));
+    }
+    assert!(message("echo s UNSATISFIABLE").contains("answers wrongly"));
+    assert!(message("echo s SATISFIABLE").contains("does not satisfy"));
+}
