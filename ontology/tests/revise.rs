@@ -352,6 +352,7 @@ fn changes_with_equalities_mean_what_one_document_means() {
 #[test]
 fn changes_that_went_wrong() {
     check(2_003_574..2_003_575, false);
+    check(2_008_464..2_008_465, false);
     check(3_001_851..3_001_852, true);
 }
 

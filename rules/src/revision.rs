@@ -16,7 +16,7 @@ use crate::engine::{Delta, Engine};
 use crate::equality::Equality;
 use crate::error::{Error, Errors};
 use crate::fact::Fact;
-use crate::maintain::Maintenance;
+use crate::maintain::{Maintenance, state_change};
 use crate::network::{Revision, compile, revise};
 use crate::record::Records;
 use crate::rule::{Program, Rule, RuleIdentity};
@@ -42,7 +42,7 @@ impl Engine {
         let Some(revision) = revision else { return self.rebuild(program) };
         let old = (Arc::clone(&self.network), Arc::clone(&self.program));
         self.program = Arc::new(program);
-        self.revise(revision).map_err(|error| {
+        self.revise(revision, Delta::default()).map_err(|error| {
             (self.network, self.program) = old;
             self.restore(&Delta::default());
             error.into()
@@ -158,16 +158,25 @@ impl Engine {
         &self.disabled
     }
 
-    /// Exchanges the rules over representatives and returns the net change of rows. After an error the engine is in no
-    /// defined state.
-    pub(crate) fn replace_rules(&mut self, old: &Program, new: &Program) -> Result<Delta, Error> {
+    /// Changes the stated rows and the rules over representatives, and returns the net change of rows. After an error the
+    /// engine is in no defined state.
+    ///
+    /// All conclusions are deleted that lose their support before anything is concluded: of pairs that make one class of
+    /// names, only as many are stored as connect it, so none of these may be deleted after the others are found.
+    pub(crate) fn replace_rules(
+        &mut self,
+        delta: Delta,
+        old: &Program,
+        new: &Program,
+    ) -> Result<Delta, Error> {
         let symbols = Arc::make_mut(&mut self.symbols);
         let revision =
             revise(&self.network, old, new, symbols, &mut self.store, &self.limits).map_err(first)?;
         if let Some(revision) = revision {
-            return self.revise(revision);
+            return self.revise(revision, delta);
         }
         let before: FxHashSet<Fact> = self.rows_with(0).collect();
+        state_change(self, delta);
         let stated = self.rows_with(state::ASSERTED).collect();
         self.store = Store::default();
         self.store.state(stated);
@@ -181,7 +190,7 @@ impl Engine {
         Ok(Delta { insert, delete: before.difference(&after).cloned().collect() })
     }
 
-    fn revise(&mut self, revision: Revision) -> Result<Delta, Error> {
+    fn revise(&mut self, revision: Revision, delta: Delta) -> Result<Delta, Error> {
         let Revision { network, removed, added } = revision;
         let heads: FxHashSet<RelationId> = removed
             .iter()
@@ -191,8 +200,9 @@ impl Engine {
         // The bindings of removed rules are needed until what they concluded is gone.
         self.records.revise(&network, |_| false);
         self.network = Arc::new(network);
+        let stated = state_change(self, delta);
         let mut maintenance = Maintenance::new(self);
-        maintenance.change_rules(&removed, &heads, &added)?;
+        maintenance.update_with_rules(&stated, &removed, &heads, &added)?;
         let change = maintenance.finish();
         let network = Arc::clone(&self.network);
         self.records.revise(&network, |number| removed.contains(&number));

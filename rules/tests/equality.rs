@@ -286,3 +286,17 @@ fn equality_is_switched_on_by_a_change() {
     engine.apply(Delta { insert: vec![], delete: vec![pair] }).expect("within the budget");
     assert!(!shown(&engine).contains("r(b)"));
 }
+
+/// A pair that a rule concludes from a name that becomes another name's is deleted with that name; the pairs that follow
+/// without that name are found all the same.
+#[test]
+fn pairs_are_found_where_constants_of_rules_become_one() {
+    let rules = "p(?x, ?y) ^ sameAs(?x, c) -> q(?y, ?x) .
+        p(?x, ?w) ^ q(?y, ?x) ^ q(?z, ?x) -> sameAs(?y, ?z) .
+        p(?x, ?y) -> n(?x) ^ n(?y) .
+        n(?x) -> p(?x, ?x) ^ p(?x, d) .
+        r(?x) -> p(?x, e) .";
+    let mut engine = engine(rules, "r(c), p(e, a), p(e, c)");
+    let pair = fact(&mut engine, "sameAs(a, c)");
+    assert!(engine.holds(&pair), "{:?}", shown(&engine));
+}

@@ -392,21 +392,22 @@ impl<'e> Update<'e> {
                 _ => {}
             }
         }
-        let change = self.engine.apply_rows(delta)?;
-        self.note(change);
         if let Some(program) = self.program.take() {
             self.engine.program = Arc::new(program);
             self.rules_changed = true;
         }
-        if std::mem::take(&mut self.rules_changed) {
-            let normal = self.equality.normal_program(&self.engine.program);
-            if normal != *self.equality.program {
-                let old = Arc::clone(&self.equality.program);
-                let change = self.engine.replace_rules(&old, &normal)?;
-                self.equality.program = Arc::new(normal);
-                self.note(change);
+        let normal = std::mem::take(&mut self.rules_changed)
+            .then(|| self.equality.normal_program(&self.engine.program))
+            .filter(|normal| *normal != *self.equality.program);
+        let change = match normal {
+            Some(normal) => {
+                let old = std::mem::replace(&mut self.equality.program, Arc::new(normal));
+                let new = Arc::clone(&self.equality.program);
+                self.engine.replace_rules(delta, &old, &new)?
             }
-        }
+            None => self.engine.apply_rows(delta)?,
+        };
+        self.note(change);
         Ok(())
     }
 
