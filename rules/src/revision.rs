@@ -3,8 +3,7 @@
 //! The rules that stay keep their recorded derivations. What a removed rule concluded loses its support, as if a fact
 //! of its body had gone, and is rederived where another rule concludes it too; a new rule is evaluated once over
 //! everything that holds. Everything is derived again only
-//! where the strata of the rules that stay fall apart, where equality is switched off, or where a rule goes while names
-//! are one.
+//! where the strata of the rules that stay fall apart, or where equality is switched off.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -82,14 +81,6 @@ impl Engine {
 
     fn change_equally(&mut self, mut delta: Delta, mut program: Program) -> Result<Delta, Errors> {
         program.equality = true;
-        let kept: FxHashSet<&Rule> = program.rules.iter().collect();
-        let is_gone = |rule: &Rule| !kept.contains(rule);
-        // What a removed rule concluded may have made names one, on which further equalities rest.
-        if self.equality.as_ref().is_some_and(|equality| equality.joins())
-            && self.program.rules.iter().any(is_gone)
-        {
-            return self.rebuild_with(program, &delta);
-        }
         let switched = if self.equality.is_none() { self.switch_on(&mut delta)? } else { Delta::default() };
         let Some(equality) = self.equality.take() else { return Ok(switched) };
         let change = self.apply_equally(equality, &delta, Some(program)).map_err(|(error, _)| error)?;
@@ -210,16 +201,7 @@ impl Engine {
     }
 
     fn rebuild(&mut self, program: Program) -> Result<Delta, Errors> {
-        self.rebuild_with(program, &Delta::default())
-    }
-
-    fn rebuild_with(&mut self, program: Program, delta: &Delta) -> Result<Delta, Errors> {
-        let mut stated: FxHashSet<Fact> = self.stated().into_iter().collect();
-        delta.delete.iter().for_each(|fact| {
-            stated.remove(fact);
-        });
-        stated.extend(delta.insert.iter().cloned());
-        let mut stated: Vec<Fact> = stated.into_iter().collect();
+        let mut stated = self.stated();
         stated.sort_unstable();
         let mut engine = Self::with_limits(self.symbols().clone(), program, stated, self.limits.clone())?;
         engine.disabled.clone_from(&self.disabled);

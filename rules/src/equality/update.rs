@@ -12,7 +12,7 @@ use crate::engine::{Delta, Engine};
 use crate::error::Error;
 use crate::fact::Fact;
 use crate::forest::Forest;
-use crate::rule::Program;
+use crate::rule::{Program, Rule};
 use crate::store::{Record, state};
 use crate::symbol::Symbol;
 
@@ -135,10 +135,14 @@ impl<'e> Update<'e> {
     }
 
     fn change_classes(&mut self, added: &[Fact], removed: &[Fact]) -> Result<(), Error> {
+        let old = Arc::clone(&self.engine.program);
+        let mut gone = FxHashSet::default();
         if let Some(program) = &self.program {
             self.equality.constants.extend(constants(program));
+            let kept: FxHashSet<&Rule> = program.rules.iter().collect();
+            gone.extend(old.rules.iter().filter(|rule| !kept.contains(rule)).map(|rule| &rule.identity));
         }
-        let invalid = self.equality.classes.resting_on(removed.iter());
+        let invalid = self.equality.classes.resting_on(removed.iter(), &gone);
         self.take_apart(&invalid, added);
         self.join_stated(added);
         self.flush()
