@@ -3,8 +3,8 @@
 use rules::{Atom, Term};
 
 use super::context::{Conjunction, Context, INTERNAL, Variables, cross};
-use super::range;
-use crate::owl::{Bound, ClassExpression, DataRange};
+use super::{inclusion, range};
+use crate::owl::{Bound, ClassExpression, DataRange, ObjectPropertyExpression};
 use crate::vocab::owl;
 
 /// What follows from being in a class: for each part, further conditions and then heads (none for a contradiction).
@@ -46,9 +46,19 @@ pub(crate) fn condition(
             individuals.iter().map(|iri| vec![Atom::Same(x, context.constant(iri))]).collect()
         }
         C::SomeValuesFrom(property, filler) | C::Cardinality(Bound::Min, 1, property, filler) => {
-            let y = variables.fresh("y");
-            let edge = vec![vec![context.property(property, x, y)]];
-            cross(&edge, &condition(context, filler, y, variables))
+            if let Some(name) = inclusion::condition(context, class) {
+                if context.abbreviated.insert(name.clone()) {
+                    let mut variables = Variables::default();
+                    let own = variables.fresh("x");
+                    let head = context.relation(&name, [own]);
+                    let identity = context.identity.clone();
+                    for body in some_value(context, property, filler, own, &mut variables) {
+                        context.rule(&identity, vec![head.clone()], body, &variables);
+                    }
+                }
+                return vec![vec![context.relation(&name, [x])]];
+            }
+            some_value(context, property, filler, x, variables)
         }
         C::HasValue(property, individual) => {
             let value = context.constant(individual);
@@ -66,10 +76,25 @@ pub(crate) fn condition(
         }
         C::ComplementOf(_) => context.gap("a complement as a condition"),
         C::AllValuesFrom(..) | C::DataAllValuesFrom(..) => {
-            context.gap("a universal restriction as a condition")
+            context.gap::<()>("a universal restriction as a condition");
+            let name = inclusion::condition(context, class);
+            name.map(|name| vec![context.relation(&name, [x])]).into_iter().collect()
         }
         C::Cardinality(..) | C::DataCardinality(..) => context.gap("a cardinality as a condition"),
     }
+}
+
+/// The ways in which `x` can be seen to have a value in a class.
+fn some_value(
+    context: &mut Context,
+    property: &ObjectPropertyExpression,
+    filler: &ClassExpression,
+    x: Term,
+    variables: &mut Variables,
+) -> Vec<Conjunction> {
+    let y = variables.fresh("y");
+    let edge = vec![vec![context.property(property, x, y)]];
+    cross(&edge, &condition(context, filler, y, variables))
 }
 
 /// A conjunction of unions is multiplied out up to so many alternatives.
@@ -147,7 +172,8 @@ pub(crate) fn conclusions(
             let y = variables.fresh("y");
             let edge = context.property(property, x, y);
             let inner = conclusions(context, filler, y, variables);
-            inner.into_iter().map(|(body, head)| (with(edge.clone(), body), head)).collect()
+            let inner = inner.into_iter().map(|(body, head)| (with(edge.clone(), body), head));
+            inner.chain(inclusion::conclusion(context, class, x)).collect()
         }
         C::DataAllValuesFrom(property, range) => {
             let value = variables.fresh("v");
@@ -174,9 +200,10 @@ pub(crate) fn conclusions(
         }
         C::Cardinality(Bound::Exact, n @ (0 | 1), property, filler) => {
             let most = C::Cardinality(Bound::Max, *n, property.clone(), filler.clone());
-            let all = conclusions(context, &most, x, variables);
+            let mut all = conclusions(context, &most, x, variables);
             if *n == 1 {
                 context.gap::<()>(EXISTS);
+                all.extend(inclusion::conclusion(context, class, x));
             }
             all
         }
@@ -194,7 +221,10 @@ pub(crate) fn conclusions(
                     let value = context.constant(&individuals[0]);
                     heads(context.property(property, x, value))
                 }
-                _ => context.gap(EXISTS),
+                _ => {
+                    context.gap::<()>(EXISTS);
+                    inclusion::conclusion(context, class, x)
+                }
             }
         }
         C::DataSomeValuesFrom(property, DataRange::OneOf(values)) if values.len() == 1 => {
@@ -203,7 +233,10 @@ pub(crate) fn conclusions(
         }
         C::DataSomeValuesFrom(..) | C::DataCardinality(Bound::Min, 1, ..) => context.gap(EXISTS),
         C::UnionOf(_) | C::OneOf(_) => context.gap("a union as a conclusion"),
-        C::Cardinality(..) | C::DataCardinality(..) => context.gap("a cardinality as a conclusion"),
+        C::Cardinality(..) | C::DataCardinality(..) => {
+            context.gap::<()>("a cardinality as a conclusion");
+            inclusion::conclusion(context, class, x)
+        }
     }
 }
 

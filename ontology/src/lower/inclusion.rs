@@ -1,0 +1,317 @@
+//! Restrictions that include others: rules scm-svf1, scm-svf2, scm-avf1 and scm-avf2 of OWL 2 RL ([1], table 9).
+//!
+//! An individual of `∃p.C` has a value that no rule can name, but it is in `∃q.D` where `p ⊑ q` and `C ⊑ D`. Where an axiom
+//! concludes the first restriction and another has the second as a condition, both get an auxiliary relation, and a rule leads
+//! from one to the other. Universal restrictions are treated alike, with `q ⊑ p`. Inclusions of classes and properties are
+//! those that axioms state, closed under transitivity, with `C ⊓ D ⊑ C`, `C ⊑ C ⊔ D`, and what this file finds itself.
+//!
+//! [1] OWL 2 Web Ontology Language Profiles, W3C 2012, section 4.3.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+
+use rules::Atom;
+
+use super::class::Conclusions;
+use super::context::{Context, INTERNAL, Variables, identity};
+use crate::owl::{
+    Atom as RuleAtom, Axiom, Bound, ClassExpression, Iri, ObjectPropertyExpression as Property, Ontology,
+};
+use crate::vocab::owl;
+
+/// Restrictions with an auxiliary relation.
+#[derive(Default)]
+pub(crate) struct Inclusions {
+    /// By restriction that an axiom concludes: the conditions that include it.
+    concluded: BTreeMap<ClassExpression, BTreeSet<ClassExpression>>,
+    /// These conditions.
+    conditions: HashSet<ClassExpression>,
+}
+
+impl Inclusions {
+    /// The inclusions between the restrictions of an ontology.
+    pub(crate) fn new(ontology: &Ontology) -> Self {
+        let mut uses = Uses::default();
+        uses.collect(ontology);
+        if uses.conditions.is_empty() || uses.concluded.is_empty() {
+            return Self::default();
+        }
+        let stated = Stated::new(ontology, uses.conditions);
+        let mut supers = HashMap::new();
+        let mut inclusions = Self::default();
+        for restriction in uses.concluded {
+            let including = stated.including(&restriction, &mut supers);
+            if !including.is_empty() {
+                inclusions.conditions.extend(including.iter().cloned());
+                inclusions.concluded.insert(restriction, including);
+            }
+        }
+        inclusions
+    }
+}
+
+/// The auxiliary relation of a condition, where a conclusion is included in the condition.
+pub(crate) fn condition(context: &Context, class: &ClassExpression) -> Option<String> {
+    let restriction = restriction(class, false)?;
+    context.inclusions.conditions.contains(&restriction).then(|| relation(&restriction))
+}
+
+/// The auxiliary head of a conclusion, where a condition includes the conclusion.
+pub(crate) fn conclusion(context: &mut Context, class: &ClassExpression, x: rules::Term) -> Conclusions {
+    let included = restriction(class, true).filter(|known| context.inclusions.concluded.contains_key(known));
+    let head = included.map(|restriction| context.relation(&relation(&restriction), [x]));
+    head.map(|atom| (Vec::new(), vec![atom])).into_iter().collect()
+}
+
+/// Adds a rule for each inclusion.
+pub(crate) fn lower(context: &mut Context, position: usize) {
+    let concluded = std::mem::take(&mut context.inclusions.concluded);
+    for (sub, including) in &concluded {
+        for sup in including.iter().filter(|sup| *sup != sub) {
+            let mut variables = Variables::default();
+            let x = variables.fresh("x");
+            let identity = identity(&Axiom::SubClassOf(sub.clone(), sup.clone()), position);
+            let [body, head]: [Atom; 2] = [sub, sup].map(|class| context.relation(&relation(class), [x]));
+            context.rule(&identity, vec![head], vec![body], &variables);
+        }
+    }
+    context.inclusions.concluded = concluded;
+}
+
+fn relation(restriction: &ClassExpression) -> String {
+    format!("{INTERNAL}restriction:{restriction}")
+}
+
+/// The existential or universal restriction that a class is, or of which the class is part if it is concluded.
+fn restriction(class: &ClassExpression, is_concluded: bool) -> Option<ClassExpression> {
+    use ClassExpression as C;
+    match class {
+        C::SomeValuesFrom(..) | C::AllValuesFrom(..) => Some(class.clone()),
+        C::Cardinality(bound, number, property, filler)
+            if (*bound, *number) == (Bound::Min, 1)
+                || (is_concluded && *bound != Bound::Max && *number > 0) =>
+        {
+            Some(C::SomeValuesFrom(property.clone(), filler.clone()))
+        }
+        _ => None,
+    }
+}
+
+/// The restrictions that axioms and rules conclude, and that they have as conditions.
+#[derive(Default)]
+struct Uses {
+    concluded: BTreeSet<ClassExpression>,
+    conditions: HashSet<ClassExpression>,
+}
+
+impl Uses {
+    fn collect(&mut self, ontology: &Ontology) {
+        for annotated in &ontology.axioms {
+            match &annotated.axiom {
+                Axiom::SubClassOf(sub, sup) => {
+                    self.condition(sub);
+                    self.conclusion(sup);
+                }
+                Axiom::EquivalentClasses(classes) => classes.iter().for_each(|class| {
+                    self.condition(class);
+                    self.conclusion(class);
+                }),
+                Axiom::DisjointClasses(classes) | Axiom::DisjointUnion(_, classes) => {
+                    classes.iter().for_each(|class| self.condition(class));
+                }
+                Axiom::ObjectPropertyDomain(_, class)
+                | Axiom::ObjectPropertyRange(_, class)
+                | Axiom::DataPropertyDomain(_, class)
+                | Axiom::ClassAssertion(class, _) => self.conclusion(class),
+                Axiom::HasKey(class, ..) => self.condition(class),
+                _ => {}
+            }
+        }
+        for rule in &ontology.rules {
+            for (atoms, is_condition) in [(&rule.body, true), (&rule.head, false)] {
+                for atom in atoms {
+                    match atom {
+                        RuleAtom::Class(class, _) if is_condition => self.condition(class),
+                        RuleAtom::Class(class, _) => self.conclusion(class),
+                        _ => {}
+                    }
+                }
+            }
+        }
+    }
+
+    fn condition(&mut self, class: &ClassExpression) {
+        use ClassExpression as C;
+        self.conditions.extend(restriction(class, false));
+        match class {
+            C::IntersectionOf(classes) | C::UnionOf(classes) => {
+                classes.iter().for_each(|class| self.condition(class));
+            }
+            C::SomeValuesFrom(_, filler) | C::Cardinality(Bound::Min, 1, _, filler) => self.condition(filler),
+            _ => {}
+        }
+    }
+
+    fn conclusion(&mut self, class: &ClassExpression) {
+        use ClassExpression as C;
+        self.concluded.extend(restriction(class, true));
+        match class {
+            C::IntersectionOf(classes) => classes.iter().for_each(|class| self.conclusion(class)),
+            C::AllValuesFrom(_, filler) => self.conclusion(filler),
+            C::ComplementOf(class) => self.condition(class),
+            C::Cardinality(Bound::Max | Bound::Exact, 0 | 1, _, filler) => self.condition(filler),
+            _ => {}
+        }
+    }
+}
+
+/// Inclusions that axioms state, and the conditions that are compared.
+struct Stated {
+    classes: HashMap<ClassExpression, Vec<ClassExpression>>,
+    properties: HashMap<Property, Vec<Property>>,
+    subproperties: HashMap<Property, Vec<Property>>,
+    conditions: HashSet<ClassExpression>,
+    /// The properties of the conditions.
+    used: HashSet<Property>,
+    thing: ClassExpression,
+}
+
+impl Stated {
+    fn new(ontology: &Ontology, conditions: HashSet<ClassExpression>) -> Self {
+        let used = conditions.iter().filter_map(parts).map(|(property, _)| property.clone()).collect();
+        let (classes, properties, subproperties) = (HashMap::new(), HashMap::new(), HashMap::new());
+        let thing = ClassExpression::Class(Iri::from(owl::THING));
+        let mut stated = Self { classes, properties, subproperties, conditions, used, thing };
+        let fillers: Vec<ClassExpression> =
+            stated.conditions.iter().filter_map(parts).map(|(_, filler)| filler.clone()).collect();
+        fillers.iter().for_each(|filler| stated.members(filler));
+        for annotated in &ontology.axioms {
+            match &annotated.axiom {
+                Axiom::SubClassOf(sub, sup) => stated.class(sub, sup),
+                Axiom::EquivalentClasses(classes) => {
+                    for (sub, sup) in classes.iter().zip(classes.iter().cycle().skip(1)) {
+                        stated.class(sub, sup);
+                    }
+                }
+                Axiom::SubObjectPropertyOf(sub, sup) => stated.property(sub, sup),
+                Axiom::EquivalentObjectProperties(properties) => {
+                    for (sub, sup) in properties.iter().zip(properties.iter().cycle().skip(1)) {
+                        stated.property(sub, sup);
+                    }
+                }
+                Axiom::InverseObjectProperties(first, second) => {
+                    let (first, second) = (first.clone(), second.clone());
+                    let (one, other) = (Property::Property(first), Property::Inverse(second));
+                    stated.property(&one, &other);
+                    stated.property(&other, &one);
+                }
+                _ => {}
+            }
+        }
+        stated
+    }
+
+    fn class(&mut self, sub: &ClassExpression, sup: &ClassExpression) {
+        self.classes.entry(sub.clone()).or_default().push(sup.clone());
+        self.members(sub);
+        self.members(sup);
+    }
+
+    /// Adds that a union includes its members.
+    fn members(&mut self, class: &ClassExpression) {
+        if let ClassExpression::UnionOf(members) = class {
+            for member in members {
+                self.classes.entry(member.clone()).or_default().push(class.clone());
+            }
+        }
+    }
+
+    fn property(&mut self, sub: &Property, sup: &Property) {
+        for (sub, sup) in [(sub.clone(), sup.clone()), (inverse(sub), inverse(sup))] {
+            self.properties.entry(sub.clone()).or_default().push(sup.clone());
+            self.subproperties.entry(sup).or_default().push(sub);
+        }
+    }
+
+    /// The conditions that include a restriction.
+    fn including(
+        &self,
+        restriction: &ClassExpression,
+        supers: &mut HashMap<ClassExpression, BTreeSet<ClassExpression>>,
+    ) -> BTreeSet<ClassExpression> {
+        let Some((property, filler)) = parts(restriction) else { return BTreeSet::new() };
+        let is_universal = matches!(restriction, ClassExpression::AllValuesFrom(..));
+        let related = if is_universal { &self.subproperties } else { &self.properties };
+        let mut properties = reachable(property, related);
+        properties.retain(|property| self.used.contains(property));
+        if properties.is_empty() {
+            return BTreeSet::new();
+        }
+        let fillers = self.supers(filler, supers);
+        let mut including = BTreeSet::new();
+        for property in properties {
+            for filler in &fillers {
+                let (property, filler) = (property.clone(), Box::new(filler.clone()));
+                let candidate = match is_universal {
+                    true => ClassExpression::AllValuesFrom(property, filler),
+                    false => ClassExpression::SomeValuesFrom(property, filler),
+                };
+                including.extend(self.conditions.get(&candidate).cloned());
+            }
+        }
+        including
+    }
+
+    /// The classes that include a class, itself among them. A class that is searched already counts as included in itself only.
+    fn supers(
+        &self,
+        class: &ClassExpression,
+        known: &mut HashMap<ClassExpression, BTreeSet<ClassExpression>>,
+    ) -> BTreeSet<ClassExpression> {
+        if let Some(supers) = known.get(class) {
+            return supers.clone();
+        }
+        known.insert(class.clone(), BTreeSet::from([class.clone()]));
+        let mut found = BTreeSet::from([class.clone(), self.thing.clone()]);
+        let mut open = vec![class.clone()];
+        while let Some(class) = open.pop() {
+            let mut next: Vec<ClassExpression> =
+                self.classes.get(&class).into_iter().flatten().cloned().collect();
+            if let ClassExpression::IntersectionOf(members) = &class {
+                next.extend(members.iter().cloned());
+            }
+            if let Some(restriction) = restriction(&class, true) {
+                next.extend(self.including(&restriction, known));
+            }
+            open.extend(next.into_iter().filter(|sup| found.insert(sup.clone())));
+        }
+        known.insert(class.clone(), found.clone());
+        found
+    }
+}
+
+/// The property and the filler of a restriction.
+fn parts(restriction: &ClassExpression) -> Option<(&Property, &ClassExpression)> {
+    match restriction {
+        ClassExpression::SomeValuesFrom(property, filler)
+        | ClassExpression::AllValuesFrom(property, filler) => Some((property, filler)),
+        _ => None,
+    }
+}
+
+fn inverse(property: &Property) -> Property {
+    match property {
+        Property::Property(name) => Property::Inverse(name.clone()),
+        Property::Inverse(name) => Property::Property(name.clone()),
+    }
+}
+
+/// A property and all properties that edges lead to from there.
+fn reachable(from: &Property, edges: &HashMap<Property, Vec<Property>>) -> BTreeSet<Property> {
+    let mut found = BTreeSet::from([from.clone()]);
+    let mut open = vec![from];
+    while let Some(property) = open.pop() {
+        let next = edges.get(property).into_iter().flatten();
+        open.extend(next.filter(|next| found.insert((*next).clone())));
+    }
+    found
+}
