@@ -74,6 +74,8 @@ fn build_here(
     sort::axioms(&mut parts.axioms, &names);
     parts.annotations.sort();
     parts.annotations.dedup();
+    parts.annotation_annotations.sort();
+    parts.annotation_annotations.dedup();
     parts.warnings.extend(unread);
     Ok(parts)
 }
@@ -116,16 +118,22 @@ impl Builder {
             Component::AnnotationAssertion(assertion) => {
                 let subject = self.iri(&assertion.subject);
                 let annotation = self.annotation(&assertion.ann);
-                self.parts.annotations.push((subject, annotation));
+                self.annotate(subject, annotation, annotations);
             }
             Component::OntologyAnnotation(about) => {
                 let annotation = self.annotation(&about.0);
                 let subject = self.ontology.clone();
                 self.parts.annotations.push((subject, annotation));
             }
-            Component::SubAnnotationPropertyOf(a) => self.annotate(&a.sub, rdfs::SUB_PROPERTY_OF, &a.sup),
-            Component::AnnotationPropertyDomain(a) => self.annotate(&a.ap, rdfs::DOMAIN, &a.iri),
-            Component::AnnotationPropertyRange(a) => self.annotate(&a.ap, rdfs::RANGE, &a.iri),
+            Component::SubAnnotationPropertyOf(a) => {
+                self.annotate_property(&a.sub, (rdfs::SUB_PROPERTY_OF, &a.sup), annotations);
+            }
+            Component::AnnotationPropertyDomain(a) => {
+                self.annotate_property(&a.ap, (rdfs::DOMAIN, &a.iri), annotations);
+            }
+            Component::AnnotationPropertyRange(a) => {
+                self.annotate_property(&a.ap, (rdfs::RANGE, &a.iri), annotations);
+            }
             component => {
                 if let Some((kind, iri)) = entity(&component) {
                     let iri = self.iri(iri);
@@ -137,11 +145,23 @@ impl Builder {
         }
     }
 
-    /// An axiom about annotation properties, which says nothing about individuals.
-    fn annotate(&mut self, subject: &str, property: &str, value: &str) {
-        let (subject, property) = (self.iri(subject), self.iri(property));
+    /// Adds an axiom about an annotation property, which an ontology keeps as an annotation.
+    fn annotate_property(
+        &mut self,
+        property: &str,
+        (relation, value): (&str, &str),
+        annotations: Vec<Annotation>,
+    ) {
+        let (subject, property) = (self.iri(property), self.iri(relation));
         let value = AnnotationValue::Iri(self.iri(value));
-        self.parts.annotations.push((subject, Annotation { property, value }));
+        self.annotate(subject, Annotation { property, value }, annotations);
+    }
+
+    /// Adds an annotation with its own annotations.
+    fn annotate(&mut self, subject: Iri, annotation: Annotation, annotations: Vec<Annotation>) {
+        let own = annotations.into_iter().map(|own| (subject.clone(), annotation.clone(), own));
+        self.parts.annotation_annotations.extend(own);
+        self.parts.annotations.push((subject, annotation));
     }
 
     fn rule(&mut self, rule: &ho::Rule<RcStr>, annotations: Vec<Annotation>) {
