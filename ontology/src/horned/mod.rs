@@ -3,6 +3,7 @@
 //!
 //! horned-owl returns sets in hash order; everything is sorted here. What it leaves over becomes warnings.
 
+mod annotations;
 mod sort;
 mod stack;
 mod transcribe;
@@ -145,25 +146,6 @@ impl Builder {
         }
     }
 
-    /// Adds an axiom about an annotation property, which an ontology keeps as an annotation.
-    fn annotate_property(
-        &mut self,
-        property: &str,
-        (relation, value): (&str, &str),
-        annotations: Vec<Annotation>,
-    ) {
-        let (subject, property) = (self.iri(property), self.iri(relation));
-        let value = AnnotationValue::Iri(self.iri(value));
-        self.annotate(subject, Annotation { property, value }, annotations);
-    }
-
-    /// Adds an annotation with its own annotations.
-    fn annotate(&mut self, subject: Iri, annotation: Annotation, annotations: Vec<Annotation>) {
-        let own = annotations.into_iter().map(|own| (subject.clone(), annotation.clone(), own));
-        self.parts.annotation_annotations.extend(own);
-        self.parts.annotations.push((subject, annotation));
-    }
-
     fn rule(&mut self, rule: &ho::Rule<RcStr>, annotations: Vec<Annotation>) {
         let text = |property: &str| {
             annotations.iter().find(|annotation| &*annotation.property == property).and_then(|annotation| {
@@ -260,16 +242,6 @@ impl Builder {
                 Literal { lexical, datatype: Some(self.iri(datatype_iri)), language: None }
             }
         }
-    }
-
-    fn annotation(&mut self, annotation: &ho::Annotation<RcStr>) -> Annotation {
-        let value = match &annotation.av {
-            ho::AnnotationValue::Literal(literal) => AnnotationValue::Literal(self.literal(literal)),
-            ho::AnnotationValue::IRI(iri) => AnnotationValue::Iri(self.iri(iri)),
-            // Blank nodes that are only the value of an annotation have no identity of their own.
-            ho::AnnotationValue::AnonymousIndividual(_) => AnnotationValue::Iri(self.iri(ANONYMOUS)),
-        };
-        Annotation { property: self.iri(&annotation.ap), value }
     }
 
     fn object(&mut self, property: &ho::ObjectPropertyExpression<RcStr>) -> ObjectPropertyExpression {

@@ -9,13 +9,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
-use rules::Atom;
-
-use super::class::Conclusions;
-use super::context::{Context, INTERNAL, Variables, identity};
-use crate::owl::{
-    Atom as RuleAtom, Axiom, Bound, ClassExpression, Iri, ObjectPropertyExpression as Property, Ontology,
-};
+use crate::owl::{Atom, Axiom, Bound, ClassExpression, Iri, ObjectPropertyExpression as Property, Ontology};
 use crate::vocab::owl;
 
 /// Restrictions with an auxiliary relation.
@@ -47,38 +41,23 @@ impl Inclusions {
         }
         inclusions
     }
-}
 
-/// The auxiliary relation of a condition, where a conclusion is included in the condition.
-pub(crate) fn condition(context: &Context, class: &ClassExpression) -> Option<String> {
-    let restriction = restriction(class, false)?;
-    context.inclusions.conditions.contains(&restriction).then(|| relation(&restriction))
-}
-
-/// The auxiliary head of a conclusion, where a condition includes the conclusion.
-pub(crate) fn conclusion(context: &mut Context, class: &ClassExpression, x: rules::Term) -> Conclusions {
-    let included = restriction(class, true).filter(|known| context.inclusions.concluded.contains_key(known));
-    let head = included.map(|restriction| context.relation(&relation(&restriction), [x]));
-    head.map(|atom| (Vec::new(), vec![atom])).into_iter().collect()
-}
-
-/// Adds a rule for each inclusion.
-pub(crate) fn lower(context: &mut Context, position: usize) {
-    let concluded = std::mem::take(&mut context.inclusions.concluded);
-    for (sub, including) in &concluded {
-        for sup in including.iter().filter(|sup| *sup != sub) {
-            let mut variables = Variables::default();
-            let x = variables.fresh("x");
-            let identity = identity(&Axiom::SubClassOf(sub.clone(), sup.clone()), position);
-            let [body, head]: [Atom; 2] = [sub, sup].map(|class| context.relation(&relation(class), [x]));
-            context.rule(&identity, vec![head], vec![body], &variables);
-        }
+    /// The restriction that a condition is, where a conclusion is included in it.
+    pub(crate) fn condition(&self, class: &ClassExpression) -> Option<ClassExpression> {
+        restriction(class, false).filter(|restriction| self.conditions.contains(restriction))
     }
-    context.inclusions.concluded = concluded;
-}
 
-fn relation(restriction: &ClassExpression) -> String {
-    format!("{INTERNAL}restriction:{restriction}")
+    /// The restriction that includes a conclusion, where a condition includes the restriction.
+    pub(crate) fn conclusion(&self, class: &ClassExpression) -> Option<ClassExpression> {
+        restriction(class, true).filter(|restriction| self.concluded.contains_key(restriction))
+    }
+
+    /// Two different restrictions each, of which the second includes the first.
+    pub(crate) fn pairs(&self) -> Vec<[ClassExpression; 2]> {
+        let pairs =
+            self.concluded.iter().flat_map(|(sub, including)| including.iter().map(move |sup| (sub, sup)));
+        pairs.filter(|(sub, sup)| sub != sup).map(|(sub, sup)| [sub.clone(), sup.clone()]).collect()
+    }
 }
 
 /// The existential or universal restriction that a class is, or of which the class is part if it is concluded.
@@ -111,12 +90,16 @@ impl Uses {
                     self.condition(sub);
                     self.conclusion(sup);
                 }
-                Axiom::EquivalentClasses(classes) => classes.iter().for_each(|class| {
-                    self.condition(class);
-                    self.conclusion(class);
-                }),
+                Axiom::EquivalentClasses(classes) => {
+                    for class in classes {
+                        self.condition(class);
+                        self.conclusion(class);
+                    }
+                }
                 Axiom::DisjointClasses(classes) | Axiom::DisjointUnion(_, classes) => {
-                    classes.iter().for_each(|class| self.condition(class));
+                    for class in classes {
+                        self.condition(class);
+                    }
                 }
                 Axiom::ObjectPropertyDomain(_, class)
                 | Axiom::ObjectPropertyRange(_, class)
@@ -130,8 +113,8 @@ impl Uses {
             for (atoms, is_condition) in [(&rule.body, true), (&rule.head, false)] {
                 for atom in atoms {
                     match atom {
-                        RuleAtom::Class(class, _) if is_condition => self.condition(class),
-                        RuleAtom::Class(class, _) => self.conclusion(class),
+                        Atom::Class(class, _) if is_condition => self.condition(class),
+                        Atom::Class(class, _) => self.conclusion(class),
                         _ => {}
                     }
                 }
@@ -144,7 +127,9 @@ impl Uses {
         self.conditions.extend(restriction(class, false));
         match class {
             C::IntersectionOf(classes) | C::UnionOf(classes) => {
-                classes.iter().for_each(|class| self.condition(class));
+                for class in classes {
+                    self.condition(class);
+                }
             }
             C::SomeValuesFrom(_, filler) | C::Cardinality(Bound::Min, 1, _, filler) => self.condition(filler),
             _ => {}
@@ -155,7 +140,11 @@ impl Uses {
         use ClassExpression as C;
         self.concluded.extend(restriction(class, true));
         match class {
-            C::IntersectionOf(classes) => classes.iter().for_each(|class| self.conclusion(class)),
+            C::IntersectionOf(classes) => {
+                for class in classes {
+                    self.conclusion(class);
+                }
+            }
             C::AllValuesFrom(_, filler) => self.conclusion(filler),
             C::ComplementOf(class) => self.condition(class),
             C::Cardinality(Bound::Max | Bound::Exact, 0 | 1, _, filler) => self.condition(filler),
@@ -183,7 +172,9 @@ impl Stated {
         let mut stated = Self { classes, properties, subproperties, conditions, used, thing };
         let fillers: Vec<ClassExpression> =
             stated.conditions.iter().filter_map(parts).map(|(_, filler)| filler.clone()).collect();
-        fillers.iter().for_each(|filler| stated.members(filler));
+        for filler in &fillers {
+            stated.members(filler);
+        }
         for annotated in &ontology.axioms {
             match &annotated.axiom {
                 Axiom::SubClassOf(sub, sup) => stated.class(sub, sup),
@@ -251,9 +242,10 @@ impl Stated {
         for property in properties {
             for filler in &fillers {
                 let (property, filler) = (property.clone(), Box::new(filler.clone()));
-                let candidate = match is_universal {
-                    true => ClassExpression::AllValuesFrom(property, filler),
-                    false => ClassExpression::SomeValuesFrom(property, filler),
+                let candidate = if is_universal {
+                    ClassExpression::AllValuesFrom(property, filler)
+                } else {
+                    ClassExpression::SomeValuesFrom(property, filler)
                 };
                 including.extend(self.conditions.get(&candidate).cloned());
             }

@@ -67,7 +67,7 @@ pub fn lower_together(
     let mut context = Context::new(symbols, equality, ontology);
     let duplicates = swrl::lower(&ontology.rules, &mut context);
     axiom::lower_rules(&ontology.axioms, &mut context);
-    inclusion::lower(&mut context, ontology.axioms.len());
+    class::lower_inclusions(&mut context, ontology.axioms.len());
     context.drop_unusable();
     axiom::lower_assertions(&ontology.axioms, &mut context);
     let stated = context.rules.len();
