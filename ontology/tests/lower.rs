@@ -297,6 +297,17 @@ fn restrictions_include_restrictions() {
     }
 }
 
+/// A definition by a restriction is lowered without an auxiliary relation, which would tell nothing.
+#[test]
+fn definitions_by_restrictions_have_no_auxiliary_relation() {
+    let definition =
+        ":A owl:equivalentClass [ a owl:Restriction ; owl:onProperty :p ; owl:someValuesFrom :B ] .";
+    let (engine, _) = engine(&format!("{definition} :i :p :j . :j a :B ."));
+    assert_eq!(derived(&engine), BTreeSet::from(["i a A".to_owned()]));
+    let texts: Vec<String> = engine.facts().map(|fact| fact.display(engine.symbols()).to_string()).collect();
+    assert!(texts.iter().all(|text| !text.contains("restriction")), "{texts:?}");
+}
+
 #[test]
 fn unusable_rules_are_reported_and_the_others_kept() {
     let prefixes = "@prefix swrl: <http://www.w3.org/2003/11/swrl#> . @prefix swrlb: <http://www.w3.org/2003/11/swrlb#> .

@@ -33,7 +33,11 @@ impl Inclusions {
         let mut supers = HashMap::new();
         let mut inclusions = Self::default();
         for restriction in uses.concluded {
-            let including = stated.including(&restriction, &mut supers);
+            let mut including = stated.including(&restriction, &mut supers);
+            // A definition by a restriction need not be told that the restriction includes itself.
+            if !uses.shared.contains(&restriction) {
+                including.remove(&restriction);
+            }
             if !including.is_empty() {
                 inclusions.conditions.extend(including.iter().cloned());
                 inclusions.concluded.insert(restriction, including);
@@ -80,11 +84,18 @@ fn restriction(class: &ClassExpression, is_concluded: bool) -> Option<ClassExpre
 struct Uses {
     concluded: BTreeSet<ClassExpression>,
     conditions: HashSet<ClassExpression>,
+    /// By restriction: the place of the axiom or rule that has it, the first of several.
+    places: HashMap<ClassExpression, usize>,
+    /// Restrictions that several axioms or rules have.
+    shared: HashSet<ClassExpression>,
+    /// The place of the axiom or rule that is visited.
+    place: usize,
 }
 
 impl Uses {
     fn collect(&mut self, ontology: &Ontology) {
         for annotated in &ontology.axioms {
+            self.place += 1;
             match &annotated.axiom {
                 Axiom::SubClassOf(sub, sup) => {
                     self.condition(sub);
@@ -110,6 +121,7 @@ impl Uses {
             }
         }
         for rule in &ontology.rules {
+            self.place += 1;
             for (atoms, is_condition) in [(&rule.body, true), (&rule.head, false)] {
                 for atom in atoms {
                     match atom {
@@ -122,9 +134,18 @@ impl Uses {
         }
     }
 
+    fn note(&mut self, restriction: &ClassExpression) {
+        if *self.places.entry(restriction.clone()).or_insert(self.place) != self.place {
+            self.shared.insert(restriction.clone());
+        }
+    }
+
     fn condition(&mut self, class: &ClassExpression) {
         use ClassExpression as C;
-        self.conditions.extend(restriction(class, false));
+        if let Some(restriction) = restriction(class, false) {
+            self.note(&restriction);
+            self.conditions.insert(restriction);
+        }
         match class {
             C::IntersectionOf(classes) | C::UnionOf(classes) => {
                 for class in classes {
@@ -138,7 +159,10 @@ impl Uses {
 
     fn conclusion(&mut self, class: &ClassExpression) {
         use ClassExpression as C;
-        self.concluded.extend(restriction(class, true));
+        if let Some(restriction) = restriction(class, true) {
+            self.note(&restriction);
+            self.concluded.insert(restriction);
+        }
         match class {
             C::IntersectionOf(classes) => {
                 for class in classes {
