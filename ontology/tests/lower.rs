@@ -297,6 +297,30 @@ fn restrictions_include_restrictions() {
     }
 }
 
+/// Long chains of restrictions are compared without recursion along the chain.
+#[test]
+#[allow(clippy::format_push_string)]
+fn chains_of_restrictions_are_lowered() {
+    let some =
+        |class: usize| format!("[ a owl:Restriction ; owl:onProperty :p ; owl:someValuesFrom :N{class} ]");
+    let size = 3_000;
+    let mut text = String::from(":i a :N1 . ");
+    for class in 0..size {
+        text += &format!(
+            ":N{class} a owl:Class ; rdfs:subClassOf :N{} , {} . ",
+            class / 2,
+            some((class + 1) % size)
+        );
+    }
+    text += &format!("{} rdfs:subClassOf :A . {} rdfs:subClassOf :B . ", some(1), some(1_500));
+    text += &format!(
+        "[ a owl:Restriction ; owl:onProperty :p ; owl:someValuesFrom {} ] rdfs:subClassOf :C .",
+        some(1)
+    );
+    let (engine, _) = engine(&text);
+    assert_eq!(derived(&engine), BTreeSet::from(["i a A", "i a C", "i a N0"].map(str::to_owned)));
+}
+
 /// A definition by a restriction is lowered without an auxiliary relation, which would tell nothing.
 #[test]
 fn definitions_by_restrictions_have_no_auxiliary_relation() {

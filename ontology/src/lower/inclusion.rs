@@ -30,10 +30,10 @@ impl Inclusions {
             return Self::default();
         }
         let stated = Stated::new(ontology, uses.conditions);
-        let mut supers = HashMap::new();
+        let mut known = Known::default();
         let mut inclusions = Self::default();
         for restriction in uses.concluded {
-            let mut including = stated.including(&restriction, &mut supers);
+            let mut including = stated.including(&restriction, stated.depth, &mut known);
             // A definition by a restriction need not be told that the restriction includes itself.
             if !uses.shared.contains(&restriction) {
                 including.remove(&restriction);
@@ -177,12 +177,24 @@ impl Uses {
     }
 }
 
+/// Limit on restrictions within restrictions that are compared; what lies deeper is not concluded.
+const MAX_DEPTH: usize = 3;
+
+/// Classes and conditions by what they include and the depth to which restrictions are compared.
+#[derive(Default)]
+struct Known {
+    supers: HashMap<(ClassExpression, usize), BTreeSet<ClassExpression>>,
+    including: HashMap<(ClassExpression, usize), BTreeSet<ClassExpression>>,
+}
+
 /// Inclusions that axioms state, and the conditions that are compared.
 struct Stated {
     classes: HashMap<ClassExpression, Vec<ClassExpression>>,
     properties: HashMap<Property, Vec<Property>>,
     subproperties: HashMap<Property, Vec<Property>>,
     conditions: HashSet<ClassExpression>,
+    /// Number of restrictions within restrictions that are compared: none where no condition contains another.
+    depth: usize,
     /// The properties of the conditions.
     used: HashSet<Property>,
     thing: ClassExpression,
@@ -193,7 +205,11 @@ impl Stated {
         let used = conditions.iter().filter_map(parts).map(|(property, _)| property.clone()).collect();
         let (classes, properties, subproperties) = (HashMap::new(), HashMap::new(), HashMap::new());
         let thing = ClassExpression::Class(Iri::from(owl::THING));
-        let mut stated = Self { classes, properties, subproperties, conditions, used, thing };
+        let is_nested = |condition: &ClassExpression| {
+            parts(condition).is_some_and(|(_, filler)| !matches!(filler, ClassExpression::Class(_)))
+        };
+        let depth = if conditions.iter().any(is_nested) { MAX_DEPTH } else { 0 };
+        let mut stated = Self { classes, properties, subproperties, conditions, depth, used, thing };
         let fillers: Vec<ClassExpression> =
             stated.conditions.iter().filter_map(parts).map(|(_, filler)| filler.clone()).collect();
         for filler in &fillers {
@@ -251,9 +267,14 @@ impl Stated {
     fn including(
         &self,
         restriction: &ClassExpression,
-        supers: &mut HashMap<ClassExpression, BTreeSet<ClassExpression>>,
+        depth: usize,
+        known: &mut Known,
     ) -> BTreeSet<ClassExpression> {
         let Some((property, filler)) = parts(restriction) else { return BTreeSet::new() };
+        let key = (restriction.clone(), depth);
+        if let Some(including) = known.including.get(&key) {
+            return including.clone();
+        }
         let is_universal = matches!(restriction, ClassExpression::AllValuesFrom(..));
         let related = if is_universal { &self.subproperties } else { &self.properties };
         let mut properties = reachable(property, related);
@@ -261,7 +282,7 @@ impl Stated {
         if properties.is_empty() {
             return BTreeSet::new();
         }
-        let fillers = self.supers(filler, supers);
+        let fillers = self.supers(filler, depth, known);
         let mut including = BTreeSet::new();
         for property in properties {
             for filler in &fillers {
@@ -274,19 +295,16 @@ impl Stated {
                 including.extend(self.conditions.get(&candidate).cloned());
             }
         }
+        known.including.insert(key, including.clone());
         including
     }
 
-    /// The classes that include a class, itself among them. A class that is searched already counts as included in itself only.
-    fn supers(
-        &self,
-        class: &ClassExpression,
-        known: &mut HashMap<ClassExpression, BTreeSet<ClassExpression>>,
-    ) -> BTreeSet<ClassExpression> {
-        if let Some(supers) = known.get(class) {
+    /// The classes that include a class, itself among them.
+    fn supers(&self, class: &ClassExpression, depth: usize, known: &mut Known) -> BTreeSet<ClassExpression> {
+        let key = (class.clone(), depth);
+        if let Some(supers) = known.supers.get(&key) {
             return supers.clone();
         }
-        known.insert(class.clone(), BTreeSet::from([class.clone()]));
         let mut found = BTreeSet::from([class.clone(), self.thing.clone()]);
         let mut open = vec![class.clone()];
         while let Some(class) = open.pop() {
@@ -295,12 +313,12 @@ impl Stated {
             if let ClassExpression::IntersectionOf(members) = &class {
                 next.extend(members.iter().cloned());
             }
-            if let Some(restriction) = restriction(&class, true) {
-                next.extend(self.including(&restriction, known));
+            if let Some(restriction) = restriction(&class, true).filter(|_| depth > 0) {
+                next.extend(self.including(&restriction, depth - 1, known));
             }
             open.extend(next.into_iter().filter(|sup| found.insert(sup.clone())));
         }
-        known.insert(class.clone(), found.clone());
+        known.supers.insert(key, found.clone());
         found
     }
 }
