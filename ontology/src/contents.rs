@@ -9,6 +9,7 @@ pub(crate) struct Parts {
     pub entities: Vec<(EntityKind, Iri)>,
     pub axioms: Vec<AnnotatedAxiom>,
     pub annotations: Vec<(Iri, Annotation)>,
+    pub annotation_annotations: Vec<(Iri, Annotation, Annotation)>,
     pub rules: Vec<Rule>,
     pub warnings: Vec<Warning>,
 }

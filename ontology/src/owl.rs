@@ -275,6 +275,8 @@ pub struct Ontology {
     pub axioms: Vec<AnnotatedAxiom>,
     /// Annotations of entities (subject, annotation), sorted.
     pub annotations: Vec<(Iri, Annotation)>,
+    /// Annotations of these annotations (subject, annotation, annotation of the annotation), sorted.
+    pub annotation_annotations: Vec<(Iri, Annotation, Annotation)>,
     /// Rules in document order.
     pub rules: Vec<Rule>,
     /// What was read differently from how it is written, or not at all.

@@ -149,6 +149,7 @@ impl Stated {
         merge(&mut self.ontology.axioms, &come.axioms);
         merge(&mut self.ontology.entities, &come.entities);
         merge(&mut self.ontology.annotations, &come.annotations);
+        merge(&mut self.ontology.annotation_annotations, &come.annotation_annotations);
         self.ontology.rules.extend_from_slice(&come.rules);
         self.ontology.sources.extend_from_slice(&come.sources);
     }
@@ -184,6 +185,11 @@ impl Stated {
             .extend(missing.map(|(_, rule, _)| Warning::NotStated { statement: format!("the rule {rule}") }));
         let gone: BTreeSet<_> = go.annotations.iter().collect();
         self.ontology.annotations.retain(|annotation| !gone.contains(annotation));
+        let gone: BTreeSet<_> =
+            go.annotations.iter().map(|(subject, annotation)| (subject, annotation)).collect();
+        self.ontology
+            .annotation_annotations
+            .retain(|(subject, annotation, _)| !gone.contains(&(subject, annotation)));
         removed
     }
 

@@ -249,6 +249,89 @@ fn axioms_are_used_in_part() {
     }
 }
 
+/// A restriction that nothing can witness by name is in each restriction that includes it (scm-svf1, -svf2, -avf1, -avf2).
+#[test]
+fn restrictions_include_restrictions() {
+    let restricted = |kind: &str, property: &str, class: &str| {
+        format!("[ a owl:Restriction ; owl:onProperty {property} ; owl:{kind} {class} ]")
+    };
+    let some = |property: &str, class: &str| restricted("someValuesFrom", property, class);
+    let all = |property: &str, class: &str| restricted("allValuesFrom", property, class);
+    let inverse = |property: &str| format!("[ owl:inverseOf {property} ]");
+    let base =
+        ":B rdfs:subClassOf :C . :p rdfs:subPropertyOf :q . :D a owl:Class . :E a owl:Class . :i a :A .";
+    let none = &["i a A2"][..];
+    let known = &["i a A2", "i a D"][..];
+    for (concluded, condition, expected) in [
+        (some(":p", ":B"), some(":p", ":C"), known),
+        (some(":p", ":B"), some(":q", ":B"), known),
+        (some(":p", ":B"), some(":q", ":C"), known),
+        (some(":p", ":B"), some(":p", ":B"), known),
+        (some(":p", ":B"), some(":q", "owl:Thing"), known),
+        (some(":p", ":C"), some(":p", ":B"), none),
+        (some(":q", ":B"), some(":p", ":B"), none),
+        (some(":r", ":B"), some(":p", ":B"), none),
+        (some(&inverse(":p"), ":B"), some(&inverse(":q"), ":C"), known),
+        (some(&inverse(":p"), ":B"), some(":q", ":C"), none),
+        (some(":p", &some(":p", ":B")), some(":q", &some(":q", ":C")), known),
+        (some(":p", &some(":p", ":C")), some(":q", &some(":q", ":B")), none),
+        (
+            some(":p", "[ a owl:Class ; owl:intersectionOf ( :B :E ) ]"),
+            some(":p", "[ a owl:Class ; owl:unionOf ( :C :E ) ]"),
+            known,
+        ),
+        (restricted("minCardinality", ":p", "\"2\"^^xsd:nonNegativeInteger"), some(":q", "owl:Thing"), known),
+        (all(":q", ":B"), all(":p", ":C"), known),
+        (all(":p", ":B"), all(":p", ":C"), known),
+        (all(":p", ":B"), all(":q", ":C"), none),
+        (all(":p", ":C"), all(":p", ":B"), none),
+        (all(":p", ":B"), some(":p", ":B"), none),
+    ] {
+        let text = format!(
+            "{base} :A2 a owl:Class . :A rdfs:subClassOf :A2 . :A2 rdfs:subClassOf {concluded} . {condition} rdfs:subClassOf :D ."
+        );
+        let (engine, warnings) = engine(&text);
+        assert_eq!(engine.violations(), [], "{text}");
+        assert!(warnings.iter().all(|warning| warning.contains("O301")), "{warnings:?}");
+        assert_eq!(derived(&engine), expected.iter().map(ToString::to_string).collect(), "{text}");
+    }
+}
+
+/// Long chains of restrictions are compared without recursion along the chain.
+#[test]
+#[allow(clippy::format_push_string)]
+fn chains_of_restrictions_are_lowered() {
+    let some =
+        |class: usize| format!("[ a owl:Restriction ; owl:onProperty :p ; owl:someValuesFrom :N{class} ]");
+    let size = 3_000;
+    let mut text = String::from(":i a :N1 . ");
+    for class in 0..size {
+        text += &format!(
+            ":N{class} a owl:Class ; rdfs:subClassOf :N{} , {} . ",
+            class / 2,
+            some((class + 1) % size)
+        );
+    }
+    text += &format!("{} rdfs:subClassOf :A . {} rdfs:subClassOf :B . ", some(1), some(1_500));
+    text += &format!(
+        "[ a owl:Restriction ; owl:onProperty :p ; owl:someValuesFrom {} ] rdfs:subClassOf :C .",
+        some(1)
+    );
+    let (engine, _) = engine(&text);
+    assert_eq!(derived(&engine), BTreeSet::from(["i a A", "i a C", "i a N0"].map(str::to_owned)));
+}
+
+/// A definition by a restriction is lowered without an auxiliary relation, which would tell nothing.
+#[test]
+fn definitions_by_restrictions_have_no_auxiliary_relation() {
+    let definition =
+        ":A owl:equivalentClass [ a owl:Restriction ; owl:onProperty :p ; owl:someValuesFrom :B ] .";
+    let (engine, _) = engine(&format!("{definition} :i :p :j . :j a :B ."));
+    assert_eq!(derived(&engine), BTreeSet::from(["i a A".to_owned()]));
+    let texts: Vec<String> = engine.facts().map(|fact| fact.display(engine.symbols()).to_string()).collect();
+    assert!(texts.iter().all(|text| !text.contains("restriction")), "{texts:?}");
+}
+
 #[test]
 fn unusable_rules_are_reported_and_the_others_kept() {
     let prefixes = "@prefix swrl: <http://www.w3.org/2003/11/swrl#> . @prefix swrlb: <http://www.w3.org/2003/11/swrlb#> .

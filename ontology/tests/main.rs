@@ -5,6 +5,7 @@ mod common;
 mod entail;
 mod field;
 mod golden;
+mod hermit;
 mod kb;
 mod lower;
 mod meaning;

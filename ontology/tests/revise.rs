@@ -352,6 +352,7 @@ fn changes_with_equalities_mean_what_one_document_means() {
 #[test]
 fn changes_that_went_wrong() {
     check(2_003_574..2_003_575, false);
+    check(2_008_464..2_008_465, false);
     check(3_001_851..3_001_852, true);
 }
 
@@ -412,4 +413,31 @@ fn individuals_without_a_name_stay_apart() {
     assert_eq!(change.delta.insert.len(), 1);
     revised.engine.apply(change.delta).expect("within the budget");
     assert_eq!(answers(&revised.engine).0.len(), 2);
+}
+
+/// Restrictions that include others depend on axioms far from each other, each of which may come and go.
+#[test]
+fn inclusions_of_restrictions_come_and_go() {
+    let axioms = [
+        "SubClassOf(:A ObjectSomeValuesFrom(:p :B))",
+        "SubClassOf(:B :C)",
+        "SubObjectPropertyOf(:p :q)",
+        "EquivalentClasses(:D ObjectSomeValuesFrom(:q :C))",
+        "ClassAssertion(:A :a)",
+    ]
+    .map(str::to_owned);
+    let (_, whole) = from_scratch(&document(&axioms, true));
+    let member = "<urn:x#D>(<urn:x#a>)".to_owned();
+    assert!(answers(&whole).0.contains(&(member, false, true)));
+    for (place, axiom) in axioms.iter().enumerate() {
+        let mut others = axioms.to_vec();
+        others.remove(place);
+        let mut revised = Revised::new(&document(&others, true));
+        let (none, one) = (document(&[], false), document(std::slice::from_ref(axiom), true));
+        let before = answers(&revised.engine);
+        revised.change(&one, &none);
+        assert_eq!(answers(&revised.engine), answers(&whole), "{axiom}");
+        revised.change(&none, &one);
+        assert_eq!(answers(&revised.engine), before, "{axiom}");
+    }
 }

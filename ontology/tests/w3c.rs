@@ -92,6 +92,19 @@ fn engine(ontology: &Ontology) -> Result<Engine, String> {
     Engine::new(symbols, lowered.program, lowered.facts).map_err(|errors| errors[0].to_string())
 }
 
+/// The premises of all cases, by identifier; none where the suite is not there.
+pub fn premises() -> Vec<(String, String)> {
+    let path = Path::new(common::SHARED).join("real/owl_w3c/semantics-direct.rdf");
+    let Ok(text) = std::fs::read_to_string(&path) else { return Vec::new() };
+    let suite = Suite::read(&text);
+    let cases = suite.0.iter().filter(|(_, said)| said.contains_key("identifier"));
+    let premises = cases.filter_map(|(case, said)| {
+        let text = suite.text(case, "Premise").or_else(|| suite.text(case, "Input"))?;
+        Some((said["identifier"][0].replace('/', "-"), text.clone()))
+    });
+    premises.collect()
+}
+
 /// What is found for each of the case's questions: its kind, and whether that is as the W3C has it.
 fn decide(suite: &Suite, case: &str) -> Result<Vec<(&'static str, bool)>, String> {
     let kinds: BTreeSet<&str> =

@@ -95,6 +95,31 @@ fn inferred_triples_as_turtle() {
     assert!(turtle("no triple").is_err());
 }
 
+/// What is said about an annotation, such as its source, is written with the annotation.
+#[test]
+fn annotations_of_annotations_are_kept() {
+    let directory = tempfile::tempdir().expect("a folder");
+    let file = directory.path().join("text.ttl");
+    let text = "@prefix : <http://e.org/#> . @prefix owl: <http://www.w3.org/2002/07/owl#> . \
+        @prefix rdfs: <http://www.w3.org/2000/01/rdf-schema#> . <http://e.org/> a owl:Ontology . \
+        :note a owl:AnnotationProperty ; rdfs:subPropertyOf rdfs:comment . :source a owl:AnnotationProperty . \
+        :C a owl:Class ; :note \"text\" ; rdfs:label \"c\" . \
+        [] a owl:Axiom ; owl:annotatedSource :C ; owl:annotatedProperty :note ; owl:annotatedTarget \"text\" ; \
+           :source \"book A\" , \"book B\" . \
+        [] a owl:Axiom ; owl:annotatedSource :note ; owl:annotatedProperty rdfs:subPropertyOf ; \
+           owl:annotatedTarget rdfs:comment ; :source \"book C\" .";
+    std::fs::write(&file, text).expect("written");
+    let original = read_text(text, "text", &ReadOptions::default()).expect("legal");
+    assert_eq!(original.annotation_annotations.len(), 3, "{original:?}");
+    for syntax in [OutputSyntax::Functional, OutputSyntax::OwlXml] {
+        let (text, warnings) = convert_files(&[&file], &ReadOptions::default(), syntax).expect("written");
+        assert_eq!(warnings, []);
+        let again = read_text(&text, "again", &ReadOptions::default()).expect("legal");
+        assert_eq!(again.annotation_annotations, original.annotation_annotations, "{text}");
+        assert_eq!(again.annotations, original.annotations, "{text}");
+    }
+}
+
 /// Axioms about annotation properties stay axioms, and an axiom about a single individual, which says nothing, is left out.
 #[test]
 fn functional_documents_are_legal() {

@@ -118,21 +118,27 @@ impl<'a> Maintenance<'a> {
 
     /// Makes the store hold what follows after a change of what is stated; what does not any more is doomed.
     pub fn update(&mut self, stated: &Stated) -> Result<(), Error> {
+        self.begin_with(stated);
+        self.propagate(&FxHashSet::default())
+    }
+
+    fn begin_with(&mut self, stated: &Stated) {
         self.added.clone_from(&stated.added);
         self.doomed.clone_from(&stated.doomed);
         for &(relation, _) in stated.added.iter().chain(&stated.doomed) {
             self.touch(relation);
         }
-        self.propagate(&FxHashSet::default())
     }
 
-    /// Takes away what rests on rules that are no more and adds what follows from new ones.
-    pub fn change_rules(
+    /// As [`Maintenance::update`], where some rules are removed and others are new.
+    pub fn update_with_rules(
         &mut self,
+        stated: &Stated,
         removed: &FxHashSet<u32>,
         heads: &FxHashSet<RelationId>,
         added: &FxHashSet<u32>,
     ) -> Result<(), Error> {
+        self.begin_with(stated);
         let mut ids: Vec<RelationId> = heads.iter().copied().collect();
         ids.sort_unstable();
         for id in ids {

@@ -3,8 +3,7 @@
 //! The rules that stay keep their recorded derivations. What a removed rule concluded loses its support, as if a fact
 //! of its body had gone, and is rederived where another rule concludes it too; a new rule is evaluated once over
 //! everything that holds. Everything is derived again only
-//! where the strata of the rules that stay fall apart, where equality is switched off, or where a rule goes while names
-//! are one.
+//! where the strata of the rules that stay fall apart, or where equality is switched off.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,7 +15,7 @@ use crate::engine::{Delta, Engine};
 use crate::equality::Equality;
 use crate::error::{Error, Errors};
 use crate::fact::Fact;
-use crate::maintain::Maintenance;
+use crate::maintain::{Maintenance, state_change};
 use crate::network::{Revision, compile, revise};
 use crate::record::Records;
 use crate::rule::{Program, Rule, RuleIdentity};
@@ -42,7 +41,7 @@ impl Engine {
         let Some(revision) = revision else { return self.rebuild(program) };
         let old = (Arc::clone(&self.network), Arc::clone(&self.program));
         self.program = Arc::new(program);
-        self.revise(revision).map_err(|error| {
+        self.revise(revision, Delta::default()).map_err(|error| {
             (self.network, self.program) = old;
             self.restore(&Delta::default());
             error.into()
@@ -82,14 +81,6 @@ impl Engine {
 
     fn change_equally(&mut self, mut delta: Delta, mut program: Program) -> Result<Delta, Errors> {
         program.equality = true;
-        let kept: FxHashSet<&Rule> = program.rules.iter().collect();
-        let is_gone = |rule: &Rule| !kept.contains(rule);
-        // What a removed rule concluded may have made names one, on which further equalities rest.
-        if self.equality.as_ref().is_some_and(|equality| equality.joins())
-            && self.program.rules.iter().any(is_gone)
-        {
-            return self.rebuild_with(program, &delta);
-        }
         let switched = if self.equality.is_none() { self.switch_on(&mut delta)? } else { Delta::default() };
         let Some(equality) = self.equality.take() else { return Ok(switched) };
         let change = self.apply_equally(equality, &delta, Some(program)).map_err(|(error, _)| error)?;
@@ -158,16 +149,25 @@ impl Engine {
         &self.disabled
     }
 
-    /// Exchanges the rules over representatives and returns the net change of rows. After an error the engine is in no
-    /// defined state.
-    pub(crate) fn replace_rules(&mut self, old: &Program, new: &Program) -> Result<Delta, Error> {
+    /// Changes the stated rows and the rules over representatives, and returns the net change of rows. After an error the
+    /// engine is in no defined state.
+    ///
+    /// All conclusions are deleted that lose their support before anything is concluded: of pairs that make one class of
+    /// names, only as many are stored as connect it, so none of these may be deleted after the others are found.
+    pub(crate) fn replace_rules(
+        &mut self,
+        delta: Delta,
+        old: &Program,
+        new: &Program,
+    ) -> Result<Delta, Error> {
         let symbols = Arc::make_mut(&mut self.symbols);
         let revision =
             revise(&self.network, old, new, symbols, &mut self.store, &self.limits).map_err(first)?;
         if let Some(revision) = revision {
-            return self.revise(revision);
+            return self.revise(revision, delta);
         }
         let before: FxHashSet<Fact> = self.rows_with(0).collect();
+        state_change(self, delta);
         let stated = self.rows_with(state::ASSERTED).collect();
         self.store = Store::default();
         self.store.state(stated);
@@ -181,7 +181,7 @@ impl Engine {
         Ok(Delta { insert, delete: before.difference(&after).cloned().collect() })
     }
 
-    fn revise(&mut self, revision: Revision) -> Result<Delta, Error> {
+    fn revise(&mut self, revision: Revision, delta: Delta) -> Result<Delta, Error> {
         let Revision { network, removed, added } = revision;
         let heads: FxHashSet<RelationId> = removed
             .iter()
@@ -191,8 +191,9 @@ impl Engine {
         // The bindings of removed rules are needed until what they concluded is gone.
         self.records.revise(&network, |_| false);
         self.network = Arc::new(network);
+        let stated = state_change(self, delta);
         let mut maintenance = Maintenance::new(self);
-        maintenance.change_rules(&removed, &heads, &added)?;
+        maintenance.update_with_rules(&stated, &removed, &heads, &added)?;
         let change = maintenance.finish();
         let network = Arc::clone(&self.network);
         self.records.revise(&network, |number| removed.contains(&number));
@@ -200,16 +201,7 @@ impl Engine {
     }
 
     fn rebuild(&mut self, program: Program) -> Result<Delta, Errors> {
-        self.rebuild_with(program, &Delta::default())
-    }
-
-    fn rebuild_with(&mut self, program: Program, delta: &Delta) -> Result<Delta, Errors> {
-        let mut stated: FxHashSet<Fact> = self.stated().into_iter().collect();
-        delta.delete.iter().for_each(|fact| {
-            stated.remove(fact);
-        });
-        stated.extend(delta.insert.iter().cloned());
-        let mut stated: Vec<Fact> = stated.into_iter().collect();
+        let mut stated = self.stated();
         stated.sort_unstable();
         let mut engine = Self::with_limits(self.symbols().clone(), program, stated, self.limits.clone())?;
         engine.disabled.clone_from(&self.disabled);

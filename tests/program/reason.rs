@@ -1,6 +1,6 @@
 //! `metaplan reason` and `metaplan convert` as their users run them.
 
-use crate::common::{Outcome, metaplan, metaplan_in, root};
+use crate::common::{Outcome, edit, metaplan, metaplan_in, processor_time, root};
 
 /// Checks the exit status and that answer or messages contain each text; no fault is ever reported.
 fn check(outcome: &Outcome, status: i32, texts: &[&str]) {
@@ -334,4 +334,39 @@ fn what_an_update_cannot_change_is_named() {
         &["O208", "urn:other"],
     );
     check(&change("--assert", ":A rdfs:subClassOf [ a owl:Class ; owl:unionOf ( :B :C ) ] ."), 0, &["O301"]);
+}
+
+/// A rule that multiplies its own conclusions ends each command with a message that names the rule and the value, within two
+/// seconds and with the limits that nobody has set.
+#[test]
+fn a_rule_that_makes_larger_and_larger_values_ends_every_command() {
+    let directory = tempfile::tempdir().expect("a temporary directory");
+    let here = directory.path();
+    assert_eq!(metaplan_in(here, &["init", "m", "--from", "warehouse"], "").status, 0);
+    let rule = "[doubling] <urn:v>(?x, ?n) ^ swrlb:multiply(?m, ?n, 2) -> <urn:v>(?x, ?m) .\n";
+    std::fs::write(here.join("m/doubling.swrl"), rule).expect("a file");
+    edit(
+        &here.join("m"),
+        "mission.toml",
+        "files = [\"robot.ttl\"]",
+        "files = [\"robot.ttl\"]\nrules = [\"doubling.swrl\"]",
+    );
+    let facts = ":f_grasp a t:Function .\n<urn:v> a owl:DatatypeProperty . :c_lidar <urn:v> 3 . :c_lamp <urn:v> 5 , 7 .\n";
+    edit(&here.join("m"), "robot.ttl", ":f_grasp a t:Function .\n", facts);
+    for arguments in [
+        &["reason", "m/robot.ttl", "--rules", "m/doubling.swrl"][..],
+        &["lint", "m/mission.toml"],
+        &["plan", "m/mission.toml"],
+        &["run", "m/mission.toml"],
+    ] {
+        let outcome = metaplan_in(here, arguments, "");
+        assert!([1, 3].contains(&outcome.status), "{outcome:#?}");
+        check(
+            &outcome,
+            outcome.status,
+            &["R301", "doubling.swrl#0 (doubling)", "the last one is", "characters)"],
+        );
+        let seconds = processor_time(here, arguments);
+        assert!(seconds < 2.0, "{arguments:?} takes {seconds} s");
+    }
 }

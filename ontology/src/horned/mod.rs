@@ -3,6 +3,7 @@
 //!
 //! horned-owl returns sets in hash order; everything is sorted here. What it leaves over becomes warnings.
 
+mod annotations;
 mod sort;
 mod stack;
 mod transcribe;
@@ -74,6 +75,8 @@ fn build_here(
     sort::axioms(&mut parts.axioms, &names);
     parts.annotations.sort();
     parts.annotations.dedup();
+    parts.annotation_annotations.sort();
+    parts.annotation_annotations.dedup();
     parts.warnings.extend(unread);
     Ok(parts)
 }
@@ -116,16 +119,22 @@ impl Builder {
             Component::AnnotationAssertion(assertion) => {
                 let subject = self.iri(&assertion.subject);
                 let annotation = self.annotation(&assertion.ann);
-                self.parts.annotations.push((subject, annotation));
+                self.annotate(subject, annotation, annotations);
             }
             Component::OntologyAnnotation(about) => {
                 let annotation = self.annotation(&about.0);
                 let subject = self.ontology.clone();
                 self.parts.annotations.push((subject, annotation));
             }
-            Component::SubAnnotationPropertyOf(a) => self.annotate(&a.sub, rdfs::SUB_PROPERTY_OF, &a.sup),
-            Component::AnnotationPropertyDomain(a) => self.annotate(&a.ap, rdfs::DOMAIN, &a.iri),
-            Component::AnnotationPropertyRange(a) => self.annotate(&a.ap, rdfs::RANGE, &a.iri),
+            Component::SubAnnotationPropertyOf(a) => {
+                self.annotate_property(&a.sub, (rdfs::SUB_PROPERTY_OF, &a.sup), annotations);
+            }
+            Component::AnnotationPropertyDomain(a) => {
+                self.annotate_property(&a.ap, (rdfs::DOMAIN, &a.iri), annotations);
+            }
+            Component::AnnotationPropertyRange(a) => {
+                self.annotate_property(&a.ap, (rdfs::RANGE, &a.iri), annotations);
+            }
             component => {
                 if let Some((kind, iri)) = entity(&component) {
                     let iri = self.iri(iri);
@@ -135,13 +144,6 @@ impl Builder {
                 }
             }
         }
-    }
-
-    /// An axiom about annotation properties, which says nothing about individuals.
-    fn annotate(&mut self, subject: &str, property: &str, value: &str) {
-        let (subject, property) = (self.iri(subject), self.iri(property));
-        let value = AnnotationValue::Iri(self.iri(value));
-        self.parts.annotations.push((subject, Annotation { property, value }));
     }
 
     fn rule(&mut self, rule: &ho::Rule<RcStr>, annotations: Vec<Annotation>) {
@@ -240,16 +242,6 @@ impl Builder {
                 Literal { lexical, datatype: Some(self.iri(datatype_iri)), language: None }
             }
         }
-    }
-
-    fn annotation(&mut self, annotation: &ho::Annotation<RcStr>) -> Annotation {
-        let value = match &annotation.av {
-            ho::AnnotationValue::Literal(literal) => AnnotationValue::Literal(self.literal(literal)),
-            ho::AnnotationValue::IRI(iri) => AnnotationValue::Iri(self.iri(iri)),
-            // Blank nodes that are only the value of an annotation have no identity of their own.
-            ho::AnnotationValue::AnonymousIndividual(_) => AnnotationValue::Iri(self.iri(ANONYMOUS)),
-        };
-        Annotation { property: self.iri(&annotation.ap), value }
     }
 
     fn object(&mut self, property: &ho::ObjectPropertyExpression<RcStr>) -> ObjectPropertyExpression {

@@ -2,9 +2,9 @@
 
 use rules::{Atom, Term};
 
-use super::context::{Conjunction, Context, INTERNAL, Variables, cross};
+use super::context::{Conjunction, Context, INTERNAL, Variables, cross, identity};
 use super::range;
-use crate::owl::{Bound, ClassExpression, DataRange};
+use crate::owl::{Axiom, Bound, ClassExpression, DataRange, ObjectPropertyExpression};
 use crate::vocab::owl;
 
 /// What follows from being in a class: for each part, further conditions and then heads (none for a contradiction).
@@ -46,9 +46,20 @@ pub(crate) fn condition(
             individuals.iter().map(|iri| vec![Atom::Same(x, context.constant(iri))]).collect()
         }
         C::SomeValuesFrom(property, filler) | C::Cardinality(Bound::Min, 1, property, filler) => {
-            let y = variables.fresh("y");
-            let edge = vec![vec![context.property(property, x, y)]];
-            cross(&edge, &condition(context, filler, y, variables))
+            if let Some(restriction) = context.inclusions.condition(class) {
+                let name = relation_of(&restriction);
+                if context.abbreviated.insert(name.clone()) {
+                    let mut variables = Variables::default();
+                    let own = variables.fresh("x");
+                    let head = context.relation(&name, [own]);
+                    let identity = context.identity.clone();
+                    for body in some_value(context, property, filler, own, &mut variables) {
+                        context.rule(&identity, vec![head.clone()], body, &variables);
+                    }
+                }
+                return vec![vec![context.relation(&name, [x])]];
+            }
+            some_value(context, property, filler, x, variables)
         }
         C::HasValue(property, individual) => {
             let value = context.constant(individual);
@@ -66,10 +77,26 @@ pub(crate) fn condition(
         }
         C::ComplementOf(_) => context.gap("a complement as a condition"),
         C::AllValuesFrom(..) | C::DataAllValuesFrom(..) => {
-            context.gap("a universal restriction as a condition")
+            context.gap::<()>("a universal restriction as a condition");
+            let restriction = context.inclusions.condition(class);
+            let atom = restriction.map(|restriction| context.relation(&relation_of(&restriction), [x]));
+            atom.map(|atom| vec![atom]).into_iter().collect()
         }
         C::Cardinality(..) | C::DataCardinality(..) => context.gap("a cardinality as a condition"),
     }
+}
+
+/// The ways in which `x` can be seen to have a value in a class.
+fn some_value(
+    context: &mut Context,
+    property: &ObjectPropertyExpression,
+    filler: &ClassExpression,
+    x: Term,
+    variables: &mut Variables,
+) -> Vec<Conjunction> {
+    let y = variables.fresh("y");
+    let edge = vec![vec![context.property(property, x, y)]];
+    cross(&edge, &condition(context, filler, y, variables))
 }
 
 /// A conjunction of unions is multiplied out up to so many alternatives.
@@ -144,10 +171,9 @@ pub(crate) fn conclusions(
             forbidden.into_iter().map(|body| (body, Vec::new())).collect()
         }
         C::AllValuesFrom(property, filler) => {
-            let y = variables.fresh("y");
-            let edge = context.property(property, x, y);
-            let inner = conclusions(context, filler, y, variables);
-            inner.into_iter().map(|(body, head)| (with(edge.clone(), body), head)).collect()
+            let mut all = all_values(context, property, filler, x, variables);
+            all.extend(included(context, class, x));
+            all
         }
         C::DataAllValuesFrom(property, range) => {
             let value = variables.fresh("v");
@@ -174,9 +200,10 @@ pub(crate) fn conclusions(
         }
         C::Cardinality(Bound::Exact, n @ (0 | 1), property, filler) => {
             let most = C::Cardinality(Bound::Max, *n, property.clone(), filler.clone());
-            let all = conclusions(context, &most, x, variables);
+            let mut all = conclusions(context, &most, x, variables);
             if *n == 1 {
                 context.gap::<()>(EXISTS);
+                all.extend(included(context, class, x));
             }
             all
         }
@@ -194,7 +221,7 @@ pub(crate) fn conclusions(
                     let value = context.constant(&individuals[0]);
                     heads(context.property(property, x, value))
                 }
-                _ => context.gap(EXISTS),
+                _ => only_included(context, class, x, EXISTS),
             }
         }
         C::DataSomeValuesFrom(property, DataRange::OneOf(values)) if values.len() == 1 => {
@@ -203,8 +230,58 @@ pub(crate) fn conclusions(
         }
         C::DataSomeValuesFrom(..) | C::DataCardinality(Bound::Min, 1, ..) => context.gap(EXISTS),
         C::UnionOf(_) | C::OneOf(_) => context.gap("a union as a conclusion"),
-        C::Cardinality(..) | C::DataCardinality(..) => context.gap("a cardinality as a conclusion"),
+        C::Cardinality(..) | C::DataCardinality(..) => {
+            only_included(context, class, x, "a cardinality as a conclusion")
+        }
     }
+}
+
+/// What follows from all values of `x` being in a class.
+fn all_values(
+    context: &mut Context,
+    property: &ObjectPropertyExpression,
+    filler: &ClassExpression,
+    x: Term,
+    variables: &mut Variables,
+) -> Conclusions {
+    let y = variables.fresh("y");
+    let edge = context.property(property, x, y);
+    let inner = conclusions(context, filler, y, variables);
+    inner.into_iter().map(|(body, head)| (with(edge.clone(), body), head)).collect()
+}
+
+/// That `x` is in a restriction, where another restriction that is a condition includes it.
+fn included(context: &mut Context, class: &ClassExpression, x: Term) -> Conclusions {
+    let restriction = context.inclusions.conclusion(class);
+    let atom = restriction.map(|restriction| context.relation(&relation_of(&restriction), [x]));
+    atom.map(|atom| (Vec::new(), vec![atom])).into_iter().collect()
+}
+
+/// As [`included`], where nothing else of the class has a rule form.
+fn only_included(
+    context: &mut Context,
+    class: &ClassExpression,
+    x: Term,
+    reason: &'static str,
+) -> Conclusions {
+    context.gap::<()>(reason);
+    included(context, class, x)
+}
+
+/// Adds a rule for each inclusion between restrictions.
+pub(crate) fn lower_inclusions(context: &mut Context, position: usize) {
+    for [sub, sup] in context.inclusions.pairs() {
+        let mut variables = Variables::default();
+        let x = variables.fresh("x");
+        let [body, head] = [&sub, &sup].map(|class| context.relation(&relation_of(class), [x]));
+        let identity = identity(&Axiom::SubClassOf(sub, sup), position);
+        context.rule(&identity, vec![head], vec![body], &variables);
+    }
+}
+
+/// The auxiliary relation of a restriction.
+fn relation_of(restriction: &ClassExpression) -> String {
+    format!("{INTERNAL}restriction:{restriction}")
 }
 
 const EXISTS: &str = "an existential restriction as a conclusion";

@@ -5,6 +5,7 @@ use std::collections::{HashMap, HashSet};
 use rules::{Atom, Fact, Rule, RuleIdentity, Symbol, Symbols, Term, Variable};
 use rustc_hash::FxHashMap;
 
+use super::inclusion::Inclusions;
 use crate::error::Warning;
 use crate::owl::{Axiom, DataRange, EntityKind, Iri, Literal, ObjectPropertyExpression, Ontology};
 use crate::vocab::{local_name, owl};
@@ -48,6 +49,8 @@ pub(crate) struct Context<'a> {
     pub identity: RuleIdentity,
     /// Why parts of it have no rule form.
     gaps: Vec<&'static str>,
+    /// Restrictions that include others, or that others include.
+    pub inclusions: Inclusions,
     /// Classes that have an auxiliary relation.
     pub abbreviated: HashSet<String>,
     /// The symbols of IRIs by where their texts lie: an ontology keeps each text once.
@@ -111,6 +114,7 @@ impl<'a> Context<'a> {
             entities: ontology.entities.iter().cloned().collect(),
             identity: RuleIdentity::new(AXIOM_SOURCE, 0),
             gaps: Vec::new(),
+            inclusions: Inclusions::new(ontology),
             abbreviated: HashSet::new(),
             shared: FxHashMap::default(),
         }

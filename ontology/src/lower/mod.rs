@@ -17,6 +17,7 @@ mod class;
 mod context;
 mod equality;
 mod groups;
+mod inclusion;
 mod range;
 mod swrl;
 mod vocabulary;
@@ -66,6 +67,7 @@ pub fn lower_together(
     let mut context = Context::new(symbols, equality, ontology);
     let duplicates = swrl::lower(&ontology.rules, &mut context);
     axiom::lower_rules(&ontology.axioms, &mut context);
+    class::lower_inclusions(&mut context, ontology.axioms.len());
     context.drop_unusable();
     axiom::lower_assertions(&ontology.axioms, &mut context);
     let stated = context.rules.len();

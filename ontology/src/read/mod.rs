@@ -115,6 +115,7 @@ fn read(roots: VecDeque<Pending>, options: &ReadOptions) -> Result<Ontology, Err
         entities: parts.entities,
         axioms: parts.axioms,
         annotations: parts.annotations,
+        annotation_annotations: parts.annotation_annotations,
         rules: parts.rules,
         warnings,
     })

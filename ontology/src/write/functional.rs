@@ -29,12 +29,14 @@ pub(super) fn document(ontology: &Ontology) -> String {
         line(&mut text, &axiom.replacen('(', &format!("({annotations}"), 1));
     }
     for (subject, found) in ontology.annotations.iter().filter(|(subject, _)| !about(subject)) {
+        let annotations = annotations_of(ontology, subject, found);
         if let Some(axiom) = annotation_axiom(ontology, subject, found) {
-            line(&mut text, &axiom);
+            line(&mut text, &axiom.replacen('(', &format!("({annotations}"), 1));
             continue;
         }
         let (property, value) = (&found.property, value(&found.value));
-        line(&mut text, &format!("AnnotationAssertion(<{property}> {} {value})", node(subject)));
+        let subject = node(subject);
+        line(&mut text, &format!("AnnotationAssertion({annotations}<{property}> {subject} {value})"));
     }
     for found in &ontology.rules {
         line(&mut text, &rule(found));
@@ -54,6 +56,14 @@ fn says_something(axiom: &Axiom) -> bool {
         _ => return true,
     };
     several > 1
+}
+
+/// The annotations of an annotation.
+fn annotations_of(ontology: &Ontology, subject: &Iri, found: &Annotation) -> String {
+    let all = &ontology.annotation_annotations;
+    let start = all.partition_point(|(s, annotation, _)| (s, annotation) < (subject, found));
+    let own = all[start..].iter().take_while(|(s, annotation, _)| (s, annotation) == (subject, found));
+    own.map(|(.., own)| annotation(own) + " ").collect()
 }
 
 /// An axiom about an annotation property, which an ontology keeps as an annotation.

@@ -9,8 +9,9 @@ use std::sync::Arc;
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use crate::derivation::DerivationStep;
+use crate::derivation::{DerivationStep, Reason};
 use crate::fact::{Arguments, Fact};
+use crate::rule::RuleIdentity;
 use crate::symbol::Symbol;
 
 /// A fact and what makes it hold, where an equality that has a derivation of its own counts as stated.
@@ -83,10 +84,19 @@ impl Classes {
         self.edges.insert(id, edge);
     }
 
-    /// The edges that rest on any of these facts, directly or by other edges.
-    pub fn resting_on<'f>(&self, facts: impl Iterator<Item = &'f Fact>) -> BTreeSet<EdgeId> {
+    /// The edges that rest on any of these facts or rules, directly or by other edges.
+    pub fn resting_on<'f>(
+        &self,
+        facts: impl Iterator<Item = &'f Fact>,
+        rules: &FxHashSet<&RuleIdentity>,
+    ) -> BTreeSet<EdgeId> {
         let mut found: BTreeSet<EdgeId> =
             facts.flat_map(|fact| self.by_fact.get(fact).into_iter().flatten()).copied().collect();
+        if !rules.is_empty() {
+            let uses = |step: &Step| matches!(&step.reason, Reason::Rule { identity, .. } if rules.contains(identity));
+            let concluded = self.edges.iter().filter(|(_, edge)| edge.proof.iter().any(uses));
+            found.extend(concluded.map(|(&id, _)| id));
+        }
         let mut open: Vec<EdgeId> = found.iter().copied().collect();
         while let Some(edge) = open.pop() {
             let further = self.by_edge.get(&edge).into_iter().flatten().copied();

@@ -3,7 +3,7 @@
 //! The engine's store, rules and recorded derivations speak of representatives only; this module translates. A pair that
 //! is stated or concluded joins two classes: the facts about one representative are restated about the other, and the
 //! rules' constants follow. What an equality rested on when it came about, down to stated facts and earlier equalities,
-//! is kept ([`classes`]). When one of these facts goes, so do the equalities that rest on it; their classes are taken
+//! is kept ([`classes`]). When one of these facts or a rule of the derivation is deleted, so are the equalities that rest on it; their classes are taken
 //! apart, what was stated about their names is restated, and whatever equality still follows is found again. This
 //! differs from [2], which over-deletes along all derivations and needs no record of equalities.
 //!
@@ -64,11 +64,6 @@ impl Equality {
             && fact.arguments.len() == 2
             && (fact.arguments[0] == fact.arguments[1]
                 || fact.arguments.iter().all(|&symbol| symbols.as_literal(symbol).is_none()))
-    }
-
-    /// Whether any two names stand for one individual.
-    pub fn joins(&self) -> bool {
-        !self.classes.edges.is_empty()
     }
 
     fn is_stated_pair(&self, fact: &Fact) -> bool {

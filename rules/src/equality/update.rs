@@ -12,7 +12,7 @@ use crate::engine::{Delta, Engine};
 use crate::error::Error;
 use crate::fact::Fact;
 use crate::forest::Forest;
-use crate::rule::Program;
+use crate::rule::{Program, Rule};
 use crate::store::{Record, state};
 use crate::symbol::Symbol;
 
@@ -135,10 +135,14 @@ impl<'e> Update<'e> {
     }
 
     fn change_classes(&mut self, added: &[Fact], removed: &[Fact]) -> Result<(), Error> {
+        let old = Arc::clone(&self.engine.program);
+        let mut gone = FxHashSet::default();
         if let Some(program) = &self.program {
             self.equality.constants.extend(constants(program));
+            let kept: FxHashSet<&Rule> = program.rules.iter().collect();
+            gone.extend(old.rules.iter().filter(|rule| !kept.contains(rule)).map(|rule| &rule.identity));
         }
-        let invalid = self.equality.classes.resting_on(removed.iter());
+        let invalid = self.equality.classes.resting_on(removed.iter(), &gone);
         self.take_apart(&invalid, added);
         self.join_stated(added);
         self.flush()
@@ -392,21 +396,22 @@ impl<'e> Update<'e> {
                 _ => {}
             }
         }
-        let change = self.engine.apply_rows(delta)?;
-        self.note(change);
         if let Some(program) = self.program.take() {
             self.engine.program = Arc::new(program);
             self.rules_changed = true;
         }
-        if std::mem::take(&mut self.rules_changed) {
-            let normal = self.equality.normal_program(&self.engine.program);
-            if normal != *self.equality.program {
-                let old = Arc::clone(&self.equality.program);
-                let change = self.engine.replace_rules(&old, &normal)?;
-                self.equality.program = Arc::new(normal);
-                self.note(change);
+        let normal = std::mem::take(&mut self.rules_changed)
+            .then(|| self.equality.normal_program(&self.engine.program))
+            .filter(|normal| *normal != *self.equality.program);
+        let change = match normal {
+            Some(normal) => {
+                let old = std::mem::replace(&mut self.equality.program, Arc::new(normal));
+                let new = Arc::clone(&self.equality.program);
+                self.engine.replace_rules(delta, &old, &new)?
             }
-        }
+            None => self.engine.apply_rows(delta)?,
+        };
+        self.note(change);
         Ok(())
     }
 
