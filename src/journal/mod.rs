@@ -169,7 +169,7 @@ impl Journal {
                 Unfinished::Agenda => control.deliberate(),
                 Unfinished::Observation(line, now) => {
                     self.observations += 1;
-                    control.handle(&Observation::parse(&line), Duration::from_micros(now))
+                    control.handle(&Observation::recorded(&line), Duration::from_micros(now))
                 }
             };
             let decision = control.decision(&answers);
@@ -186,7 +186,7 @@ impl Journal {
         let mut answers = Vec::new();
         if let Some(Unfinished::Observation(line, now)) = self.unfinished.take() {
             self.observations += 1;
-            answers = control.react(&Observation::parse(&line), Duration::from_micros(now));
+            answers = control.react(&Observation::recorded(&line), Duration::from_micros(now));
             self.reacted(control, &answers)?;
         }
         self.again(control, answers)
@@ -224,7 +224,7 @@ impl Journal {
         let micros = u64::try_from(now.as_micros()).unwrap_or(u64::MAX);
         self.append("event", &[json!(micros), json!(line)])?;
         self.observations += 1;
-        Ok(control.react(&Observation::parse(line), Duration::from_micros(micros)))
+        Ok(control.react(&Observation::recorded(line), Duration::from_micros(micros)))
     }
 
     /// Writes the answers of [`Journal::observe`].

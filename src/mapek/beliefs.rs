@@ -14,6 +14,7 @@ use pddl::validate::{Options, Verdict, Violation, advance, validate};
 
 use crate::knowledge::Fault;
 use crate::mapek::answer::{Command, Effect};
+use crate::mapek::filter::FilterStates;
 use crate::mapek::receipts::Receipts;
 use crate::mapek::resume::{resume, resumed_goal};
 use crate::mapek::sequence::Numbers;
@@ -72,6 +73,8 @@ pub struct Beliefs {
     pub(super) numbers: Numbers,
     /// The time of the last line, since the start of the mission.
     pub(super) now: Duration,
+    /// Memory of the filters of what is measured and of what components report.
+    pub(super) filters: FilterStates,
 }
 
 /// An action that was requested and has not ended.
@@ -96,6 +99,8 @@ pub(super) struct Running {
     pub(super) heard: Duration,
     /// Number of deadlines that have passed since then.
     pub(super) overdue: u32,
+    /// Whether its start or progress was reported.
+    pub(super) started: bool,
     /// Whether its progress was reported.
     pub(super) progressed: bool,
 }
@@ -151,6 +156,7 @@ impl Beliefs {
             lines: 0,
             numbers: Numbers::default(),
             now: Duration::ZERO,
+            filters: FilterStates::default(),
         }
     }
 

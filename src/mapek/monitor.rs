@@ -1,8 +1,9 @@
 //! Monitor: events to changes of what is believed.
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use num_rational::BigRational;
+use ontology::tomasys::change::Status;
 use ontology::vocab::local_name;
 use pddl::ast::{InitialElement, Name, Term};
 use pddl::validate::{Advance, advance};
@@ -15,6 +16,8 @@ use crate::mapek::beliefs::{Beliefs, Running};
 pub(super) use crate::mapek::changes::{Base, Changes};
 use crate::mapek::event::Event;
 use crate::mapek::fields::Refusal;
+use crate::mapek::filter::{Accepted, Filters};
+use crate::mapek::settings::Settings;
 use crate::mapek::step::PlannedStep;
 use crate::message::{Message, did_you_mean};
 use crate::mission::Mission;
@@ -46,15 +49,31 @@ pub(super) struct Monitor {
     attributes: BTreeSet<String>,
     /// Facts and functions that were found to fit the domain, as text.
     checked: HashSet<String>,
+    filters: Filters,
+    /// Names under which components have reported, with their local names.
+    components: HashMap<String, String>,
 }
 
 impl Monitor {
     /// For the reports of a robot with this mission.
-    pub(super) fn new(mission: &Mission) -> Self {
+    pub(super) fn new(mission: &Mission, settings: &Settings) -> Self {
         let kinds =
             mission.knowledge().map(|knowledge| knowledge.view().attribute_types()).unwrap_or_default();
         let attributes = kinds.into_iter().flat_map(|kind| [kind.iri, kind.name]).collect();
-        Self { attributes, checked: HashSet::new() }
+        let filters = Filters::new(&settings.filters, mission.knowledge());
+        Self { attributes, checked: HashSet::new(), filters, components: HashMap::new() }
+    }
+
+    /// Filters of what is measured and of what components report.
+    pub(super) fn filters(&self) -> &Filters {
+        &self.filters
+    }
+
+    /// Takes over what filters have held back and what is due at the time of the beliefs.
+    pub(super) fn elapse(&mut self, beliefs: &mut Beliefs, changes: &mut Changes) -> Vec<Refusal> {
+        let due = self.filters.elapse(&mut beliefs.filters, beliefs.now, &mut changes.filtered);
+        let mut taking = Taking { monitor: self, beliefs, changes };
+        due.into_iter().filter_map(|accepted| taking.accept(accepted).err()).collect()
     }
 
     /// Takes an event over into what is believed, and notes what that changes.
@@ -81,10 +100,8 @@ struct Taking<'a> {
 impl Taking<'_> {
     fn take(&mut self, event: &Event) -> Result<(), Refusal> {
         match event {
-            Event::Measured { attribute, value } => self.measured(attribute, value),
-            Event::Component { component, status } => {
-                self.report("component", component, RobotReport::Component(*status))
-            }
+            Event::Measured { attribute, value } => self.sampled(attribute, value),
+            Event::Component { component, status } => self.component(component, *status),
             Event::Design { design, realisable } => {
                 self.report("design", design, RobotReport::Design(*realisable))
             }
@@ -118,7 +135,14 @@ impl Taking<'_> {
             Event::Fact { name, value } => self.fact(name, value),
             Event::Acknowledged { effect } => {
                 let none = || Refusal::new("M305", format!("there was no effect {effect}"));
-                self.beliefs.acknowledge(*effect).then_some(()).ok_or_else(none)
+                let doubtful = self.beliefs.acknowledge(*effect).ok_or_else(none)?;
+                let running = self.beliefs.running.as_ref();
+                if let Some(function) = doubtful
+                    && running.is_some_and(|own| own.step.design(&function).is_some())
+                {
+                    self.changes.must.push(format!("it is not certain which design {function} has"));
+                }
+                Ok(())
             }
             Event::ObjectiveAdded { .. } | Event::ObjectiveRemoved { .. } => {
                 let text =
@@ -172,10 +196,14 @@ impl Taking<'_> {
             Some(design) => self.beliefs.configuration.insert(function.to_owned(), design.to_owned()),
             None => self.beliefs.configuration.remove(function),
         };
-        self.beliefs.receipts.observe(function);
         // What was asked for may be on its way: the action goes on with that.
-        let is_pending = self.beliefs.pending().any(|(own, _)| own == function);
-        if before.as_deref() == design || is_pending {
+        let pending = self.beliefs.pending().find(|(own, _)| *own == function).map(|(_, to)| to.to_owned());
+        let is_news = before.as_deref() != design;
+        let is_crossing =
+            (is_news || design.is_none()) && pending.as_ref().is_some_and(|to| design != Some(to));
+        let latest = is_crossing.then_some(self.beliefs.effects);
+        self.beliefs.receipts.observe(function, latest, pending.is_some());
+        if !is_news || pending.is_some() {
             return Ok(());
         }
         let Some(running) = self.beliefs.running.as_mut().filter(|own| own.step.design(function).is_some())
@@ -194,6 +222,47 @@ impl Taking<'_> {
                 .push(format!("{function} has no design any more, and action {action} needs it"));
         }
         Ok(())
+    }
+
+    /// Takes over what a filter has accepted.
+    fn accept(&mut self, accepted: Accepted) -> Result<(), Refusal> {
+        match accepted {
+            Accepted::Value(attribute, value) => self.measured(&attribute, &value),
+            Accepted::Status(component, status) => {
+                self.report("component", &component, RobotReport::Component(status))
+            }
+            Accepted::Unknown(attribute) => self.report("attribute", &attribute, RobotReport::Unmeasured),
+        }
+    }
+
+    /// Takes a sample over, unless its filter holds it back.
+    fn sampled(&mut self, attribute: &str, value: &BigRational) -> Result<(), Refusal> {
+        let is_known = self.monitor.attributes.contains(attribute);
+        let (states, now, filtered) =
+            (&mut self.beliefs.filters, self.beliefs.now, &mut self.changes.filtered);
+        if !is_known {
+            return self.measured(attribute, value);
+        }
+        match self.monitor.filters.sample(states, now, attribute, value, filtered) {
+            Some(value) => self.measured(attribute, &value),
+            None => Ok(()),
+        }
+    }
+
+    /// Takes the status of a component over, unless its filter holds it back.
+    fn component(&mut self, component: &str, status: Status) -> Result<(), Refusal> {
+        let name = match self.monitor.components.get(component) {
+            Some(name) => Some(name.clone()),
+            None => self.beliefs.mission.knowledge().and_then(|base| base.known_component(component)),
+        };
+        if let Some(name) = &name {
+            self.monitor.components.insert(component.to_owned(), name.clone());
+        }
+        let (states, now, filtered) =
+            (&mut self.beliefs.filters, self.beliefs.now, &mut self.changes.filtered);
+        let is_held =
+            name.is_some_and(|name| !self.monitor.filters.report(states, now, &name, status, filtered));
+        if is_held { Ok(()) } else { self.report("component", component, RobotReport::Component(status)) }
     }
 
     fn measured(&mut self, attribute: &str, value: &BigRational) -> Result<(), Refusal> {
@@ -270,7 +339,7 @@ impl Taking<'_> {
         self.beliefs.reports_actions = true;
         let now = self.beliefs.now;
         let running = self.running(action)?;
-        (running.heard, running.overdue) = (now, 0);
+        (running.heard, running.overdue, running.started) = (now, 0, true);
         Ok(running)
     }
 
@@ -419,13 +488,15 @@ mod tests {
     use super::{Base, Changes, Monitor};
     use crate::mapek::beliefs::Beliefs;
     use crate::mapek::event::Observation;
+    use crate::mapek::settings::Settings;
     use crate::setup::Setup;
 
     /// What an event changes in the mission `ugv`; or the code of its refusal.
     fn check(line: &str, expected: Result<(Base, [bool; 3], &[&str]), &str>) {
         let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
         let mission = Setup::read(&manifest).expect("the mission is read").mission;
-        let (mut monitor, mut beliefs) = (Monitor::new(&mission), Beliefs::new(mission));
+        let (mut monitor, mut beliefs) =
+            (Monitor::new(&mission, &Settings::default()), Beliefs::new(mission));
         let mut changes = Changes::default();
         let event = Observation::parse(line).events.remove(0).expect("an event");
         let taken = monitor.take(&mut beliefs, &event, &mut changes);

@@ -10,6 +10,7 @@ use crate::knowledge::{Knowledge, Part, Statement, Statements, Waiting};
 use crate::mapek::analyze::available;
 use crate::mapek::answer::{Command, Effect};
 use crate::mapek::beliefs::{Beliefs, Running, Wait};
+use crate::mapek::filter::FilterStates;
 use crate::mapek::receipts::Receipts;
 use crate::mapek::sequence::Numbers;
 use crate::mapek::step::PlannedStep;
@@ -73,6 +74,7 @@ pub(super) fn snapshot(known: &Beliefs) -> Snapshot {
             micros(running.heard),
             running.overdue,
             running.progressed,
+            running.started,
         ])
     });
     Snapshot(json!({
@@ -102,6 +104,7 @@ pub(super) fn snapshot(known: &Beliefs) -> Snapshot {
         "lines": known.lines,
         "numbers": known.numbers.to_record(),
         "now": micros(known.now),
+        "filters": known.filters.to_record(),
     }))
 }
 
@@ -176,6 +179,7 @@ fn restore_work(known: &mut Beliefs, data: &Value) -> Option<()> {
     (known.actions, known.effects, known.lines) = (number("actions")?, number("effects")?, number("lines")?);
     known.numbers = Numbers::from_record(data.get("numbers")?)?;
     known.now = Duration::from_micros(number("now")?);
+    known.filters = FilterStates::from_record(data.get("filters")?)?;
     known.receipts = Receipts::from_record(data.get("receipts")?)?;
     let wait = |record: &Value| {
         let (since, repeats) = (record.get(1)?.as_u64()?, record.get(2)?.as_u64()?);
@@ -206,6 +210,7 @@ fn running_from_record(record: &Value) -> Option<Running> {
         heard: Duration::from_micros(record.get(7)?.as_u64()?),
         overdue: u32::try_from(record.get(8)?.as_u64()?).ok()?,
         progressed: record.get(9)?.as_bool()?,
+        started: record.get(10)?.as_bool()?,
     })
 }
 

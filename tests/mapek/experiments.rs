@@ -242,7 +242,7 @@ fn a_better_design_returns() {
     let detour = |benefit: i64, settle: u64| {
         let mut ugv = control("ugv");
         let mission = ugv.beliefs().mission().clone();
-        let settings = metaplan::mapek::Settings::default()
+        let settings = metaplan::mapek::Settings::immediate()
             .with_minimum_benefit(num_rational::BigRational::from_integer(benefit.into()))
             .with_settle(std::time::Duration::from_secs(settle))
             .with_time_limit(None);

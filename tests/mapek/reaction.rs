@@ -138,6 +138,8 @@ fn a_wrong_time_is_refused() {
             let line = status("c_kinect", status_).replace('}', &format!(r#","time":{time}}}"#));
             feed(&mut ugv, &line);
         }
+        // The recovery counts after some seconds.
+        feed(&mut ugv, r#"{"event":"tick","time":9}"#);
         let answers = feed(&mut ugv, r#"{"event":"tick","time":5000}"#);
         assert!(
             kinds(&answers).contains(&"plan_requested".to_owned()),
