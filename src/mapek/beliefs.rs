@@ -49,6 +49,8 @@ pub struct Beliefs {
     pub(super) stuck: bool,
     /// Whether the plan at hand may not be the best, since time was up.
     pub(super) unproved: bool,
+    /// The next search for a plan after one that was cut short, if nothing else happens.
+    pub(super) retry: Option<Retry>,
     /// The last step that failed, and how often in a row.
     pub(super) failures: Option<(PlannedStep, u32)>,
     /// Designs that have come back, or a word for facts that have changed, without another plan being looked for.
@@ -105,6 +107,15 @@ pub(super) struct Running {
     pub(super) progressed: bool,
 }
 
+/// A search for a plan that is to be repeated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Retry {
+    /// Time since the start of the mission at which it is repeated.
+    pub(super) at: Duration,
+    /// Number of searches in a row that were cut short.
+    pub(super) attempt: u32,
+}
+
 /// How long an effect has been outstanding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Wait {
@@ -144,6 +155,7 @@ impl Beliefs {
             reached: false,
             stuck: false,
             unproved: false,
+            retry: None,
             failures: None,
             hopes: BTreeSet::new(),
             hoped: Duration::ZERO,

@@ -12,7 +12,7 @@ use crate::mapek::adapt::Adapting;
 use crate::mapek::analyze::{Findings, analyze, available, follow, judged};
 use crate::mapek::answer::{Answer, Command, DesignChange, Effect};
 use crate::mapek::ask::Outcome;
-use crate::mapek::beliefs::Beliefs;
+use crate::mapek::beliefs::{Beliefs, Retry};
 use crate::mapek::deadlines::{self, overdue};
 use crate::mapek::digest::digest;
 use crate::mapek::effects::{objectives, reconfigure, request};
@@ -54,6 +54,7 @@ pub(super) struct Checkpoint {
     hopes: (BTreeSet<String>, Duration),
     failures: Option<(PlannedStep, u32)>,
     plan: Option<VecDeque<PlannedStep>>,
+    retry: Option<Retry>,
     flags: [bool; 2],
 }
 
@@ -259,6 +260,7 @@ impl Loop {
             hopes: (known.hopes.clone(), known.hoped),
             failures: known.failures.clone(),
             plan: known.plan.clone(),
+            retry: known.retry,
             flags: [known.stuck, known.reached],
         }
     }
@@ -269,7 +271,7 @@ impl Loop {
         self.agenda = to.agenda;
         (known.hopes, known.hoped) = to.hopes;
         known.failures = to.failures;
-        known.plan = to.plan;
+        (known.plan, known.retry) = (to.plan, to.retry);
         [known.stuck, known.reached] = to.flags;
         self.planner.made.clear();
     }
@@ -280,14 +282,15 @@ impl Loop {
     }
 
     /// Time since the start of the mission at which something becomes due without an event: a report that a filter holds
-    /// back, a sensor that counts as silent, a better plan, or a deadline. A tick or a [timer](Observation::timer) at that
+    /// back, a sensor that counts as silent, a better plan, another search after one that was cut short, or a deadline. A tick or a [timer](Observation::timer) at that
     /// time takes it.
     pub fn due(&self) -> Option<Duration> {
         let hope = self.beliefs.hoped.saturating_add(self.settings.settle);
         let hope = (!self.beliefs.hopes.is_empty() && hope > self.beliefs.now).then_some(hope);
+        let retry = self.beliefs.retry.map(|own| own.at).filter(|at| *at > self.beliefs.now);
         let filters = self.monitor.filters().due(&self.beliefs.filters);
         let deadline = deadlines::due(&self.beliefs, &self.settings);
-        filters.into_iter().chain(hope).chain(deadline).min()
+        filters.into_iter().chain(hope).chain(retry).chain(deadline).min()
     }
 
     /// Effects that were asked for and not acknowledged, to be asked for again after a restart.

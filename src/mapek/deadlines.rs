@@ -93,7 +93,7 @@ fn action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<Answer>)
         (false, false) => beliefs.reports_actions,
     };
     let outcome = match (is_first, is_unheard, is_expected) {
-        (true, true, true) => OverdueOutcome::Repeated,
+        (true, true, true) | (_, true, false) => OverdueOutcome::Repeated,
         (false, _, true) => OverdueOutcome::Cancelled,
         _ => OverdueOutcome::Waiting,
     };
@@ -101,8 +101,10 @@ fn action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<Answer>)
     answers.push(Answer::Overdue { effect: is_unheard.then_some(request), action, seconds, outcome });
     match outcome {
         OverdueOutcome::Repeated => {
-            let effect = beliefs.outstanding.get(&request).cloned();
-            answers.extend(effect.map(|effect| Answer::Effect(Effect { repeated: true, ..effect })));
+            // Of a robot that has never acknowledged anything nothing else is repeated: so are the designs that the action needs.
+            let from = if beliefs.receipts.are_sent() { request } else { 0 };
+            let effects = beliefs.outstanding.range(from..=request).map(|(_, effect)| effect.clone());
+            answers.extend(effects.map(|effect| Answer::Effect(Effect { repeated: true, ..effect })));
         }
         OverdueOutcome::Cancelled => {
             let running = running.clone();

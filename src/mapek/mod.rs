@@ -38,6 +38,7 @@ mod react;
 mod receipts;
 mod record;
 mod resume;
+mod sense;
 mod sequence;
 mod settings;
 mod step;

@@ -3,7 +3,6 @@
 use std::collections::{BTreeSet, HashMap, HashSet};
 
 use num_rational::BigRational;
-use ontology::tomasys::change::Status;
 use ontology::vocab::local_name;
 use pddl::ast::{InitialElement, Name, Term};
 use pddl::validate::{Advance, advance};
@@ -16,7 +15,7 @@ use crate::mapek::beliefs::{Beliefs, Running};
 pub(super) use crate::mapek::changes::{Base, Changes};
 use crate::mapek::event::Event;
 use crate::mapek::fields::Refusal;
-use crate::mapek::filter::{Accepted, Filters};
+use crate::mapek::filter::Filters;
 use crate::mapek::settings::Settings;
 use crate::mapek::step::PlannedStep;
 use crate::message::{Message, did_you_mean};
@@ -46,12 +45,12 @@ const VALUES: [&str; 2] = ["hasValue", "qa_has_value"];
 #[derive(Debug, Clone)]
 pub(super) struct Monitor {
     /// Attributes of the knowledge base, by local name and by IRI.
-    attributes: BTreeSet<String>,
+    pub(super) attributes: BTreeSet<String>,
     /// Facts and functions that were found to fit the domain, as text.
     checked: HashSet<String>,
-    filters: Filters,
+    pub(super) filters: Filters,
     /// Names under which components have reported, with their local names.
-    components: HashMap<String, String>,
+    pub(super) components: HashMap<String, String>,
 }
 
 impl Monitor {
@@ -91,10 +90,10 @@ impl Monitor {
 }
 
 /// One event being taken over.
-struct Taking<'a> {
-    monitor: &'a mut Monitor,
-    beliefs: &'a mut Beliefs,
-    changes: &'a mut Changes,
+pub(super) struct Taking<'a> {
+    pub(super) monitor: &'a mut Monitor,
+    pub(super) beliefs: &'a mut Beliefs,
+    pub(super) changes: &'a mut Changes,
 }
 
 impl Taking<'_> {
@@ -154,7 +153,7 @@ impl Taking<'_> {
     }
 
     /// Tells the knowledge base something about one of its individuals.
-    fn report(&mut self, kind: &str, name: &str, report: RobotReport) -> Result<(), Refusal> {
+    pub(super) fn report(&mut self, kind: &str, name: &str, report: RobotReport) -> Result<(), Refusal> {
         let Some(knowledge) = self.beliefs.mission.knowledge_mut() else {
             let text = format!("there is no knowledge base that has a {kind} `{name}`");
             return Err(Refusal::new("M306", text));
@@ -180,92 +179,7 @@ impl Taking<'_> {
         }
     }
 
-    /// A function was seen with a design that was not asked for: it has it from now on, and so has the action under way. Whether that is
-    /// worth a change is asked as when a design comes back.
-    fn observed(&mut self, function: &str, design: Option<&str>) -> Result<(), Refusal> {
-        let designs = self.beliefs.mission.designs_of(function);
-        if designs.is_empty() {
-            return Err(Refusal::new("M306", format!("there is no function `{function}` that has designs")));
-        }
-        if let Some(design) = design.filter(|design| designs.iter().all(|known| known != design)) {
-            let meant = did_you_mean(design, designs.iter().map(String::as_str));
-            let text = format!("{function} has no design `{design}`; it has {}{meant}", designs.join(", "));
-            return Err(Refusal::new("M306", text));
-        }
-        let before = match design {
-            Some(design) => self.beliefs.configuration.insert(function.to_owned(), design.to_owned()),
-            None => self.beliefs.configuration.remove(function),
-        };
-        // What was asked for may be on its way: the action goes on with that.
-        let pending = self.beliefs.pending().find(|(own, _)| *own == function).map(|(_, to)| to.to_owned());
-        let is_news = before.as_deref() != design;
-        let is_crossing =
-            (is_news || design.is_none()) && pending.as_ref().is_some_and(|to| design != Some(to));
-        let latest = is_crossing.then_some(self.beliefs.effects);
-        self.beliefs.receipts.observe(function, latest, pending.is_some());
-        if !is_news || pending.is_some() {
-            return Ok(());
-        }
-        let Some(running) = self.beliefs.running.as_mut().filter(|own| own.step.design(function).is_some())
-        else {
-            return Ok(());
-        };
-        if let Some(design) = design {
-            running.step = running.step.with_design(function, design);
-            self.changes.facts = true;
-            self.changes.predicates = true;
-            self.changes.observed = true;
-        } else {
-            let action = running.action;
-            self.changes
-                .must
-                .push(format!("{function} has no design any more, and action {action} needs it"));
-        }
-        Ok(())
-    }
-
-    /// Takes over what a filter has accepted.
-    fn accept(&mut self, accepted: Accepted) -> Result<(), Refusal> {
-        match accepted {
-            Accepted::Value(attribute, value) => self.measured(&attribute, &value),
-            Accepted::Status(component, status) => {
-                self.report("component", &component, RobotReport::Component(status))
-            }
-            Accepted::Unknown(attribute) => self.report("attribute", &attribute, RobotReport::Unmeasured),
-        }
-    }
-
-    /// Takes a sample over, unless its filter holds it back.
-    fn sampled(&mut self, attribute: &str, value: &BigRational) -> Result<(), Refusal> {
-        let is_known = self.monitor.attributes.contains(attribute);
-        let (states, now, filtered) =
-            (&mut self.beliefs.filters, self.beliefs.now, &mut self.changes.filtered);
-        if !is_known {
-            return self.measured(attribute, value);
-        }
-        match self.monitor.filters.sample(states, now, attribute, value, filtered) {
-            Some(value) => self.measured(attribute, &value),
-            None => Ok(()),
-        }
-    }
-
-    /// Takes the status of a component over, unless its filter holds it back.
-    fn component(&mut self, component: &str, status: Status) -> Result<(), Refusal> {
-        let name = match self.monitor.components.get(component) {
-            Some(name) => Some(name.clone()),
-            None => self.beliefs.mission.knowledge().and_then(|base| base.known_component(component)),
-        };
-        if let Some(name) = &name {
-            self.monitor.components.insert(component.to_owned(), name.clone());
-        }
-        let (states, now, filtered) =
-            (&mut self.beliefs.filters, self.beliefs.now, &mut self.changes.filtered);
-        let is_held =
-            name.is_some_and(|name| !self.monitor.filters.report(states, now, &name, status, filtered));
-        if is_held { Ok(()) } else { self.report("component", component, RobotReport::Component(status)) }
-    }
-
-    fn measured(&mut self, attribute: &str, value: &BigRational) -> Result<(), Refusal> {
+    pub(super) fn measured(&mut self, attribute: &str, value: &BigRational) -> Result<(), Refusal> {
         let is_known = self.monitor.attributes.contains(attribute);
         if let Some(knowledge) = self.beliefs.mission.knowledge_mut().filter(|_| is_known) {
             let was_known = knowledge.fault().is_none();

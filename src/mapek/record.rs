@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use crate::knowledge::{Knowledge, Part, Statement, Statements, Waiting};
 use crate::mapek::analyze::available;
 use crate::mapek::answer::{Command, Effect};
-use crate::mapek::beliefs::{Beliefs, Running, Wait};
+use crate::mapek::beliefs::{Beliefs, Retry, Running, Wait};
 use crate::mapek::filter::FilterStates;
 use crate::mapek::receipts::Receipts;
 use crate::mapek::sequence::Numbers;
@@ -92,6 +92,7 @@ pub(super) fn snapshot(known: &Beliefs) -> Snapshot {
         "reached": known.reached,
         "stuck": known.stuck,
         "unproved": known.unproved,
+        "retry": known.retry.map(|own| json!([micros(own.at), own.attempt])),
         "failures": known.failures.as_ref().map(|(step, count)| json!([step.to_record(), count])),
         "hopes": known.hopes,
         "hoped": micros(known.hoped),
@@ -174,6 +175,13 @@ fn restore_work(known: &mut Beliefs, data: &Value) -> Option<()> {
     };
     (known.reached, known.stuck) = (truth("reached")?, truth("stuck")?);
     known.unproved = truth("unproved")?;
+    known.retry = match data.get("retry")? {
+        Value::Null => None,
+        record => Some(Retry {
+            at: Duration::from_micros(record.get(0)?.as_u64()?),
+            attempt: u32::try_from(record.get(1)?.as_u64()?).ok()?,
+        }),
+    };
     known.hopes = texts(data.get("hopes")?)?.into_iter().collect();
     known.hoped = Duration::from_micros(number("hoped")?);
     (known.actions, known.effects, known.lines) = (number("actions")?, number("effects")?, number("lines")?);

@@ -27,8 +27,8 @@ pub struct AdaptationSection {
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     settle: Option<Spanned<toml::Value>>,
-    /// So many seconds may one plan take (10 if nothing is said); then the best so far is used if there is one, and planning goes on when
-    /// something changes.
+    /// So many seconds may one plan take (10 if nothing is said); then the best so far is used if there is one. It is looked for again when
+    /// something changes, and with twice the time after twice that pause, and so on.
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     time_limit: Option<Spanned<toml::Value>>,

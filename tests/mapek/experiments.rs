@@ -22,6 +22,7 @@ fn words(answer: &Answer) -> Option<String> {
         }
         Answer::PlanKept { because } => format!("kept: {because}"),
         Answer::PlanNone { status, .. } => format!("no plan: {status}"),
+        Answer::Effect(effect) if effect.repeated => return None,
         Answer::Effect(effect) => match &effect.command {
             Command::Reconfigure { function, from, to } => {
                 format!("reconfigure {function}: {} to {to}", from.as_deref().unwrap_or("none"))

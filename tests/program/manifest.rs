@@ -43,7 +43,8 @@ fn a_section_is_refused_whoever_uses_it() {
     );
     check(
         "[adaptation.measured.ambient_ligth]\nhysteresis = 0.1",
-        "9:25: error[M143]: the knowledge base has no quality attribute type `ambient_ligth`",
+        "9:22: error[M143]: the knowledge base has no quality attribute type `ambient_ligth`; it has: \
+         ambient_light, battery_usage, minimum_illuminance, safety; did you mean `ambient_light`?",
     );
     check(
         "[adaptation]\nsettle = -1",

@@ -9,7 +9,8 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::manifest::{self, ManifestPath};
-use crate::mapek::filter::{ComponentTimes, FilterSettings, MeasuredSettings, Stale};
+use crate::mapek::filter::attribute::Stale;
+use crate::mapek::filter::settings::{ComponentTimes, FilterSettings, MeasuredSettings};
 use crate::message::Message;
 use crate::number;
 
