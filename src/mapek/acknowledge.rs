@@ -14,6 +14,17 @@ use crate::mapek::answer::Command;
 use crate::mapek::beliefs::Beliefs;
 use crate::mapek::receipts::Acknowledged;
 
+/// The consequence of an acknowledgement.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Receipt {
+    /// There was no such effect.
+    Unknown,
+    /// The effect is acknowledged.
+    Taken,
+    /// It is not certain any more which design this function has.
+    Doubtful(String),
+}
+
 /// The consequence of a reconfiguration's failure.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Failure {
@@ -26,24 +37,23 @@ pub(super) enum Failure {
 }
 
 impl Beliefs {
-    /// Takes an acknowledgement of an effect; none if there was no such effect. Returns the function of which it is not certain any
-    /// more which design it has, if there is one.
-    pub(super) fn acknowledge(&mut self, effect: u64) -> Option<Option<String>> {
+    /// Takes an acknowledgement of an effect.
+    pub(super) fn acknowledge(&mut self, effect: u64) -> Receipt {
         if effect == 0 || effect > self.effects {
-            return None;
+            return Receipt::Unknown;
         }
         self.waits.remove(&effect);
         // A report of the action may have confirmed the effect before its acknowledgement came.
         self.receipts.by_number = true;
         if let Some(outstanding) = self.outstanding.remove(&effect) {
             if let Command::Reconfigure { function, to, .. } = outstanding.command {
-                return Some(self.configured(effect, function, to));
+                return self.configured(effect, function, to);
             }
         } else if let Some((function, design)) = self.receipts.superseded(effect) {
             let (function, design) = (function.clone(), design.clone());
-            return Some(self.configured(effect, function, design));
+            return self.configured(effect, function, design);
         }
-        Some(None)
+        Receipt::Taken
     }
 
     /// Takes a report of an action that has started: its request has arrived, and with a robot that never acknowledges also what
@@ -104,12 +114,12 @@ impl Beliefs {
     }
 
     /// Believes that a function has got a design by a reconfiguration, unless a later one was acknowledged. The function was seen
-    /// with another design while the reconfiguration was pending: then nobody knows which came first. Returns it in that case.
-    fn configured(&mut self, effect: u64, function: String, design: String) -> Option<String> {
+    /// with another design while the reconfiguration was pending: then nobody knows which came first.
+    fn configured(&mut self, effect: u64, function: String, design: String) -> Receipt {
         let own = self.receipts.functions.entry(function.clone()).or_default();
         own.superseded.retain(|number, _| *number > effect);
         if own.last.as_ref().is_some_and(|last| last.effect >= effect) {
-            return None;
+            return Receipt::Taken;
         }
         let is_doubtful = own.doubted >= effect;
         let before = if is_doubtful {
@@ -118,6 +128,6 @@ impl Beliefs {
             self.configuration.insert(function.clone(), design.clone())
         };
         own.last = Some(Acknowledged { effect, design, before, failed: is_doubtful });
-        is_doubtful.then_some(function)
+        if is_doubtful { Receipt::Doubtful(function) } else { Receipt::Taken }
     }
 }

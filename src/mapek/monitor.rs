@@ -9,7 +9,7 @@ use pddl::validate::{Advance, advance};
 use rules::{Delta, Fact};
 
 use crate::knowledge::RobotReport;
-use crate::mapek::acknowledge::Failure;
+use crate::mapek::acknowledge::{Failure, Receipt};
 use crate::mapek::answer::{Command, Effect};
 use crate::mapek::beliefs::{Beliefs, Running};
 pub(super) use crate::mapek::changes::{Base, Changes};
@@ -132,17 +132,7 @@ impl Taking<'_> {
                 Ok(())
             }
             Event::Fact { name, value } => self.fact(name, value),
-            Event::Acknowledged { effect } => {
-                let none = || Refusal::new("M305", format!("there was no effect {effect}"));
-                let doubtful = self.beliefs.acknowledge(*effect).ok_or_else(none)?;
-                let running = self.beliefs.running.as_ref();
-                if let Some(function) = doubtful
-                    && running.is_some_and(|own| own.step.design(&function).is_some())
-                {
-                    self.changes.must.push(format!("it is not certain which design {function} has"));
-                }
-                Ok(())
-            }
+            Event::Acknowledged { effect } => self.acknowledged(*effect),
             Event::ObjectiveAdded { .. } | Event::ObjectiveRemoved { .. } => {
                 let text =
                     format!("`{}` goes with `run --configure`; here the plan needs functions", event.kind());
@@ -162,6 +152,21 @@ impl Taking<'_> {
         let delta = knowledge.take(name, report).map_err(|message| fault(&message))?;
         self.note(&delta, was_known);
         Ok(())
+    }
+
+    /// An effect has arrived.
+    fn acknowledged(&mut self, effect: u64) -> Result<(), Refusal> {
+        match self.beliefs.acknowledge(effect) {
+            Receipt::Unknown => Err(Refusal::new("M305", format!("there was no effect {effect}"))),
+            Receipt::Taken => Ok(()),
+            Receipt::Doubtful(function) => {
+                let running = self.beliefs.running.as_ref();
+                if running.is_some_and(|own| own.step.design(&function).is_some()) {
+                    self.changes.must.push(format!("it is not certain which design {function} has"));
+                }
+                Ok(())
+            }
+        }
     }
 
     /// A function could not take the design that was asked for: it has the one that was acknowledged before, and nobody asks for the

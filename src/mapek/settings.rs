@@ -98,7 +98,7 @@ impl AdaptationSection {
     pub fn settings(&self, origin: &ManifestPath) -> Result<Settings, Message> {
         let filters = filters(&self.confirm_time, &self.heal_time, &self.components, &self.measured, origin)?;
         let (stay_close, safe_reaction) = (self.stay_close, self.safe_reaction);
-        let mut settings = Settings { stay_close, safe_reaction, filters, ..Settings::default() };
+        let mut settings = Settings { stay_close, filters, safe_reaction, ..Settings::default() };
         if let Some(value) = &self.band {
             settings.filters.band = origin.number("band", value)?;
         }

@@ -106,9 +106,15 @@ fn fluents_of<'a>(action: &'a Action, found: &mut Vec<&'a Atom>) {
             assigned(effect, found);
         }
         ActionBody::Durative { duration, conditions, effects } => {
-            duration.iter().for_each(|constraint| fluents(&constraint.expression, found));
-            conditions.iter().for_each(|(_, condition)| compared(condition, found));
-            effects.iter().for_each(|(_, effect)| assigned(effect, found));
+            for constraint in duration {
+                fluents(&constraint.expression, found);
+            }
+            for (_, condition) in conditions {
+                compared(condition, found);
+            }
+            for (_, effect) in effects {
+                assigned(effect, found);
+            }
         }
     }
 }
@@ -117,7 +123,7 @@ fn compared<'a>(condition: &'a Condition, found: &mut Vec<&'a Atom>) {
     match condition {
         Condition::And(parts) | Condition::Or(parts) => parts.iter().for_each(|part| compared(part, found)),
         Condition::Not(body) | Condition::Exists(_, body) | Condition::ForAll(_, body) => {
-            compared(body, found)
+            compared(body, found);
         }
         Condition::Imply(left, right) => {
             compared(left, found);

@@ -244,7 +244,7 @@ impl AttributeFilter {
     }
 
     /// Begins to wait for samples at a time, unless that was done before.
-    pub(crate) fn begin(&self, state: &mut AttributeState, now: Micros) {
+    pub(crate) fn begin(state: &mut AttributeState, now: Micros) {
         state.heard.get_or_insert(now);
     }
 

@@ -37,7 +37,7 @@ impl ComponentFilter {
         let since = state.change.as_ref().map_or(now, |(since, _)| *since);
         state.change = Some((since, status));
         if now >= since.saturating_add(self.time(status)) {
-            self.accept(state, status);
+            Self::accept(state, status);
             return true;
         }
         state.held += 1;
@@ -54,11 +54,11 @@ impl ComponentFilter {
     pub(crate) fn elapse(&self, state: &mut ComponentState, now: Micros) -> Option<Status> {
         self.due(state).filter(|due| *due <= now)?;
         let (_, status) = state.change?;
-        self.accept(state, status);
+        Self::accept(state, status);
         Some(status)
     }
 
-    fn accept(&self, state: &mut ComponentState, status: Status) {
+    fn accept(state: &mut ComponentState, status: Status) {
         *state = ComponentState { has_failed: Some(status == Status::Failed), ..ComponentState::default() };
     }
 

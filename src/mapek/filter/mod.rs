@@ -42,7 +42,7 @@ impl FilterSettings {
             let bounds: Vec<String> = bounds.map(|bound| number::decimal(&bound.value)).collect();
             let text = format!("noise of `{name}` at {} switches designs with every sample: it has neither hysteresis nor debounce", bounds.join(", "));
             Message::warning("M144", text)
-                .with_help(&format!("set `hysteresis` or `debounce` in `[adaptation.measured.{name}]`"))
+                .with_help(format!("set `hysteresis` or `debounce` in `[adaptation.measured.{name}]`"))
         });
         let mut doubts: Vec<Message> = noisy.collect();
         if self.heal_time.is_zero() && filters.has_components {
@@ -215,7 +215,7 @@ impl Filters {
         let mut accepted = Vec::new();
         for (name, filter) in &self.measured {
             let Some(state) = states.measured.get_mut(name) else { continue };
-            filter.begin(state, now);
+            AttributeFilter::begin(state, now);
             while let Some(elapsed) = filter.elapse(state, now) {
                 let value = match elapsed {
                     Elapsed::Accepted(value) => Some(value),

@@ -88,9 +88,12 @@ impl FilterSettings {
     pub(crate) fn mistakes(&self, knowledge: Option<&Knowledge>) -> Vec<(&'static str, String, Message)> {
         let view = knowledge.map(Knowledge::view);
         let attributes: Vec<String> =
-            view.iter().flat_map(|view| view.attribute_types()).map(|own| own.name).collect();
-        let components: Vec<String> =
-            view.iter().flat_map(|view| view.components()).map(|own| own.individual.name).collect();
+            view.iter().flat_map(ontology::tomasys::View::attribute_types).map(|own| own.name).collect();
+        let components: Vec<String> = view
+            .iter()
+            .flat_map(ontology::tomasys::View::components)
+            .map(|own| own.individual.name)
+            .collect();
         let unknown = |key: &'static str, kind: &str, name: &String, known: &[String]| {
             let meant = did_you_mean(name, known.iter().map(String::as_str));
             let text =

@@ -226,7 +226,7 @@ fn silence_lasts_longer_than_the_period_and_is_noticed_once() {
             };
             let period = filter.period.expect("there is one");
             let mut state = AttributeState::default();
-            filter.begin(&mut state, 0);
+            AttributeFilter::begin(&mut state, 0);
             let (mut heard, mut silent) = (0, false);
             for now in 0..60 {
                 let due = filter.due(&state);
