@@ -1,4 +1,4 @@
-//! A deterministic simulation of the loop with an unreliable robot, as FoundationDB tests itself.
+//! A deterministic simulation of the loop with an unreliable robot, as `FoundationDB` tests itself.
 //!
 //! A schedule is a seed. Messages either way are delayed, reordered, duplicated and lost; components fail and recover;
 //! reconfigurations and actions fail; the loop crashes and comes back from its snapshot and the lines since. After some
@@ -59,16 +59,17 @@ fn knowledge() -> String {
         :usage a t:QualityAttributeType .\n:f_drive a t:Function .\n:a_move a t:Action ; t:requiresF :f_drive .\n"
         .to_owned();
     for component in COMPONENTS {
-        text += &format!(":{component} a t:Component .\n");
+        text.extend([":", component, " a t:Component .\n"]);
     }
     for (rank, (design, components)) in DESIGNS.iter().enumerate() {
-        text += &format!(
+        let statements = format!(
             ":{design} a t:FunctionDesign ; t:solvesF :f_drive ; t:hasQAestimation :u_{design} .\n\
              :u_{design} a t:QAvalue ; t:isQAtype :usage ; t:hasValue {}.0 .\n",
             2 - rank
         );
+        text += &statements;
         for component in *components {
-            text += &format!(":{design} t:requiresC :{component} .\n");
+            text.extend([":", design, " t:requiresC :", component, " .\n"]);
         }
     }
     text
@@ -109,7 +110,7 @@ fn no_schedule_violates_what_the_loop_promises() {
 /// In every other schedule the effects of the start may be lost, too.
 fn faults(seed: u64) -> Faults {
     let faults = Faults::of(seed);
-    if seed.is_multiple_of(2) { faults.from_the_start() } else { faults }
+    if seed.is_multiple_of(2) { faults.with_lost_start() } else { faults }
 }
 
 /// The seeds of each kind of violation, with the messages of the first.

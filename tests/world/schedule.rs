@@ -25,6 +25,7 @@ const MAX_UNDELIBERATED: u32 = 4;
 
 /// Faults of a schedule: each in so many of a hundred cases.
 #[derive(Debug, Clone, Copy)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a fault of its own")]
 pub struct Faults {
     pub lost: u32,
     pub doubled: u32,
@@ -67,7 +68,7 @@ impl Faults {
     }
 
     /// The same where the effects of the start may be lost.
-    pub fn from_the_start(self) -> Self {
+    pub fn with_lost_start(self) -> Self {
         Self { start: true, ..self }
     }
 }
@@ -166,7 +167,9 @@ impl<'a> Schedule<'a> {
         if self.chance(self.faults.restarts) {
             self.log.push(format!("{}: the robot restarts", self.now));
             let reports = self.robot.restart();
-            reports.into_iter().for_each(|report| self.report(report));
+            for report in reports {
+                self.report(report);
+            }
         }
         if !self.is_unfair() {
             self.fair_reports();
@@ -174,7 +177,9 @@ impl<'a> Schedule<'a> {
         if self.now.is_multiple_of(2) {
             let fails = self.chance(self.faults.fails);
             let report = self.robot.work(fails);
-            report.into_iter().for_each(|report| self.report(report));
+            if let Some(report) = report {
+                self.report(report);
+            }
         }
         if self.chance(self.faults.crashes) {
             self.crash()?;
@@ -211,7 +216,9 @@ impl<'a> Schedule<'a> {
         }
         let is_first = self.now == STEPS.0 + 1;
         if is_first || !self.faults.quiet && self.now % 20 == 1 {
-            self.robot.again().into_iter().for_each(|report| self.report(report));
+            for report in self.robot.again() {
+                self.report(report);
+            }
         }
         if is_first || !self.faults.quiet && self.now % 100 == 1 {
             for (design, _) in DESIGNS {
@@ -244,16 +251,16 @@ impl<'a> Schedule<'a> {
             self.line += 1;
             event["seq"] = json!(self.line);
         }
-        self.post(Message::Event(event));
+        self.post(&Message::Event(event));
     }
 
     /// Sends a message, which may be lost, doubled and overtaken.
-    fn post(&mut self, message: Message) {
+    fn post(&mut self, message: &Message) {
         // As long as nothing was acknowledged the loop cannot know whether this robot ever acknowledges anything.
         let is_safe = self.now == 0 && !self.faults.start;
         if !is_safe && self.chance(self.faults.lost) {
             self.log.push(format!("{}: lost {message:?}", self.now));
-            self.judge.lose(&message);
+            self.judge.lose(message);
             return;
         }
         let copies = 1 + u32::from(self.chance(self.faults.doubled));
@@ -350,7 +357,7 @@ impl<'a> Schedule<'a> {
             self.log.push(format!("{}: {}", self.now, answer.to_json()));
             self.judge.note(&answer);
             if let Answer::Effect(effect) = answer {
-                self.post(Message::Effect(effect));
+                self.post(&Message::Effect(effect));
             }
         }
     }
