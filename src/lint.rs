@@ -36,6 +36,7 @@ pub fn lint(setup: &Setup) -> Vec<Message> {
     }
     messages.extend(setup.positions().err().into_iter().flatten());
     messages.extend(setup.mistakes());
+    messages.extend(setup.settings.doubts(mission.knowledge()));
     in_order(messages)
 }
 

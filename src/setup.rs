@@ -123,6 +123,7 @@ impl Setup {
             wrong.extend(origin.quote(more));
             wrong
         })?;
+        settings.check(mission.knowledge(), &origin)?;
         mission.change_warnings(|warnings| origin.quote(warnings));
         let Sections { description, planning, probabilistic: roles, report, scenarios, .. } = sections;
         let time_unit = planning.time_unit;

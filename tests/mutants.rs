@@ -1,6 +1,6 @@
-//! Whether the oracles notice when the planner is wrong.
+//! Whether the oracles notice when the planner is wrong, and the simulation of `tests/world` when the loop is.
 //!
-//! `tests/oracle/mutants.toml` names faults. They are put into a copy of the workspace, all into one program, which is asked once for each
+//! `tests/oracle/mutants.toml` and `tests/world/mutants.toml` name faults. They are put into a copy of the workspace, all into one program, which is asked once for each
 //! fault with that one switched on. A fault that no oracle notices is a hole in the oracles, or no fault at all. `MUTANTS` has the numbers of
 //! those that are tried, if not all are.
 
@@ -60,10 +60,21 @@ enum Tests {
     Planta,
     /// What stands beside the code of the planner, for what only larger tasks come to.
     Unit,
+    /// `tests/world`.
+    World,
 }
 
+/// Tests that judge faults: the program, the name of the tests, and the number of tasks that they judge, or 0.
+type Oracle = (Tests, &'static str, u32);
+
+/// Files of faults, each with the tests that have to notice them.
+const SUITES: [(&str, &[Oracle]); 2] = [
+    ("tests/oracle/mutants.toml", &ORACLES),
+    ("tests/world/mutants.toml", &[(Tests::World, "schedule", 1_000)]),
+];
+
 /// What is asked of each fault, in order: tests, and how many tasks they judge.
-const ORACLES: [(Tests, &str, u32); 10] = [
+const ORACLES: [Oracle; 10] = [
     (Tests::Oracle, "field::", 0),
     (Tests::Planta, "random::", 0),
     (Tests::Oracle, "front::", 300),
@@ -90,6 +101,9 @@ struct Mutant {
     file: String,
     before: String,
     after: String,
+    /// The tests that have to notice it.
+    #[serde(skip)]
+    oracles: &'static [Oracle],
 }
 
 /// Writes a file; what is as it was is left alone, and not compiled again.
@@ -128,9 +142,11 @@ fn copy(from: &Path, to: &Path, faulty: &BTreeMap<PathBuf, String>) {
 }
 
 fn mutants() -> Vec<Mutant> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/oracle/mutants.toml");
-    let text = std::fs::read_to_string(path).expect("the faults");
-    toml::from_str::<Mutants>(&text).expect("faults").mutant
+    let read = |(file, oracles): &(&str, &'static [Oracle])| {
+        let mutants = toml::from_str::<Mutants>(&original(file)).expect("faults").mutant.into_iter();
+        mutants.map(|mutant| Mutant { oracles, ..mutant }).collect::<Vec<_>>()
+    };
+    SUITES.iter().flat_map(read).collect()
 }
 
 /// The files below the workspace that have faults, with all of them, each behind its switch.
@@ -187,6 +203,7 @@ fn compiled(home: &Path, tests: Tests) -> PathBuf {
     let (target, name): (&[&str], _) = match tests {
         Tests::Oracle => (&["--test", "oracle"], "oracle"),
         Tests::Planta => (&["--test", "planta"], "planta"),
+        Tests::World => (&["--test", "world"], "world"),
         Tests::Unit => (&["--package", "metaplan-search", "--lib"], "metaplan_search"),
     };
     let output = Command::new(env!("CARGO"))
@@ -218,7 +235,7 @@ fn is_content(
     let mut command = Command::new(&program.expect("it is compiled").1);
     command.arg(test).current_dir(home).env(SWITCH, fault.to_string()).env("ORACLE_STOP", "1");
     if tasks > 0 {
-        command.env("ORACLE_TASKS", tasks.to_string());
+        command.env("ORACLE_TASKS", tasks.to_string()).env("METAPLAN_SCHEDULES", tasks.to_string());
     }
     let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the oracles");
     let started = Instant::now();
@@ -257,9 +274,10 @@ fn every_member_is_copied() {
 fn every_fault_is_noticed() {
     let mutants = mutants();
     let home = mutated(&mutants);
-    let programs = [Tests::Oracle, Tests::Planta, Tests::Unit].map(|tests| (tests, compiled(&home, tests)));
-    for oracle in ORACLES {
-        assert!(is_content(&programs, &home, 0, oracle), "{} fails without a fault", oracle.1);
+    let all = [Tests::Oracle, Tests::Planta, Tests::Unit, Tests::World];
+    let programs = all.map(|tests| (tests, compiled(&home, tests)));
+    for oracle in SUITES.iter().flat_map(|(_, oracles)| *oracles) {
+        assert!(is_content(&programs, &home, 0, *oracle), "{} fails without a fault", oracle.1);
     }
     let mut missed = Vec::new();
     let chosen: Option<Vec<usize>> = std::env::var("MUTANTS")
@@ -268,7 +286,7 @@ fn every_fault_is_noticed() {
     let is_chosen = |number: &usize| chosen.as_ref().is_none_or(|chosen| chosen.contains(number));
     for (mutant, number) in mutants.iter().zip(1..).filter(|(_, number)| is_chosen(number)) {
         let started = Instant::now();
-        let noticed = ORACLES.iter().find(|oracle| !is_content(&programs, &home, number, **oracle));
+        let noticed = mutant.oracles.iter().find(|oracle| !is_content(&programs, &home, number, **oracle));
         let by = noticed.map_or("NOBODY", |(_, test, _)| test);
         println!("{number:>3}. {}: noticed by {by} after {:.0?}", mutant.name, started.elapsed());
         if noticed.is_none() {

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use metaplan::answers::JournalAnswer;
-use metaplan::journal::{Entry, JournalReport};
+use metaplan::journal::{Entry, Journal, JournalReport};
+use metaplan::mapek::Loop;
+use metaplan::setup::Setup;
 use serde_json::Value;
 
 use crate::cli::common::{Common, Exit, Failure, Format};
@@ -29,6 +31,9 @@ enum Operation {
         /// The journal's directory.
         #[arg(value_name = "DIR")]
         directory: PathBuf,
+        /// The mission's manifest: the journal is resumed, without a change on disk.
+        #[arg(long, value_name = "MISSION")]
+        mission: Option<PathBuf>,
     },
     /// All sound records: events, and what was decided.
     Show {
@@ -41,8 +46,17 @@ enum Operation {
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let _guard = arguments.time.guard(common)?;
-    let (Operation::Check { directory } | Operation::Show { directory }) = &arguments.what;
-    let report = during("reading", common, || JournalReport::read(directory))?;
+    let (Operation::Check { directory, .. } | Operation::Show { directory }) = &arguments.what;
+    let mut report = during("reading", common, || JournalReport::read(directory))?;
+    if let Operation::Check { mission: Some(mission), .. } = &arguments.what
+        && report.is_sound()
+    {
+        let Setup { mission, settings, .. } = Setup::read(mission)?;
+        let mut control = Loop::new(mission, settings)?;
+        if let Err(message) = during("resuming", common, || Journal::rehearse(directory, &mut control)) {
+            report.messages.push(message);
+        }
+    }
     let shows = matches!(arguments.what, Operation::Show { .. });
     if common.format == Format::Json {
         output::json_answer(&JournalAnswer::new(&report, shows));
@@ -65,6 +79,8 @@ fn line(entry: &Entry) -> String {
         let _ = write!(text, "  {:.3} s", time as f64 / 1e6);
     }
     let content = match &entry.content {
+        // A timer.
+        Value::String(line) if line.is_empty() => "time has passed".to_owned(),
         Value::String(line) => line.clone(),
         Value::Array(answers) if answers.is_empty() => "nothing".to_owned(),
         Value::Array(answers) => {

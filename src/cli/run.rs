@@ -1,6 +1,6 @@
 //! `metaplan run`: lines of events to lines of adaptations.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -9,7 +9,8 @@ use clap::{Args, ValueEnum};
 use metaplan::answers::{KeeperReadyLine, PlanningLine, ReadyLine};
 use metaplan::configure::Keeper;
 use metaplan::journal::{Journal, Policy, Sync};
-use metaplan::mapek::{Clock as _, Loop, Observation, SystemClock, Watch};
+use metaplan::knowledge::Knowledge;
+use metaplan::mapek::{Clock as _, FilterSettings, Loop, Observation, Settings, SystemClock, Watch};
 use metaplan::message::Message;
 use metaplan::setup::Setup;
 
@@ -34,6 +35,9 @@ pub struct Arguments {
     configure: bool,
     #[command(flatten)]
     wanted: Wanted,
+    /// With `--configure`: a TOML file with the section `[adaptation]` of a manifest, whose filters count.
+    #[arg(long, value_name = "FILE", requires = "configure")]
+    adaptation: Option<PathBuf>,
     /// Where events come from, one JSON object a line, or an MCAP file; `-` is standard input.
     #[arg(long, value_name = "FILE", default_value = "-")]
     events: PathBuf,
@@ -137,11 +141,18 @@ fn keep(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let configurator = arguments.wanted.configurator(knowledge)?;
     consistent(Some(configurator.knowledge()))?;
     let objectives = configurator.objectives().into_iter().map(|own| own.individual.name).collect();
-    let keeper = Keeper::new(configurator, None);
+    let filters = filters(arguments.adaptation.as_deref(), configurator.knowledge())?;
+    let keeper = Keeper::new(configurator, None).with_filters(&filters);
     let events = Lines::open(&arguments.events)?;
     let outlet = Outlet::open(&arguments.outlets, "", None)?;
     let ready = output::line(&KeeperReadyLine::new(objectives));
     ended(keep_going(common, keeper, &ready, events, &outlet), &outlet)
+}
+
+/// The filters of a file, or those that count unless said otherwise.
+fn filters(file: Option<&Path>, knowledge: &Knowledge) -> Result<FilterSettings, Failure> {
+    let Some(file) = file else { return Ok(FilterSettings::default()) };
+    Ok(Settings::read(file, Some(knowledge))?.filters)
 }
 
 /// As [`drive`], without a task plan.
@@ -163,8 +174,9 @@ fn keep_going(
         let Some(next) = events.next(common)? else { return Ok(()) };
         read = Instant::now();
         line += 1;
-        outlet.heard(line, next.now.unwrap_or_else(|| clock.now()), &next.text);
-        answers = keeper.handle(&Observation::parse(&next.text));
+        let now = next.now.unwrap_or_else(|| clock.now());
+        outlet.heard(line, now, &next.text);
+        answers = keeper.handle_at(&Observation::parse(&next.text), now);
         written = Ok(());
     }
 }

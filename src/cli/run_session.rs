@@ -26,6 +26,9 @@ const MAX_WAITING: usize = 1024;
 /// would prevent every plan.
 const MAX_STOPPED: u32 = 3;
 
+/// Least time between two timers.
+const MIN_PAUSE: Duration = Duration::from_millis(1);
+
 /// What the loop waits for.
 enum Input {
     Line(Line, Instant),
@@ -64,6 +67,8 @@ pub(super) struct Session<'a> {
     open: Option<(u64, Instant)>,
     thinking: Option<Thinking>,
     stopped: u32,
+    /// Whether a line had a time of its own: then time passes with lines only.
+    has_times: bool,
 }
 
 impl<'a> Session<'a> {
@@ -76,7 +81,19 @@ impl<'a> Session<'a> {
     ) -> Self {
         let begun = control.beliefs().now();
         let clock = SystemClock::default();
-        Self { common, control, journal, outlet, clock, begun, line, open: None, thinking: None, stopped: 0 }
+        Self {
+            common,
+            control,
+            journal,
+            outlet,
+            clock,
+            begun,
+            line,
+            open: None,
+            thinking: None,
+            stopped: 0,
+            has_times: false,
+        }
     }
 
     /// Answers each line completely before the next one is read.
@@ -127,9 +144,15 @@ impl<'a> Session<'a> {
                     if self.thinking.is_none() {
                         flow = self.close()?;
                     }
+                    let pause = self.pause();
                     // The sender is kept here, so that there is always one.
-                    waiting.extend(inputs.recv().ok());
-                    flow
+                    match pause.map_or_else(|| inputs.recv().ok(), |pause| inputs.recv_timeout(pause).ok()) {
+                        None if flow == Flow::GoesOn && pause.is_some() => self.elapse()?,
+                        input => {
+                            waiting.extend(input);
+                            flow
+                        }
+                    }
                 }
             };
         }
@@ -175,8 +198,10 @@ impl<'a> Session<'a> {
         }
         // A recording has its own clock: it is played as a file is.
         if line.now.is_some() {
+            self.has_times = true;
             return self.recorded(line, read);
         }
+        self.has_times = self.has_times || Observation::parse(&line.text).time.is_some();
         let now = self.heard(line);
         let mut answers = match &mut self.journal {
             None => self.control.react(&Observation::parse(&line.text), now),
@@ -197,6 +222,31 @@ impl<'a> Session<'a> {
             answers.extend(more);
             self.decided(&answers)?;
         } else if let Some(journal) = &mut self.journal {
+            journal.reacted(&mut self.control, &answers).map_err(|error| unwritten(&error))?;
+        }
+        self.say(&answers)
+    }
+
+    /// Time until something is due without a line; none if nothing is, or if lines have times of their own.
+    fn pause(&mut self) -> Option<Duration> {
+        let due = self.control.due().filter(|_| !self.has_times)?;
+        Some(due.saturating_sub(self.begun + self.clock.now()).max(MIN_PAUSE))
+    }
+
+    /// Reacts to the passing of time.
+    fn elapse(&mut self) -> Result<Flow, Failure> {
+        let now = self.begun + self.clock.now();
+        if self.control.due().is_none_or(|due| due > now) {
+            return Ok(Flow::GoesOn);
+        }
+        let answers = match &mut self.journal {
+            None => self.control.react(&Observation::timer(), now),
+            Some(journal) => journal
+                .observe(&mut self.control, Observation::TIMER, now)
+                .map_err(|error| unwritten(&error))?,
+        };
+        self.stop_thinking();
+        if let Some(journal) = &mut self.journal {
             journal.reacted(&mut self.control, &answers).map_err(|error| unwritten(&error))?;
         }
         self.say(&answers)

@@ -189,6 +189,18 @@ pub const CODES: &[[&str; 4]] = &[
         "Give a number that is 0 or larger.",
     ],
     [
+        "M143",
+        "A filter is about an attribute or a component that the knowledge base does not have.",
+        "The section `[adaptation.measured.NAME]` or `[adaptation.components.NAME]` has another name than the individual.",
+        "Use the local name that the message proposes.",
+    ],
+    [
+        "M144",
+        "Noise switches designs.",
+        "A measured attribute has a bound without hysteresis and without debounce, or `settle` or `heal_time` is 0.",
+        "Set `hysteresis`, `debounce`, `settle` or `heal_time`; see [noise](../explanation/loop.md#noise).",
+    ],
+    [
         "M150",
         "A study is wrong.",
         "A key of its file has a value that cannot be varied, a placeholder stands for nothing, or there are too many runs.",

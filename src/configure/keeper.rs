@@ -3,13 +3,17 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
+use ontology::tomasys::change::Status;
 use planner::Limits;
 use serde::Serialize;
 
 use crate::configure::choice::{Choice, Verdict, current};
 use crate::configure::configurator::{Configurator, Goal};
 use crate::knowledge::{Fault, RobotReport};
-use crate::mapek::{Answer, Event, Numbers, Observation, Refusal, available, changes, doubts, inferred};
+use crate::mapek::{
+    Accepted, Answer, Event, FilterSettings, FilterStates, Filters, Numbers, Observation, Refusal, available,
+    changes, doubts, inferred,
+};
 use crate::message::Message;
 
 /// One line of output, in the format `metaplan-events/1`.
@@ -58,11 +62,15 @@ pub enum Service {
     },
 }
 
-/// A change of design that was asked for, to be undone if it fails.
+/// Upper limit on the changes of design that are kept to be undone.
+const MAX_CHANGES: usize = 256;
+
+/// A change of design that was asked for, to be undone if it fails, also after its acknowledgement.
 #[derive(Debug, Clone)]
 struct Asked {
     objective: String,
     from: Option<String>,
+    to: String,
 }
 
 /// Keeps the functions of a robot served.
@@ -80,14 +88,18 @@ pub struct Keeper {
     fault: Option<Fault>,
     /// What was said last of objectives that no design can serve.
     unserved: BTreeMap<String, Vec<String>>,
+    filters: Filters,
+    states: FilterStates,
+    /// Time of the last line, since the start.
+    now: Duration,
 }
 
 impl Keeper {
-    /// Takes charge; for each choice there is so much time.
+    /// Takes charge; for each choice there is so much time. Every report is believed at once.
     pub fn new(configurator: Configurator, limit: Option<Duration>) -> Self {
         let available = available(configurator.knowledge());
+        let filters = Filters::new(&FilterSettings::none(), Some(configurator.knowledge()));
         Self {
-            configurator,
             limit,
             numbers: Numbers::default(),
             effects: 0,
@@ -97,7 +109,24 @@ impl Keeper {
             violated: BTreeSet::new(),
             fault: None,
             unserved: BTreeMap::new(),
+            states: filters.states(Some(configurator.knowledge())),
+            filters,
+            configurator,
+            now: Duration::ZERO,
         }
+    }
+
+    /// The same with filters of what is measured and of what components report.
+    #[must_use]
+    pub fn with_filters(self, settings: &FilterSettings) -> Self {
+        let filters = Filters::new(settings, Some(self.configurator.knowledge()));
+        let states = filters.states(Some(self.configurator.knowledge()));
+        Self { filters, states, ..self }
+    }
+
+    /// Time since the start at which a filter needs a tick, if nothing else is reported.
+    pub fn due(&self) -> Option<Duration> {
+        self.filters.due(&self.states)
     }
 
     /// What is known, and how the objectives are served.
@@ -112,12 +141,19 @@ impl Keeper {
         answers
     }
 
-    /// Takes a line over and says what follows.
+    /// Takes a line over at its own time, or else at that of the line before, and says what follows.
     pub fn handle(&mut self, observation: &Observation) -> Vec<KeeperAnswer> {
+        self.handle_at(observation, self.now)
+    }
+
+    /// Takes a line over, at a time since the start that never goes back, and says what follows.
+    pub fn handle_at(&mut self, observation: &Observation, now: Duration) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
+        self.now = self.now.max(observation.time.unwrap_or(now));
         if let Some(refusal) = observation.sequence.and_then(|seq| self.numbers.refused(seq)) {
             return vec![KeeperAnswer::Loop(refusal)];
         }
+        self.elapse(&mut answers);
         let mut understood = false;
         for event in &observation.events {
             match event.clone().and_then(|event| self.take(&event, &mut answers)) {
@@ -139,11 +175,14 @@ impl Keeper {
         let knowledge = self.configurator.knowledge_mut();
         match event {
             Event::Measured { attribute, value } => {
-                knowledge.take(attribute, RobotReport::measured(value)).map_err(refused)?;
+                let mut held = Vec::new();
+                let value = self.filters.sample(&mut self.states, self.now, attribute, value, &mut held);
+                answers.extend(held.into_iter().map(KeeperAnswer::Loop));
+                if let Some(value) = value {
+                    knowledge.take(attribute, RobotReport::measured(&value)).map_err(refused)?;
+                }
             }
-            Event::Component { component, status } => {
-                knowledge.take(component, RobotReport::Component(*status)).map_err(refused)?;
-            }
+            Event::Component { component, status } => self.component(component, *status, answers)?,
             Event::ObjectiveAdded { objective, function, requirements, always_improve } => {
                 let (name, function) = (objective.clone(), function.clone());
                 let (requirements, always_improve) = (requirements.clone(), *always_improve);
@@ -151,13 +190,10 @@ impl Keeper {
                 self.configurator.pursue(&goal).map_err(refused)?;
             }
             Event::ObjectiveRemoved { objective } => self.give_up(objective, answers)?,
-            Event::Acknowledged { effect } => {
-                self.asked.remove(effect).ok_or_else(|| unknown_effect(*effect))?;
-            }
+            Event::Acknowledged { effect } => self.check_effect(*effect)?,
             Event::ReconfigurationFailed { effect } => {
-                let Asked { objective, from } =
-                    self.asked.remove(effect).ok_or_else(|| unknown_effect(*effect))?;
-                self.configurator.revert(&objective, from.as_deref()).map_err(refused)?;
+                self.check_effect(*effect)?;
+                self.undo(*effect).map_err(refused)?;
             }
             Event::Design { design, realisable } => {
                 knowledge.take(design, RobotReport::Design(*realisable)).map_err(refused)?;
@@ -169,6 +205,57 @@ impl Keeper {
             }
         }
         Ok(())
+    }
+
+    /// Takes the status of a component over, unless its filter holds it back.
+    fn component(
+        &mut self,
+        component: &str,
+        status: Status,
+        answers: &mut Vec<KeeperAnswer>,
+    ) -> Result<(), Refusal> {
+        let knowledge = self.configurator.knowledge_mut();
+        let mut held = Vec::new();
+        let is_believed = knowledge
+            .known_component(component)
+            .is_none_or(|name| self.filters.report(&mut self.states, self.now, &name, status, &mut held));
+        answers.extend(held.into_iter().map(KeeperAnswer::Loop));
+        if is_believed {
+            let taken = knowledge.take(component, RobotReport::Component(status));
+            taken.map_err(|message| Refusal::new("M306", message.message.clone()))?;
+        }
+        Ok(())
+    }
+
+    /// Refuses the number of an effect that there was not.
+    fn check_effect(&self, effect: u64) -> Result<(), Refusal> {
+        let is_known = (1..=self.effects).contains(&effect);
+        is_known.then_some(()).ok_or_else(|| Refusal::new("M305", format!("there was no effect {effect}")))
+    }
+
+    /// Takes a change of design back: the design counts as not realisable, so that the next best is chosen. Of a change that is not
+    /// known any more, or has been undone, nothing is left.
+    fn undo(&mut self, effect: u64) -> Result<(), Message> {
+        let Some(Asked { objective, from, to }) = self.asked.remove(&effect) else { return Ok(()) };
+        self.configurator.knowledge_mut().take(&to, RobotReport::Design(false))?;
+        // A later change of the same objective has replaced it.
+        if self.asked.range(effect..).any(|(_, later)| later.objective == objective) {
+            return Ok(());
+        }
+        self.configurator.revert(&objective, from.as_deref())
+    }
+
+    /// Takes over what filters have held back and what is due.
+    fn elapse(&mut self, answers: &mut Vec<KeeperAnswer>) {
+        let mut said = Vec::new();
+        let due: Vec<Accepted> = self.filters.elapse(&mut self.states, self.now, &mut said);
+        answers.extend(said.into_iter().map(KeeperAnswer::Loop));
+        for accepted in due {
+            let (name, report) = accepted.report();
+            if let Err(message) = self.configurator.knowledge_mut().take(name, report) {
+                answers.push(wrong(&message));
+            }
+        }
     }
 
     fn give_up(&mut self, name: &str, answers: &mut Vec<KeeperAnswer>) -> Result<(), Refusal> {
@@ -202,8 +289,9 @@ impl Keeper {
         let knowledge = self.configurator.knowledge();
         let doubts = doubts(knowledge, &mut self.fault, &mut self.violated);
         answers.extend(doubts.into_iter().map(KeeperAnswer::Loop));
-        // MROS adapts nothing while there is a contradiction, and where it is not known what follows nothing is available.
-        if !self.violated.is_empty() || self.fault.is_some() {
+        // MROS adapts nothing while there is a contradiction. Here the designs that it rules out are not available, and the others serve.
+        // Where it is not known what follows nothing is available.
+        if self.fault.is_some() {
             return;
         }
         let limits = self.limit.map_or_else(Limits::none, |time| Limits::none().with_time(time));
@@ -235,9 +323,12 @@ impl Keeper {
         self.unserved.remove(&objective);
         if choice.before.as_ref() != Some(design) {
             self.effects += 1;
-            self.asked.retain(|_, asked| asked.objective != objective);
-            let asked = Asked { objective: objective.clone(), from: choice.before.clone() };
+            let asked =
+                Asked { objective: objective.clone(), from: choice.before.clone(), to: design.clone() };
             self.asked.insert(self.effects, asked);
+            if self.asked.len() > MAX_CHANGES {
+                self.asked.pop_first();
+            }
             let (from, to) = (choice.before.clone(), choice.design.clone());
             let (because, effect) = (said(choice), self.effects);
             answers.push(KeeperAnswer::Service(Service::Reconfigure {
@@ -262,10 +353,6 @@ impl Keeper {
 
 fn wrong(message: &Message) -> KeeperAnswer {
     KeeperAnswer::Loop(Answer::Error { code: message.code.clone(), message: message.message.clone() })
-}
-
-fn unknown_effect(effect: u64) -> Refusal {
-    Refusal::new("M305", format!("no effect {effect} is waited for"))
 }
 
 /// Why an objective is in need, and what speaks against the designs that are worth more than the chosen one.

@@ -36,7 +36,7 @@ use crate::mapek::{Answer, Decision, Loop, Observation, Snapshot};
 use crate::message::Message;
 pub use recovery::Recovery;
 
-use directory::{JournalFiles, broken, closing, name, path};
+use directory::{JournalFiles, Segment, broken, closing, name, path};
 use lock::Lock;
 use record::{Link, header};
 use recover::{Replay, Unfinished, settle, usable};
@@ -116,31 +116,8 @@ impl Journal {
             return Ok((journal, recovery));
         }
         let failed = |error: io::Error| broken(&directory, &error.to_string());
-        let (from, segments) =
-            usable(&contents, &mut recovery.warnings).map_err(|text| broken(&directory, &text))?;
-        if segments.iter().any(|segment| segment.digest != digest) {
-            let text = "it belongs to another mission, or the mission's files or settings have changed";
-            return Err(broken(&directory, text));
-        }
-        if from > 0 {
-            let snapshot = contents.start(from).map_err(|text| broken(&directory, &text))?;
-            control.restore(&Snapshot(snapshot.data.clone()))?;
-        }
-        recovery.replayed = Some(0);
-        let (directory_, recovery_) = (&directory, &mut recovery);
-        let mut replay =
-            Replay { directory: directory_, control, recovery: recovery_, observations: 0, unfinished: None };
-        let mut anew = Vec::new();
-        for segment in &segments {
-            if segment.number > from && contents.start(segment.number).is_err() {
-                anew.push((
-                    segment.number,
-                    snapshot_line(&segment.before, &digest, segment.number, replay.control),
-                ));
-            }
-            replay.segment(segment)?;
-        }
-        let Replay { observations, unfinished, .. } = replay;
+        let Resumed { from, segments, observations, unfinished, anew } =
+            resume(&directory, &contents, control, &mut recovery)?;
         let (file, link) = settle(&directory, &segments, &mut recovery).map_err(failed)?;
         for (number, line) in anew {
             write_snapshot(&directory, number, &line).map_err(failed)?;
@@ -157,6 +134,18 @@ impl Journal {
         Ok((journal, recovery))
     }
 
+    /// Brings a loop that has not begun back as [`Journal::open`] does, and changes nothing on disk.
+    ///
+    /// # Errors
+    /// The journal cannot be resumed: it is damaged, or belongs to another mission, or the mission leads to other decisions.
+    pub fn rehearse(directory: &Path, control: &mut Loop) -> Result<Recovery, Message> {
+        let contents =
+            JournalFiles::read(directory).map_err(|error| broken(directory, &error.to_string()))?;
+        let mut recovery = Recovery::default();
+        resume(directory, &contents, control, &mut recovery)?;
+        Ok(recovery)
+    }
+
     /// Decides what was begun, which may take as long as a plan takes. The answers have not left the program, or may not
     /// have: those to what was begun, then effects that were not acknowledged.
     ///
@@ -169,7 +158,7 @@ impl Journal {
                 Unfinished::Agenda => control.deliberate(),
                 Unfinished::Observation(line, now) => {
                     self.observations += 1;
-                    control.handle(&Observation::parse(&line), Duration::from_micros(now))
+                    control.handle(&Observation::recorded(&line), Duration::from_micros(now))
                 }
             };
             let decision = control.decision(&answers);
@@ -186,7 +175,7 @@ impl Journal {
         let mut answers = Vec::new();
         if let Some(Unfinished::Observation(line, now)) = self.unfinished.take() {
             self.observations += 1;
-            answers = control.react(&Observation::parse(&line), Duration::from_micros(now));
+            answers = control.react(&Observation::recorded(&line), Duration::from_micros(now));
             self.reacted(control, &answers)?;
         }
         self.again(control, answers)
@@ -224,7 +213,7 @@ impl Journal {
         let micros = u64::try_from(now.as_micros()).unwrap_or(u64::MAX);
         self.append("event", &[json!(micros), json!(line)])?;
         self.observations += 1;
-        Ok(control.react(&Observation::parse(line), Duration::from_micros(micros)))
+        Ok(control.react(&Observation::recorded(line), Duration::from_micros(micros)))
     }
 
     /// Writes the answers of [`Journal::observe`].
@@ -300,6 +289,49 @@ impl Journal {
         }
         Ok(())
     }
+}
+
+/// A loop that was brought back, and where in the journal it is.
+struct Resumed<'c> {
+    /// The number of the snapshot, or 0.
+    from: u64,
+    segments: Vec<&'c Segment>,
+    observations: u64,
+    unfinished: Option<Unfinished>,
+    /// Snapshots that are missing, by number.
+    anew: Vec<(u64, String)>,
+}
+
+/// Brings a loop back by the newest sound snapshot and the observations since.
+fn resume<'c>(
+    directory: &Path,
+    contents: &'c JournalFiles,
+    control: &mut Loop,
+    recovery: &mut Recovery,
+) -> Result<Resumed<'c>, Message> {
+    let digest = control.digest();
+    let (from, segments) =
+        usable(contents, &mut recovery.warnings).map_err(|text| broken(directory, &text))?;
+    if segments.iter().any(|segment| segment.digest != digest) {
+        let text = "it belongs to another mission, or the mission's files or settings have changed";
+        return Err(broken(directory, text));
+    }
+    if from > 0 {
+        let snapshot = contents.start(from).map_err(|text| broken(directory, &text))?;
+        control.restore(&Snapshot(snapshot.data.clone()))?;
+    }
+    recovery.replayed = Some(0);
+    let mut replay = Replay { directory, control, recovery, observations: 0, unfinished: None };
+    let mut anew = Vec::new();
+    for segment in &segments {
+        if segment.number > from && contents.start(segment.number).is_err() {
+            let line = snapshot_line(&segment.before, &digest, segment.number, replay.control);
+            anew.push((segment.number, line));
+        }
+        replay.segment(segment)?;
+    }
+    let Replay { observations, unfinished, .. } = replay;
+    Ok(Resumed { from, segments, observations, unfinished, anew })
 }
 
 /// Makes a segment that holds nothing but its header. It is whole or not there.

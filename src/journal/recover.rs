@@ -113,7 +113,7 @@ impl Replay<'_> {
             self.unfinished = Some(Unfinished::Observation(line.to_owned(), now));
             return Ok(());
         };
-        let (observation, now) = (Observation::parse(line), Duration::from_micros(now));
+        let (observation, now) = (Observation::recorded(line), Duration::from_micros(now));
         let answers = match next.kind.as_str() {
             "reaction" => self.control.react(&observation, now),
             _ => self.control.handle_again(&observation, now, &next.list(1)),

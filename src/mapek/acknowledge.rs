@@ -14,6 +14,17 @@ use crate::mapek::answer::Command;
 use crate::mapek::beliefs::Beliefs;
 use crate::mapek::receipts::Acknowledged;
 
+/// The consequence of an acknowledgement.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Receipt {
+    /// There was no such effect.
+    Unknown,
+    /// The effect is acknowledged.
+    Taken,
+    /// It is not certain any more which design this function has.
+    Doubtful(String),
+}
+
 /// The consequence of a reconfiguration's failure.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Failure {
@@ -26,23 +37,23 @@ pub(super) enum Failure {
 }
 
 impl Beliefs {
-    /// Takes an acknowledgement of an effect. Returns `false` if there was no such effect.
-    pub(super) fn acknowledge(&mut self, effect: u64) -> bool {
+    /// Takes an acknowledgement of an effect.
+    pub(super) fn acknowledge(&mut self, effect: u64) -> Receipt {
         if effect == 0 || effect > self.effects {
-            return false;
+            return Receipt::Unknown;
         }
         self.waits.remove(&effect);
+        // A report of the action may have confirmed the effect before its acknowledgement came.
+        self.receipts.by_number = true;
         if let Some(outstanding) = self.outstanding.remove(&effect) {
             if let Command::Reconfigure { function, to, .. } = outstanding.command {
-                self.receipts.by_number = true;
-                self.configured(effect, &function, to);
+                return self.configured(effect, function, to);
             }
         } else if let Some((function, design)) = self.receipts.superseded(effect) {
             let (function, design) = (function.clone(), design.clone());
-            self.receipts.by_number = true;
-            self.configured(effect, &function, design);
+            return self.configured(effect, function, design);
         }
-        true
+        Receipt::Taken
     }
 
     /// Takes a report of an action that has started: its request has arrived, and with a robot that never acknowledges also what
@@ -63,7 +74,7 @@ impl Beliefs {
         for (number, function, design) in implied {
             self.outstanding.remove(&number);
             self.waits.remove(&number);
-            self.configured(number, &function, design);
+            self.configured(number, function, design);
         }
     }
 
@@ -102,14 +113,21 @@ impl Beliefs {
         Failure::Stale
     }
 
-    /// Believes that a function has got a design by a reconfiguration, unless a later one was acknowledged.
-    fn configured(&mut self, effect: u64, function: &str, design: String) {
-        let own = self.receipts.functions.entry(function.to_owned()).or_default();
+    /// Believes that a function has got a design by a reconfiguration, unless a later one was acknowledged. The function was seen
+    /// with another design while the reconfiguration was pending: then nobody knows which came first.
+    fn configured(&mut self, effect: u64, function: String, design: String) -> Receipt {
+        let own = self.receipts.functions.entry(function.clone()).or_default();
         own.superseded.retain(|number, _| *number > effect);
         if own.last.as_ref().is_some_and(|last| last.effect >= effect) {
-            return;
+            return Receipt::Taken;
         }
-        let before = self.configuration.insert(function.to_owned(), design.clone());
-        own.last = Some(Acknowledged { effect, design, before, failed: false });
+        let is_doubtful = own.doubted >= effect;
+        let before = if is_doubtful {
+            self.configuration.remove(&function)
+        } else {
+            self.configuration.insert(function.clone(), design.clone())
+        };
+        own.last = Some(Acknowledged { effect, design, before, failed: is_doubtful });
+        if is_doubtful { Receipt::Doubtful(function) } else { Receipt::Taken }
     }
 }

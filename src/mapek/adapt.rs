@@ -5,13 +5,15 @@
 //! design of the action under way is lost, that action and the rest of the plan are configured anew together, see
 //! [`crate::mapek::resume`]; if that is impossible or bad, the action is suspended or cancelled, see [`crate::mapek::interrupt`].
 
+use std::time::Duration;
+
 use num_rational::BigRational;
 use pddl::ast::Direction;
 
 use crate::mapek::analyze::{Findings, unknown};
 use crate::mapek::answer::Answer;
 use crate::mapek::ask::{Ask, Outcome};
-use crate::mapek::beliefs::{Beliefs, Running};
+use crate::mapek::beliefs::{Beliefs, Retry, Running};
 use crate::mapek::effects::{cancel, reconfigure, resume_suspended, suspend};
 use crate::mapek::interrupt::{Interruption, weigh};
 use crate::mapek::monitor::Changes;
@@ -23,6 +25,10 @@ use crate::number;
 
 /// How often one step may fail in a row before something has to change.
 const FAILURES: u32 = 3;
+
+/// Least time limit that a pause after a search is a multiple of, and the longest pause.
+const MIN_RETRY: Duration = Duration::from_secs(10);
+const MAX_RETRY: Duration = Duration::from_secs(3600);
 
 /// What stands among designs for facts that have changed.
 const FACTS: &str = "facts";
@@ -87,6 +93,9 @@ impl Adapting<'_> {
         if changes.must.is_empty() && self.beliefs.stuck && is_change {
             changes.must.push("the situation has changed, and there is no plan".to_owned());
         }
+        if changes.must.is_empty() && self.beliefs.stuck && self.is_retry_due() {
+            changes.must.push("the last search for a plan was cut short".to_owned());
+        }
         if changes.must.is_empty() {
             if !findings.lost.is_empty() && self.beliefs.plan.is_some() {
                 let because = "it uses none of the designs that are not available any more".to_owned();
@@ -147,11 +156,29 @@ impl Adapting<'_> {
             self.beliefs.hopes.clear();
         } else if self.beliefs.fault.is_some() {
             // It is not known what there is to hope for.
+        } else if self.is_retry_due() {
+            self.replan(vec!["the plan may not be the best".to_owned()], Need::Better, answers);
         } else if !self.beliefs.hopes.is_empty()
             && self.beliefs.now >= self.beliefs.hoped.saturating_add(self.settings.settle)
         {
             self.replan(vec!["there may be a better plan".to_owned()], Need::Better, answers);
         }
+    }
+
+    /// Whether it is time to repeat a search that was cut short.
+    fn is_retry_due(&self) -> bool {
+        self.beliefs.retry.is_some_and(|own| own.at <= self.beliefs.now)
+    }
+
+    /// Repeats a search that was cut short later, with twice the time; nothing is searched where it is not known what follows.
+    fn schedule_retry(&mut self, attempt: u32, outcome: &Outcome) {
+        if outcome.proved || self.beliefs.fault.is_some() {
+            return;
+        }
+        let limit = self.settings.time_limit.unwrap_or(MIN_RETRY);
+        let pause = limit.max(MIN_RETRY).saturating_mul(2_u32.saturating_pow(attempt + 1)).min(MAX_RETRY);
+        let at = self.beliefs.now.saturating_add(pause);
+        self.beliefs.retry = Some(Retry { at, attempt: attempt + 1 });
     }
 
     /// Looks for a plan, and adopts it if it must, or if it is better by enough.
@@ -160,10 +187,15 @@ impl Adapting<'_> {
         let reason = because.first().cloned().unwrap_or_default();
         answers.push(Answer::PlanRequested { because });
         self.beliefs.hopes.clear();
+        // A search for another reason begins with the ordinary time limit.
+        let retry = self.beliefs.retry.take().filter(|own| own.at <= self.beliefs.now);
+        let attempt = retry.map_or(0, |own| own.attempt);
+        self.planner.attempt = attempt;
         let outcome = self.plan(true);
         if self.planner.is_missing {
             return;
         }
+        self.schedule_retry(attempt, &outcome);
         if must && self.interrupt(&reason, need, &outcome, answers) {
             return;
         }
@@ -173,7 +205,10 @@ impl Adapting<'_> {
         };
         self.beliefs.stuck = false;
         if self.is_current(steps) {
-            answers.push(Answer::PlanKept { because: "it is still the best".to_owned() });
+            self.beliefs.unproved = !outcome.proved;
+            let because =
+                if outcome.proved { "it is still the best" } else { "no better one was found in time" };
+            answers.push(Answer::PlanKept { because: because.to_owned() });
             self.configure_again(answers);
         } else if let Some(because) = (!must).then(|| self.not_worth_it(&outcome)).flatten() {
             answers.push(Answer::PlanKept { because });

@@ -1,5 +1,7 @@
 //! What the loop answers: conclusions, plans and effects, one JSON object each, in the format `metaplan-events/1`.
 
+use std::time::Duration;
+
 use num_rational::BigRational;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::Value;
@@ -74,6 +76,28 @@ pub enum Answer {
     },
     /// The goal holds; nothing is to be done.
     GoalReached,
+    /// A report is held back by a filter: the first, tenth, hundredth … one since the value or status last changed.
+    Filtered {
+        /// The attribute or component, by local name.
+        name: String,
+        /// The value or status that was reported.
+        value: Value,
+        /// `range`, `jump`, `hysteresis`, `debounce`, `confirm` or `heal`.
+        because: &'static str,
+        /// Number of reports that were held back since the last change.
+        held: u64,
+        /// Time at which the report will be believed if nothing else is reported, if there is one.
+        due: Option<Duration>,
+    },
+    /// A sensor has been silent for longer than its period.
+    Silent {
+        /// The attribute, by local name.
+        name: String,
+        /// `keep`, `unknown` or `worst`.
+        outcome: &'static str,
+        /// The value that is believed from now on, with `worst`.
+        value: Option<Value>,
+    },
     /// The line was seen before and has changed nothing.
     Duplicate {
         /// Its number.
@@ -242,6 +266,8 @@ impl Answer {
             Self::Effect(effect) => effect.command.kind(),
             Self::Overdue { .. } => "overdue",
             Self::GoalReached => "goal_reached",
+            Self::Filtered { .. } => "filtered",
+            Self::Silent { .. } => "silent",
             Self::Duplicate { .. } => "duplicate",
             Self::Stale { .. } => "stale",
             Self::Error { .. } => "error",
@@ -281,6 +307,18 @@ impl Answer {
                 object.serialize_entry("outcome", outcome)
             }
             Self::Effect(_) | Self::GoalReached => Ok(()),
+            Self::Filtered { name, value, because, held, due } => {
+                object.serialize_entry("name", name)?;
+                object.serialize_entry("value", value)?;
+                object.serialize_entry("because", because)?;
+                object.serialize_entry("held", held)?;
+                object.serialize_entry("due", &due.map(|due| due.as_secs_f64()))
+            }
+            Self::Silent { name, outcome, value } => {
+                object.serialize_entry("name", name)?;
+                object.serialize_entry("outcome", outcome)?;
+                object.serialize_entry("value", value)
+            }
             Self::Duplicate { sequence } => object.serialize_entry("seq", sequence),
             Self::Stale { sequence, mark } => {
                 let because = format!(

@@ -14,6 +14,7 @@ use pddl::validate::{Options, Verdict, Violation, advance, validate};
 
 use crate::knowledge::Fault;
 use crate::mapek::answer::{Command, Effect};
+use crate::mapek::filter::FilterStates;
 use crate::mapek::receipts::Receipts;
 use crate::mapek::resume::{resume, resumed_goal};
 use crate::mapek::sequence::Numbers;
@@ -48,6 +49,8 @@ pub struct Beliefs {
     pub(super) stuck: bool,
     /// Whether the plan at hand may not be the best, since time was up.
     pub(super) unproved: bool,
+    /// The next search for a plan after one that was cut short, if nothing else happens.
+    pub(super) retry: Option<Retry>,
     /// The last step that failed, and how often in a row.
     pub(super) failures: Option<(PlannedStep, u32)>,
     /// Designs that have come back, or a word for facts that have changed, without another plan being looked for.
@@ -72,6 +75,8 @@ pub struct Beliefs {
     pub(super) numbers: Numbers,
     /// The time of the last line, since the start of the mission.
     pub(super) now: Duration,
+    /// Memory of the filters of what is measured and of what components report.
+    pub(super) filters: FilterStates,
 }
 
 /// An action that was requested and has not ended.
@@ -96,8 +101,19 @@ pub(super) struct Running {
     pub(super) heard: Duration,
     /// Number of deadlines that have passed since then.
     pub(super) overdue: u32,
+    /// Whether its start or progress was reported.
+    pub(super) started: bool,
     /// Whether its progress was reported.
     pub(super) progressed: bool,
+}
+
+/// A search for a plan that is to be repeated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Retry {
+    /// Time since the start of the mission at which it is repeated.
+    pub(super) at: Duration,
+    /// Number of searches in a row that were cut short.
+    pub(super) attempt: u32,
 }
 
 /// How long an effect has been outstanding.
@@ -139,6 +155,7 @@ impl Beliefs {
             reached: false,
             stuck: false,
             unproved: false,
+            retry: None,
             failures: None,
             hopes: BTreeSet::new(),
             hoped: Duration::ZERO,
@@ -151,6 +168,7 @@ impl Beliefs {
             lines: 0,
             numbers: Numbers::default(),
             now: Duration::ZERO,
+            filters: FilterStates::default(),
         }
     }
 

@@ -1,5 +1,7 @@
 //! What observations have changed: from the monitor to the analysis and the planning.
 
+use crate::mapek::answer::Answer;
+
 /// What a line has changed, for the analysis.
 #[derive(Debug, Clone, Default)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a fact of its own")]
@@ -22,6 +24,8 @@ pub(super) struct Changes {
     pub(super) upset: Vec<String>,
     /// Reasons to plan whatever the plan is like: sentences.
     pub(super) must: Vec<String>,
+    /// Reports that filters have held back, and sensors that are silent.
+    pub(super) filtered: Vec<Answer>,
 }
 
 /// What has changed in the knowledge base.
@@ -48,7 +52,7 @@ impl Changes {
 
     /// Adds what has changed since.
     pub(super) fn extend(&mut self, later: Self) {
-        let Self { base, facts, predicates, goal, values, ended, observed, upset, must } = later;
+        let Self { base, facts, predicates, goal, values, ended, observed, upset, must, filtered } = later;
         self.base = self.base.max(base);
         self.facts |= facts;
         self.predicates |= predicates;
@@ -58,5 +62,6 @@ impl Changes {
         self.observed |= observed;
         self.upset.extend(upset);
         self.must.extend(must);
+        self.filtered.extend(filtered);
     }
 }

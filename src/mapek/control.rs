@@ -12,8 +12,8 @@ use crate::mapek::adapt::Adapting;
 use crate::mapek::analyze::{Findings, analyze, available, follow, judged};
 use crate::mapek::answer::{Answer, Command, DesignChange, Effect};
 use crate::mapek::ask::Outcome;
-use crate::mapek::beliefs::Beliefs;
-use crate::mapek::deadlines::overdue;
+use crate::mapek::beliefs::{Beliefs, Retry};
+use crate::mapek::deadlines::{self, overdue};
 use crate::mapek::digest::digest;
 use crate::mapek::effects::{objectives, reconfigure, request};
 use crate::mapek::event::{Event, Observation};
@@ -54,6 +54,7 @@ pub(super) struct Checkpoint {
     hopes: (BTreeSet<String>, Duration),
     failures: Option<(PlannedStep, u32)>,
     plan: Option<VecDeque<PlannedStep>>,
+    retry: Option<Retry>,
     flags: [bool; 2],
 }
 
@@ -85,13 +86,14 @@ impl Loop {
                 format!("the knowledge is inconsistent: {}: {}", first.violated, first.facts.join(", "));
             return Err(vec![Message::error("M110", text)].into());
         }
-        let monitor = Monitor::new(&mission);
+        let monitor = Monitor::new(&mission, &settings);
         let digest = digest(&mission, &settings);
         let planner = Planner { time_limit: settings.time_limit, ..Planner::default() };
         let mut beliefs = Beliefs::new(mission);
         if let Some(base) = beliefs.mission.knowledge_mut() {
             base.limit(STEPS);
         }
+        beliefs.filters = monitor.filters().states(beliefs.mission.knowledge());
         if let Some(base) = beliefs.mission.knowledge() {
             beliefs.available = available(base);
         }
@@ -154,7 +156,7 @@ impl Loop {
         let mut answers = Vec::new();
         // Plans that nobody has asked for are of no use to anybody.
         self.planner.made.clear();
-        self.beliefs.lines += 1;
+        self.beliefs.lines += u64::from(!observation.is_timer);
         let latest = self.beliefs.now.max(now).saturating_add(MAX_TIME_STEP);
         self.beliefs.now =
             self.beliefs.now.max(observation.time.filter(|time| *time <= latest).unwrap_or(now));
@@ -174,19 +176,20 @@ impl Loop {
         }
         let mut changes = Changes::default();
         let mut understood = false;
+        let due = self.monitor.elapse(&mut self.beliefs, &mut changes);
+        answers.extend(due.into_iter().map(refused));
         for event in &observation.events {
             let outcome =
                 event.clone().and_then(|event| self.monitor.take(&mut self.beliefs, &event, &mut changes));
             match outcome {
                 Ok(()) => understood = true,
-                Err(Refusal { code, message }) => {
-                    answers.push(Answer::Error { code: code.to_owned(), message });
-                }
+                Err(refusal) => answers.push(refused(refusal)),
             }
         }
         for effect in overdue(&mut self.beliefs, &self.settings, &mut answers) {
             self.give_up(effect, &mut changes);
         }
+        answers.append(&mut changes.filtered);
         if changes.goal {
             self.planner.memo.forget();
         }
@@ -234,7 +237,7 @@ impl Loop {
 
     /// A reconfiguration that was not acknowledged in time counts as failed, and it is not known which design the function has.
     fn give_up(&mut self, effect: u64, changes: &mut Changes) {
-        let Some(Command::Reconfigure { function, .. }) =
+        let Some(Command::Reconfigure { function, to, .. }) =
             self.beliefs.outstanding.get(&effect).map(|effect| effect.command.clone())
         else {
             return;
@@ -245,6 +248,8 @@ impl Loop {
         self.beliefs.outstanding.remove(&effect);
         self.beliefs.waits.remove(&effect);
         self.beliefs.configuration.remove(&function);
+        // It may still arrive, and be acknowledged.
+        self.beliefs.receipts.supersede(effect, function, to);
     }
 
     /// What deliberation changes before the first plan is asked for.
@@ -255,6 +260,7 @@ impl Loop {
             hopes: (known.hopes.clone(), known.hoped),
             failures: known.failures.clone(),
             plan: known.plan.clone(),
+            retry: known.retry,
             flags: [known.stuck, known.reached],
         }
     }
@@ -265,7 +271,7 @@ impl Loop {
         self.agenda = to.agenda;
         (known.hopes, known.hoped) = to.hopes;
         known.failures = to.failures;
-        known.plan = to.plan;
+        (known.plan, known.retry) = (to.plan, to.retry);
         [known.stuck, known.reached] = to.flags;
         self.planner.made.clear();
     }
@@ -273,6 +279,18 @@ impl Loop {
     /// The station that decides.
     fn adapting(&mut self) -> Adapting<'_> {
         Adapting { beliefs: &mut self.beliefs, planner: &mut self.planner, settings: &self.settings }
+    }
+
+    /// Time since the start of the mission at which something becomes due without an event: a report that a filter holds
+    /// back, a sensor that counts as silent, a better plan, another search after one that was cut short, or a deadline. A tick or a [timer](Observation::timer) at that
+    /// time takes it.
+    pub fn due(&self) -> Option<Duration> {
+        let hope = self.beliefs.hoped.saturating_add(self.settings.settle);
+        let hope = (!self.beliefs.hopes.is_empty() && hope > self.beliefs.now).then_some(hope);
+        let retry = self.beliefs.retry.map(|own| own.at).filter(|at| *at > self.beliefs.now);
+        let filters = self.monitor.filters().due(&self.beliefs.filters);
+        let deadline = deadlines::due(&self.beliefs, &self.settings);
+        filters.into_iter().chain(hope).chain(retry).chain(deadline).min()
     }
 
     /// Effects that were asked for and not acknowledged, to be asked for again after a restart.
@@ -295,6 +313,11 @@ impl Loop {
         // What was consistent and came to an end does so again.
         let _ = base.restore(&statements);
     }
+}
+
+/// A refusal as an answer.
+fn refused(Refusal { code, message }: Refusal) -> Answer {
+    Answer::Error { code: code.to_owned(), message }
 }
 
 /// What the journal keeps, and what is made of it again.
@@ -348,6 +371,7 @@ impl Loop {
         self.beliefs.now = self.beliefs.now.max(now);
         self.agenda = None;
         let mut changes = Changes::default();
+        let _ = self.monitor.elapse(&mut self.beliefs, &mut changes);
         for event in observation.events.iter().flatten() {
             // What the loop would answer with an error changes nothing.
             let _ = self.monitor.take(&mut self.beliefs, event, &mut changes);

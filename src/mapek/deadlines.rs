@@ -25,6 +25,24 @@ pub(super) fn overdue(beliefs: &mut Beliefs, settings: &Settings, answers: &mut 
     expired
 }
 
+/// Time since the start of the mission of the next deadline.
+pub(super) fn due(beliefs: &Beliefs, settings: &Settings) -> Option<Duration> {
+    if settings.deadline.is_zero() {
+        return None;
+    }
+    let is_effect = |number: &u64| beliefs.outstanding.get(number).is_some_and(|own| !is_request(own));
+    let waits = beliefs.waits.iter().filter(|(number, _)| beliefs.receipts.are_sent() && is_effect(number));
+    let effects = waits.map(|(_, wait)| wait.since.saturating_add(settings.deadline));
+    let running = beliefs.running.as_ref().filter(|own| !own.cancelling && !own.suspended);
+    let action = running.map(|own| own.heard.saturating_add(patience(own, settings)));
+    effects.chain(action).min()
+}
+
+/// Returns `true` for the request of an action, which has a deadline of its own.
+fn is_request(effect: &Effect) -> bool {
+    matches!(effect.command, Command::Request { .. })
+}
+
 /// Effects that the robot should have acknowledged.
 fn effects(beliefs: &mut Beliefs, deadline: Duration, answers: &mut Vec<Answer>) -> Expired {
     let mut expired = Expired::new();
@@ -35,8 +53,7 @@ fn effects(beliefs: &mut Beliefs, deadline: Duration, answers: &mut Vec<Answer>)
     for (number, wait) in &mut beliefs.waits {
         let Some(effect) = beliefs.outstanding.get(number) else { continue };
         let waited = now.saturating_sub(wait.since);
-        // The request of an action has a deadline of its own.
-        if waited < deadline || matches!(effect.command, Command::Request { .. }) {
+        if waited < deadline || is_request(effect) {
             continue;
         }
         let is_hopeless = wait.repeats > 0 && matches!(effect.command, Command::Reconfigure { .. });
@@ -62,18 +79,21 @@ fn action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<Answer>)
     let Some(running) = beliefs.running.as_mut().filter(|own| !own.cancelling && !own.suspended) else {
         return;
     };
-    let limit = limit(running, settings);
     let silence = beliefs.now.saturating_sub(running.heard);
-    if silence < limit.saturating_mul(running.overdue.saturating_add(1)) {
+    if silence < patience(running, settings) {
         return;
     }
     running.overdue = running.overdue.saturating_mul(2).max(1);
     let (action, request) = (running.action, running.request);
     let is_unheard = beliefs.outstanding.contains_key(&request);
     let is_first = running.overdue == 1;
-    let is_expected = if is_unheard { beliefs.reports_actions } else { running.progressed };
+    let is_expected = match (running.started, is_unheard) {
+        (true, _) => running.progressed,
+        (false, true) => beliefs.reports_actions || beliefs.receipts.are_sent(),
+        (false, false) => beliefs.reports_actions,
+    };
     let outcome = match (is_first, is_unheard, is_expected) {
-        (true, true, true) => OverdueOutcome::Repeated,
+        (true, true, true) | (_, true, false) => OverdueOutcome::Repeated,
         (false, _, true) => OverdueOutcome::Cancelled,
         _ => OverdueOutcome::Waiting,
     };
@@ -81,8 +101,10 @@ fn action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<Answer>)
     answers.push(Answer::Overdue { effect: is_unheard.then_some(request), action, seconds, outcome });
     match outcome {
         OverdueOutcome::Repeated => {
-            let effect = beliefs.outstanding.get(&request).cloned();
-            answers.extend(effect.map(|effect| Answer::Effect(Effect { repeated: true, ..effect })));
+            // Of a robot that has never acknowledged anything nothing else is repeated: so are the designs that the action needs.
+            let from = if beliefs.receipts.are_sent() { request } else { 0 };
+            let effects = beliefs.outstanding.range(from..=request).map(|(_, effect)| effect.clone());
+            answers.extend(effects.map(|effect| Answer::Effect(Effect { repeated: true, ..effect })));
         }
         OverdueOutcome::Cancelled => {
             let running = running.clone();
@@ -91,6 +113,11 @@ fn action(beliefs: &mut Beliefs, settings: &Settings, answers: &mut Vec<Answer>)
         }
         OverdueOutcome::Failed | OverdueOutcome::Waiting => {}
     }
+}
+
+/// Time without a report of an action after which its next deadline has passed.
+fn patience(running: &Running, settings: &Settings) -> Duration {
+    limit(running, settings).saturating_mul(running.overdue.saturating_add(1))
 }
 
 /// How long nothing need be heard of an action.

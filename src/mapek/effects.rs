@@ -1,10 +1,15 @@
 //! What is asked of the managed system, and what the knowledge base hears of it: which functions are objectives now, and which
 //! designs are grounded for them.
 
+use std::collections::BTreeSet;
+
 use crate::mapek::analyze::{analyze, contradict};
 use crate::mapek::answer::{Answer, Command, Effect};
 use crate::mapek::beliefs::{Beliefs, Running, Wait};
 use crate::mapek::step::PlannedStep;
+
+/// Upper limit on the effects that one effect names as superseded.
+const MAX_SUPERSEDED: usize = 64;
 
 /// The goal holds: nothing is to be done any more.
 pub(super) fn finish(beliefs: &mut Beliefs, answers: &mut Vec<Answer>) {
@@ -31,6 +36,7 @@ pub(super) fn request(beliefs: &mut Beliefs, step: PlannedStep, answers: &mut Ve
         request: beliefs.effects,
         heard: beliefs.now,
         overdue: 0,
+        started: false,
         progressed: false,
     });
 }
@@ -53,9 +59,19 @@ pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answe
     let number = beliefs.effects;
     let outstanding = &mut beliefs.outstanding;
     let is_replaced = |old: &Effect| command.replaces(&old.command, old.action == action);
-    let supersedes: Vec<u64> =
+    let replaced: Vec<u64> =
         outstanding.values().filter(|old| is_replaced(old)).map(|old| old.number).collect();
-    for number in &supersedes {
+    // An effect may arrive after the one that has superseded it has been superseded in turn: all of them are named.
+    let mut supersedes: BTreeSet<u64> = replaced.iter().copied().collect();
+    supersedes
+        .extend(replaced.iter().filter_map(|number| outstanding.get(number)).flat_map(|old| &old.supersedes));
+    if let Command::Reconfigure { function, .. } = &command {
+        supersedes.extend(beliefs.receipts.unanswered(function));
+    }
+    while supersedes.len() > MAX_SUPERSEDED {
+        supersedes.pop_first();
+    }
+    for number in &replaced {
         beliefs.waits.remove(number);
         if let Some(Command::Reconfigure { function, to, .. }) =
             outstanding.remove(number).map(|old| old.command)
@@ -64,6 +80,7 @@ pub(super) fn effect(beliefs: &mut Beliefs, action: u64, command: Command, answe
         }
     }
     beliefs.waits.insert(number, Wait { since: beliefs.now, repeats: 0 });
+    let supersedes = supersedes.into_iter().collect();
     let effect = Effect { number, action, command, repeated: false, supersedes };
     outstanding.insert(number, effect.clone());
     answers.push(Answer::Effect(effect));

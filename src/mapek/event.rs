@@ -206,18 +206,33 @@ pub struct Observation {
     pub time: Option<Duration>,
     /// What it says; a diagnostic array says several things.
     pub events: Vec<Result<Event, Refusal>>,
+    /// Whether it is no line of input but the passing of time: it counts as no line.
+    pub is_timer: bool,
 }
 
 impl From<Event> for Observation {
     fn from(event: Event) -> Self {
-        Self { sequence: None, time: None, events: vec![Ok(event)] }
+        Self { sequence: None, time: None, events: vec![Ok(event)], is_timer: false }
     }
 }
 
 impl Observation {
-    /// Reads a line.
+    /// Text of a [timer](Self::timer) in a journal. Blank lines of input are skipped, so that no line has this text.
+    pub const TIMER: &str = "";
+
+    /// The passing of time, which [`Loop::due`](crate::mapek::Loop::due) calls for.
+    pub fn timer() -> Self {
+        Self { is_timer: true, ..Self::from(Event::Tick) }
+    }
+
+    /// Reads a line of a journal: a [timer](Self::TIMER), or a line of input.
+    pub fn recorded(text: &str) -> Self {
+        if text == Self::TIMER { Self::timer() } else { Self::parse(text) }
+    }
+
+    /// Reads a line of input.
     pub fn parse(text: &str) -> Self {
-        let mut observation = Self { sequence: None, time: None, events: Vec::new() };
+        let mut observation = Self { sequence: None, time: None, events: Vec::new(), is_timer: false };
         match observation.read(text) {
             Ok(events) => observation.events = events,
             Err(fault) => observation.events.push(Err(fault)),

@@ -1,6 +1,6 @@
 //! Monitor: events to changes of what is believed.
 
-use std::collections::{BTreeSet, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use num_rational::BigRational;
 use ontology::vocab::local_name;
@@ -9,12 +9,14 @@ use pddl::validate::{Advance, advance};
 use rules::{Delta, Fact};
 
 use crate::knowledge::RobotReport;
-use crate::mapek::acknowledge::Failure;
+use crate::mapek::acknowledge::{Failure, Receipt};
 use crate::mapek::answer::{Command, Effect};
 use crate::mapek::beliefs::{Beliefs, Running};
 pub(super) use crate::mapek::changes::{Base, Changes};
 use crate::mapek::event::Event;
 use crate::mapek::fields::Refusal;
+use crate::mapek::filter::Filters;
+use crate::mapek::settings::Settings;
 use crate::mapek::step::PlannedStep;
 use crate::message::{Message, did_you_mean};
 use crate::mission::Mission;
@@ -43,18 +45,34 @@ const VALUES: [&str; 2] = ["hasValue", "qa_has_value"];
 #[derive(Debug, Clone)]
 pub(super) struct Monitor {
     /// Attributes of the knowledge base, by local name and by IRI.
-    attributes: BTreeSet<String>,
+    pub(super) attributes: BTreeSet<String>,
     /// Facts and functions that were found to fit the domain, as text.
     checked: HashSet<String>,
+    pub(super) filters: Filters,
+    /// Names under which components have reported, with their local names.
+    pub(super) components: HashMap<String, String>,
 }
 
 impl Monitor {
     /// For the reports of a robot with this mission.
-    pub(super) fn new(mission: &Mission) -> Self {
+    pub(super) fn new(mission: &Mission, settings: &Settings) -> Self {
         let kinds =
             mission.knowledge().map(|knowledge| knowledge.view().attribute_types()).unwrap_or_default();
         let attributes = kinds.into_iter().flat_map(|kind| [kind.iri, kind.name]).collect();
-        Self { attributes, checked: HashSet::new() }
+        let filters = Filters::new(&settings.filters, mission.knowledge());
+        Self { attributes, checked: HashSet::new(), filters, components: HashMap::new() }
+    }
+
+    /// Filters of what is measured and of what components report.
+    pub(super) fn filters(&self) -> &Filters {
+        &self.filters
+    }
+
+    /// Takes over what filters have held back and what is due at the time of the beliefs.
+    pub(super) fn elapse(&mut self, beliefs: &mut Beliefs, changes: &mut Changes) -> Vec<Refusal> {
+        let due = self.filters.elapse(&mut beliefs.filters, beliefs.now, &mut changes.filtered);
+        let mut taking = Taking { monitor: self, beliefs, changes };
+        due.into_iter().filter_map(|accepted| taking.accept(accepted).err()).collect()
     }
 
     /// Takes an event over into what is believed, and notes what that changes.
@@ -72,19 +90,17 @@ impl Monitor {
 }
 
 /// One event being taken over.
-struct Taking<'a> {
-    monitor: &'a mut Monitor,
-    beliefs: &'a mut Beliefs,
-    changes: &'a mut Changes,
+pub(super) struct Taking<'a> {
+    pub(super) monitor: &'a mut Monitor,
+    pub(super) beliefs: &'a mut Beliefs,
+    pub(super) changes: &'a mut Changes,
 }
 
 impl Taking<'_> {
     fn take(&mut self, event: &Event) -> Result<(), Refusal> {
         match event {
-            Event::Measured { attribute, value } => self.measured(attribute, value),
-            Event::Component { component, status } => {
-                self.report("component", component, RobotReport::Component(*status))
-            }
+            Event::Measured { attribute, value } => self.sampled(attribute, value),
+            Event::Component { component, status } => self.component(component, *status),
             Event::Design { design, realisable } => {
                 self.report("design", design, RobotReport::Design(*realisable))
             }
@@ -116,10 +132,7 @@ impl Taking<'_> {
                 Ok(())
             }
             Event::Fact { name, value } => self.fact(name, value),
-            Event::Acknowledged { effect } => {
-                let none = || Refusal::new("M305", format!("there was no effect {effect}"));
-                self.beliefs.acknowledge(*effect).then_some(()).ok_or_else(none)
-            }
+            Event::Acknowledged { effect } => self.acknowledged(*effect),
             Event::ObjectiveAdded { .. } | Event::ObjectiveRemoved { .. } => {
                 let text =
                     format!("`{}` goes with `run --configure`; here the plan needs functions", event.kind());
@@ -130,7 +143,7 @@ impl Taking<'_> {
     }
 
     /// Tells the knowledge base something about one of its individuals.
-    fn report(&mut self, kind: &str, name: &str, report: RobotReport) -> Result<(), Refusal> {
+    pub(super) fn report(&mut self, kind: &str, name: &str, report: RobotReport) -> Result<(), Refusal> {
         let Some(knowledge) = self.beliefs.mission.knowledge_mut() else {
             let text = format!("there is no knowledge base that has a {kind} `{name}`");
             return Err(Refusal::new("M306", text));
@@ -139,6 +152,21 @@ impl Taking<'_> {
         let delta = knowledge.take(name, report).map_err(|message| fault(&message))?;
         self.note(&delta, was_known);
         Ok(())
+    }
+
+    /// An effect has arrived.
+    fn acknowledged(&mut self, effect: u64) -> Result<(), Refusal> {
+        match self.beliefs.acknowledge(effect) {
+            Receipt::Unknown => Err(Refusal::new("M305", format!("there was no effect {effect}"))),
+            Receipt::Taken => Ok(()),
+            Receipt::Doubtful(function) => {
+                let running = self.beliefs.running.as_ref();
+                if running.is_some_and(|own| own.step.design(&function).is_some()) {
+                    self.changes.must.push(format!("it is not certain which design {function} has"));
+                }
+                Ok(())
+            }
+        }
     }
 
     /// A function could not take the design that was asked for: it has the one that was acknowledged before, and nobody asks for the
@@ -156,47 +184,7 @@ impl Taking<'_> {
         }
     }
 
-    /// A function was seen with a design that was not asked for: it has it from now on, and so has the action under way. Whether that is
-    /// worth a change is asked as when a design comes back.
-    fn observed(&mut self, function: &str, design: Option<&str>) -> Result<(), Refusal> {
-        let designs = self.beliefs.mission.designs_of(function);
-        if designs.is_empty() {
-            return Err(Refusal::new("M306", format!("there is no function `{function}` that has designs")));
-        }
-        if let Some(design) = design.filter(|design| designs.iter().all(|known| known != design)) {
-            let meant = did_you_mean(design, designs.iter().map(String::as_str));
-            let text = format!("{function} has no design `{design}`; it has {}{meant}", designs.join(", "));
-            return Err(Refusal::new("M306", text));
-        }
-        let before = match design {
-            Some(design) => self.beliefs.configuration.insert(function.to_owned(), design.to_owned()),
-            None => self.beliefs.configuration.remove(function),
-        };
-        self.beliefs.receipts.observe(function);
-        // What was asked for may be on its way: the action goes on with that.
-        let is_pending = self.beliefs.pending().any(|(own, _)| own == function);
-        if before.as_deref() == design || is_pending {
-            return Ok(());
-        }
-        let Some(running) = self.beliefs.running.as_mut().filter(|own| own.step.design(function).is_some())
-        else {
-            return Ok(());
-        };
-        if let Some(design) = design {
-            running.step = running.step.with_design(function, design);
-            self.changes.facts = true;
-            self.changes.predicates = true;
-            self.changes.observed = true;
-        } else {
-            let action = running.action;
-            self.changes
-                .must
-                .push(format!("{function} has no design any more, and action {action} needs it"));
-        }
-        Ok(())
-    }
-
-    fn measured(&mut self, attribute: &str, value: &BigRational) -> Result<(), Refusal> {
+    pub(super) fn measured(&mut self, attribute: &str, value: &BigRational) -> Result<(), Refusal> {
         let is_known = self.monitor.attributes.contains(attribute);
         if let Some(knowledge) = self.beliefs.mission.knowledge_mut().filter(|_| is_known) {
             let was_known = knowledge.fault().is_none();
@@ -270,7 +258,7 @@ impl Taking<'_> {
         self.beliefs.reports_actions = true;
         let now = self.beliefs.now;
         let running = self.running(action)?;
-        (running.heard, running.overdue) = (now, 0);
+        (running.heard, running.overdue, running.started) = (now, 0, true);
         Ok(running)
     }
 
@@ -419,13 +407,15 @@ mod tests {
     use super::{Base, Changes, Monitor};
     use crate::mapek::beliefs::Beliefs;
     use crate::mapek::event::Observation;
+    use crate::mapek::settings::Settings;
     use crate::setup::Setup;
 
     /// What an event changes in the mission `ugv`; or the code of its refusal.
     fn check(line: &str, expected: Result<(Base, [bool; 3], &[&str]), &str>) {
         let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("missions/ugv.toml");
         let mission = Setup::read(&manifest).expect("the mission is read").mission;
-        let (mut monitor, mut beliefs) = (Monitor::new(&mission), Beliefs::new(mission));
+        let (mut monitor, mut beliefs) =
+            (Monitor::new(&mission, &Settings::default()), Beliefs::new(mission));
         let mut changes = Changes::default();
         let event = Observation::parse(line).events.remove(0).expect("an event");
         let taken = monitor.take(&mut beliefs, &event, &mut changes);

@@ -18,11 +18,16 @@ use crate::mapek::watch::Watch;
 use crate::mission::ground_with;
 use crate::number;
 
+/// Upper limit on how often the time limit of a search is doubled.
+const MAX_DOUBLINGS: u32 = 3;
+
 /// Makes plans.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Planner {
     /// How long one plan may take.
     pub time_limit: Option<Duration>,
+    /// Number of searches in a row that were cut short: the time limit doubles with each.
+    pub attempt: u32,
     /// Limits at which all planning ends.
     pub limits: Limits,
     /// Plans that were made before, to be used again in this order.
@@ -78,7 +83,9 @@ impl Planner {
     }
 
     fn solve(&mut self, ask: &Ask<'_>) -> Outcome {
-        let limits = self.time_limit.map_or_else(|| self.limits.clone(), |time| self.limits.within(time));
+        let time_limit =
+            self.time_limit.map(|time| time.saturating_mul(1 << self.attempt.min(MAX_DOUBLINGS)));
+        let limits = time_limit.map_or_else(|| self.limits.clone(), |time| self.limits.within(time));
         self.watch.begin();
         let outcome = self
             .live

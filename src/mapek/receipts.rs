@@ -22,6 +22,9 @@ pub(super) struct Received {
     pub(super) last: Option<Acknowledged>,
     /// Reconfigurations that were superseded and never answered, by number, with their design.
     pub(super) superseded: BTreeMap<u64, String>,
+    /// The greatest number of an effect when the function was seen with a design that was neither the believed nor the pending one;
+    /// 0 if it never was. Such a reconfiguration may have been carried out before or after.
+    pub(super) doubted: u64,
 }
 
 /// The greatest reconfiguration that was acknowledged.
@@ -55,11 +58,20 @@ impl Receipts {
         }
     }
 
-    /// Notes that a function was seen: it is certain which design it has.
-    pub(super) fn observe(&mut self, function: &str) {
-        if let Some(own) = self.functions.get_mut(function) {
+    /// Notes that a function was seen. If no reconfiguration is pending it is certain which design it has; otherwise acknowledgements
+    /// of those up to `doubted` are not.
+    pub(super) fn observe(&mut self, function: &str, doubted: Option<u64>, is_pending: bool) {
+        if !is_pending && let Some(own) = self.functions.get_mut(function) {
             own.superseded.clear();
         }
+        if let Some(doubted) = doubted {
+            self.functions.entry(function.to_owned()).or_default().doubted = doubted;
+        }
+    }
+
+    /// Numbers of the reconfigurations of a function that were superseded and never answered.
+    pub(super) fn unanswered(&self, function: &str) -> impl Iterator<Item = &u64> {
+        self.functions.get(function).into_iter().flat_map(|own| own.superseded.keys())
     }
 
     /// Returns the superseded reconfiguration with that number.
@@ -73,7 +85,7 @@ impl Receipts {
         let function = |(name, own): (&String, &Received)| {
             let last =
                 own.last.as_ref().map(|last| json!([last.effect, last.design, last.before, last.failed]));
-            json!([name, last, own.superseded.iter().collect::<Vec<_>>()])
+            json!([name, last, own.superseded.iter().collect::<Vec<_>>(), own.doubted])
         };
         json!([self.by_number, self.functions.iter().map(function).collect::<Vec<_>>()])
     }
@@ -93,7 +105,8 @@ impl Receipts {
                 }),
             };
             let superseded = record.get(2)?.as_array()?.iter().map(superseded).collect::<Option<_>>()?;
-            Some((text(record.get(0)?)?, Received { last, superseded }))
+            let doubted = record.get(3)?.as_u64()?;
+            Some((text(record.get(0)?)?, Received { last, superseded, doubted }))
         };
         let functions = record.get(1)?.as_array()?.iter().map(function).collect::<Option<_>>()?;
         Some(Self { by_number: record.get(0)?.as_bool()?, functions })

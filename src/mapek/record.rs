@@ -9,7 +9,8 @@ use serde_json::{Value, json};
 use crate::knowledge::{Knowledge, Part, Statement, Statements, Waiting};
 use crate::mapek::analyze::available;
 use crate::mapek::answer::{Command, Effect};
-use crate::mapek::beliefs::{Beliefs, Running, Wait};
+use crate::mapek::beliefs::{Beliefs, Retry, Running, Wait};
+use crate::mapek::filter::FilterStates;
 use crate::mapek::receipts::Receipts;
 use crate::mapek::sequence::Numbers;
 use crate::mapek::step::PlannedStep;
@@ -73,6 +74,7 @@ pub(super) fn snapshot(known: &Beliefs) -> Snapshot {
             micros(running.heard),
             running.overdue,
             running.progressed,
+            running.started,
         ])
     });
     Snapshot(json!({
@@ -90,6 +92,7 @@ pub(super) fn snapshot(known: &Beliefs) -> Snapshot {
         "reached": known.reached,
         "stuck": known.stuck,
         "unproved": known.unproved,
+        "retry": known.retry.map(|own| json!([micros(own.at), own.attempt])),
         "failures": known.failures.as_ref().map(|(step, count)| json!([step.to_record(), count])),
         "hopes": known.hopes,
         "hoped": micros(known.hoped),
@@ -102,6 +105,7 @@ pub(super) fn snapshot(known: &Beliefs) -> Snapshot {
         "lines": known.lines,
         "numbers": known.numbers.to_record(),
         "now": micros(known.now),
+        "filters": known.filters.to_record(),
     }))
 }
 
@@ -171,11 +175,19 @@ fn restore_work(known: &mut Beliefs, data: &Value) -> Option<()> {
     };
     (known.reached, known.stuck) = (truth("reached")?, truth("stuck")?);
     known.unproved = truth("unproved")?;
+    known.retry = match data.get("retry")? {
+        Value::Null => None,
+        record => Some(Retry {
+            at: Duration::from_micros(record.get(0)?.as_u64()?),
+            attempt: u32::try_from(record.get(1)?.as_u64()?).ok()?,
+        }),
+    };
     known.hopes = texts(data.get("hopes")?)?.into_iter().collect();
     known.hoped = Duration::from_micros(number("hoped")?);
     (known.actions, known.effects, known.lines) = (number("actions")?, number("effects")?, number("lines")?);
     known.numbers = Numbers::from_record(data.get("numbers")?)?;
     known.now = Duration::from_micros(number("now")?);
+    known.filters = FilterStates::from_record(data.get("filters")?)?;
     known.receipts = Receipts::from_record(data.get("receipts")?)?;
     let wait = |record: &Value| {
         let (since, repeats) = (record.get(1)?.as_u64()?, record.get(2)?.as_u64()?);
@@ -206,6 +218,7 @@ fn running_from_record(record: &Value) -> Option<Running> {
         heard: Duration::from_micros(record.get(7)?.as_u64()?),
         overdue: u32::try_from(record.get(8)?.as_u64()?).ok()?,
         progressed: record.get(9)?.as_bool()?,
+        started: record.get(10)?.as_bool()?,
     })
 }
 

@@ -1,5 +1,6 @@
 //! How eager the loop is: the section `adaptation` of a manifest.
 
+use std::path::Path;
 use std::time::Duration;
 
 use num_rational::BigRational;
@@ -7,8 +8,10 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
 
-use crate::manifest::{self, ManifestPath};
-use crate::message::Message;
+use crate::knowledge::Knowledge;
+use crate::manifest::{self, Key, ManifestPath, Part};
+use crate::mapek::filter::{ComponentsSection, FilterSettings, MeasuredsSection, filters};
+use crate::message::{Errors, Message};
 use crate::mission::TimeUnit;
 use crate::number;
 
@@ -20,12 +23,12 @@ pub struct AdaptationSection {
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     minimum_benefit: Option<Spanned<toml::Value>>,
-    /// For so many seconds must a design be back before a better plan is looked for; of the clock, whatever the unit of the domain's times.
+    /// For so many seconds must a design be back before a better plan is looked for (5 if nothing is said); of the clock, whatever the unit of the domain's times.
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     settle: Option<Spanned<toml::Value>>,
-    /// So many seconds may one plan take (10 if nothing is said); then the best so far is used if there is one, and planning goes on when
-    /// something changes.
+    /// So many seconds may one plan take (10 if nothing is said); then the best so far is used if there is one. It is looked for again when
+    /// something changes, and with twice the time after twice that pause, and so on.
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     time_limit: Option<Spanned<toml::Value>>,
@@ -33,6 +36,25 @@ pub struct AdaptationSection {
     /// situation alone.
     #[serde(default)]
     stay_close: bool,
+    /// For so many seconds must a component report a failure before it is believed (0 if nothing is said: a failure counts at once).
+    #[serde(default)]
+    #[schemars(schema_with = "manifest::decimal")]
+    confirm_time: Option<Spanned<toml::Value>>,
+    /// For so many seconds must a component that has failed be in order again before that is believed (2 if nothing is said).
+    #[serde(default)]
+    #[schemars(schema_with = "manifest::decimal")]
+    heal_time: Option<Spanned<toml::Value>>,
+    /// Share of a bound by which it must be kept again after it was missed (0.02 if nothing is said; 0 for none), unless the attribute has
+    /// its own `hysteresis`.
+    #[serde(default)]
+    #[schemars(schema_with = "manifest::decimal")]
+    band: Option<Spanned<toml::Value>>,
+    /// Times of single components, by local name.
+    #[serde(default)]
+    components: ComponentsSection,
+    /// Filters of measured attributes, by local name.
+    #[serde(default)]
+    measured: MeasuredsSection,
     /// What is done at once, before any planning, where the action under way loses a design or cannot go on: `reconfigure` gives it other
     /// available designs if what is left of it can be done with them, and suspends it otherwise; `suspend` always suspends it.
     #[serde(default)]
@@ -46,6 +68,15 @@ pub struct AdaptationSection {
     #[serde(default)]
     #[schemars(schema_with = "manifest::decimal")]
     deadline_factor: Option<Spanned<toml::Value>>,
+}
+
+/// A file with the section `adaptation` alone.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Section {
+    /// How eager the loop is.
+    #[serde(default)]
+    adaptation: AdaptationSection,
 }
 
 /// The safe effect that precedes planning.
@@ -65,8 +96,12 @@ impl AdaptationSection {
     /// # Errors
     /// A value that is not a number, or negative.
     pub fn settings(&self, origin: &ManifestPath) -> Result<Settings, Message> {
+        let filters = filters(&self.confirm_time, &self.heal_time, &self.components, &self.measured, origin)?;
         let (stay_close, safe_reaction) = (self.stay_close, self.safe_reaction);
-        let mut settings = Settings { stay_close, safe_reaction, ..Settings::default() };
+        let mut settings = Settings { stay_close, filters, safe_reaction, ..Settings::default() };
+        if let Some(value) = &self.band {
+            settings.filters.band = origin.number("band", value)?;
+        }
         if let Some(value) = &self.minimum_benefit {
             settings.minimum_benefit = origin.number("minimum_benefit", value)?;
         }
@@ -105,13 +140,15 @@ impl AdaptationSection {
 pub struct Settings {
     /// Another plan replaces one that could be kept only if its metric is better by this much, in the metric's unit.
     pub minimum_benefit: BigRational,
-    /// So long must a design be available again before a better plan is looked for.
+    /// So long must a design be available again before a better plan is looked for. Five seconds unless said otherwise.
     pub settle: Duration,
     /// How long one plan may take; the best so far is used then, if there is one. Ten seconds unless said otherwise.
     pub time_limit: Option<Duration>,
     /// Whether, of plans that are as good and as long, one is chosen that has most steps of the plan at hand. The choice then
     /// depends on what has happened, and no longer on the situation alone.
     pub stay_close: bool,
+    /// Filters of what is measured and of what components report.
+    pub filters: FilterSettings,
     /// What is done at once where the action under way cannot go on as it is.
     pub safe_reaction: SafeReaction,
     /// How long an effect may remain without acknowledgement, and an action without a report, at least. Ten seconds unless said
@@ -124,6 +161,53 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// Nothing is damped: every report is believed at once, and a better plan is looked for at once.
+    pub fn immediate() -> Self {
+        Self { settle: Duration::ZERO, filters: FilterSettings::none(), ..Self::default() }
+    }
+
+    /// Reads a file with the section `adaptation` alone; names in it are those of a knowledge base.
+    ///
+    /// # Errors
+    /// The file cannot be read, or all that is wrong with the section.
+    pub fn read(file: &Path, knowledge: Option<&Knowledge>) -> Result<Self, Errors> {
+        let (section, origin) = manifest::read::<Section>(file)?;
+        let settings = section.adaptation.settings(&origin)?;
+        settings.check(knowledge, &origin)?;
+        Ok(settings)
+    }
+
+    /// Compares the names of filters with those of a knowledge base.
+    ///
+    /// # Errors
+    /// M143 for each name that it does not have.
+    pub(crate) fn check(&self, knowledge: Option<&Knowledge>, origin: &ManifestPath) -> Result<(), Errors> {
+        let mistakes = self.filters.mistakes(knowledge).into_iter().map(|(key, name, message)| {
+            let path: [Key; 3] = ["adaptation".into(), key.into(), name.as_str().into()];
+            let place = origin.place_of(&path, Part::Key);
+            Message::at(&message.code, origin.file(), place, message.message.clone())
+        });
+        Errors::unless_empty(origin.quote(mistakes))
+    }
+
+    /// Settings that let noise switch designs, each as a warning; for `lint`.
+    pub(crate) fn doubts(&self, knowledge: Option<&Knowledge>) -> Vec<Message> {
+        let mut doubts = self.filters.doubts(knowledge);
+        if self.settle.is_zero() && knowledge.is_some() {
+            let text = "each design that comes back is followed by a search for a better plan at once: `settle` is 0";
+            doubts.push(
+                Message::warning("M144", text).with_help("set `settle` in `[adaptation]` to some seconds"),
+            );
+        }
+        doubts
+    }
+
+    /// Filters of what is measured and of what components report.
+    #[must_use]
+    pub fn with_filters(self, filters: FilterSettings) -> Self {
+        Self { filters, ..self }
+    }
+
     /// What is done at once where the action under way cannot go on as it is.
     #[must_use]
     pub fn with_safe_reaction(self, safe_reaction: SafeReaction) -> Self {
@@ -171,9 +255,10 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             minimum_benefit: BigRational::from_integer(0.into()),
-            settle: Duration::ZERO,
+            settle: SETTLE,
             time_limit: Some(TIME_LIMIT),
             stay_close: false,
+            filters: FilterSettings::default(),
             safe_reaction: SafeReaction::default(),
             deadline: DEADLINE,
             deadline_factor: 3.0,
@@ -181,6 +266,10 @@ impl Default for Settings {
         }
     }
 }
+
+/// Time for which a design must be back unless said otherwise. Nothing is urgent about a better plan, and a driver that is
+/// restarted by its supervisor comes and goes within seconds.
+const SETTLE: Duration = Duration::from_secs(5);
 
 /// How long an effect may remain without acknowledgement unless said otherwise.
 const DEADLINE: Duration = Duration::from_secs(10);

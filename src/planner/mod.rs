@@ -24,7 +24,7 @@ use crate::planner::planned::Ground;
 pub use crate::planner::planned::{Planned, PlannedFront};
 pub use ::planner::{
     Alternatives, Backend, Config, Engine, Exact, Improvement, Limits, Plan, Point, Proof, Solution,
-    Statistics, Status, Step, Strategy,
+    Statistics, Status, Step, Strategy, alternatives, optimize, optimize_concurrent, optimize_exact,
 };
 
 /// Callback that receives a short description of the work after the best plan is proved.

@@ -17,7 +17,7 @@ pub(super) const ANSWER: &str = "metaplan.Answer";
 
 /// The topics of answers with the kinds that belong to each; what is not named belongs to the last.
 pub(super) const ANSWERS: [(&str, &[&str]); 4] = [
-    ("/metaplan/inferences", &["inferred", "contradicted", "unconcluded"]),
+    ("/metaplan/inferences", &["inferred", "contradicted", "unconcluded", "filtered", "silent"]),
     ("/metaplan/plans", &["plan_requested", "planning", "plan_found", "plan_kept", "plan_none"]),
     (
         "/metaplan/effects",

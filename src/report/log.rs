@@ -70,6 +70,14 @@ fn told(answer: &Value) -> (Kind, String, Vec<Reason>) {
         "cancel_action" => (Kind::Effect, format!("cancel: {}", word("because")), Vec::new()),
         "suspend_action" => (Kind::Effect, format!("suspend: {}", word("because")), Vec::new()),
         "resume_action" => (Kind::Effect, "resume".to_owned(), Vec::new()),
+        "filtered" => {
+            let text = format!("{} {} is held back: {}", word("name"), word("value"), word("because"));
+            (Kind::Inference, text, Vec::new())
+        }
+        "silent" => {
+            let value = answer["value"].as_number().map(|value| format!(", {value}")).unwrap_or_default();
+            (Kind::Inference, format!("{} is silent: {}{value}", word("name"), word("outcome")), Vec::new())
+        }
         "error" => (Kind::Refusal, format!("{}: {}", word("code"), word("message")), Vec::new()),
         other => (Kind::Refusal, other.to_owned(), Vec::new()),
     }

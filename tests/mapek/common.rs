@@ -3,13 +3,14 @@
 use std::path::Path;
 use std::time::Duration;
 
-use metaplan::mapek::{Answer, Loop, Observation};
+use metaplan::mapek::{Answer, Loop, Observation, Settings};
 use metaplan::setup::Setup;
 
-/// A loop for one of the shipped missions.
+/// A loop for one of the shipped missions, which believes every report at once: tests compare it with what was reported last.
 pub fn control(name: &str) -> Loop {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("missions/{name}.toml"));
     let Setup { mission, settings, .. } = Setup::read(&manifest).expect("the mission is read");
+    let settings = Settings::immediate().with_time_unit(settings.time_unit);
     Loop::new(mission, settings).expect("the mission can be planned for")
 }
 

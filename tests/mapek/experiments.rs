@@ -22,6 +22,7 @@ fn words(answer: &Answer) -> Option<String> {
         }
         Answer::PlanKept { because } => format!("kept: {because}"),
         Answer::PlanNone { status, .. } => format!("no plan: {status}"),
+        Answer::Effect(effect) if effect.repeated => return None,
         Answer::Effect(effect) => match &effect.command {
             Command::Reconfigure { function, from, to } => {
                 format!("reconfigure {function}: {} to {to}", from.as_deref().unwrap_or("none"))
@@ -242,7 +243,7 @@ fn a_better_design_returns() {
     let detour = |benefit: i64, settle: u64| {
         let mut ugv = control("ugv");
         let mission = ugv.beliefs().mission().clone();
-        let settings = metaplan::mapek::Settings::default()
+        let settings = metaplan::mapek::Settings::immediate()
             .with_minimum_benefit(num_rational::BigRational::from_integer(benefit.into()))
             .with_settle(std::time::Duration::from_secs(settle))
             .with_time_limit(None);

@@ -323,7 +323,9 @@ fn a_journal_belongs_to_all_that_decisions_rest_on() {
     drop(open);
     let edits = [
         ("m.toml", "name = \"m\"", "name = \"n\""),
-        ("m.toml", "[planning]", "[adaptation]\nsettle = 5\n[planning]"),
+        ("m.toml", "[planning]", "[adaptation]\nsettle = 6\n[planning]"),
+        ("m.toml", "[planning]", "[adaptation]\nheal_time = 6\n[planning]"),
+        ("m.toml", "[planning]", "[adaptation.measured.light]\nhysteresis = 0.3\n[planning]"),
         ("m.toml", "[planning]", "[adaptation]\nminimum_benefit = 5\n[planning]"),
         ("m.toml", "[planning]", "[adaptation]\ntime_limit = 5\n[planning]"),
         ("m.toml", "[planning]", "[adaptation]\nstay_close = true\n[planning]"),

@@ -11,6 +11,7 @@ mod fleet;
 mod fuzz;
 mod journal;
 mod kill;
+mod noise;
 mod numbers;
 mod reaction;
 mod receipts;

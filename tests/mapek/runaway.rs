@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use metaplan::journal::{Journal, Policy, Sync};
-use metaplan::mapek::{Answer, Command, Loop};
+use metaplan::mapek::{Answer, Command, Loop, Settings};
 use metaplan::setup::Setup;
 use serde_json::json;
 
@@ -16,9 +16,8 @@ const RUNAWAY: &str = "@prefix : <http://example.org/m#> .\n@prefix t: <http://m
     [counting] t:c_status(:c_0, \"FALSE\") ^ :counts(?x, ?n) ^ swrlb:add(?m, ?n, 1) -> :counts(?x, ?m) .\n";
 
 fn read(directory: &Path) -> Loop {
-    let Setup { mission, settings, .. } =
-        Setup::read(&directory.join("m.toml")).expect("the mission is read");
-    Loop::new(mission, settings).expect("the mission can be planned for")
+    let mission = Setup::read(&directory.join("m.toml")).expect("the mission is read").mission;
+    Loop::new(mission, Settings::immediate()).expect("the mission can be planned for")
 }
 
 /// A mission with the rule that runs away, and a loop for it without the rule.

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use fastrand::Rng;
-use metaplan::mapek::Loop;
+use metaplan::mapek::{Loop, Settings};
 use metaplan::setup::Setup;
 use num_rational::BigRational;
 
@@ -34,9 +34,8 @@ pub struct Place {
 
 impl Place {
     fn new(name: &str, manifest: &Path, depends: Vec<(String, String)>, is_plain: bool) -> Self {
-        let Setup { mission, settings, .. } =
-            Setup::read(manifest).unwrap_or_else(|errors| panic!("{name}: {errors:?}"));
-        let settings = settings.with_time_limit(None);
+        let mission = Setup::read(manifest).unwrap_or_else(|errors| panic!("{name}: {errors:?}")).mission;
+        let settings = Settings::immediate().with_time_limit(None);
         let mut begun = Loop::new(mission, settings).expect("the mission can be planned for");
         begun.start();
         let knowledge = begun.beliefs().mission().knowledge().expect("a knowledge base");

@@ -12,6 +12,12 @@ fn a_journal_is_checked_and_shown() {
     let check = metaplan(&["journal", "check", &journal]);
     assert_eq!(check.status, 0, "{check:#?}");
     assert!(check.stdout.ends_with("the journal can be used\n"), "{check:#?}");
+    // The same mission resumes it, and another one does not.
+    let resumed = metaplan(&["journal", "check", &journal, "--mission", "missions/ugv.toml"]);
+    assert_eq!(resumed.status, 0, "{resumed:#?}");
+    let other = metaplan(&["journal", "check", &journal, "--mission", "missions/uuv.toml"]);
+    assert_eq!(other.status, 3, "{other:#?}");
+    assert!(other.stderr.contains("it belongs to another mission"), "{other:#?}");
     let show = metaplan(&["journal", "show", &journal]);
     assert!(
         show.stdout.contains("c_kinect") && show.stdout.contains("inferred, plan_requested"),

@@ -38,7 +38,13 @@ fn a_section_is_refused_whoever_uses_it() {
     check(
         "[adaptation]\nsetle = 1",
         "10:1: error[M104]: unknown field `setle`, expected one of `minimum_benefit`, `settle`, `time_limit`, \
-         `stay_close`, `safe_reaction`, `deadline`, `deadline_factor`; did you mean `settle`?",
+         `stay_close`, `confirm_time`, `heal_time`, `band`, `components`, `measured`, `safe_reaction`, \
+         `deadline`, `deadline_factor`; did you mean `settle`?",
+    );
+    check(
+        "[adaptation.measured.ambient_ligth]\nhysteresis = 0.1",
+        "9:22: error[M143]: the knowledge base has no quality attribute type `ambient_ligth`; it has: \
+         ambient_light, battery_usage, minimum_illuminance, safety; did you mean `ambient_light`?",
     );
     check(
         "[adaptation]\nsettle = -1",
@@ -70,8 +76,10 @@ fn all_mistakes_of_a_manifest_are_told() {
          m.toml:11:2: error[M104]: unknown field `scenaros`, expected one of `name`, `description`, `knowledge`, `planning`, \
          `bindings`, `adaptation`, `probabilistic`, `report`, `scenarios`; did you mean `scenarios`?\n\
          m.toml:14:1: error[M104]: unknown field `setle`, expected one of `minimum_benefit`, `settle`, `time_limit`, \
-         `stay_close`, `safe_reaction`, `deadline`, `deadline_factor`; did you mean `settle`?\n\
+         `stay_close`, `confirm_time`, `heal_time`, `band`, `components`, `measured`, `safe_reaction`, \
+         `deadline`, `deadline_factor`; did you mean `settle`?\n\
          m.toml:16:1: error[M104]: unknown field `min`, expected one of `minimum_benefit`, `settle`, `time_limit`, \
-         `stay_close`, `safe_reaction`, `deadline`, `deadline_factor`",
+         `stay_close`, `confirm_time`, `heal_time`, `band`, `components`, `measured`, `safe_reaction`, \
+         `deadline`, `deadline_factor`",
     );
 }

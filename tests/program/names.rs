@@ -53,7 +53,7 @@ fn said(directory: &Path, arguments: &[&str], input: &str) -> String {
         .replace("ka_", "a_");
     let strip = |line: &str| match serde_json::from_str::<Value>(line) {
         Ok(mut value) => {
-            for timed in ["statistics", "mission", "digest", "time", "microseconds"] {
+            for timed in ["statistics", "mission", "digest", "time", "microseconds", "due"] {
                 value.as_object_mut().map(|own| own.remove(timed));
             }
             value.to_string()

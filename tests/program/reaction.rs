@@ -113,6 +113,36 @@ fn a_lost_design_is_answered_before_a_plan_is_looked_for() {
     again.end();
 }
 
+/// A recovery that a filter has held back counts, and a better plan is looked for, without a further line.
+#[test]
+fn time_passes_without_a_line() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let manifest = directory.path().join("ugv.toml");
+    let text = std::fs::read_to_string(root().join("missions/ugv.toml")).expect("a manifest");
+    let text = text.replace("\"../", &format!("\"{}/", root().display()));
+    let quick = "\n[adaptation]\nheal_time = 0.2\nsettle = 0.3\n";
+    std::fs::write(&manifest, text + quick).expect("a file");
+    let (manifest, journal) = (manifest.display().to_string(), directory.path().join("journal"));
+    let journal = journal.display().to_string();
+    let mut run = Run::new(&[&manifest, "--journal", &journal]);
+    run.until(is("handled", 0));
+    run.say(&failed("c_kinect"));
+    run.until(is("handled", 1));
+    run.say(&failed("c_kinect").replace("FALSE", "RECOVERED"));
+    let (answers, _) = run.until(is("filtered", 2));
+    assert_eq!(answers.last().expect("an answer")["because"], "heal");
+    run.until(is("inferred", 2));
+    let (answers, _) = run.until(is("plan_requested", 2));
+    assert_eq!(answers.last().expect("an answer")["because"][0], "there may be a better plan");
+    run.until(is("plan_found", 2));
+    run.end();
+    // Time that passed is a part of the journal, and not a line.
+    let again = Run::new(&[&manifest, "--journal", &journal]);
+    let (ready, _) = again.until(|answer| answer["answer"] == "ready");
+    assert_eq!((&ready[0]["resumed"], &ready[0]["lines"]), (&Value::Bool(true), &Value::from(2)));
+    again.end();
+}
+
 /// Who pipes a script in, with reports on actions to come, gets the answers to it.
 #[test]
 fn a_script_can_be_piped_in() {

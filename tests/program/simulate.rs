@@ -144,7 +144,7 @@ fn flickering(unit: &str, settle: u32) -> Vec<Value> {
         &format!("problem = \"problem.pddl\"{unit}"),
     );
     let scenario = format!(
-        "\n[adaptation]\nsettle = {settle}\n[scenarios.flicker.simulation]\nstep = 1\ntime_budget = 600\npatience = 5\n\
+        "\n[adaptation]\nsettle = {settle}\nheal_time = 0\n[scenarios.flicker.simulation]\nstep = 1\ntime_budget = 600\npatience = 5\n\
          [[scenarios.flicker.simulation.events]]\nat = 10\nfail = [\"c_lidar\"]\n\
          [[scenarios.flicker.simulation.events]]\nat = 20\nrecover = [\"c_lidar\"]\n"
     );

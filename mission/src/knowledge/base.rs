@@ -255,6 +255,13 @@ impl Knowledge {
         self.called.iter().find(is_so).map(|(iri, _)| iri.as_str())
     }
 
+    /// The local name of a component that is named by IRI or local name, or as the problem calls it, if there is one.
+    pub fn known_component(&self, name: &str) -> Option<String> {
+        let name = self.component(name);
+        let components = self.runtime.view().components().into_iter().map(|own| own.individual);
+        components.into_iter().find(|own| own.name == name || own.iri == name).map(|own| own.name)
+    }
+
     /// A component as the knowledge base names it: what it has no component of that name for may be the name of an object.
     pub(super) fn component(&self, name: &str) -> String {
         let iri = self.called_so(name).filter(|_| {

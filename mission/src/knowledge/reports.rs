@@ -59,7 +59,7 @@ impl Knowledge {
         for (name, report) in reports {
             let delta = report.update(engine, name)?;
             let word = match report {
-                RobotReport::Component(_) | RobotReport::Design(_) => None,
+                RobotReport::Component(_) | RobotReport::Design(_) | RobotReport::Unmeasured => None,
                 RobotReport::Measured(value) => engine.symbols().find_literal(value),
             };
             for fact in delta.insert {

@@ -14,6 +14,8 @@ pub enum RobotReport {
     Component(Status),
     /// What an attribute measures.
     Measured(Literal),
+    /// That nothing is known of what an attribute measures.
+    Unmeasured,
     /// Whether a design can be taken, as its function says: not by what follows from its components.
     Design(bool),
 }
@@ -41,13 +43,16 @@ pub struct Waiting {
 
 impl RobotReport {
     pub(super) fn is_alike(&self, other: &Self) -> bool {
+        let is_measured = |own: &Self| matches!(own, Self::Measured(_) | Self::Unmeasured);
         std::mem::discriminant(self) == std::mem::discriminant(other)
+            || is_measured(self) && is_measured(other)
     }
 
     pub(super) fn update(&self, engine: &mut rules::Engine, name: &str) -> Result<Delta, ontology::Error> {
         match self {
             Self::Component(status) => change::component_status(engine, name, *status),
             Self::Measured(value) => change::measured_value(engine, name, value.clone()),
+            Self::Unmeasured => change::unmeasured(engine, name),
             Self::Design(realisable) => change::design_realisable(engine, name, *realisable),
         }
     }
@@ -63,6 +68,7 @@ impl RobotReport {
             Self::Component(Status::Recovered) => ("component", "RECOVERED".to_owned()),
             Self::Component(Status::Working) => ("component", "TRUE".to_owned()),
             Self::Measured(value) => ("measured", value.lexical()),
+            Self::Unmeasured => ("unmeasured", String::new()),
             Self::Design(realisable) => ("design", realisable.to_string()),
         }
     }
@@ -72,6 +78,7 @@ impl RobotReport {
             ("component", "FALSE") => Some(Self::Component(Status::Failed)),
             ("component", "RECOVERED") => Some(Self::Component(Status::Recovered)),
             ("component", "TRUE") => Some(Self::Component(Status::Working)),
+            ("unmeasured", _) => Some(Self::Unmeasured),
             ("design", word) => word.parse().ok().map(Self::Design),
             ("measured", number) => {
                 let value = Literal::parse(number, Some(ontology::vocab::xsd::DECIMAL), None);

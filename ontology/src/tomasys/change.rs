@@ -128,6 +128,20 @@ pub fn measured_value(engine: &mut Engine, attribute: &str, value: Literal) -> R
     Ok(delta)
 }
 
+/// The update that withdraws the measured value of a quality attribute, named by the IRI or local name of its type.
+///
+/// # Errors
+/// As [`measured_value`].
+pub fn unmeasured(engine: &mut Engine, attribute: &str) -> Result<Delta, Error> {
+    let facts = Facts::new(engine);
+    let (kind, class) = facts.find("quality attribute type", terms::ATTRIBUTE_TYPE, attribute)?;
+    let holders = holders(facts, kind);
+    let property = engine.symbols_mut().name(beside(terms::HAS_VALUE, class));
+    let changes = holders.into_iter().map(|holder| replace(engine, property, holder, None));
+    let delete = changes.flat_map(|change| change.delete).collect();
+    Ok(Delta { insert: Vec::new(), delete })
+}
+
 /// The facts that make `holder` hold measurements of a type.
 fn observation(symbols: &mut Symbols, holder: Symbol, kind: Symbol, class: &str) -> Vec<Fact> {
     let mut facts = vec![

@@ -15,6 +15,7 @@ use super::execute::Execution;
 use super::happening::Part;
 use super::options::Options;
 use super::plan::PlanStep;
+use super::relevant::relevant;
 use super::running::is_durative;
 use super::step;
 use super::verdict::Violation;
@@ -60,7 +61,8 @@ pub fn advance(
     step: &PlanStep,
     forced: bool,
 ) -> Result<Advance, Box<Violation>> {
-    advance_in(&World::new(domain, problem, &|| false), step, forced)
+    let own = relevant(domain, problem, std::slice::from_ref(step));
+    advance_in(&World::new(domain, own.as_ref().unwrap_or(problem), &|| false), step, forced)
 }
 
 /// Executes each of some steps from the initial state of a problem, as [`advance`] does for one of them that is not forced.
@@ -69,7 +71,8 @@ pub fn advance_each(
     problem: &Problem,
     steps: &[PlanStep],
 ) -> Vec<Result<Advance, Box<Violation>>> {
-    let world = World::new(domain, problem, &|| false);
+    let own = relevant(domain, problem, steps);
+    let world = World::new(domain, own.as_ref().unwrap_or(problem), &|| false);
     steps.iter().map(|step| advance_in(&world, step, false)).collect()
 }
 
@@ -152,7 +155,8 @@ fn is_same(left: &Atom, right: &Atom) -> bool {
 /// The value of the problem's metric if the plan ended in its initial state after `total_time`, in the domain's time
 /// unit; none without a metric, or where it is undefined.
 pub fn metric_after(domain: &Domain, problem: &Problem, total_time: &BigRational) -> Option<BigRational> {
-    let world = World::new(domain, problem, &|| false);
+    let own = relevant(domain, problem, &[]);
+    let world = World::new(domain, own.as_ref().unwrap_or(problem), &|| false);
     let options = Options::default();
     let execution = Execution::new(&world, &options);
     metric(&world, &execution.state, total_time)

@@ -22,6 +22,7 @@ mod interference;
 mod options;
 mod plan;
 mod record;
+mod relevant;
 mod running;
 mod sequential;
 mod solve;

@@ -62,13 +62,12 @@ pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(),
         "How long a function may take to change its mode before it is asked once more, in seconds.",
         5.0,
     )?;
-    let ticks = !adaptation.settle.is_zero();
     let mut control = Loop::new(mission, adaptation)?;
     let journal = journal(node, options, &mut control)?;
     let begun = control.beliefs().now();
     let performers: BTreeMap<String, Box<dyn Perform>> =
         performers(node, &settings.actions, &settings.poses)?;
-    let machine = Machine::new(control, journal, settings.clone(), ticks);
+    let machine = Machine::new(control, journal, settings.clone());
     let (sender, inputs) = mpsc::channel();
     let robot = Robot::connect(node, &settings, machine.functions(), performers, sender.clone())?;
     let active = Lifecycle::activated(node)?;

@@ -234,7 +234,8 @@ impl Machine {
             }
             !is_over
         });
-        if self.ticks && self.state == State::Execute {
+        let is_due = self.control.due().is_some_and(|due| due <= self.now);
+        if is_due && self.state == State::Execute {
             self.say(&Event::Tick);
         }
         "time has passed".to_owned()

@@ -81,8 +81,6 @@ pub(super) struct Machine {
     without_plan: bool,
     obeyed: bool,
     deferred: Option<Deferred>,
-    /// Whether the loop waits for time to pass before it looks for a better plan.
-    ticks: bool,
     /// States that were passed since the last one that lasted.
     through: Vec<State>,
     outputs: Vec<Output>,
@@ -92,7 +90,7 @@ pub(super) struct Machine {
 
 impl Machine {
     /// For a loop that has not begun, with the journal that it was brought back from, if there is one.
-    pub(super) fn new(control: Loop, journal: Option<Journal>, settings: Settings, ticks: bool) -> Self {
+    pub(super) fn new(control: Loop, journal: Option<Journal>, settings: Settings) -> Self {
         let mission = control.beliefs().mission();
         let functions = mission.functions();
         let task = control.beliefs().goal().filter(|goal| *goal != NOTHING).and_then(|goal| {
@@ -115,7 +113,6 @@ impl Machine {
             without_plan: false,
             obeyed: false,
             deferred: None,
-            ticks,
             through: Vec::new(),
             outputs: Vec::new(),
             lines: VecDeque::new(),

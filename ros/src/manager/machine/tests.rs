@@ -38,7 +38,7 @@ impl Robot {
         let (mut control, settings) = control();
         let journal =
             journal.map(|path| Journal::open(path, Policy::default(), &mut control).expect("a journal").0);
-        let machine = Machine::new(control, journal, settings, false);
+        let machine = Machine::new(control, journal, settings);
         let modes =
             machine.functions().iter().map(|name| (name.clone(), Some(mode(name).to_owned()))).collect();
         let mut robot = Self { machine, now: Duration::ZERO };

@@ -1,0 +1,393 @@
+//! Samples of one attribute to the values that reach the knowledge base: plausibility, hysteresis, debounce, staleness.
+//!
+//! Bounds of designs divide the values of an attribute into *cells*: within a cell each bound is either kept or missed.
+//! A value of the believed cell is accepted at once. A bound is missed as soon as a sample misses it, and kept again only
+//! by a sample that keeps it by its band (a Schmitt trigger with the threshold of loss at the bound \[1\]). Where one
+//! design needs at least a value and another one at most a value within a band of it, either cell is left only by a
+//! sample beyond the band, since each crossing would take a design away. What crosses then is debounced.
+//!
+//! Time is a number of microseconds that never goes back. Extra calls of [`AttributeFilter::elapse`] change nothing of
+//! what is accepted.
+//!
+//! - \[1\] O. H. Schmitt: A thermionic trigger, Journal of Scientific Instruments 15, 1938.
+
+use std::collections::VecDeque;
+
+use num_rational::BigRational;
+use serde_json::{Value, json};
+
+/// Microseconds since the start of the mission.
+pub(crate) type Micros = u64;
+
+/// Side of a bound on which a design can be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Side {
+    /// At least the bound.
+    Least,
+    /// At most the bound.
+    Most,
+}
+
+/// A value beyond which a design cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Bound {
+    /// The bound, in the attribute's unit.
+    pub value: BigRational,
+    /// Side on which the design can be used.
+    pub side: Side,
+    /// Distance from the bound, in the attribute's unit, from which a missed bound is kept again.
+    pub band: BigRational,
+}
+
+/// Outcome for a sensor without a plausible sample for longer than its period.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Stale {
+    /// The last value stays.
+    Keep,
+    /// The measurement is withdrawn. The shipped rules do not violate a requirement without a measurement.
+    Unknown,
+    /// The value with which the fewest designs can be used.
+    #[default]
+    Worst,
+}
+
+impl Stale {
+    /// Key of the outcome in manifests and answers.
+    pub(crate) fn word(self) -> &'static str {
+        match self {
+            Self::Keep => "keep",
+            Self::Unknown => "unknown",
+            Self::Worst => "worst",
+        }
+    }
+}
+
+/// Filter of one attribute. Any values are valid; the default accepts every sample at once.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct AttributeFilter {
+    /// Bounds of designs, in any order.
+    pub bounds: Vec<Bound>,
+    /// Number of the last `of` samples that must lie in another cell than the believed value; 0 and 1 for no such condition.
+    pub agree: usize,
+    /// Number of samples of which `agree` must agree; at least `agree` counts.
+    pub of: usize,
+    /// Time for which all samples must lie in another cell than the believed value.
+    pub debounce: Micros,
+    /// Least plausible value.
+    pub minimum: Option<BigRational>,
+    /// Greatest plausible value.
+    pub maximum: Option<BigRational>,
+    /// Greatest plausible distance between two samples; a second sample within this distance confirms a jump.
+    pub jump: Option<BigRational>,
+    /// Time after a plausible sample at which the sensor counts as silent.
+    pub period: Option<Micros>,
+    /// Outcome for a silent sensor.
+    pub stale: Stale,
+}
+
+/// Memory of the filter of one attribute.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct AttributeState {
+    /// Value that was accepted last.
+    believed: Option<BigRational>,
+    /// Last plausible sample.
+    plausible: Option<BigRational>,
+    /// Last sample that was set aside as a jump.
+    suspect: Option<BigRational>,
+    /// For each of the last samples whether it lies in another cell than the believed value, oldest first.
+    recent: VecDeque<bool>,
+    /// Time since which all samples lie in another cell, and the last of them.
+    crossing: Option<(Micros, BigRational)>,
+    /// Time of the last plausible sample.
+    heard: Option<Micros>,
+    /// Whether the sensor counts as silent.
+    silent: bool,
+    /// Number of samples that were held back since the last change of cell.
+    pub held: u64,
+}
+
+/// Reason for which a sample is held back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Hold {
+    /// It is outside the plausible range.
+    Range,
+    /// It is farther from the sample before than is plausible.
+    Jump,
+    /// It is within the band of a bound that was missed.
+    Hysteresis,
+    /// It has crossed a bound for too short a time, or with too few samples.
+    Debounce,
+}
+
+impl Hold {
+    /// Word for the reason in answers.
+    pub(crate) fn word(self) -> &'static str {
+        match self {
+            Self::Range => "range",
+            Self::Jump => "jump",
+            Self::Hysteresis => "hysteresis",
+            Self::Debounce => "debounce",
+        }
+    }
+}
+
+/// Verdict on a sample.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Verdict {
+    /// The value that is believed from now on. It differs from the sample where some but not all bounds are crossed clearly.
+    Accepted(BigRational),
+    /// The believed value stays.
+    Held(Hold),
+}
+
+/// Something that becomes due without a sample.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Elapsed {
+    /// A crossing has lasted for long enough: the value that is believed from now on.
+    Accepted(BigRational),
+    /// The sensor counts as silent since its last plausible sample; with the outcome `worst`, the value believed from now on.
+    Silent(Option<BigRational>),
+}
+
+impl AttributeFilter {
+    /// Takes a sample at a time. Whatever was due before must have been taken with [`AttributeFilter::elapse`].
+    pub(crate) fn sample(&self, state: &mut AttributeState, now: Micros, value: &BigRational) -> Verdict {
+        let verdict = self.judge(state, now, value);
+        if matches!(verdict, Verdict::Held(_)) {
+            state.held += 1;
+        }
+        verdict
+    }
+
+    fn judge(&self, state: &mut AttributeState, now: Micros, value: &BigRational) -> Verdict {
+        let below = self.minimum.as_ref().is_some_and(|minimum| value < minimum);
+        if below || self.maximum.as_ref().is_some_and(|maximum| value > maximum) {
+            return Verdict::Held(Hold::Range);
+        }
+        if self.is_jump(state, value) {
+            state.suspect = Some(value.clone());
+            return Verdict::Held(Hold::Jump);
+        }
+        state.suspect = None;
+        state.plausible = Some(value.clone());
+        state.heard = Some(now);
+        state.silent = false;
+        let Some(believed) = &state.believed else {
+            state.believed = Some(value.clone());
+            return Verdict::Accepted(value.clone());
+        };
+        let target = self.target(believed, value);
+        let crosses = self.cell(believed) != self.cell(&target);
+        state.recent.push_back(crosses);
+        while state.recent.len() > self.of.max(self.agree).max(1) {
+            state.recent.pop_front();
+        }
+        if !crosses {
+            state.crossing = None;
+            if target != *value {
+                return Verdict::Held(Hold::Hysteresis);
+            }
+            state.believed = Some(value.clone());
+            return Verdict::Accepted(value.clone());
+        }
+        let since = state.crossing.as_ref().map_or(now, |(since, _)| *since);
+        state.crossing = Some((since, value.clone()));
+        if self.is_ripe(state, now) { self.accept(state, value) } else { Verdict::Held(Hold::Debounce) }
+    }
+
+    /// Returns `true` if a sample is too far from the one before, and no sample that was set aside confirms it.
+    fn is_jump(&self, state: &AttributeState, value: &BigRational) -> bool {
+        let Some(jump) = &self.jump else { return false };
+        let is_near =
+            |other: &BigRational| if value > other { value - other <= *jump } else { other - value <= *jump };
+        state.plausible.as_ref().is_some_and(|last| !is_near(last))
+            && !state.suspect.as_ref().is_some_and(is_near)
+    }
+
+    /// Returns `true` if the crossing has lasted for long enough and enough samples agree.
+    fn is_ripe(&self, state: &AttributeState, now: Micros) -> bool {
+        let agreeing = state.recent.iter().filter(|crosses| **crosses).count();
+        let lasted =
+            state.crossing.as_ref().is_some_and(|(since, _)| now >= since.saturating_add(self.debounce));
+        lasted && agreeing >= self.agree
+    }
+
+    /// Believes a sample that has crossed bounds.
+    fn accept(&self, state: &mut AttributeState, value: &BigRational) -> Verdict {
+        let target = state.believed.as_ref().map_or_else(|| value.clone(), |own| self.target(own, value));
+        state.believed = Some(target.clone());
+        state.recent.clear();
+        state.crossing = None;
+        state.held = 0;
+        Verdict::Accepted(target)
+    }
+
+    /// Time at which something becomes due without a sample.
+    pub(crate) fn due(&self, state: &AttributeState) -> Option<Micros> {
+        let silent = self.silent_from(state);
+        let ripe = self.ripe_from(state);
+        [silent, ripe].into_iter().flatten().min()
+    }
+
+    /// Time from which the sensor counts as silent, if it does not yet.
+    fn silent_from(&self, state: &AttributeState) -> Option<Micros> {
+        let period = self.period.filter(|_| !state.silent)?;
+        Some(state.heard.unwrap_or(0).saturating_add(period).saturating_add(1))
+    }
+
+    /// Time from which a crossing has lasted for long enough, if enough samples agree.
+    fn ripe_from(&self, state: &AttributeState) -> Option<Micros> {
+        let (since, _) = state.crossing.as_ref()?;
+        let ripe = since.saturating_add(self.debounce);
+        self.is_ripe(state, ripe).then_some(ripe)
+    }
+
+    /// Begins to wait for samples at a time, unless that was done before.
+    pub(crate) fn begin(state: &mut AttributeState, now: Micros) {
+        state.heard.get_or_insert(now);
+    }
+
+    /// Takes the first thing that has become due up to a time; to be called until nothing has.
+    pub(crate) fn elapse(&self, state: &mut AttributeState, now: Micros) -> Option<Elapsed> {
+        let due = self.due(state).filter(|due| *due <= now)?;
+        if self.ripe_from(state) == Some(due) {
+            let (_, value) = state.crossing.clone()?;
+            let Verdict::Accepted(value) = self.accept(state, &value) else { return None };
+            return Some(Elapsed::Accepted(value));
+        }
+        state.silent = true;
+        // What a silent sensor had begun to report is not continued.
+        state.crossing = None;
+        state.recent.clear();
+        let worst = if self.stale == Stale::Worst { self.worst() } else { None };
+        if let Some(worst) = &worst {
+            state.believed = Some(worst.clone());
+            state.held = 0;
+        }
+        // The jump back from silence is plausible.
+        state.plausible = None;
+        Some(Elapsed::Silent(worst))
+    }
+
+    /// For each bound, in order, whether a value keeps it.
+    fn cell(&self, value: &BigRational) -> Vec<bool> {
+        self.bounds.iter().map(|bound| bound.keeps(value)).collect()
+    }
+
+    /// The value to be believed after a sample, were it not debounced: the sample, or a value that still misses the bounds
+    /// that the sample keeps by less than their bands.
+    fn target(&self, believed: &BigRational, sample: &BigRational) -> BigRational {
+        let is_missed =
+            |bound: &&Bound| !bound.keeps(believed) && bound.keeps(sample) && !bound.keeps_clearly(sample);
+        let most = self.bounds.iter().filter(|bound| bound.side == Side::Most).filter(is_missed);
+        let least = self.bounds.iter().filter(|bound| bound.side == Side::Least).filter(is_missed);
+        let target = match (most.max_by_key(|bound| &bound.value), least.min_by_key(|bound| &bound.value)) {
+            (Some(bound), _) | (None, Some(bound)) => self.beyond(bound),
+            (None, None) => return sample.clone(),
+        };
+        if self.cell(&target) == self.cell(believed) { believed.clone() } else { target }
+    }
+
+    /// A value that misses a bound, between it and the next one.
+    fn beyond(&self, bound: &Bound) -> BigRational {
+        let two = BigRational::from_integer(2.into());
+        let others = self.bounds.iter().map(|other| &other.value);
+        if bound.side == Side::Most {
+            let next = others.filter(|other| **other > bound.value).min();
+            let room =
+                next.map_or_else(|| bound.band.clone(), |next| (next - &bound.value).min(bound.band.clone()));
+            &bound.value + room / two
+        } else {
+            let next = others.filter(|other| **other < bound.value).max();
+            let room =
+                next.map_or_else(|| bound.band.clone(), |next| (&bound.value - next).min(bound.band.clone()));
+            &bound.value - room / two
+        }
+    }
+
+    /// The value that keeps the fewest bounds, the least of them; none without bounds.
+    pub(crate) fn worst(&self) -> Option<BigRational> {
+        let one = BigRational::from_integer(1.into());
+        let two = BigRational::from_integer(2.into());
+        let mut values: Vec<&BigRational> = self.bounds.iter().map(|bound| &bound.value).collect();
+        values.sort();
+        values.dedup();
+        let (first, last) = (*values.first()?, *values.last()?);
+        let between = values.windows(2).map(|pair| (pair[0] + pair[1]) / &two);
+        let mut candidates: Vec<BigRational> = vec![first - &one, last + &one];
+        candidates.extend(between);
+        candidates.retain(|value| {
+            self.minimum.as_ref().is_none_or(|minimum| value >= minimum || value < first)
+                && self.maximum.as_ref().is_none_or(|maximum| value <= maximum || value > last)
+        });
+        candidates.sort();
+        let kept = |value: &BigRational| self.bounds.iter().filter(|bound| bound.keeps(value)).count();
+        candidates.into_iter().min_by_key(kept)
+    }
+}
+
+impl Bound {
+    /// Returns `true` if a design with this bound can be used at a value.
+    pub(crate) fn keeps(&self, value: &BigRational) -> bool {
+        match self.side {
+            Side::Least => *value >= self.value,
+            Side::Most => *value <= self.value,
+        }
+    }
+
+    /// Returns `true` if a value keeps the bound by its band.
+    pub(crate) fn keeps_clearly(&self, value: &BigRational) -> bool {
+        match self.side {
+            Side::Least => *value >= &self.value + &self.band,
+            Side::Most => *value <= &self.value - &self.band,
+        }
+    }
+}
+
+impl AttributeState {
+    /// A filter that believes a value from the start.
+    pub(crate) fn believing(value: Option<BigRational>) -> Self {
+        Self { believed: value, ..Self::default() }
+    }
+
+    /// For a snapshot.
+    pub(crate) fn to_record(&self) -> Value {
+        let text = |value: &Option<BigRational>| value.as_ref().map(ToString::to_string);
+        json!([
+            text(&self.believed),
+            text(&self.plausible),
+            text(&self.suspect),
+            self.recent,
+            self.crossing.as_ref().map(|(since, value)| json!([since, value.to_string()])),
+            self.heard,
+            self.silent,
+            self.held
+        ])
+    }
+
+    /// Inverse of [`AttributeState::to_record`].
+    pub(crate) fn from_record(record: &Value) -> Option<Self> {
+        let [believed, plausible, suspect, recent, crossing, heard, silent, held] =
+            record.as_array()?.as_slice()
+        else {
+            return None;
+        };
+        let number = |value: &Value| -> Option<Option<BigRational>> {
+            if value.is_null() { Some(None) } else { value.as_str()?.parse().ok().map(Some) }
+        };
+        Some(Self {
+            believed: number(believed)?,
+            plausible: number(plausible)?,
+            suspect: number(suspect)?,
+            recent: recent.as_array()?.iter().map(Value::as_bool).collect::<Option<_>>()?,
+            crossing: match crossing {
+                Value::Null => None,
+                pair => Some((pair.get(0)?.as_u64()?, pair.get(1)?.as_str()?.parse().ok()?)),
+            },
+            heard: if heard.is_null() { None } else { Some(heard.as_u64()?) },
+            silent: silent.as_bool()?,
+            held: held.as_u64()?,
+        })
+    }
+}

@@ -1,0 +1,107 @@
+//! Reports of one component to the statuses that reach the knowledge base: times to confirm a failure and a recovery.
+
+use ontology::tomasys::change::Status;
+use serde_json::{Value, json};
+
+use crate::mapek::filter::attribute::Micros;
+
+/// Filter of one component. The default accepts every report at once.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct ComponentFilter {
+    /// Time for which all reports must say that the component has failed.
+    pub confirm: Micros,
+    /// Time for which all reports must say that the component is in order.
+    pub heal: Micros,
+}
+
+/// Memory of the filter of one component.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct ComponentState {
+    /// Whether the component is believed to have failed, if anything is believed.
+    has_failed: Option<bool>,
+    /// Time since which all reports say otherwise, and the last of them.
+    change: Option<(Micros, Status)>,
+    /// Number of reports that were held back since the last change.
+    pub held: u64,
+}
+
+impl ComponentFilter {
+    /// Takes a report at a time; returns `true` if it is believed from now on.
+    pub(crate) fn report(&self, state: &mut ComponentState, now: Micros, status: Status) -> bool {
+        let fails = status == Status::Failed;
+        if state.has_failed.unwrap_or(false) == fails {
+            state.has_failed = Some(fails);
+            state.change = None;
+            return true;
+        }
+        let since = state.change.as_ref().map_or(now, |(since, _)| *since);
+        state.change = Some((since, status));
+        if now >= since.saturating_add(self.time(status)) {
+            Self::accept(state, status);
+            return true;
+        }
+        state.held += 1;
+        false
+    }
+
+    /// Time at which a change is confirmed without a further report.
+    pub(crate) fn due(&self, state: &ComponentState) -> Option<Micros> {
+        let (since, status) = state.change.as_ref()?;
+        Some(since.saturating_add(self.time(*status)))
+    }
+
+    /// The status that is believed from now on, if a change has lasted for long enough.
+    pub(crate) fn elapse(&self, state: &mut ComponentState, now: Micros) -> Option<Status> {
+        self.due(state).filter(|due| *due <= now)?;
+        let (_, status) = state.change?;
+        Self::accept(state, status);
+        Some(status)
+    }
+
+    fn accept(state: &mut ComponentState, status: Status) {
+        *state = ComponentState { has_failed: Some(status == Status::Failed), ..ComponentState::default() };
+    }
+
+    /// Time for which a status must be reported before it is believed.
+    fn time(&self, status: Status) -> Micros {
+        if status == Status::Failed { self.confirm } else { self.heal }
+    }
+}
+
+impl ComponentState {
+    /// A filter that believes from the start whether the component has failed.
+    pub(crate) fn believing(has_failed: Option<bool>) -> Self {
+        Self { has_failed, ..Self::default() }
+    }
+
+    /// For a snapshot.
+    pub(crate) fn to_record(&self) -> Value {
+        json!([self.has_failed, self.change.map(|(since, status)| json!([since, word(status)])), self.held])
+    }
+
+    /// Inverse of [`ComponentState::to_record`].
+    pub(crate) fn from_record(record: &Value) -> Option<Self> {
+        let [has_failed, change, held] = record.as_array()?.as_slice() else { return None };
+        Some(Self {
+            has_failed: if has_failed.is_null() { None } else { Some(has_failed.as_bool()?) },
+            change: match change {
+                Value::Null => None,
+                pair => Some((pair.get(0)?.as_u64()?, status(pair.get(1)?.as_str()?)?)),
+            },
+            held: held.as_u64()?,
+        })
+    }
+}
+
+/// A status as events spell it.
+pub(super) fn word(status: Status) -> &'static str {
+    match status {
+        Status::Failed => "FALSE",
+        Status::Recovered => "RECOVERED",
+        Status::Working => "TRUE",
+    }
+}
+
+fn status(word: &str) -> Option<Status> {
+    [Status::Failed, Status::Recovered, Status::Working].into_iter().find(|own| self::word(*own) == word)
+}

@@ -1,0 +1,332 @@
+//! Filters against their definitions: oracles look at the whole history with each sample and keep no memory of their own.
+
+use std::time::Duration;
+
+use fastrand::Rng;
+use num_rational::BigRational;
+use ontology::tomasys::change::Status;
+
+use super::attribute::{AttributeFilter, AttributeState, Bound, Elapsed, Side, Stale, Verdict};
+use super::component::{ComponentFilter, ComponentState};
+
+/// Thousandths.
+fn value(thousandths: i64) -> BigRational {
+    BigRational::new(thousandths.into(), 1000.into())
+}
+
+fn bound(thousandths: i64, side: Side, band: i64) -> Bound {
+    Bound { value: value(thousandths), side, band: value(band) }
+}
+
+/// Returns `true` if a bound is kept after some samples: the last sample that misses it, or keeps it by its band, decides;
+/// without one, the first sample does.
+fn is_kept(bound: &Bound, samples: &[BigRational]) -> bool {
+    let decisive = samples.iter().rev().find(|sample| !bound.keeps(sample) || bound.keeps_clearly(sample));
+    bound.keeps(decisive.unwrap_or(&samples[0]))
+}
+
+/// Bounds that are farther from each other than their bands, and on both sides.
+fn random_bounds(random: &mut Rng, sides: &[Side]) -> Vec<Bound> {
+    let count = random.i64(1..=4);
+    (0..count)
+        .map(|at| bound(200 + 200 * at, sides[random.usize(..sides.len())], random.i64(0..90)))
+        .collect()
+}
+
+/// A sample near a bound, or anywhere.
+fn random_sample(random: &mut Rng, bounds: &[Bound]) -> BigRational {
+    if random.bool() {
+        return value(random.i64(0..1200));
+    }
+    let bound = &bounds[random.usize(..bounds.len())];
+    &bound.value + value(random.i64(-120..=120))
+}
+
+#[test]
+fn each_bound_is_a_trigger_of_its_own() {
+    let mut random = Rng::with_seed(1);
+    for _ in 0..3_000 {
+        let bounds = random_bounds(&mut random, &[Side::Least, Side::Most]);
+        let filter = AttributeFilter { bounds: bounds.clone(), ..AttributeFilter::default() };
+        let (mut state, mut samples, mut believed) = (AttributeState::default(), Vec::new(), None);
+        for now in 0..30 {
+            samples.push(random_sample(&mut random, &bounds));
+            if let Verdict::Accepted(value) = filter.sample(&mut state, now, &samples[samples.len() - 1]) {
+                believed = Some(value);
+            }
+            let own = believed.as_ref().expect("the first sample is believed");
+            for bound in &bounds {
+                assert_eq!(bound.keeps(own), is_kept(bound, &samples), "{bounds:?} {samples:?} {own}");
+                // No filter makes a design available that the sample rules out.
+                assert!(bound.keeps(&samples[samples.len() - 1]) || !bound.keeps(own));
+            }
+        }
+    }
+}
+
+#[test]
+fn noise_within_the_band_crosses_at_most_once() {
+    let mut random = Rng::with_seed(2);
+    for _ in 0..2_000 {
+        let mut bounds = vec![bound(800, Side::Most, 16), bound(800, Side::Least, 16)];
+        bounds.truncate(random.usize(1..=2));
+        let filter = AttributeFilter { bounds: bounds.clone(), ..AttributeFilter::default() };
+        let mut state = AttributeState::believing(Some(value(if random.bool() { 500 } else { 900 })));
+        let mut cells = vec![];
+        for now in 0..40 {
+            let sample = value(800 + random.i64(-15..=15));
+            if let Verdict::Accepted(value) = filter.sample(&mut state, now, &sample) {
+                cells.push(bounds.iter().map(|own| own.keeps(&value)).collect::<Vec<_>>());
+            }
+        }
+        cells.dedup();
+        assert!(cells.len() <= 2, "{bounds:?} {cells:?}");
+        // Far across the bound counts at once.
+        for far in [500, 900] {
+            let Verdict::Accepted(value) = filter.sample(&mut state, 50, &value(far)) else {
+                panic!("{far} is held")
+            };
+            assert_eq!(value, self::value(far));
+        }
+    }
+}
+
+/// Time, in hundredths of a second, and thousandths of a sample; none for a tick.
+type History = Vec<(u64, Option<i64>)>;
+
+/// The value that is believed at the end of a history, by definition: a sample of the believed cell at once, another one when, at some
+/// moment of the history, all samples in force during the last `debounce` lie in other cells, and `agree` of the last `of`
+/// samples do.
+fn believed(history: &History, debounce: u64, agree: usize, of: usize) -> i64 {
+    let is_high = |value: i64| value > 500;
+    let mut own = history.iter().find_map(|(_, sample)| *sample).expect("a sample");
+    let end = history.last().map_or(0, |(time, _)| *time);
+    // Samples before a change do not count any more.
+    let mut from = 0;
+    for now in 0..=end {
+        let times: Vec<u64> =
+            history.iter().filter(|(_, sample)| sample.is_some()).map(|(time, _)| *time).collect();
+        // A sample in force until now may complete the time before a sample of now is seen.
+        for inclusive in [false, true] {
+            let seen: Vec<(usize, u64, i64)> = history
+                .iter()
+                .filter(|(_, sample)| sample.is_some())
+                .enumerate()
+                .filter(|(_, (time, _))| *time < now || (inclusive && *time == now))
+                .map(|(at, (time, sample))| (at, *time, sample.unwrap_or_default()))
+                .filter(|(at, ..)| *at >= from)
+                .collect();
+            let Some((last_at, _, last)) = seen.last().copied() else { continue };
+            if is_high(last) == is_high(own) {
+                own = last;
+                continue;
+            }
+            let run: Vec<_> =
+                seen.iter().rev().take_while(|(_, _, sample)| is_high(*sample) != is_high(own)).collect();
+            let since = run.last().map_or(now, |(_, time, _)| *time);
+            let recent = seen.iter().rev().take(of.max(agree).max(1));
+            let agreeing = recent.filter(|(_, _, sample)| is_high(*sample) != is_high(own)).count();
+            if now - since >= debounce && agreeing >= agree {
+                own = last;
+                from = last_at + 1;
+            }
+        }
+        assert!(times.len() <= history.len());
+    }
+    own
+}
+
+#[test]
+fn debounce_is_as_it_is_defined_and_ticks_change_nothing() {
+    let mut random = Rng::with_seed(3);
+    for round in 0..3_000 {
+        let (debounce, of) = (random.u64(0..6), random.usize(0..5));
+        let agree = random.usize(0..=of);
+        let filter = AttributeFilter {
+            bounds: vec![bound(500, Side::Most, 0)],
+            debounce,
+            agree,
+            of,
+            ..AttributeFilter::default()
+        };
+        let mut history: History = vec![(0, Some(400))];
+        for _ in 0..random.usize(1..25) {
+            let time = history[history.len() - 1].0 + random.u64(1..4);
+            history.push((time, Some(if random.bool() { 400 } else { 600 } + random.i64(0..50))));
+        }
+        let end = history[history.len() - 1].0 + 10;
+        let mut results = Vec::new();
+        for ticks in [false, true] {
+            let (mut state, mut own) = (AttributeState::default(), None);
+            let mut next = 0;
+            for now in 0..=end {
+                let sample = history.get(next).filter(|(time, _)| *time == now);
+                if !ticks && sample.is_none() && now != end {
+                    continue;
+                }
+                while let Some(Elapsed::Accepted(value)) = filter.elapse(&mut state, now) {
+                    own = Some(value);
+                }
+                if let Some((_, Some(sample))) = sample {
+                    next += 1;
+                    if let Verdict::Accepted(value) = filter.sample(&mut state, now, &value(*sample)) {
+                        own = Some(value);
+                    }
+                }
+            }
+            results.push(own.expect("the first sample is believed"));
+            assert_eq!(filter.due(&state), None, "nothing is due at the end unless samples are missing");
+        }
+        let mut whole = history.clone();
+        whole.push((end, None));
+        let expected = value(believed(&whole, debounce, agree, of));
+        assert_eq!(
+            results,
+            [expected.clone(), expected],
+            "round {round}: {debounce} {agree}/{of} {history:?}"
+        );
+    }
+}
+
+#[test]
+fn implausible_samples_are_ignored_until_they_are_confirmed() {
+    let filter = AttributeFilter {
+        minimum: Some(value(0)),
+        maximum: Some(value(2000)),
+        jump: Some(value(100)),
+        ..AttributeFilter::default()
+    };
+    let mut state = AttributeState::default();
+    let mut check = |now, sample: i64, is_accepted: bool| {
+        let verdict = filter.sample(&mut state, now, &value(sample));
+        assert_eq!(verdict == Verdict::Accepted(value(sample)), is_accepted, "{sample}: {verdict:?}");
+    };
+    check(0, 500, true);
+    check(1, -1, false);
+    check(2, 2001, false);
+    check(3, 900, false);
+    check(4, 510, true);
+    check(5, 900, false);
+    check(6, 950, true);
+    check(7, 500, false);
+    check(8, 1200, false);
+    check(9, 1000, true);
+}
+
+#[test]
+fn silence_lasts_longer_than_the_period_and_is_noticed_once() {
+    let mut random = Rng::with_seed(4);
+    for stale in [Stale::Keep, Stale::Unknown, Stale::Worst] {
+        for _ in 0..500 {
+            let filter = AttributeFilter {
+                bounds: vec![bound(500, Side::Most, 10), bound(700, Side::Most, 10)],
+                period: Some(random.u64(1..6)),
+                stale,
+                ..AttributeFilter::default()
+            };
+            let period = filter.period.expect("there is one");
+            let mut state = AttributeState::default();
+            AttributeFilter::begin(&mut state, 0);
+            let (mut heard, mut silent) = (0, false);
+            for now in 0..60 {
+                let due = filter.due(&state);
+                let elapsed = filter.elapse(&mut state, now);
+                let is_new = !silent && now > heard + period;
+                assert_eq!(elapsed.is_some(), is_new, "{now} {heard} {period}");
+                assert_eq!(due.is_some_and(|due| due <= now), is_new);
+                if let Some(Elapsed::Silent(worst)) = &elapsed {
+                    let is_worst = worst.as_ref().is_some_and(|worst| *worst > value(700));
+                    assert_eq!(is_worst, stale == Stale::Worst);
+                }
+                silent |= is_new;
+                assert_eq!(filter.elapse(&mut state, now), None, "once");
+                if random.u32(..4) == 0 {
+                    filter.sample(&mut state, now, &value(400));
+                    (heard, silent) = (now, false);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_worst_value_keeps_the_fewest_bounds() {
+    let mut random = Rng::with_seed(5);
+    for _ in 0..1_000 {
+        let bounds = random_bounds(&mut random, &[Side::Least, Side::Most]);
+        let filter = AttributeFilter { bounds: bounds.clone(), ..AttributeFilter::default() };
+        let worst = filter.worst().expect("there are bounds");
+        let kept = |value: &BigRational| bounds.iter().filter(|bound| bound.keeps(value)).count();
+        let least = (-100..1500).map(|sample| kept(&value(sample))).min();
+        assert_eq!(Some(kept(&worst)), least, "{bounds:?}");
+    }
+}
+
+#[test]
+fn a_component_changes_when_all_reports_have_agreed_for_long_enough() {
+    let mut random = Rng::with_seed(6);
+    for round in 0..3_000 {
+        let filter = ComponentFilter { confirm: random.u64(0..3), heal: random.u64(0..6) };
+        let (mut state, mut has_failed) = (ComponentState::default(), false);
+        let mut reports: Vec<(u64, bool)> = Vec::new();
+        let mut expected = false;
+        for now in 0..50 {
+            // By definition: the reports in force during the last seconds all say otherwise than is believed.
+            let is_ripe = |reports: &[(u64, bool)], believed: bool| {
+                let run = reports.iter().rev().take_while(|(_, fails)| *fails != believed);
+                let since = run.last().map(|(time, _)| *time);
+                since.is_some_and(|since| now - since >= if believed { filter.heal } else { filter.confirm })
+            };
+            let was_due = filter.due(&state).is_some_and(|due| due <= now);
+            if is_ripe(&reports, expected) {
+                expected = !expected;
+                reports.clear();
+                assert!(was_due, "round {round} at {now}");
+            }
+            if let Some(status) = filter.elapse(&mut state, now) {
+                has_failed = status == Status::Failed;
+            }
+            if random.u32(..2) == 0 {
+                let status = [Status::Failed, Status::Working, Status::Recovered][random.usize(..3)];
+                let fails = status == Status::Failed;
+                reports.push((now, fails));
+                if is_ripe(&reports, expected) {
+                    expected = !expected;
+                    reports.clear();
+                }
+                if filter.report(&mut state, now, status) {
+                    has_failed = fails;
+                }
+            }
+            assert_eq!(has_failed, expected, "round {round} at {now}: {filter:?} {reports:?}");
+        }
+    }
+}
+
+#[test]
+fn a_restored_filter_goes_on_exactly() {
+    let mut random = Rng::with_seed(7);
+    for _ in 0..500 {
+        let bounds = random_bounds(&mut random, &[Side::Least, Side::Most]);
+        let filter = AttributeFilter {
+            bounds: bounds.clone(),
+            agree: random.usize(0..3),
+            of: 3,
+            debounce: random.u64(0..4),
+            jump: random.bool().then(|| value(300)),
+            period: random.bool().then_some(3),
+            ..AttributeFilter::default()
+        };
+        let (mut whole, mut cut) = (AttributeState::default(), AttributeState::default());
+        for now in 0..40 {
+            cut = AttributeState::from_record(&cut.to_record()).expect("it is read");
+            assert_eq!(cut, whole);
+            assert_eq!(filter.elapse(&mut whole, now), filter.elapse(&mut cut, now));
+            if random.bool() {
+                let sample = random_sample(&mut random, &bounds);
+                assert_eq!(filter.sample(&mut whole, now, &sample), filter.sample(&mut cut, now, &sample));
+            }
+        }
+    }
+    assert_eq!(super::micros(Duration::from_secs(2)), 2_000_000);
+}

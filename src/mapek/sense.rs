@@ -1,0 +1,97 @@
+//! Reports of sensors, components and functions, through their filters, to changes of what is believed.
+
+use num_rational::BigRational;
+use ontology::tomasys::change::Status;
+
+use crate::knowledge::RobotReport;
+use crate::mapek::fields::Refusal;
+use crate::mapek::filter::Accepted;
+use crate::mapek::monitor::Taking;
+use crate::message::did_you_mean;
+
+impl Taking<'_> {
+    /// A function was seen with a design that was not asked for: it has it from now on, and so has the action under way. Whether that is
+    /// worth a change is asked as when a design comes back.
+    pub(super) fn observed(&mut self, function: &str, design: Option<&str>) -> Result<(), Refusal> {
+        let designs = self.beliefs.mission.designs_of(function);
+        if designs.is_empty() {
+            return Err(Refusal::new("M306", format!("there is no function `{function}` that has designs")));
+        }
+        if let Some(design) = design.filter(|design| designs.iter().all(|known| known != design)) {
+            let meant = did_you_mean(design, designs.iter().map(String::as_str));
+            let text = format!("{function} has no design `{design}`; it has {}{meant}", designs.join(", "));
+            return Err(Refusal::new("M306", text));
+        }
+        let before = match design {
+            Some(design) => self.beliefs.configuration.insert(function.to_owned(), design.to_owned()),
+            None => self.beliefs.configuration.remove(function),
+        };
+        // What was asked for may be on its way: the action goes on with that.
+        let pending = self.beliefs.pending().find(|(own, _)| *own == function).map(|(_, to)| to.to_owned());
+        let is_news = before.as_deref() != design;
+        let is_crossing =
+            (is_news || design.is_none()) && pending.as_ref().is_some_and(|to| design != Some(to));
+        let latest = is_crossing.then_some(self.beliefs.effects);
+        self.beliefs.receipts.observe(function, latest, pending.is_some());
+        if !is_news || pending.is_some() {
+            return Ok(());
+        }
+        let Some(running) = self.beliefs.running.as_mut().filter(|own| own.step.design(function).is_some())
+        else {
+            return Ok(());
+        };
+        if let Some(design) = design {
+            running.step = running.step.with_design(function, design);
+            self.changes.facts = true;
+            self.changes.predicates = true;
+            self.changes.observed = true;
+        } else {
+            let action = running.action;
+            self.changes
+                .must
+                .push(format!("{function} has no design any more, and action {action} needs it"));
+        }
+        Ok(())
+    }
+
+    /// Takes over what a filter has accepted.
+    pub(super) fn accept(&mut self, accepted: Accepted) -> Result<(), Refusal> {
+        match accepted {
+            Accepted::Value(attribute, value) => self.measured(&attribute, &value),
+            Accepted::Status(component, status) => {
+                self.report("component", &component, RobotReport::Component(status))
+            }
+            Accepted::Unknown(attribute) => self.report("attribute", &attribute, RobotReport::Unmeasured),
+        }
+    }
+
+    /// Takes a sample over, unless its filter holds it back.
+    pub(super) fn sampled(&mut self, attribute: &str, value: &BigRational) -> Result<(), Refusal> {
+        let is_known = self.monitor.attributes.contains(attribute);
+        let (states, now, filtered) =
+            (&mut self.beliefs.filters, self.beliefs.now, &mut self.changes.filtered);
+        if !is_known {
+            return self.measured(attribute, value);
+        }
+        match self.monitor.filters.sample(states, now, attribute, value, filtered) {
+            Some(value) => self.measured(attribute, &value),
+            None => Ok(()),
+        }
+    }
+
+    /// Takes the status of a component over, unless its filter holds it back.
+    pub(super) fn component(&mut self, component: &str, status: Status) -> Result<(), Refusal> {
+        let name = match self.monitor.components.get(component) {
+            Some(name) => Some(name.clone()),
+            None => self.beliefs.mission.knowledge().and_then(|base| base.known_component(component)),
+        };
+        if let Some(name) = &name {
+            self.monitor.components.insert(component.to_owned(), name.clone());
+        }
+        let (states, now, filtered) =
+            (&mut self.beliefs.filters, self.beliefs.now, &mut self.changes.filtered);
+        let is_held =
+            name.is_some_and(|name| !self.monitor.filters.report(states, now, &name, status, filtered));
+        if is_held { Ok(()) } else { self.report("component", component, RobotReport::Component(status)) }
+    }
+}

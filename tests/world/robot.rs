@@ -1,0 +1,207 @@
+//! A robot with one function: it carries effects out, each once, and reports.
+
+use std::collections::BTreeSet;
+
+use metaplan::mapek::{Command, Effect};
+use serde_json::{Value, json};
+
+use crate::{COMPONENTS, FUNCTION, START};
+
+/// Number of steps of work that an action takes.
+const WORK: u32 = 4;
+
+/// An action that the robot carries out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Action {
+    pub number: u64,
+    /// Number of the effect that has requested it.
+    request: u64,
+    /// Steps of work done so far.
+    pub done: u32,
+    pub suspended: bool,
+    /// The place where the action ends.
+    pub to: String,
+    /// The design that the action waits for before it begins.
+    wanted: Option<String>,
+}
+
+impl Action {
+    /// Whether the action has begun and does not stand still.
+    pub fn is_moving(&self) -> bool {
+        self.wanted.is_none() && !self.suspended
+    }
+}
+
+/// The robot.
+#[derive(Debug, Clone)]
+pub struct Robot {
+    /// Components that have failed.
+    pub failed: BTreeSet<&'static str>,
+    /// Design of the function.
+    pub design: Option<String>,
+    pub action: Option<Action>,
+    /// The place of the robot.
+    pub place: String,
+    /// Numbers of effects that were carried out, refused, or superseded before they came.
+    pub seen: BTreeSet<u64>,
+    /// The last reconfiguration, if it was refused.
+    pub refused: Option<u64>,
+    /// Answers to effects and ends of actions, to be reported again.
+    pub said: Vec<Value>,
+    /// The greatest number of an action that has begun.
+    begun: u64,
+    has_restarted: bool,
+    /// The action and the number of the last reconfiguration that was carried out.
+    configured: (u64, u64),
+    /// The action to come that is to stand still from its beginning.
+    still: Option<u64>,
+}
+
+impl Default for Robot {
+    fn default() -> Self {
+        Self {
+            failed: BTreeSet::new(),
+            design: None,
+            action: None,
+            place: START.to_owned(),
+            seen: BTreeSet::new(),
+            refused: None,
+            said: Vec::new(),
+            begun: 0,
+            has_restarted: false,
+            configured: (0, 0),
+            still: None,
+        }
+    }
+}
+
+impl Robot {
+    /// Carries an effect out, once; `fails` for a reconfiguration that cannot be carried out. Returns its reports.
+    pub fn take(&mut self, effect: &Effect, fails: bool) -> Vec<Value> {
+        self.seen.extend(&effect.supersedes);
+        if !self.seen.insert(effect.number) {
+            // The effect has been answered before, and is answered again.
+            let is_answer = |said: &&Value| said["effect"] == effect.number;
+            return self.said.iter().filter(is_answer).cloned().collect();
+        }
+        let is_refused = fails && matches!(effect.command, Command::Reconfigure { .. });
+        let kind = if is_refused { "reconfiguration_failed" } else { "acknowledged" };
+        let mut reports = vec![json!({ "event": kind, "effect": effect.number })];
+        if matches!(effect.command, Command::Reconfigure { .. }) {
+            self.refused = is_refused.then_some(effect.number);
+        }
+        if !is_refused {
+            reports.extend(self.carry_out(effect));
+        }
+        self.said.extend(reports.iter().cloned());
+        reports
+    }
+
+    /// Changes the robot as an effect says. Returns reports about its action.
+    pub fn carry_out(&mut self, effect: &Effect) -> Option<Value> {
+        let number = effect.action;
+        let own = self.action.as_mut().filter(|own| own.number == number);
+        match (&effect.command, own) {
+            (Command::Reconfigure { to, .. }, own) => {
+                self.design = Some(to.clone());
+                self.configured = (number, effect.number);
+                // An action begins only when its function has its design: that of the request, or a later one.
+                if let Some(own) = own
+                    && let Some(wanted) = &own.wanted
+                    && (wanted == to || effect.number > own.request)
+                {
+                    own.wanted = None;
+                    return Some(json!({ "event": "action_started", "action": number }));
+                }
+            }
+            (Command::Request { step }, _) if number > self.begun => {
+                self.begun = number;
+                let to = step.arguments.get(1).cloned().unwrap_or_default();
+                let wanted = step.design(FUNCTION).filter(|design| self.design.as_deref() != Some(design));
+                // A later reconfiguration for the action may have come before its request.
+                let is_later = self.design.is_some() && self.configured > (number, effect.number);
+                let wanted = wanted.filter(|_| !is_later).map(ToOwned::to_owned);
+                let is_begun = wanted.is_none();
+                let (request, suspended) = (effect.number, self.still == Some(number));
+                self.action = Some(Action { number, request, done: 0, suspended, to, wanted });
+                return is_begun.then(|| json!({ "event": "action_started", "action": number }));
+            }
+            (Command::Suspend { .. }, Some(own)) => own.suspended = true,
+            // What is said of an action before its request comes holds when it begins.
+            (Command::Suspend { .. }, None) => self.still = Some(number),
+            (Command::Resume, None) => self.still = self.still.filter(|still| *still != number),
+            (Command::Resume, Some(own)) => {
+                own.suspended = false;
+                // The action goes on with the design that the function has now.
+                if own.wanted.take_if(|_| self.design.is_some()).is_some() {
+                    return Some(json!({ "event": "action_started", "action": number }));
+                }
+            }
+            (Command::Cancel { .. }, Some(_)) => {
+                self.action = None;
+                return Some(json!({ "event": "action_cancelled", "action": number }));
+            }
+            (Command::Cancel { .. }, None) => {
+                // The action never begins any more.
+                self.begun = self.begun.max(number);
+                let end = self.said.iter().find(|said| said["action"] == number && is_end(said));
+                let cancelled = || json!({ "event": "action_cancelled", "action": number });
+                return Some(end.cloned().unwrap_or_else(cancelled));
+            }
+            _ => {}
+        }
+        None
+    }
+
+    /// Works for a while; `fails` for an action that fails now. Returns its reports.
+    pub fn work(&mut self, fails: bool) -> Option<Value> {
+        let action = self.action.as_mut().filter(|own| own.is_moving() || fails)?;
+        action.done += 1;
+        let number = action.number;
+        let report = if fails {
+            json!({ "event": "action_failed", "action": number })
+        } else if action.done >= WORK {
+            self.place.clone_from(&action.to);
+            json!({ "event": "action_succeeded", "action": number })
+        } else {
+            let fraction = f64::from(action.done) / f64::from(WORK);
+            return Some(json!({ "event": "action_progress", "action": number, "fraction": fraction }));
+        };
+        self.action = None;
+        self.said.push(report.clone());
+        Some(report)
+    }
+
+    /// Restarts. The function has no design any more, and the action under way has failed. Returns its reports.
+    pub fn restart(&mut self) -> Vec<Value> {
+        (self.design, self.has_restarted) = (None, true);
+        let failed = self.action.take();
+        let failed = failed.map(|own| json!({ "event": "action_failed", "action": own.number }));
+        self.said.extend(failed.clone());
+        failed.into_iter().chain([self.observed()]).collect()
+    }
+
+    /// A component's status as it is.
+    pub fn status(&self, component: &str) -> Value {
+        let status = if self.failed.contains(component) { "FALSE" } else { "TRUE" };
+        json!({ "event": "component_status", "component": component, "status": status })
+    }
+
+    fn observed(&self) -> Value {
+        json!({ "event": "configuration_observed", "function": FUNCTION, "design": self.design })
+    }
+
+    /// Statuses of all components, and ends of actions, as robots publish them again and again. Answers to effects are not repeated:
+    /// the loop has to repeat effects that have no answer.
+    pub fn again(&self) -> Vec<Value> {
+        let mut reports: Vec<Value> = COMPONENTS.iter().map(|component| self.status(component)).collect();
+        reports.extend(self.said.iter().filter(|said| is_end(said)).cloned());
+        reports.extend(self.has_restarted.then(|| self.observed()));
+        reports
+    }
+}
+
+fn is_end(said: &Value) -> bool {
+    let kind = said["event"].as_str().unwrap_or_default();
+    ["action_succeeded", "action_failed", "action_cancelled"].contains(&kind)
+}
