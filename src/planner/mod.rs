@@ -202,7 +202,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         let limits = self.config.limits.clone();
         let task = self.mission.ground_concurrent(&self.problem, &objectives.metrics, separation, &limits)?;
         let ground = began.elapsed();
-        let mut solution = planner::optimize_concurrent(&task, &limits, &mut self.hear());
+        let mut solution = optimize_concurrent(&task, &limits, &mut self.hear());
         let reading = Reading::concurrent(separation);
         if let Some(plan) = solution.plan.take() {
             let mut problem = self.problem.clone();
@@ -250,7 +250,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         let began = Instant::now();
         let task = self.mission.ground_exact(&self.problem, &objectives.metrics, &self.config.limits)?;
         let ground = began.elapsed();
-        let point = valued(planner::optimize_exact(&task, &self.config), &objectives);
+        let point = valued(optimize_exact(&task, &self.config), &objectives);
         let reading = Reading::sequential(task.is_timed());
         let mut planned = self.planned(point, objectives, Ground::Exact(task), reading, ground)?;
         planned.too_large = refused.into_vec();
@@ -259,7 +259,7 @@ impl<'m, 'r> Planner<'m, 'r> {
 
     /// Further plans; each is executed by the validator as the first one is.
     fn others(&self, task: &Task, solution: &Solution, most: usize) -> Result<Option<Alternatives>, Errors> {
-        let Some(mut found) = planner::alternatives(task, solution, most, &self.config) else {
+        let Some(mut found) = alternatives(task, solution, most, &self.config) else {
             return Ok(None);
         };
         let reading = Reading::sequential(task.is_timed());

@@ -6,7 +6,7 @@
 #[non_exhaustive]
 pub struct Thresholds {
     /// Number of stored states without a plan after which A\* is joined by a greedy search, and then by stubborn sets, the exchange of
-    /// objects and landmarks, where nothing else takes turns with it. [`Config::head_start`](crate::Config::head_start) is the number for
+    /// objects and landmarks, where nothing else takes turns with it. `Config::head_start` of the planner is the number for
     /// the planner as a whole.
     pub states: usize,
     /// Number of stored states at which A\* first compares its progress with the memory that there is.

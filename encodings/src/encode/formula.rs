@@ -204,9 +204,9 @@ impl Formula {
         }
     }
 
-    /// At most one of the literals: pairwise for few, else Sinz's sequential counter [1].
+    /// At most one of the literals: pairwise for few, else Sinz's sequential counter \[1\].
     ///
-    /// [1] C. Sinz: Towards an optimal CNF encoding of Boolean cardinality constraints, CP 2005.
+    /// \[1\] C. Sinz: Towards an optimal CNF encoding of Boolean cardinality constraints, CP 2005.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub(crate) fn at_most_one(&mut self, family: Family, literals: &[Lit]) {
         if literals.len() <= 5 {

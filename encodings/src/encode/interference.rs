@@ -1,7 +1,7 @@
 //! Several operators at a step: which ones must not stand together.
 //!
-//! In ∀-step semantics [1] the operators of a step can be executed in any order with the same outcome, in ∃-step semantics
-//! [2] in at least one order, which is fixed: that of the ground task. Both ask for all conditions before the step and
+//! In ∀-step semantics \[1\] the operators of a step can be executed in any order with the same outcome, in ∃-step semantics
+//! \[2\] in at least one order, which is fixed: that of the ground task. Both ask for all conditions before the step and
 //! for all effects after it. With E the operators that change a fact (or any variable that is read in another way than by a
 //! plain condition) and R those that need it:
 //!

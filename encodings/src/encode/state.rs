@@ -1,10 +1,10 @@
 //! State variables: their domains at every step, and the frame axioms.
 //!
 //! - domain: `⋁_d v=d@t`, and at most one of them;
-//! - frame (explanatory, after Haas [1]): `v=d@t+1 → v=d@t ∨ ⋁ {o@t : o sets v to d}`. With the domain
+//! - frame (explanatory, after Haas \[1\]): `v=d@t+1 → v=d@t ∨ ⋁ {o@t : o sets v to d}`. With the domain
 //!   constraints on both sides this also keeps what nothing changes.
 //!
-//! [1] A. Haas: The case for domain-specific frame axioms, The Frame Problem in AI, 1987.
+//! \[1\] A. Haas: The case for domain-specific frame axioms, The Frame Problem in AI, 1987.
 
 use task::number::dense;
 use task::task::{Fact, VariableId};

@@ -2,7 +2,7 @@
 //!
 //! - designs: of designs of a slot that no operator tells apart, only the first is chosen: `¬slot=d@t`. Designs are chosen anew
 //!   at every step, so each step is symmetric by itself;
-//! - objects: objects x₁ < x₂ < … any two of which can be exchanged without changing the task [1] are used first in this order:
+//! - objects: objects x₁ < x₂ < … any two of which can be exchanged without changing the task \[1\] are used first in this order:
 //!   `o@t → s_i@t` for each operator o with x_{i+1} among its arguments and `x_i` not, where `s_i@t → s_i@t−1 ∨ u_i@t` says that
 //!   `x_i` has been used, and `u_i@t ↔ ⋁ o@t` that it is used now. Renaming the objects of a plan in the order of their first use
 //!   makes one that satisfies this, and costs the same.

@@ -1,4 +1,4 @@
-//! `BatSat` [1], `MiniSat` [2] in Rust, as a back end.
+//! `BatSat` \[1\], `MiniSat` \[2\] in Rust, as a back end.
 //!
 //! Its callbacks count what is learnt and say when to stop.
 //!

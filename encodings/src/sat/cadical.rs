@@ -1,4 +1,4 @@
-//! `CaDiCaL` [1] as a back end.
+//! `CaDiCaL` \[1\] as a back end.
 //!
 //! Its callbacks count what is learnt and say when to stop.
 //!

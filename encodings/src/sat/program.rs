@@ -1,4 +1,4 @@
-//! A solver that is a program of its own: DIMACS [1] to its standard input, its answer from its standard output.
+//! A solver that is a program of its own: DIMACS \[1\] to its standard input, its answer from its standard output.
 //!
 //! Two forms of answers are read: that of the SAT competitions (`s SATISFIABLE`, and the assignment in lines `v …`), and
 //! that of `MiniSat`'s result file (`SAT`, and the assignment on the line below). The process is killed when a limit is

@@ -1,4 +1,4 @@
-//! How many of some literals are true: the totalizer [1], of the library `RustSAT`, grown as far as it is needed [2].
+//! How many of some literals are true: the totalizer \[1\], of the library `RustSAT`, grown as far as it is needed \[2\].
 //!
 //! \[1\] O. Bailleux, Y. Boufkhad: Efficient CNF encoding of Boolean cardinality constraints, CP 2003.
 //! \[2\] R. Martins, S. Joshi, V. Manquinho, I. Lynce: Incremental cardinality constraints for `MaxSAT`, CP 2014.

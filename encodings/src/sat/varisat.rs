@@ -1,4 +1,4 @@
-//! Varisat [1] as a back end.
+//! Varisat \[1\] as a back end.
 //!
 //! Varisat has no way to be interrupted. It streams its proof, though, and stops at once when the stream reports an
 //! error; so the proof goes to a sink that counts learnt clauses and fails when a limit is reached. That proof is in Varisat's own

@@ -3,12 +3,12 @@
 //! The formula "a plan that costs at most the optimum", with as many steps as such a plan can have, is solved
 //! repeatedly. Each time, the plans found before are excluded.
 //!
-//! The choices that every cheapest plan makes are the backbone of that formula [1]. The solver is queried for a plan
+//! The choices that every cheapest plan makes are the backbone of that formula \[1\]. The solver is queried for a plan
 //! that differs from the first one in at least one of the remaining candidates. Such a plan rules out the candidates
 //! in which it differs; unsatisfiability proves that all remaining candidates are shared. Equal designs or objects
 //! count as different here.
 //!
-//! [1] J. Marques-Silva, M. Janota, I. Lynce: On computing backbones of propositional theories, ECAI 2010.
+//! \[1\] J. Marques-Silva, M. Janota, I. Lynce: On computing backbones of propositional theories, ECAI 2010.
 
 use encodings::encode::{CostEncoding, CostLimit, Encoding, PlanConstraints, StepSemantics, VariableMeaning};
 use encodings::sat::{Answer, Backend, Lit, Solver};

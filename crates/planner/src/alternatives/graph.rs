@@ -2,7 +2,7 @@
 //!
 //! A cheapest plan reaches each of its states at the least cost at which that state can be reached. So each state is
 //! expanded once, and every path from the initial state to a goal is a cheapest plan. K\* and its successors
-//! represent top-k plans in this way [1].
+//! represent top-k plans in this way \[1\].
 //!
 //! If resources distinguish many states, expanding every state whose estimate admits a cheapest plan is too much
 //! work. So a label-setting search comes first. Each of its labels represents all states that cost no less and have
@@ -10,7 +10,7 @@
 //! a state that the label represents. The second search distinguishes all states, and expands only those that the
 //! first search has not ruled out.
 //!
-//! [1] J. Lee, M. Katz, S. Sohrabi: On K* search for top-k planning, 2023; H. Aljazzar, S. Leue: K*: a heuristic search algorithm for
+//! \[1\] J. Lee, M. Katz, S. Sohrabi: On K* search for top-k planning, 2023; H. Aljazzar, S. Leue: K*: a heuristic search algorithm for
 //! finding the k shortest paths, Artificial Intelligence 175, 2011.
 
 use std::cell::OnceCell;

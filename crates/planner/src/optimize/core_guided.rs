@@ -4,8 +4,8 @@
 //! false. The solver answers with a plan, which then is a cheapest one, or with a core: some of them, of which one at least is
 //! true in every plan. So every plan pays the least weight in the core, which is taken from each weight in it. What is left of the
 //! sum is that more than one of them may be true, more than two, and so on: literals of a totalizer, with that weight, one of
-//! which is added for each core that has the one before it (OLL [1, 2]). Heavy literals come first (stratification [3]), so that plans
-//! are found on the way; a literal whose weight alone makes a plan as dear as the best known is false for good [3].
+//! which is added for each core that has the one before it (OLL \[1, 2\]). Heavy literals come first (stratification \[3\]), so that plans
+//! are found on the way; a literal whose weight alone makes a plan as dear as the best known is false for good \[3\].
 //!
 //! \[1\] B. Andres, B. Kaufmann, O. Matheis, T. Schaub: Unsatisfiability-based optimization in clasp, ICLP 2012.
 //! \[2\] A. Morgado, C. Dodaro, J. Marques-Silva: Core-guided `MaxSAT` with soft cardinality constraints, CP 2014.

@@ -12,9 +12,9 @@ use task::task::Task;
 use crate::optimize::optimizer_run::Run;
 use crate::optimize::sat_budget::{FORMULA_LIMIT, SatBudget};
 
-/// Longer and longer formulas without a cost limit, several of them open at a time [1].
+/// Longer and longer formulas without a cost limit, several of them open at a time \[1\].
 ///
-/// [1] J. Rintanen, K. Heljanko, I. Niemelä: Planning as satisfiability: parallel plans and algorithms for plan search,
+/// \[1\] J. Rintanen, K. Heljanko, I. Niemelä: Planning as satisfiability: parallel plans and algorithms for plan search,
 /// Artificial Intelligence 170, 2006, section 6.
 pub(super) struct HorizonSchedule {
     /// Horizons that are not decided.

@@ -4,7 +4,7 @@
 //! cost. So each question is an ordinary task with one objective, and each answer has an ordinary proof. The Pareto front is
 //! enumerated by the ε-constraint method [1]: best by A, then among those best by B, then strictly better by B, and so on.
 //!
-//! [1] Y. Haimes, L. Lasdon, D. Wismer: On a bicriterion formulation of the problems of integrated system identification
+//! \[1\] Y. Haimes, L. Lasdon, D. Wismer: On a bicriterion formulation of the problems of integrated system identification
 //! and system optimization, IEEE Trans. SMC 1(3), 1971.
 
 use task::context::Context;

@@ -5,7 +5,7 @@
 //! sum is consistent, as each estimate is for the costs it took. What one projection cannot see at all, such as goals of
 //! another robot, or changes of designs off its pattern, another one counts.
 //!
-//! [1] J. Seipp, T. Keller, M. Helmert: Saturated cost partitioning for optimal classical planning, JAIR 67, 2020.
+//! \[1\] J. Seipp, T. Keller, M. Helmert: Saturated cost partitioning for optimal classical planning, JAIR 67, 2020.
 
 use std::cmp::Reverse;
 

@@ -1,11 +1,11 @@
 //! A task without what is deleted: rules by which facts follow from facts, each at the cost of an operator.
 //!
-//! The delete relaxation [1]. An operator is one rule for what it sets in any case, and one for each conditional effect; all have
+//! The delete relaxation \[1\]. An operator is one rule for what it sets in any case, and one for each conditional effect; all have
 //! the operator's least cost, which is paid once. Rules of derived variables, and what makes one literal of a clause hold, cost
 //! nothing. Numbers are left out, and derived variables may be false at any time: the relaxation of a task allows all that the task
 //! does.
 //!
-//! [1] B. Bonet, H. Geffner: Planning as heuristic search, Artificial Intelligence 129, 2001.
+//! \[1\] B. Bonet, H. Geffner: Planning as heuristic search, Artificial Intelligence 129, 2001.
 
 use rustc_hash::FxHashMap;
 

@@ -1,11 +1,11 @@
 //! Lower bounds on the cost of plans, and on the number of steps that a cheaper plan can have.
 //!
 //! A projection of the task to a few finite-domain variables is small enough to be solved outright: Dijkstra from its
-//! goal states gives a consistent, admissible estimate [1]; dynamic programming over (step, abstract state) says which
+//! goal states gives a consistent, admissible estimate \[1\]; dynamic programming over (step, abstract state) says which
 //! operators can still be at which step of a plan cheaper than the best known one, and beyond which step there is none. Shares
 //! of the costs make estimates of several projections add up.
 //!
-//! [1] S. Edelkamp: Planning with pattern databases, ECP 2001.
+//! \[1\] S. Edelkamp: Planning with pattern databases, ECP 2001.
 
 mod cost_partitioning;
 mod delete_relaxation;

@@ -1,9 +1,9 @@
 //! What is still to be tried: several lists that take turns, each the most promising first.
 //!
-//! All operators that are applicable in a state have its value, as states are looked at only when it is their turn [1]; so a
+//! All operators that are applicable in a state have its value, as states are looked at only when it is their turn \[1\]; so a
 //! list holds states, each with its operators. Lists of preferred operators get more turns when there is progress.
 //!
-//! [1] M. Helmert: The Fast Downward planning system, JAIR 26, 2006, section 5.
+//! \[1\] M. Helmert: The Fast Downward planning system, JAIR 26, 2006, section 5.
 
 use std::collections::{BTreeMap, VecDeque};
 

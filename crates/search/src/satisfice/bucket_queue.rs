@@ -51,7 +51,7 @@ impl Queue {
         }
     }
 
-    /// One of the cheapest, those that came first first. A queue is emptied by this or by [`Queue::pop`], never by both.
+    /// One of the cheapest, those that came first first. A queue is emptied by this or by `pop`, never by both.
     pub fn pop_first(&mut self) -> Option<(u32, u32)> {
         if self.count == 0 {
             return self.dear.pop().map(|std::cmp::Reverse(least)| least);

@@ -3,9 +3,9 @@
 //! Propositions are facts, disjunctions, and comparisons of numbers. A node is an operator, a conditional effect of one, a rule of a
 //! derived variable, or one way to make a disjunction true. A derived variable that is required to be false is taken for false. Of
 //! designs the best for each purpose are taken, each time anew. How often an operator has to be applied until a comparison holds
-//! is reckoned as by Scala et al. [1]; an operator that does not add a constant is taken to bring it about at once.
+//! is reckoned as by Scala et al. \[1\]; an operator that does not add a constant is taken to bring it about at once.
 //!
-//! [1] E. Scala, P. Haslum, S. Thiébaux: Heuristics for numeric planning via subgoaling, IJCAI 2016.
+//! \[1\] E. Scala, P. Haslum, S. Thiébaux: Heuristics for numeric planning via subgoaling, IJCAI 2016.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 

@@ -1,9 +1,9 @@
 //! Which landmarks were reached on the way to a state, and how many are still to come.
 //!
 //! A landmark is reached when it holds and those before it were reached. One that was reached has to hold again if it is a goal, or
-//! needed right before another one that was not reached [1].
+//! needed right before another one that was not reached \[1\].
 //!
-//! [1] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 5.
+//! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 5.
 
 use task::task::number::TaskNumber;
 use task::task::{Fact, State};

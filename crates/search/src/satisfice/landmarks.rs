@@ -5,7 +5,7 @@
 //! disjunction. What cannot be reached without a landmark comes after it. A landmark that would have to be given up for another one is to
 //! come after that (reasonable orders); these orders only guide.
 //!
-//! [1] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 4.
+//! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 4.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 use task::limits::{Interrupted, Limits};

@@ -1,4 +1,4 @@
-//! A plan soon: relaxed plans and landmarks guide a lazy greedy search, and then weighted A\*, as in LAMA [1].
+//! A plan soon: relaxed plans and landmarks guide a lazy greedy search, and then weighted A\*, as in LAMA \[1\].
 //!
 //! `delete_relaxation` is the task without deletes, `ff_heuristic` computes relaxed plans, `landmarks` finds landmarks, and `landmark_status` tracks which
 //! of them a state has reached. `search` is the greedy search with an `alternating_open_list` over the states of a `store`.
@@ -6,7 +6,7 @@
 //! Nothing that is found here rests on an estimate: a plan is executed by whoever takes it, and only a search that has been
 //! everywhere without one says that there is none.
 //!
-//! [1] S. Richter, M. Westphal: The LAMA planner: guiding cost-based anytime planning with landmarks, JAIR 39, 2010.
+//! \[1\] S. Richter, M. Westphal: The LAMA planner: guiding cost-based anytime planning with landmarks, JAIR 39, 2010.
 
 pub mod alternating_open_list;
 pub mod bucket_queue;

@@ -2,12 +2,12 @@
 //!
 //! States that agree on all finite-domain variables are compared by cost and by numeric variables; where a higher value
 //! never hurts (a battery), a state that costs no less and has no more of anything is dropped. That is the label-setting
-//! search of resource-constrained shortest paths [1]. If it ends before its limits, its answer is exact.
+//! search of resource-constrained shortest paths \[1\]. If it ends before its limits, its answer is exact.
 //!
 //! Of states with equal sums of cost and estimate, those come first from which fewer steps can lead to the goal, and of these the
 //! ones that are further: a plan that is found is cheapest once nothing that is left can be cheaper, or as cheap with fewer steps.
 //!
-//! [1] M. Desrochers, F. Soumis: A generalized permanent labelling algorithm for the shortest path problem with time
+//! \[1\] M. Desrochers, F. Soumis: A generalized permanent labelling algorithm for the shortest path problem with time
 //! windows, INFOR 26(3), 1988.
 
 use std::sync::Arc;

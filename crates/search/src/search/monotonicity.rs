@@ -5,7 +5,7 @@
 //! factor below 0 the opposite. The least such sets tell which labels dominate which in a search with resources [1]: what is
 //! asked in one direction is compared, what is asked in both must be equal, and what is not asked at all does not count.
 //!
-//! [1] M. Desrochers, F. Soumis: A generalized permanent labelling algorithm for the shortest path problem with time
+//! \[1\] M. Desrochers, F. Soumis: A generalized permanent labelling algorithm for the shortest path problem with time
 //! windows, INFOR 26(3), 1988.
 
 use task::task::number::TaskNumber;

@@ -2,9 +2,9 @@
 //! those that a new one dominates.
 //!
 //! A box knows the best and the worst of each criterion among its labels. Whole boxes are passed over, as in the ND-tree of
-//! non-dominated points [1]; boxes are split where their labels differ, as in a k-d tree.
+//! non-dominated points \[1\]; boxes are split where their labels differ, as in a k-d tree.
 //!
-//! [1] A. Jaszkiewicz, T. Lust: ND-Tree-Based Update: A Fast Algorithm for the Dynamic Nondominance Problem, IEEE Transactions on
+//! \[1\] A. Jaszkiewicz, T. Lust: ND-Tree-Based Update: A Fast Algorithm for the Dynamic Nondominance Problem, IEEE Transactions on
 //! Evolutionary Computation 22(5), 2018.
 
 use task::number::dense;

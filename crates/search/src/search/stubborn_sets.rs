@@ -1,7 +1,7 @@
 //! Which of the operators that can be applied are enough: stubborn sets.
 //!
 //! Operators that do not interfere can be put into any order, so that all orders but one need not be searched. A set of operators
-//! is stubborn in a state [1] if it has
+//! is stubborn in a state \[1\] if it has
 //!
 //! - every operator that makes some part of the goal true that does not hold;
 //! - for each of its operators that cannot be applied, every operator that makes some part of its condition true that does not hold;
@@ -12,7 +12,7 @@
 //! is one by the first condition, and it can be applied already, as by the second condition something before it would be in the set
 //! otherwise. By the third it disturbs nothing that is before it, and nothing before it changes what it does, so that it can
 //! come first: the plan has the same operators in another order. That what comes before may make it inapplicable for a while
-//! does no harm [2]. So a cheapest plan with fewest steps is left from each state. That is all that the search needs, also where it drops
+//! does no harm \[2\]. So a cheapest plan with fewest steps is left from each state. That is all that the search needs, also where it drops
 //! states that a known one dominates, or that only interchangeable objects tell from a known one [3]: from the known one there is a plan
 //! with the same operators, or with their images, and so one that begins with an operator of its own stubborn set.
 //!

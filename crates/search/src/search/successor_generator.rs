@@ -1,9 +1,9 @@
-//! Which operators can be applied in a state: a decision tree over the variables that they require [1].
+//! Which operators can be applied in a state: a decision tree over the variables that they require \[1\].
 //!
 //! A node holds the operators that require nothing more, asks for the value of one variable, and goes on with those that
 //! require this value, and with those that do not ask for it. So operators are not looked at one by one.
 //!
-//! [1] M. Helmert: The Fast Downward planning system, JAIR 26, 2006, section 5.3.
+//! \[1\] M. Helmert: The Fast Downward planning system, JAIR 26, 2006, section 5.3.
 
 use task::number::dense;
 use task::task::{OperatorId, State, Task};

@@ -5,7 +5,7 @@
 //! comes earlier in the order of their values. States that nothing but exchanges tells apart are usually found to be equal so; that they always
 //! are is not needed.
 //!
-//! [1] C. Domshlak, M. Katz, A. Shleyfman: Enhanced symmetry breaking in cost-optimal planning as forward search, ICAPS 2012.
+//! \[1\] C. Domshlak, M. Katz, A. Shleyfman: Enhanced symmetry breaking in cost-optimal planning as forward search, ICAPS 2012.
 
 use task::context::Context;
 use task::limits::Interrupted;

@@ -4,7 +4,7 @@
 //! their rules, those that are negated first. What is always or never true is folded, and an atom with one rule
 //! is replaced by the body of that rule where it occurs.
 //!
-//! [1] S. Thiébaux, J. Hoffmann, B. Nebel: In defense of PDDL axioms, Artificial Intelligence 168, 2005.
+//! \[1\] S. Thiébaux, J. Hoffmann, B. Nebel: In defense of PDDL axioms, Artificial Intelligence 168, 2005.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 

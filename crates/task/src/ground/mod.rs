@@ -1,6 +1,6 @@
 //! Lifted task to ground task.
 //!
-//! Relaxed reachability (a Datalog program on the rule engine, after Helmert [1]) yields the instances of each
+//! Relaxed reachability (a Datalog program on the rule engine, after Helmert \[1\]) yields the instances of each
 //! schema, without its separable design parameters; each instance becomes one operator with slots; mutex groups become
 //! finite-domain variables; all numbers become exact integers.
 //!
@@ -15,7 +15,7 @@
 //! | `prune` | operators, rules | those that can matter; or why the goal is out of reach |
 //! | `finalize` | `GroundTask` | `Task`: variables for atoms, integers for rationals |
 //!
-//! [1] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009.
+//! \[1\] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009.
 
 mod config;
 mod derived;

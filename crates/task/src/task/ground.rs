@@ -1,10 +1,10 @@
 //! The ground task: finite-domain and numeric variables, and operators whose function designs are still open.
 //!
-//! After Bäckström and Nebel's SAS+ [1], with two additions: numeric variables hold exact integers, and an
+//! After Bäckström and Nebel's SAS+ \[1\], with two additions: numeric variables hold exact integers, and an
 //! operator has *slots*, each to be filled with one function design. Conditions, costs and consumptions that
 //! depend on the designs are tables over slots, so k functions of m designs cost k·m choices, not m^k operators.
 //!
-//! [1] C. Bäckström, B. Nebel: Complexity results for SAS+ planning, Computational Intelligence 11(4), 1995.
+//! \[1\] C. Bäckström, B. Nebel: Complexity results for SAS+ planning, Computational Intelligence 11(4), 1995.
 
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;

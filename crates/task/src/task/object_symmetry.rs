@@ -1,9 +1,9 @@
 //! Objects that change places: where that takes facts and operators, and whether the task is the same then.
 //!
-//! Two objects are interchangeable if their exchange maps operators to operators and the goal to the goal [1]. Objects whose numeric
+//! Two objects are interchangeable if their exchange maps operators to operators and the goal to the goal \[1\]. Objects whose numeric
 //! variables differ, and tasks with derived variables, are left alone.
 //!
-//! [1] J. Rintanen: Symmetry reduction for SAT representations of transition systems, ICAPS 2003.
+//! \[1\] J. Rintanen: Symmetry reduction for SAT representations of transition systems, ICAPS 2003.
 
 use std::collections::BTreeMap;
 

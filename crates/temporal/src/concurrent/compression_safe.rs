@@ -2,10 +2,10 @@
 //!
 //! Happenings that do not interfere have no order in time, whatever their order in a sequence. An end that interferes with
 //! nothing that can happen while its action is under way can be put before all that, which changes neither the times nor the states before and
-//! after. Coles et al. [1] ask for actions that only add at their end; what can lie in between is asked for here, by facts that hold as
+//! after. Coles et al. \[1\] ask for actions that only add at their end; what can lie in between is asked for here, by facts that hold as
 //! long as the action is under way, so that more actions qualify and none loses a plan.
 //!
-//! [1] A. Coles, M. Fox, K. Halsey, D. Long, A. Smith: Managing concurrency in temporal planning using planner-scheduler
+//! \[1\] A. Coles, M. Fox, K. Halsey, D. Long, A. Smith: Managing concurrency in temporal planning using planner-scheduler
 //! interaction, Artificial Intelligence 173, 2009.
 
 use task::limits::{Interrupted, Limits};

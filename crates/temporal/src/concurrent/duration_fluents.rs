@@ -1,10 +1,10 @@
 //! Durations that the state or the planner decides: a number for each schema that a start sets and an end clears.
 //!
-//! `?duration` is what the expression comes to in the state in which the action starts [1]. So the start assigns it to a number of its own, from
+//! `?duration` is what the expression comes to in the state in which the action starts \[1\]. So the start assigns it to a number of its own, from
 //! which the end and its effects take it, and the clocks. One that the planner chooses is set by an operator that never happens: to
 //! whoever asks what is in reach, it can be anything from 0 on.
 //!
-//! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 5.2.
+//! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 5.2.
 
 use pddl::ast::{Assignment, Comparison, Name};
 use task::lifted::{

@@ -1,9 +1,9 @@
-//! What a happening reads and writes, by the rule of PDDL 2.1 that there are no moving targets [1].
+//! What a happening reads and writes, by the rule of PDDL 2.1 that there are no moving targets \[1\].
 //!
 //! Everything that a condition or an effect mentions counts as read, whether or not it matters in a state: below a quantifier all
 //! instances of an atom, below a derived predicate all that its axioms depend on.
 //!
-//! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.4.
+//! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.4.
 
 use rustc_hash::FxHashMap;
 

@@ -1,12 +1,12 @@
 //! Lazy greedy best-first search over sequences of happenings: a plan soon, then better ones.
 //!
 //! Situations are evaluated when they are taken up, not when they are found, and stand in the order of what was left before them;
-//! happenings that the relaxed plan begins with have a queue of their own [1]. In a third one those come first that follow a situation with a fact
+//! happenings that the relaxed plan begins with have a queue of their own \[1\]. In a third one those come first that follow a situation with a fact
 //! which no other one had before with as many goals to go [2]: a way that the relaxed plan does not see is found there. Where ends come right
 //! after starts in the sequence, far fewer situations are left, and most tasks have a plan among them; times overlap all the same. Of situations with the same state and the same actions under
 //! way only the first is pursued, so that this search may miss plans and proves nothing.
 //!
-//! [1] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010. [2] N. Lipovetzky, H. Geffner: Best-first width search, AAAI 2017.
+//! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010. \[2\] N. Lipovetzky, H. Geffner: Best-first width search, AAAI 2017.
 
 use std::collections::hash_map::Entry;
 use std::hash::{Hash, Hasher};

@@ -3,9 +3,9 @@
 //! A node is a state, the actions under way, and the clocks. Of two nodes with the same state and the same actions under way one
 //! is dropped if whatever can follow it can follow the other one, no later, at no higher cost, and with no less of any
 //! resource. Orders of happenings that do not interfere have the same clocks, so only one of them is pursued. Actions can start at any
-//! time, not only when others end: planners that know no other times are incomplete [1].
+//! time, not only when others end: planners that know no other times are incomplete \[1\].
 //!
-//! [1] W. Cushing, S. Kambhampati, Mausam, D. Weld: When is temporal planning really temporal?, IJCAI 2007.
+//! \[1\] W. Cushing, S. Kambhampati, Mausam, D. Weld: When is temporal planning really temporal?, IJCAI 2007.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

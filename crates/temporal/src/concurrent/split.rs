@@ -1,11 +1,11 @@
 //! Durative actions to their starts and ends: a lifted task whose every schema is a single happening.
 //!
-//! A durative action becomes two instantaneous ones, after Fox and Long's *snap actions* [1], joined by an atom that says
+//! A durative action becomes two instantaneous ones, after Fox and Long's *snap actions* \[1\], joined by an atom that says
 //! that the instance is under way. What must hold over all becomes a third schema, which never happens: its condition is looked
 //! up while the instance is under way. An instance that takes no time is one happening, and nothing holds over all of it. Timed
 //! initial literals become schemas without parameters, one after another.
 //!
-//! [1] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.
+//! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.
 
 use task::compile::is_hidden;
 use task::error::{File, Place};

@@ -5,7 +5,7 @@
 //! an operator breaks are refined by a predicate that the same operator deletes. Checked on ground operators, so that
 //! statically impossible instances do no harm.
 //!
-//! [1] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009, section 5.
+//! \[1\] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009, section 5.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};

@@ -12,7 +12,7 @@ pub(super) fn forbid(forbidden: &mut Vec<ForbiddenCombinations>, slots: &SlotSet
         Some(rule) if rule.combinations.contains(&combination) => {}
         Some(rule) => rule.combinations.push(combination),
         None => {
-            forbidden.push(ForbiddenCombinations { slots: slots.clone(), combinations: vec![combination] })
+            forbidden.push(ForbiddenCombinations { slots: slots.clone(), combinations: vec![combination] });
         }
     }
 }

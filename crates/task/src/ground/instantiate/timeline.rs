@@ -13,8 +13,8 @@
 //! reads, or they set an atom to different values) is not at its time [1, section 8.4; 2, section 2]; one that does not may be, and
 //! then their order does not matter. An event at the time of an end is not part of the interval over which a condition holds.
 //!
-//! [1] M. Fox, D. Long: PDDL2.1: an extension to PDDL for expressing temporal planning domains, JAIR 20, 2003.
-//! [2] S. Edelkamp, J. Hoffmann: PDDL2.2: the language for the classical part of IPC-4, technical report 195, 2004.
+//! \[1\] M. Fox, D. Long: PDDL2.1: an extension to PDDL for expressing temporal planning domains, JAIR 20, 2003.
+//! \[2\] S. Edelkamp, J. Hoffmann: PDDL2.2: the language for the classical part of IPC-4, technical report 195, 2004.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;

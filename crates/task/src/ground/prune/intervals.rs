@@ -1,10 +1,10 @@
 //! Which values numeric variables can have at all: interval reachability.
 //!
-//! The relaxation of Hoffmann's Metric-FF [1] with an upper and a lower end for each variable: an operator whose comparisons
+//! The relaxation of Hoffmann's Metric-FF \[1\] with an upper and a lower end for each variable: an operator whose comparisons
 //! can hold somewhere in the intervals widens those of the variables that it changes. An end that still moves
 //! after a few rounds is taken to be unbounded, so that the iteration ends.
 //!
-//! [1] J. Hoffmann: The Metric-FF planning system, JAIR 20, 2003.
+//! \[1\] J. Hoffmann: The Metric-FF planning system, JAIR 20, 2003.
 
 use num_traits::Zero;
 

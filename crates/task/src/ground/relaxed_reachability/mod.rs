@@ -1,13 +1,13 @@
 //! Relaxed reachability: which instances of each schema can ever become applicable if nothing is ever deleted.
 //!
-//! The lifted task becomes a Datalog program for the rule engine [1]. A schema with slots has one auxiliary
+//! The lifted task becomes a Datalog program for the rule engine \[1\]. A schema with slots has one auxiliary
 //! relation for each slot, which says for which other arguments *some* design fits; the designs themselves never
 //! enter the relation of the schema, so its size does not depend on how many designs there are.
 //!
 //! Static derived predicates are rules of the same program, with stratified negation: the engine evaluates them once,
 //! and from then on they are facts. Derived fluents are relaxed like everything else that changes.
 //!
-//! [1] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009.
+//! \[1\] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009.
 
 mod program;
 mod relaxed;

@@ -2,9 +2,9 @@
 //!
 //! A program is kept as a *dictionary* [1]: the columns that are above 0, and what constraints have left, as expressions over the columns that
 //! are 0. A constraint that does not hold is mended by the dual simplex algorithm, which starts from where the last one has ended; another
-//! objective is minimised by the primal one. Both take the first column that will do, so that they end [2].
+//! objective is minimised by the primal one. Both take the first column that will do, so that they end \[2\].
 //!
-//! [1] V. Chvátal: Linear Programming, 1983. [2] R. Bland: New finite pivoting rules for the simplex method, Mathematics of Operations
+//! \[1\] V. Chvátal: Linear Programming, 1983. \[2\] R. Bland: New finite pivoting rules for the simplex method, Mathematics of Operations
 //! Research 2, 1977.
 
 use num_traits::Zero;

@@ -1,9 +1,9 @@
-//! Sequences that differ only in the order of happenings which do not interfere are one: traces [1].
+//! Sequences that differ only in the order of happenings which do not interfere are one: traces \[1\].
 //!
 //! Such sequences have the same state, and the same linear program but for the names of its columns. Of each trace the sequence is taken that is
 //! first in lexicographic order. An end says which of the runs of its instance ends; these do not change their order.
 //!
-//! [1] A. Mazurkiewicz: TemporalTask program schemes and their interpretations, DAIMI PB 78, Aarhus University, 1977.
+//! \[1\] A. Mazurkiewicz: Concurrent program schemes and their interpretations, DAIMI PB 78, Aarhus University, 1977.
 
 use rustc_hash::FxHashMap;
 use task::task::OperatorId;

@@ -1,11 +1,11 @@
 //! Sequences of happenings whose times and durations are open: what has happened, and a linear program for when and for how long.
 //!
-//! After POPF [1] and COLIN [2]: each start has a column for its time, and one for its duration if the planner chooses that. Numbers of the task
+//! After POPF \[1\] and COLIN [2]: each start has a column for its time, and one for its duration if the planner chooses that. Numbers of the task
 //! are expressions over the durations so far, and so are conditions, each of which is a constraint; happenings that interfere are a
 //! separation apart, in the order of the sequence. The end of an action under way is constrained as soon as what it comes after has happened.
 //! The first column is the makespan.
 //!
-//! [1] A. Coles, A. Coles, M. Fox, D. Long: Forward-chaining partial-order planning, ICAPS 2010. [2] The same: COLIN: planning with
+//! \[1\] A. Coles, A. Coles, M. Fox, D. Long: Forward-chaining partial-order planning, ICAPS 2010. \[2\] The same: COLIN: planning with
 //! continuous linear numeric change, JAIR 44, 2012.
 
 use task::number::{Int, Rational, dense};

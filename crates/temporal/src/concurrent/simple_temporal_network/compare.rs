@@ -1,4 +1,4 @@
-//! SimpleTemporalNetwork against clocks: which are never worse, and what of them still matters.
+//! Dominance between two simple temporal networks, and the time points that still matter.
 
 use task::number::{Int, words};
 

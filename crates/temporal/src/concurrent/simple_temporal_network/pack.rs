@@ -1,4 +1,4 @@
-//! SimpleTemporalNetwork in few bytes and back: each number takes seven bits a byte, as long as it is.
+//! Packs a simple temporal network into bytes and unpacks it; each number takes seven bits per byte.
 
 use smallvec::SmallVec;
 use task::number::{Int, dense};
@@ -143,7 +143,7 @@ impl SimpleTemporalNetwork {
     }
 }
 
-/// SimpleTemporalNetwork of which the head is unpacked.
+/// A packed simple temporal network whose head is unpacked.
 pub(in crate::concurrent) struct PackedStn<'a> {
     pub(in crate::concurrent) clocks: SimpleTemporalNetwork,
     rest: Reader<'a>,
