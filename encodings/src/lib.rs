@@ -1,6 +1,6 @@
 //! SAT encodings of ground planning tasks with the selection of function designs in the same formula, and SAT solvers behind one trait.
 //!
-//! What is absent: PDDL and OWL. Which designs are available is part of the ground task.
+//! Absent: PDDL and OWL. Which designs are available is part of the ground task.
 
 #![allow(missing_docs, reason = "an interface of the workspace; names say what fields hold")]
 #![warn(

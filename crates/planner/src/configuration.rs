@@ -1,19 +1,20 @@
-//! Which design each of several functions gets, where their designs compete for components or share a budget.
+//! Design selection without a plan: assigns designs to functions that compete for components or share budgets.
 //!
-//! The best choice serves as many functions as can be served together; of those choices, it misses the fewest requirements, and of
-//! those it has the greatest sum of utilities. Of equals it is the first: earlier functions get the earlier ones of their designs. All three
-//! together are one integer, the worth, in which one function more outweighs any requirements, and one requirement any utility. A component
-//! that only one design can use is a budget of one.
+//! The best assignment serves as many functions as possible, then violates the fewest requirements, then has the
+//! greatest sum of utilities. Ties go to the earlier designs of earlier functions. The three criteria form one
+//! integer, the worth: one more function outweighs all requirements, and one requirement outweighs all
+//! utilities. A component that only one design can use is a budget of one.
 //!
-//! Function after function, all that has been chosen so far is kept unless something else is at least as good in every respect: of as
-//! much worth, no more of any budget taken. What is left at the end has the optimum among it. A choice is left out, too, if it can no
-//! more keep a budget, whatever comes, or if no completion is worth as much as a choice that is known. For that, the worth of the functions that
-//! follow is bounded by what they are worth at a price for each budget, whatever the prices are \[1\]; good ones are found by subgradients
-//! \[2\] in floating-point numbers, and then rounded, so that the bound is exact.
+//! The algorithm is dynamic programming over the functions with dominance: a partial assignment is dropped if
+//! another one has at least its worth and uses no more of any budget. It is also dropped if no completion keeps
+//! a budget, or if its upper bound does not exceed the best known worth. The upper bound is a Lagrangian
+//! relaxation of the budgets, valid for any multipliers \[1\]. Subgradients find good multipliers in
+//! floating-point numbers \[2\]; they are rounded, so that the bound is exact.
 //!
-//! - \[1\] H. Everett: Generalized Lagrange Multiplier Method for Solving Problems of Optimum Allocation of Resources, Operations
-//!   Research 11(3), 1963.
-//! - \[2\] M. Held, R. M. Karp: The Traveling-Salesman Problem and Minimum Spanning Trees: Part II, Mathematical Programming 1, 1971.
+//! - \[1\] H. Everett: Generalized Lagrange Multiplier Method for Solving Problems of Optimum Allocation of
+//!   Resources, Operations Research 11(3), 1963.
+//! - \[2\] M. Held, R. M. Karp: The Traveling-Salesman Problem and Minimum Spanning Trees: Part II, Mathematical
+//!   Programming 1, 1971.
 
 use std::collections::BTreeSet;
 

@@ -1,6 +1,6 @@
 //! Proved optimal plans of PDDL tasks: a portfolio of heuristic search and SAT, lists of objectives, alternatives, replanning, certificates.
 //!
-//! What is absent: OWL. Availability of designs arrives as facts of the problem.
+//! Absent: OWL. Availability of designs arrives as facts of the problem.
 
 #![warn(
     clippy::cast_possible_truncation,

@@ -1,4 +1,4 @@
-//! The front door: a domain and a problem to a plan, in one call.
+//! The builder `Planner`: from a domain and a problem to a plan in one call.
 
 use std::fmt;
 use std::ops::ControlFlow;

@@ -1,4 +1,4 @@
-//! What the codes of messages mean that this crate gives.
+//! Error codes of this crate with meaning, cause and remedy.
 
 /// Codes in their order, each with what it means, what causes it, and what to do.
 pub const CODES: &[[&str; 4]] = &[

@@ -1,4 +1,4 @@
-//! What everything after grounding shares.
+//! The ground task with its limits, shared by all stages after grounding.
 
 use crate::limits::Limits;
 use crate::number::Int;

@@ -1,4 +1,4 @@
-//! What can go wrong between a checked PDDL task and its ground task, each cause with a stable code.
+//! Errors between a checked PDDL task and its ground task, each with a stable code.
 
 use crate::limits::Interrupted;
 use pddl::ast::Span;

@@ -2,7 +2,7 @@
 //!
 //! Modules in the order of the pipeline: syntax tree (crate `pddl`) → `normalize` → `lifted` → `ground` → `task` → `plan`.
 //!
-//! What is absent: search, SAT and OWL. Availability of designs arrives as facts of the problem.
+//! Absent: search, SAT and OWL. Availability of designs arrives as facts of the problem.
 
 #![allow(missing_docs, reason = "an interface of the workspace; names say what fields hold")]
 #![warn(

@@ -1,8 +1,8 @@
-//! When a long search has to stop: a deadline, and a flag that Ctrl-C sets.
+//! Limits of a computation: a deadline, memory, and a flag that Ctrl-C sets.
 //!
-//! What takes long goes through its items by [`Limits::watch`], or beats a [`LimitPoll`] each time round. Both yield [`Interrupted`] when
-//! a limit is reached, which has to be handed on (`?`): a function that was cut short has no result that could be taken for an
-//! answer. Where to stop is thus seen at each loop, and that the callers stop, too, is checked by the compiler.
+//! Long loops iterate through [`Limits::watch`] or call [`LimitPoll::beat`]. Both return [`Interrupted`] at a
+//! limit, which callers propagate with `?`: an interrupted function has no result that could be mistaken for an
+//! answer. So the compiler checks that every caller stops.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -107,7 +107,7 @@ impl Limits {
     /// An error once a limit is reached.
     ///
     /// # Errors
-    /// When a limit is reached.
+    /// Fails when a limit is reached.
     pub fn check(&self) -> Result<(), Interrupted> {
         if self.reached() { Err(Interrupted) } else { Ok(()) }
     }
@@ -161,7 +161,7 @@ impl LimitPoll<'_> {
     /// An error once a limit is reached.
     ///
     /// # Errors
-    /// When a limit is reached.
+    /// Fails when a limit is reached.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "above 0 where it is taken from; a stride is at most twice the longest"

@@ -1,4 +1,4 @@
-//! Many short lists of numbers in one piece of memory.
+//! A list of lists of numbers in one allocation.
 
 use crate::number::dense;
 

@@ -1,4 +1,4 @@
-//! Sizes from which on a search uses what pays for large tasks only.
+//! Task sizes at which parts of a search begin.
 
 /// Sizes at which parts of the search begin that small tasks do without. Answers do not depend on them: tests lower them, so that small
 /// tasks, of which the answer is known by brute force, reach every pruning.

@@ -1,4 +1,4 @@
-//! Words that stand for the variants of an enumeration, in text and in documents.
+//! Names of the variants of enumerations, in text and in documents.
 
 /// A word that stands for none of the variants.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

@@ -1,6 +1,6 @@
 //! Search for concurrent plans: A* over happenings with a simple temporal network.
 //!
-//! What is absent: SAT and OWL.
+//! Absent: SAT and OWL.
 
 #![warn(
     clippy::cast_possible_truncation,

@@ -115,7 +115,7 @@ pub fn depot(seed: u64) -> (String, String) {
 /// The ground task of a domain and a problem in PDDL.
 ///
 /// # Panics
-/// When the text is not a task.
+/// Panics when the text is not a task.
 pub fn ground_text((domain, problem): (String, String)) -> Task {
     let (domain, problem, _) = read(&Source::new("d", domain), &Source::new("p", problem)).expect("PDDL");
     let config = GroundConfig { solves: vec![pddl::ast::Name::new("solves")], ..GroundConfig::default() };
@@ -125,7 +125,7 @@ pub fn ground_text((domain, problem): (String, String)) -> Task {
 /// Successors of a state, with the cost of each step.
 ///
 /// # Panics
-/// When numbers overflow.
+/// Panics when numbers overflow.
 pub fn successors(task: &Task, state: &State) -> Vec<(State, Int)> {
     let mut all = Vec::new();
     for operator in &task.operators {

@@ -1,4 +1,4 @@
-//! By what the numbers of a ground task become integers, where they are not yet.
+//! Scales that make the numbers of a ground task integers.
 
 use certificate::format::Integer;
 use num_bigint::BigInt;

@@ -1,8 +1,8 @@
-//! What the search leaves behind for the checker: the ground task, why no plan is cheaper, and a refutation.
+//! Writes certificates: the ground task, the argument that no plan is cheaper, and a refutation.
 //!
-//! The forms are those of crate `certificate`, which checks them and links nothing of this one. `write` makes the argument from a
-//! search that has ended, `refute` has the checker's formula refuted by a SAT solver, and `trim` keeps of the refutation \[1\] what
-//! matters, with what each clause follows from.
+//! The formats are those of crate `certificate`, which checks them and links nothing of this crate. `write`
+//! derives the argument from an exhausted search, `refute` refutes the checker's formula with a SAT solver, and
+//! `trim` reduces the refutation \[1\] to the clauses that matter, with hints.
 //!
 //! \[1\] M. Heule, W. Hunt, N. Wetzler: Trimming while checking clausal proofs, FMCAD 2013 (DRUP).
 

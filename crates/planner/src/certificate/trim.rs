@@ -1,10 +1,10 @@
-//! Makes a short proof with hints of a solver's long one in DRAT.
+//! Trims a DRAT proof of a solver to a short proof with hints.
 //!
-//! The solver's clauses are gone through as they come [1]: each follows from those before by unit propagation, and the clauses
-//! that this goes through become its hints. What is settled for good becomes a clause of its own, so that hints are
-//! short. In the end, those clauses are kept that the empty clause rests on.
+//! Each clause of the solver follows from the clauses before by unit propagation \[1\]; the clauses used in the
+//! propagation become its hints. Literals that are implied permanently become unit clauses, which keeps hints
+//! short. Only the clauses on which the empty clause depends are kept.
 //!
-//! That a clause follows is checked once more by crate `certificate`, which shares nothing with this.
+//! Crate `certificate`, which shares no code with this file, checks the result again.
 //!
 //! \[1\] L. Cruz-Filipe, M. Heule, W. Hunt, M. Kaufmann, P. Schneider-Kamp: Efficient certified RAT verification, CADE 2017.
 

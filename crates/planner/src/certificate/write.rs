@@ -1,4 +1,4 @@
-//! A ground task and a search that has ended to a certificate.
+//! A ground task and an exhausted search to a certificate.
 
 use std::hash::Hash;
 use std::sync::Arc;

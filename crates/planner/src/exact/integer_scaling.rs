@@ -1,4 +1,4 @@
-//! The same task in other units: all constants become integers, as sums and comparisons of these are quick.
+//! Scales the constants of a task to integers, whose sums and comparisons are fast.
 
 use std::convert::Infallible;
 

@@ -1,8 +1,8 @@
-//! Tasks whose numbers do not fit integers of a fixed size: planned in exact rationals, by search alone.
+//! Tasks whose numbers do not fit integers of a fixed size: search in exact rationals.
 //!
-//! No scale makes integers of what an action multiplies by one half, and a common denominator of many measured numbers can be
-//! longer than any machine integer. The search needs no integers: it adds and compares. Its estimates are those of the same
-//! task without numbers, whose costs are rounded down to integers, so that no plan is cheaper than estimated.
+//! No scale makes the numbers integers if an action multiplies by one half, and a common denominator of many
+//! measured numbers can exceed any machine integer. The search needs only addition and comparison. Its heuristic
+//! values come from the task without numeric variables, with costs rounded down to integers, and stay admissible.
 
 mod integer_scaling;
 

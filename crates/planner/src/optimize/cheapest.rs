@@ -1,4 +1,4 @@
-//! The way to a cheapest plan that a task asks for.
+//! Chooses the algorithm that finds a cheapest plan of a task.
 
 use task::plan::solution::{Improvement, Proof, Solution, Status};
 use task::task::Task;

@@ -1,4 +1,4 @@
-//! What the user asks of the optimizer.
+//! Configuration of the optimizer.
 
 use encodings::encode::StepSemantics;
 use encodings::sat::Backend;

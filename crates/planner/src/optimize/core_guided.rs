@@ -1,11 +1,12 @@
-//! A lower bound that rises, contradiction by contradiction, until a plan costs as much.
+//! Core-guided optimisation: unsatisfiable cores raise the lower bound until a plan meets it (OLL \[1, 2\]).
 //!
-//! What a plan pays beyond the lower bound is a sum over literals: each, if true, adds its weight. All of them are assumed to be
-//! false. The solver answers with a plan, which then is a cheapest one, or with a core: some of them, of which one at least is
-//! true in every plan. So every plan pays the least weight in the core, which is taken from each weight in it. What is left of the
-//! sum is that more than one of them may be true, more than two, and so on: literals of a totalizer, with that weight, one of
-//! which is added for each core that has the one before it (OLL \[1, 2\]). Heavy literals come first (stratification \[3\]), so that plans
-//! are found on the way; a literal whose weight alone makes a plan as dear as the best known is false for good \[3\].
+//! The cost of a plan above the lower bound is a weighted sum of literals, all of which are assumed to be false.
+//! The solver returns either a plan, which is then a cheapest one, or a core: at least one of its literals is
+//! true in every plan. So the lower bound rises by the least weight in the core, which is subtracted from each of
+//! its weights. The remaining cost, that more than one of them is true, more than two, and so on, is expressed by
+//! the literals of a totalizer with that weight, added one by one. Heavy literals come first (stratification
+//! \[3\]), so that plans are found early. A literal whose weight alone reaches the incumbent's cost is fixed to
+//! false \[3\].
 //!
 //! \[1\] B. Andres, B. Kaufmann, O. Matheis, T. Schaub: Unsatisfiability-based optimization in clasp, ICLP 2012.
 //! \[2\] A. Morgado, C. Dodaro, J. Marques-Silva: Core-guided `MaxSAT` with soft cardinality constraints, CP 2014.

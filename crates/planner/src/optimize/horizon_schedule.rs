@@ -1,4 +1,4 @@
-//! Any plan, with few steps.
+//! A first plan by SAT: formulas with growing horizons.
 
 use std::time::Instant;
 

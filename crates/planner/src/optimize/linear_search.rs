@@ -1,4 +1,4 @@
-//! Cheaper and cheaper plans from one solver, until there is none.
+//! Linear search SAT-UNSAT: one solver finds cheaper and cheaper plans until the formula is unsatisfiable.
 
 use encodings::encode::Encoding;
 use encodings::sat::Answer;

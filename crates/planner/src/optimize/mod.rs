@@ -1,10 +1,10 @@
-//! From a ground task to a cheapest plan, and to the reason why there is no cheaper one.
+//! From a ground task to a cheapest plan, and to the proof that no plan is cheaper.
 //!
-//! A quick search yields a first plan. Then come formulas "a plan of at most B steps that costs at most L", where B is the step
-//! bound for L: by dynamic programming over projections, no plan that costs so little has more steps. L begins near the lower bound,
-//! because the formula is small there, and what is unsatisfiable raises that bound; a formula that has a plan yields a cheapest
-//! one, by one of two strategies. Only then is the answer called optimal. Where no step bound exists (free cycles), the search's own
-//! exhaustion may serve; otherwise the answer is a plan that is not proved optimal.
+//! Search yields a first plan. Then formulas "a plan of at most B steps that costs at most L" are solved, where B
+//! is the step bound for L: dynamic programming over projections shows that no plan of this cost has more steps.
+//! L starts near the lower bound, where the formula is small. An unsatisfiable formula raises the lower bound; a
+//! satisfiable one is optimised by one of two strategies. Only then is the answer optimal. If no step bound
+//! exists (cycles without cost), exhaustive search can prove optimality; otherwise the plan is not proved.
 
 mod cheapest;
 mod config;

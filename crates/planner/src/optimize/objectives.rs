@@ -1,11 +1,11 @@
-//! Several objectives: one after the other, or against each other.
+//! Several objectives: lexicographic, or as a Pareto front.
 //!
-//! What an earlier objective has come to is a budget for the later ones: a numeric variable that every operator uses up by its
-//! cost. So each question is an ordinary task with one objective, and each answer has an ordinary proof. The Pareto front is
-//! enumerated by the ε-constraint method [1]: best by A, then among those best by B, then strictly better by B, and so on.
+//! The value of an earlier objective becomes a budget for the later ones: a numeric variable that each operator
+//! reduces by its cost. Each query is then a task with one objective and an ordinary proof. The Pareto front is
+//! enumerated by the ε-constraint method \[1\]: best by A, then best by B among those, then strictly better by B.
 //!
-//! \[1\] Y. Haimes, L. Lasdon, D. Wismer: On a bicriterion formulation of the problems of integrated system identification
-//! and system optimization, IEEE Trans. SMC 1(3), 1971.
+//! \[1\] Y. Haimes, L. Lasdon, D. Wismer: On a bicriterion formulation of the problems of integrated system
+//! identification and system optimization, IEEE Trans. SMC 1(3), 1971.
 
 use task::context::Context;
 use task::number::{Int, Rational};

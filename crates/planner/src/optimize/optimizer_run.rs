@@ -1,4 +1,4 @@
-//! One run of the optimizer: what it asks the SAT solver, what it has heard, and how it ends.
+//! State of one run of the optimizer: SAT queries, incumbent, bounds, and the resulting solution.
 
 use std::cell::OnceCell;
 use std::time::Instant;

@@ -1,8 +1,7 @@
-//! Search and the SAT solver in turns: a plan soon, a bound that rises, and a proof by whichever comes to it first.
+//! Portfolio of exact search, satisficing search and SAT in turns.
 //!
-//! In each round, the exact search, the search for some plan, and formulas get about the same work, twice as much as in the round
-//! before. Work is counted in what was looked at, and not in time, so that the same task has the same answer. What one of
-//! them finds limits the others.
+//! In each round all three get about the same work, twice as much as in the round before. Work is counted in
+//! units, not in time, so results are deterministic. Plans and bounds of one engine limit the others.
 
 use std::time::Instant;
 

@@ -1,4 +1,4 @@
-//! A plan to a cheapest one by formulas, stage by stage.
+//! Optimality proofs by formulas, one per stage.
 
 use std::time::Instant;
 

@@ -1,4 +1,4 @@
-//! How much work the SAT solver may spend.
+//! Conflict budgets of the SAT solver.
 
 /// In a formula with so many clauses a conflict takes twice as long as in a small one, about.
 const LARGE: usize = 50_000;

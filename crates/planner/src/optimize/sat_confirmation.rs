@@ -1,4 +1,4 @@
-//! What is proved without the SAT solver is confirmed by it, where that does not take long.
+//! Confirms results of the search with the SAT solver where that is quick.
 
 use std::time::Instant;
 

@@ -1,4 +1,4 @@
-//! A first plan, improved to a cheapest one.
+//! Improves a first plan to a cheapest one.
 
 use std::time::Instant;
 

@@ -1,4 +1,4 @@
-//! The bounded reading of a metric that actions improve: fewest steps first, then the metric.
+//! Bounded reading of a metric without a best value: fewest steps first, then the metric.
 
 use search::bounds::Bounds;
 use task::context::Context;

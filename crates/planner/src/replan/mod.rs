@@ -1,17 +1,17 @@
-//! Planning again and again for one mission, from what does not change: the live planner of an adaptation loop.
+//! Incremental replanning for one mission: the planner of an adaptation loop.
 //!
-//! What is available and the state are assumptions here, not facts \[1\]: the mission is ground once, with every design available and
-//! without conclusions from numbers. A problem is then a state of that task, see [`state_mapping`], and a set of available
-//! designs is a part of its operators, see [`restrict_designs`]. What depends on that set alone (operators, projections with their costs to
-//! go, designs that none dominates) is kept for the sets that were met last, since components that fail also recover. What is
-//! left for each problem is the search, whose estimates are exact in projections, and the choice among equal plans. Its answers are
-//! those of grounding and optimizing anew, only that nothing is proved a second time by SAT.
+//! Availability and state are assumptions, not facts \[1\]. The mission is grounded once, with every design
+//! available and without conclusions from numbers. A problem is then a state of that task (see
+//! [`state_mapping`]), and a set of available designs restricts its operators (see [`restrict_designs`]). Data
+//! that depend on that set alone (operators, pattern databases, undominated designs) are cached for recent sets,
+//! since failed components often recover. The remaining work per problem is the search, whose heuristic is exact
+//! in the projections, and the tie-breaking. The answers equal those of grounding and optimising from scratch,
+//! except that SAT does not prove them a second time.
 //!
-//! The old plan, where it is a plan still, limits what the search looks at, and is the answer if time is up before there is a
-//! better one.
+//! The previous plan, if it is still valid, is an upper bound, and the answer if time runs out first.
 //!
-//! Why no SAT solver is kept with assumptions: on maps of 50 to 200 places the search ends within milliseconds, and the same proof
-//! takes a solver seconds; what it would have learnt of one cost limit says nothing about the next.
+//! No SAT solver is kept with assumptions: on maps of 50 to 200 places the search takes milliseconds and a SAT
+//! proof seconds, and clauses learnt for one cost limit do not help with the next.
 //!
 //! - \[1\] N. Eén, N. Sörensson: Temporal induction by incremental SAT solving, ENTCS 89(4), 2003.
 

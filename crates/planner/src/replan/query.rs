@@ -1,4 +1,4 @@
-//! What is asked of a replanner, and what it answers.
+//! Queries and answers of a replanner.
 
 use num_rational::BigRational;
 

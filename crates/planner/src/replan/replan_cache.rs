@@ -1,4 +1,4 @@
-//! What is ground once: the task with everything available, and with a part of it.
+//! The ground task with all designs, and cached restrictions to sets of available designs.
 
 use search::bounds::Bounds;
 use search::search::SearchTask;

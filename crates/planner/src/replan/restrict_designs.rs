@@ -1,8 +1,8 @@
-//! A task with all designs to the task with those that are available.
+//! Restricts a task with all designs to the available ones.
 //!
-//! Every operator with a design that is needed and not available goes; where designs are still open, tables and exclusions
-//! keep the rows of what is left. That is the task which grounding would make of the problem with these designs,
-//! apart from operators that nothing leads to any more.
+//! Operators that require an unavailable design are removed. In tables and exclusions of open slots only the
+//! rows of available designs remain. The result is the task that grounding would make of the problem with these
+//! designs, apart from operators that become unreachable.
 
 use std::sync::Arc;
 

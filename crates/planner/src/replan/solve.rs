@@ -1,8 +1,9 @@
-//! A situation to a best plan: a search from each first step that may lead to one, then the choice among equal plans.
+//! Optimal replanning from a situation: one search per possible first step, then tie-breaking.
 //!
-//! The search from the most promising first step comes first; one whose lower bound is above the best metric so far is not
-//! searched from. Equal plans are chosen from as without first steps: fewest steps, fewest reconfigurations, model order. A plan to
-//! stay close to is kept if it is as good as any; otherwise, of plans with fewest steps, one with most of its steps.
+//! The most promising first step is searched first; a step whose lower bound exceeds the best metric is skipped.
+//! Ties are broken as without first steps: fewest steps, fewest reconfigurations, model order. A plan to stay
+//! close to is kept if it is optimal; otherwise, among plans with the fewest steps, one that shares most of its
+//! steps is chosen.
 
 use num_rational::BigRational;
 use rustc_hash::FxHashSet;

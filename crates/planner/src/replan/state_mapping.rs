@@ -1,9 +1,9 @@
-//! A problem to a state of a task that was ground for another problem, if that is the same task.
+//! Maps a problem to a state of a task that was grounded for another problem, if both have the same operators.
 //!
-//! Two problems of one domain lead to the same operators if they differ in three respects only: in what is available, in
-//! numbers that actions change, and in facts that actions change and that the task has variables for, of which none holds that the
-//! relaxed reachability of the task has not met, and no two that its operators take to exclude each other. For then all that is reachable from the one state is among what is reachable
-//! from the other. Facts and values that nothing reads may differ at will. Everything else must be the same.
+//! Two problems of one domain have the same operators if they differ in three respects only: availability,
+//! numbers that actions change, and facts that actions change and for which the task has variables. The facts
+//! must be relaxed-reachable in the task and must not violate its mutex groups. Everything reachable from the
+//! new state is then reachable from the old one. Facts and values that nothing reads may differ freely.
 
 use num_rational::BigRational;
 use num_traits::ToPrimitive;

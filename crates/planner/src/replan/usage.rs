@@ -1,7 +1,6 @@
-//! A domain to what its symbols are used for: which conditions read them, which effects change them, and which parameters must be
-//! available.
+//! Usage of the symbols of a domain: read by conditions, changed by effects, or required to be available.
 //!
-//! Only a syntactic look: a symbol that is read somewhere counts as read everywhere.
+//! The analysis is syntactic: a symbol that is read somewhere counts as read everywhere.
 
 use rustc_hash::FxHashSet;
 

@@ -1,9 +1,9 @@
-//! Costs divided among projections, so that their estimates add up.
+//! Saturated cost partitioning \[1\] over projections.
 //!
-//! Saturated cost partitioning [1]: projections take their share of the operators' costs one after the other, each only as
-//! much as its estimates need; what is left is for the next. The order decides how much that is, so that several are tried. The
-//! sum is consistent, as each estimate is for the costs it took. What one projection cannot see at all, such as goals of
-//! another robot, or changes of designs off its pattern, another one counts.
+//! Projections take their share of the operators' costs one after another: as much as their heuristic values
+//! need. The remaining costs go to the next projection. The result depends on the order, so several orders are
+//! tried. The sum of the values is consistent, since each of them is for its own costs. It counts costs that a
+//! single projection cannot see, such as goals of another robot or design changes outside its pattern.
 //!
 //! \[1\] J. Seipp, T. Keller, M. Helmert: Saturated cost partitioning for optimal classical planning, JAIR 67, 2020.
 

@@ -1,9 +1,9 @@
-//! A task without what is deleted: rules by which facts follow from facts, each at the cost of an operator.
+//! Delete relaxation \[1\] of a task: rules that derive facts from facts, each at the cost of an operator.
 //!
-//! The delete relaxation \[1\]. An operator is one rule for what it sets in any case, and one for each conditional effect; all have
-//! the operator's least cost, which is paid once. Rules of derived variables, and what makes one literal of a clause hold, cost
-//! nothing. Numbers are left out, and derived variables may be false at any time: the relaxation of a task allows all that the task
-//! does.
+//! An operator becomes one rule for its unconditional effects and one rule per conditional effect. All of them
+//! have the operator's least cost, which is paid once. Axioms and the literals of clauses are rules without
+//! cost. Numbers are ignored, and derived variables may be false at any time, so the relaxation admits every
+//! plan of the task.
 //!
 //! \[1\] B. Bonet, H. Geffner: Planning as heuristic search, Artificial Intelligence 129, 2001.
 

@@ -1,9 +1,9 @@
-//! A lower bound by landmarks: what every plan has to pay at some cut between the state and the goal, cut after cut.
+//! LM-cut \[1\]: an admissible heuristic that sums the costs of disjunctive action landmarks.
 //!
-//! LM-cut \[1\]. The estimate h^max says from which fact each rule of the relaxed task has its value. The rules that lead from what is
-//! reached before into what leads to the goal for nothing are a landmark: every plan has one of their operators. The least of
-//! their costs is counted, and taken off all of them, until the goal costs nothing. An operator with conditional effects is several
-//! rules, and pays once for all of them, so that no cost is counted twice.
+//! h^max selects the supporting fact of each rule of the delete relaxation. The rules that lead from the facts
+//! before the cut into the zone from which the goal costs nothing form a landmark: every plan uses one of their
+//! operators. The least of their costs is counted and subtracted from all of them, until the goal costs
+//! nothing. The rules of an operator with conditional effects share one cost, so nothing is counted twice.
 //!
 //! \[1\] M. Helmert, C. Domshlak: Landmarks, critical paths and abstractions: what's the difference anyway?, ICAPS 2009.
 

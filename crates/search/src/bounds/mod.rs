@@ -1,9 +1,9 @@
-//! Lower bounds on the cost of plans, and on the number of steps that a cheaper plan can have.
+//! Admissible heuristics, and upper bounds on the number of steps of a cheaper plan.
 //!
-//! A projection of the task to a few finite-domain variables is small enough to be solved outright: Dijkstra from its
-//! goal states gives a consistent, admissible estimate \[1\]; dynamic programming over (step, abstract state) says which
-//! operators can still be at which step of a plan cheaper than the best known one, and beyond which step there is none. Shares
-//! of the costs make estimates of several projections add up.
+//! A projection to a few finite-domain variables is solved exactly. Dijkstra's algorithm from the abstract goal
+//! states gives a consistent, admissible heuristic: a pattern database \[1\]. Dynamic programming over steps and
+//! abstract states gives the operators that can occur at each step of a plan cheaper than the best known one,
+//! and the number of steps beyond which there is no such plan. Cost partitioning adds up several projections.
 //!
 //! \[1\] S. Edelkamp: Planning with pattern databases, ECP 2001.
 
@@ -58,7 +58,7 @@ impl Bounds {
     /// Lower bounds of a task, by projections and cost partitioning.
     ///
     /// # Errors
-    /// When a limit is reached.
+    /// Fails when a limit is reached.
     pub fn new(context: Context<'_>) -> Result<Self, Interrupted> {
         let _span = info_span!("bounds").entered();
         let mut bounds = Self::of_projections(context)?;
@@ -75,7 +75,7 @@ impl Bounds {
     /// Bounds that each rest on one projection.
     ///
     /// # Errors
-    /// When a limit is reached.
+    /// Fails when a limit is reached.
     pub fn of_projections(context: Context<'_>) -> Result<Self, Interrupted> {
         let task = context.task;
         let basic = |variable: &VariableId| variable.index() < task.basic;
@@ -110,7 +110,7 @@ impl Bounds {
     /// Bounds that say nothing: the projection to no variable at all.
     ///
     /// # Errors
-    /// When a limit is reached.
+    /// Fails when a limit is reached.
     pub fn trivial(context: Context<'_>) -> Result<Self, Interrupted> {
         let projections = vec![Projection::new(context, Vec::new())?];
         Ok(Self { projections, resources: Vec::new(), partitions: Vec::new(), further: Vec::new() })
@@ -148,7 +148,7 @@ impl Bounds {
     /// What is known of plans with cost at most `limit` and at most `horizon` steps, where either is given.
     ///
     /// # Errors
-    /// When a limit is reached.
+    /// Fails when a limit is reached.
     pub fn window(
         &self,
         context: Context<'_>,

@@ -1,4 +1,4 @@
-//! A task seen through a few of its finite-domain variables.
+//! Pattern database: the projection of a task to a few finite-domain variables, with goal distances.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

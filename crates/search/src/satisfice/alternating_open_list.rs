@@ -1,7 +1,7 @@
-//! What is still to be tried: several lists that take turns, each the most promising first.
+//! Alternating open list: several lists in turns, each sorted by its heuristic value.
 //!
-//! All operators that are applicable in a state have its value, as states are looked at only when it is their turn \[1\]; so a
-//! list holds states, each with its operators. Lists of preferred operators get more turns when there is progress.
+//! The search is lazy: the operators applicable in a state inherit its value \[1\]. A list therefore holds states,
+//! each with its operators. Lists of preferred operators are boosted after progress.
 //!
 //! \[1\] M. Helmert: The Fast Downward planning system, JAIR 26, 2006, section 5.
 

@@ -1,4 +1,4 @@
-//! A queue of numbers by small costs, the cheapest first.
+//! Bucket queue: numbers sorted by small integer costs.
 
 /// Costs from here on are kept together, in no order but that of their costs once it is their turn.
 const BUCKET_COUNT: usize = 1 << 16;

@@ -1,9 +1,9 @@
-//! Landmarks: what has to hold at some time in every plan, and in which order.
+//! Landmarks and their orders, found backwards from the goal \[1\].
 //!
-//! Found backwards from the goal, as Richter and Westphal do [1]: what all possible first achievers of a landmark require is a landmark,
-//! needed right before it; a fact of one predicate that each of them requires, another one for each, is a landmark as a
-//! disjunction. What cannot be reached without a landmark comes after it. A landmark that would have to be given up for another one is to
-//! come after that (reasonable orders); these orders only guide.
+//! Each condition that all possible first achievers of a landmark share is a landmark, ordered greedily-necessary
+//! before it. If each achiever requires a fact of one predicate, the disjunction of these facts is a landmark.
+//! Facts that are unreachable without a landmark come after it. Reasonable orders delay a landmark that would
+//! have to be given up for another one; they only guide the search.
 //!
 //! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 4.
 

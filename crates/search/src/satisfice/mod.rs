@@ -1,10 +1,11 @@
-//! A plan soon: relaxed plans and landmarks guide a lazy greedy search, and then weighted A\*, as in LAMA \[1\].
+//! Satisficing search: lazy greedy best-first search, then weighted A\*, guided by the FF heuristic and landmarks, as in LAMA \[1\].
 //!
-//! `delete_relaxation` is the task without deletes, `ff_heuristic` computes relaxed plans, `landmarks` finds landmarks, and `landmark_status` tracks which
-//! of them a state has reached. `search` is the greedy search with an `alternating_open_list` over the states of a `store`.
+//! `delete_relaxation` is the task without deletes, `ff_heuristic` computes relaxed plans, `landmarks` finds
+//! landmarks, and `landmark_status` tracks which of them a path has reached. `search` is the search with an
+//! `alternating_open_list` over the states of a `store`.
 //!
-//! Nothing that is found here rests on an estimate: a plan is executed by whoever takes it, and only a search that has been
-//! everywhere without one says that there is none.
+//! Heuristic values never serve as proofs: callers execute each plan, and only an exhausted search reports that
+//! there is no plan.
 //!
 //! \[1\] S. Richter, M. Westphal: The LAMA planner: guiding cost-based anytime planning with landmarks, JAIR 39, 2010.
 
@@ -69,7 +70,7 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
     /// None if an operator has too many combinations of designs.
     ///
     /// # Errors
-    /// When a limit is reached.
+    /// Fails when a limit is reached.
     pub fn new(context: Context<'a, N>) -> Result<Option<Self>, Interrupted> {
         let Some(known) = SearchContext::new(context)? else { return Ok(None) };
         Ok(Some(Self {
@@ -91,7 +92,7 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
     /// task.
     ///
     /// # Errors
-    /// When a limit is reached.
+    /// Fails when a limit is reached.
     pub fn run(&mut self, limit: Option<&N>, work: u64) -> Result<StepResult<N>, Interrupted> {
         let Some((priced, weight)) = SEARCH_SEQUENCE.get(self.phase).copied() else {
             return Ok(StepResult::Ended);

@@ -1,8 +1,9 @@
-//! Lazy greedy search with preferred operators, then weighted A\*: a plan soon, and better ones.
+//! Lazy greedy best-first search with preferred operators, then weighted A\* with decreasing weights.
 //!
-//! A state is looked at when it is its turn, and its successors are noted with its own estimates [1]: the relaxed plan's cost and the
-//! number of landmarks still to come, in turns. The first search counts steps, the next ones costs, with smaller and smaller
-//! weights on the estimates \[2\]. A search that ends without a plan has been everywhere, but where relaxed plans do not exist.
+//! A state is evaluated when it is expanded, and its successors are queued with its values \[1\]: the cost of the
+//! relaxed plan and the number of required landmarks, in turns. The first search counts steps, the next ones
+//! costs, with smaller and smaller weights \[2\]. A search that ends without a plan is exhaustive, except for
+//! states without a relaxed plan.
 //!
 //! - \[1\] M. Helmert: The Fast Downward planning system, JAIR 26, 2006, section 5.
 //! - \[2\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 6.

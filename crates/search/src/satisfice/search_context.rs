@@ -1,4 +1,4 @@
-//! What the searches for a plan soon share: what is known of a task, and room for looking at its states.
+//! Data that the satisficing searches of a task share.
 
 use num_traits::ToPrimitive as _;
 use task::context::Context;

@@ -1,4 +1,4 @@
-//! States, packed, each of them once.
+//! Packed states of a satisficing search, each stored once.
 
 use std::hash::{BuildHasher as _, Hash as _, Hasher as _};
 

@@ -1,14 +1,15 @@
-//! A* with Pareto dominance over numeric variables. Among the cheapest plans it finds one with fewest steps.
+//! A\* with Pareto dominance over numeric variables. Among the cheapest plans it returns one with the fewest steps.
 //!
-//! States that agree on all finite-domain variables are compared by cost and by numeric variables; where a higher value
-//! never hurts (a battery), a state that costs no less and has no more of anything is dropped. That is the label-setting
-//! search of resource-constrained shortest paths \[1\]. If it ends before its limits, its answer is exact.
+//! States with equal finite-domain variables are compared by cost and by numeric variables. Where a higher
+//! value is never worse (a battery), a state is dominated by another one that costs no more and has at least
+//! as much of everything. This is label setting for resource-constrained shortest paths \[1\]. The answer is
+//! exact if the search ends before its limits.
 //!
-//! Of states with equal sums of cost and estimate, those come first from which fewer steps can lead to the goal, and of these the
-//! ones that are further: a plan that is found is cheapest once nothing that is left can be cheaper, or as cheap with fewer steps.
+//! The open list is sorted by cost plus heuristic value. Ties are broken by the fewest estimated steps to the
+//! goal, then by depth. A plan is optimal once no open node can be cheaper, or as cheap with fewer steps.
 //!
-//! \[1\] M. Desrochers, F. Soumis: A generalized permanent labelling algorithm for the shortest path problem with time
-//! windows, INFOR 26(3), 1988.
+//! \[1\] M. Desrochers, F. Soumis: A generalized permanent labelling algorithm for the shortest path problem
+//! with time windows, INFOR 26(3), 1988.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! The designs worth choosing for an operator.
+//! The combinations of designs of an operator that no other combination dominates.
 
 use std::collections::hash_map::Entry;
 
@@ -33,7 +33,7 @@ pub type CostedCombinations<N> = Vec<(Vec<u32>, N)>;
 /// them is dominated in all combinations that extend it: k functions of m designs cost no m^k comparisons.
 ///
 /// # Errors
-/// When a limit is reached.
+/// Fails when a limit is reached.
 pub fn pareto_optimal_combinations<N: TaskNumber>(
     operator: &Operator<N>,
     monotone: bool,

@@ -1,11 +1,13 @@
-//! Pairs of facts that no state on the way from the initial state to the goal has.
+//! h² mutexes: pairs of facts that no state on a path from the initial state to the goal contains.
 //!
-//! What h² \[1\] says forwards, of pairs that no reachable state has, and backwards, of pairs that no state has from which the goal can be reached [2]:
-//! where a robot paints itself in, say. An operator before or after which such a pair holds is of no use. Numbers, clauses, and derived facts are left out, and what
-//! happens only under a condition may happen or not: more pairs are taken to be possible than are.
+//! Forward h² \[1\] finds pairs that no reachable state contains. Backward h² \[2\] finds pairs that no state contains
+//! from which the goal is reachable, so it detects dead ends. An operator is useless if such a pair holds
+//! before or after it. Numeric conditions, clauses and derived facts are ignored, and conditional effects may
+//! fire or not. The analysis is therefore conservative: it may miss mutexes.
 //!
-//! \[1\] P. Haslum, H. Geffner: Admissible heuristics for optimal planning, AIPS 2000. \[2\] V. Alcázar, Á. Torralba: A reminder about the importance of
-//! computing and exploiting invariants in planning, ICAPS 2015.
+//! \[1\] P. Haslum, H. Geffner: Admissible heuristics for optimal planning, AIPS 2000.
+//! \[2\] V. Alcázar, Á. Torralba: A reminder about the importance of computing and exploiting invariants in
+//! planning, ICAPS 2015.
 
 use task::limits::{Interrupted, Limits};
 use task::number::dense;

@@ -1,4 +1,4 @@
-//! What the search asks of bounds.
+//! The interface between A\* and admissible heuristics.
 
 use task::context::Context;
 use task::number::Int;

@@ -1,4 +1,4 @@
-//! Search in the space of states: for a first plan, for a best one, and among equal ones.
+//! Optimal search in the state space: A\*, its open list, state registry, heuristics interface and pruning methods.
 
 mod astar;
 pub mod design_combinations;

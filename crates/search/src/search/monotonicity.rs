@@ -1,12 +1,13 @@
-//! Of which numeric variables more never hurts, of which less never hurts, and of which neither can be said.
+//! Monotonicity of numeric variables: more is never worse, less is never worse, or neither.
 //!
-//! A variable is *asked* upwards where more of it may make a condition hold, downwards where less of it may. What is
-//! asked of a variable is asked of those that it is computed from: of those with a factor above 0 the same, of those with a
-//! factor below 0 the opposite. The least such sets tell which labels dominate which in a search with resources [1]: what is
-//! asked in one direction is compared, what is asked in both must be equal, and what is not asked at all does not count.
+//! A variable is needed upwards if a higher value can make a condition true, and downwards if a lower value
+//! can. The need passes to the variables from which it is computed: in the same direction for positive
+//! factors, in the opposite direction for negative ones. The least fixpoint decides which labels dominate
+//! which in a search with resources \[1\]. A variable needed in one direction is compared, one needed in both
+//! must be equal, and one that is not needed is ignored.
 //!
-//! \[1\] M. Desrochers, F. Soumis: A generalized permanent labelling algorithm for the shortest path problem with time
-//! windows, INFOR 26(3), 1988.
+//! \[1\] M. Desrochers, F. Soumis: A generalized permanent labelling algorithm for the shortest path problem
+//! with time windows, INFOR 26(3), 1988.
 
 use task::task::number::TaskNumber;
 use task::task::quantity::Linear;

@@ -1,4 +1,4 @@
-//! The nodes of a best-first search that wait for their turn: a bucket for each priority, the last one in first out.
+//! Open list of a best-first search: one bucket per priority, last in, first out.
 
 use std::collections::BTreeMap;
 

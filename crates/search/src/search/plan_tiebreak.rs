@@ -1,13 +1,13 @@
-//! Which of several cheapest plans is chosen.
+//! Selection among plans of equal cost.
 //!
-//! Of plans that cost the same one with fewest steps is chosen, of those one with fewest reconfigurations (steps at which a
-//! function changes its design), and of those the first in model order: step by step the action that the domain
-//! declares first, with the arguments, and then the designs, that the problem declares first. Names play no part. Designs for
-//! which there is a strictly better one (cheaper, or using up less) are not chosen.
+//! The chosen plan has the fewest steps, then the fewest reconfigurations (steps at which a function changes
+//! its design), then comes first in model order. Model order compares step by step the position of the action
+//! in the domain, of its arguments in the problem, and of its designs. Names play no part. A design is not
+//! chosen if a strictly better one exists (cheaper, or with less consumption).
 //!
-//! The search for it is held within cost and steps of the plan that is known, by the bounds of both: one search for the fewest
-//! reconfigurations, then one in depth, in model order, whose first plan is the one. Where that is not enough to keep it small,
-//! the choice stays what it is then: deterministic, but not in this order.
+//! The known plan bounds both searches: one for the fewest reconfigurations, and a depth-first search in model
+//! order that stops at the first plan. If these bounds do not keep the searches small, the choice is still
+//! deterministic, but not in this order.
 
 use std::cell::{Cell, RefCell};
 use std::cmp::Reverse;
@@ -102,7 +102,7 @@ impl TieBreakContext {
     /// Prepares the comparison of plans of equal cost.
     ///
     /// # Errors
-    /// When a limit is reached.
+    /// Fails when a limit is reached.
     pub fn new(context: Context<'_>, bounds: &Bounds) -> Result<Self, Interrupted> {
         let Context { task, limits } = context;
         let configurations = task.operators.iter().flat_map(|operator| &operator.configuration);

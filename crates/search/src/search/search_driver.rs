@@ -1,9 +1,9 @@
-//! The order of searches: for a first plan, for a best one, and for the states that prove it.
+//! The order of searches: a first plan, an optimal plan, and the closed states that prove it.
 //!
-//! A\* with projections comes first, as it is quick. If it does not end soon, a greedy search, which looks at estimates only, finds
-//! some plan meanwhile. Then two searches take turns with equal work, one with projections alone and one that looks at landmarks,
-//! too: whichever ends first has the answer, which therefore takes at most twice the work of the better one. Work is counted, so that the same
-//! task is always answered in the same way.
+//! A\* with pattern databases runs first. If it does not finish soon, greedy best-first search finds some plan.
+//! Then two searches run interleaved with equal work: one with pattern databases only, one with LM-cut as well.
+//! The first to finish has the answer, so the total work is at most twice that of the better search. Work is
+//! counted in units, not in time, so the result is deterministic.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! What a search needs to know of a task, whatever state it begins in: what can be done where, at what cost.
+//! Preprocessed task of a search, independent of the initial state: applicable operators and their costs.
 
 use task::context::Context;
 use task::limits::Interrupted;
@@ -26,7 +26,7 @@ impl<N: TaskNumber> SearchTask<N> {
     /// None if some operator has too many combinations of designs.
     ///
     /// # Errors
-    /// When a limit is reached.
+    /// Fails when a limit is reached.
     pub fn new(context: Context<'_, N>) -> Result<Option<Self>, Interrupted> {
         let Context { task, limits } = context;
         let monotone = is_monotone(task);

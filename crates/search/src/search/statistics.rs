@@ -1,4 +1,4 @@
-//! What a search has done.
+//! Statistics of a search.
 
 use task::plan::solution::Statistics;
 

@@ -1,30 +1,30 @@
-//! Which of the operators that can be applied are enough: stubborn sets.
+//! Stubborn-set pruning: applying a subset of the applicable operators is enough.
 //!
-//! Operators that do not interfere can be put into any order, so that all orders but one need not be searched. A set of operators
-//! is stubborn in a state \[1\] if it has
+//! Operators that do not interfere can be reordered, so only one of their orders has to be searched. A set of
+//! operators is stubborn in a state \[1\] if it contains
 //!
-//! - every operator that makes some part of the goal true that does not hold;
-//! - for each of its operators that cannot be applied, every operator that makes some part of its condition true that does not hold;
-//! - for each of its operators that can be applied, every operator that it *disturbs*: what requires or sets another value of a variable
-//!   that it sets, or asks for one in a conditional effect; and where it has conditional effects of its own, what sets what they ask for.
+//! - every operator that makes some unsatisfied part of the goal true;
+//! - for each of its inapplicable operators, every operator that makes some unsatisfied part of its precondition true;
+//! - for each of its applicable operators, every operator that it *disturbs*: one that requires or sets another
+//!   value of a variable that it sets, or has a conditional effect on such a value. If it has conditional
+//!   effects itself, it also contains every operator that sets one of their conditions.
 //!
-//! It is enough to apply the operators of such a set. Take any plan from the state, and its first operator that is in the set: there
-//! is one by the first condition, and it can be applied already, as by the second condition something before it would be in the set
-//! otherwise. By the third it disturbs nothing that is before it, and nothing before it changes what it does, so that it can
-//! come first: the plan has the same operators in another order. That what comes before may make it inapplicable for a while
-//! does no harm \[2\]. So a cheapest plan with fewest steps is left from each state. That is all that the search needs, also where it drops
-//! states that a known one dominates, or that only interchangeable objects tell from a known one [3]: from the known one there is a plan
-//! with the same operators, or with their images, and so one that begins with an operator of its own stubborn set.
+//! Proof sketch. Take any plan from the state, and its first operator in the set. One exists by the first
+//! condition. It is applicable, because by the second condition an earlier operator would otherwise be in the
+//! set. By the third condition it can be moved to the front: the plan has the same operators in another order.
+//! An earlier operator may make it inapplicable for a while; weak stubborn sets allow this \[2\]. So a cheapest
+//! plan with the fewest steps is preserved from each state. Pruning of dominated states and of symmetric states
+//! remains sound \[3\]: the representative has a plan with the same operators or their images.
 //!
-//! A variable that an operator requires at one value and sets to another one is changed by others only from that value, or from any:
-//! what requires further values comes after something that is in the set already.
+//! If an operator requires one value of a variable and sets another one, other operators change the variable
+//! only from that value or from any value.
 //!
-//! Where few operators are left out the search goes on without, as finding out takes time.
+//! Pruning is switched off when it removes too few operators to pay for its time.
 //!
 //! - \[1\] M. Wehrle, M. Helmert: Efficient stubborn sets: generalized algorithms and selection strategies, ICAPS 2014.
 //! - \[2\] S. Sievers, M. Wehrle: On weak stubborn sets in classical planning, IJCAI 2021.
-//! - \[3\] M. Wehrle, M. Helmert, A. Shleyfman, M. Katz: Integrating partial order reduction and symmetry elimination for cost-optimal
-//!   classical planning, IJCAI 2015.
+//! - \[3\] M. Wehrle, M. Helmert, A. Shleyfman, M. Katz: Integrating partial order reduction and symmetry elimination
+//!   for cost-optimal classical planning, IJCAI 2015.
 
 use std::sync::Arc;
 

@@ -1,7 +1,7 @@
-//! Which operators can be applied in a state: a decision tree over the variables that they require \[1\].
+//! Successor generator: a decision tree over required variables that returns the applicable operators \[1\].
 //!
-//! A node holds the operators that require nothing more, asks for the value of one variable, and goes on with those that
-//! require this value, and with those that do not ask for it. So operators are not looked at one by one.
+//! A node holds the operators without further preconditions. It tests one variable, and has one child for
+//! each value and one for the operators that do not require the variable.
 //!
 //! \[1\] M. Helmert: The Fast Downward planning system, JAIR 26, 2006, section 5.3.
 

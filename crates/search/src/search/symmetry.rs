@@ -1,11 +1,12 @@
-//! States that only interchangeable objects tell apart: one of them stands for all.
+//! Symmetry reduction: one state represents all states that differ only in interchangeable objects.
 //!
-//! Orbit search [1]: whatever can be done from a state can be done, at the same cost, from its image under an exchange of
-//! objects that changes neither operators nor goal. States are looked up by what exchanges of neighbours make of them as long as that
-//! comes earlier in the order of their values. States that nothing but exchanges tells apart are usually found to be equal so; that they always
-//! are is not needed.
+//! Orbit search \[1\]: whatever can be done from a state can be done, at the same cost, from its image under an
+//! exchange of objects that changes neither operators nor goal. A state is made canonical by exchanges of
+//! neighbouring objects as long as they lower it in the lexicographic order. Symmetric states usually get the
+//! same canonical state; completeness is not needed for soundness.
 //!
-//! \[1\] C. Domshlak, M. Katz, A. Shleyfman: Enhanced symmetry breaking in cost-optimal planning as forward search, ICAPS 2012.
+//! \[1\] C. Domshlak, M. Katz, A. Shleyfman: Enhanced symmetry breaking in cost-optimal planning as forward
+//! search, ICAPS 2012.
 
 use task::context::Context;
 use task::limits::Interrupted;

@@ -1,4 +1,4 @@
-//! What has to follow in time, which is judged when the times of a plan are known.
+//! Deadlines of trajectory constraints, checked once the times of a plan are known.
 
 use num_rational::BigRational;
 use pddl::ast::{ActionBody, Condition, Domain, Effect, Problem};

@@ -1,4 +1,4 @@
-//! Objects by type, and conditions with objects for variables.
+//! Objects by type, and conditions with variables replaced by objects.
 
 use crate::limits::Limits;
 use pddl::TypeHierarchy;

@@ -1,4 +1,4 @@
-//! How the states of a plan follow each other.
+//! Plan semantics: sequential or temporal.
 
 use num_rational::BigRational;
 

@@ -1,4 +1,4 @@
-//! Conditions that are made up, simplified where they are decided.
+//! Simplifies generated conditions.
 
 use pddl::ast::{Atom, Condition, Identifier, Name, Span, Term, TypedName};
 

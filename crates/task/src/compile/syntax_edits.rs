@@ -1,4 +1,4 @@
-//! What actions and domains get in addition.
+//! Additions to the syntax trees of actions and domains.
 
 use crate::error::{Error, File, Place};
 use pddl::ast::{

@@ -1,4 +1,4 @@
-//! What has to be remembered of the states so far, for each instance of a constraint, and how actions keep it.
+//! Monitors of trajectory constraints: the atoms that store the state of each automaton, and the effects that update them.
 
 use num_rational::BigRational;
 use num_traits::{Signed, Zero};

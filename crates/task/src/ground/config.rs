@@ -1,4 +1,4 @@
-//! How the domain's symbols are to be read, and what a ground task is to be good for.
+//! Configuration of grounding: the roles of the domain's symbols, and the generality of the ground task.
 
 use crate::limits::Limits;
 use crate::number::Int;

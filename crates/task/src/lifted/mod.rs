@@ -1,4 +1,4 @@
-//! The lifted task, and which of its parameters are function designs.
+//! The lifted task, and the parameters that are function designs.
 
 pub mod configuration;
 mod task;

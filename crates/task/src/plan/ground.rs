@@ -1,4 +1,4 @@
-//! A plan over operators, and what it comes to.
+//! Plans over operators, and their execution.
 
 use crate::number::Int;
 use crate::task::number::TaskNumber;

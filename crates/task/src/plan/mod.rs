@@ -1,4 +1,4 @@
-//! Plans: over the ground task, in names, and as answers with their proof.
+//! Plans of the ground task, plans in names, and solutions with their proof.
 
 pub mod ground;
 mod named_plan;

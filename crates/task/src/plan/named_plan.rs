@@ -1,4 +1,4 @@
-//! Plans: sequences of operators with the designs they run with, and how they read to people and programs.
+//! Plans in names: actions with their designs, as text and JSON.
 
 use std::borrow::Cow;
 use std::str::FromStr;

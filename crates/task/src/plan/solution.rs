@@ -1,4 +1,4 @@
-//! What the optimizer answers: a plan, how good it is, why that is known, and figures of the run.
+//! Solutions of the optimizer: plan, status, proof and statistics.
 
 use std::time::Duration;
 

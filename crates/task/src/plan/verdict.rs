@@ -1,4 +1,4 @@
-//! What is claimed of a solution, in a sentence, and why.
+//! The claim about a solution and its reason, in one sentence.
 
 use std::fmt;
 

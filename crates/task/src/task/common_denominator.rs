@@ -1,4 +1,4 @@
-//! What rationals have to be multiplied by to become integers, however large it is.
+//! The common denominator of rationals, of any size.
 
 use std::collections::hash_map::Entry;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Ids that count from 0 without gaps.
+//! Newtypes for dense ids.
 
 /// From ids to indices and back.
 macro_rules! dense_ids {

@@ -1,4 +1,4 @@
-//! The ground task and its parts: variables, operators and states; quantities over slots, and the numbers in them.
+//! The ground task: variables, operators, states, and quantities over slots.
 
 pub mod common_denominator;
 mod dense_ids;

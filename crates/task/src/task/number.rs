@@ -1,4 +1,4 @@
-//! What numbers of a ground task are: integers that are scaled, or rationals.
+//! Number types of a ground task: scaled integers, or rationals.
 
 use num_bigint::BigInt;
 use num_traits::{Signed, ToPrimitive as _};

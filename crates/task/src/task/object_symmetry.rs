@@ -23,7 +23,7 @@ const WORK_LIMIT: usize = 2_000_000;
 /// is; nor, if that is asked for, the initial state.
 ///
 /// # Errors
-/// When a limit is reached.
+/// Fails when a limit is reached.
 #[expect(clippy::arithmetic_side_effects, reason = "work is looked at each time")]
 pub fn symmetry_generators(context: Context<'_>, initially: bool) -> Result<Vec<Exchange>, Interrupted> {
     let Context { task, limits } = context;

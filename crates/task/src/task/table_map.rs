@@ -1,4 +1,4 @@
-//! The numbers of quantities to others; tables that operators share stay shared.
+//! Maps the numbers of quantities; tables that operators share stay shared.
 
 use std::collections::hash_map::Entry;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! When an operator can start, where something happens by itself.
+//! Earliest starts of operators relative to timed initial literals.
 
 /// When an operator starts at the earliest, besides not before what is before it has ended.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]

@@ -1,4 +1,4 @@
-//! What can happen while an action is under way: facts that hold all the while say what cannot.
+//! Invariants of running actions: facts that hold while an action runs, and happenings that they exclude.
 
 use rustc_hash::FxHashMap;
 use task::number::{Int, dense};

@@ -1,4 +1,4 @@
-//! The operators of a split task: which halves belong together, and what each reads and writes.
+//! Builds the operators of a split task: pairs of starts and ends, and what each reads and writes.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 use task::context::Context;

@@ -1,12 +1,13 @@
-//! Which actions can have their end put right after their start, so that they take one step of the search.
+//! Compression-safe actions: their end can follow their start directly, so that they take one step of the search.
 //!
-//! Happenings that do not interfere have no order in time, whatever their order in a sequence. An end that interferes with
-//! nothing that can happen while its action is under way can be put before all that, which changes neither the times nor the states before and
-//! after. Coles et al. \[1\] ask for actions that only add at their end; what can lie in between is asked for here, by facts that hold as
-//! long as the action is under way, so that more actions qualify and none loses a plan.
+//! Happenings that do not interfere are unordered in time, whatever their order in a sequence. If an end
+//! interferes with nothing that can happen while its action runs, it can be moved before all of that without
+//! changing times or states. Coles et al. \[1\] require actions that only add facts at their end. Here the
+//! condition is about what can happen in between, by the facts that hold while the action runs, so more actions
+//! qualify and no plan is lost.
 //!
-//! \[1\] A. Coles, M. Fox, K. Halsey, D. Long, A. Smith: Managing concurrency in temporal planning using planner-scheduler
-//! interaction, Artificial Intelligence 173, 2009.
+//! \[1\] A. Coles, M. Fox, K. Halsey, D. Long, A. Smith: Managing concurrency in temporal planning using
+//! planner-scheduler interaction, Artificial Intelligence 173, 2009.
 
 use task::limits::{Interrupted, Limits};
 use task::task::Task;

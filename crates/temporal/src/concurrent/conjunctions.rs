@@ -1,10 +1,12 @@
-//! Facts that nothing brings back, and what has to hold together with them.
+//! Explicit conjunctions in the delete relaxation, for facts that no action restores.
 //!
-//! A relaxed plan takes no fact away, so what deletes a fact that is needed later looks like a way, even if nothing adds the fact again. For each such
-//! fact the relaxed task gets conjunctions of it with what is needed at the same time: only what leaves the fact alone brings them about.
-//! These are conjunctions of two facts as in the task Π^C \[1\], for few, chosen facts.
+//! A relaxed plan deletes nothing, so an action that deletes a fact needed later looks useful even if nothing
+//! adds the fact again. For each such fact the relaxed task gets conjunctions with the facts that are needed at
+//! the same time. Only rules that keep the fact achieve them. These are conjunctions of two facts as in the task
+//! Π^C \[1\], for a few selected facts.
 //!
-//! \[1\] E. Keyder, J. Hoffmann, P. Haslum: Improving delete relaxation heuristics through explicitly represented conjunctions, JAIR 50, 2014.
+//! \[1\] E. Keyder, J. Hoffmann, P. Haslum: Improving delete relaxation heuristics through explicitly represented
+//! conjunctions, JAIR 50, 2014.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 use task::lists::Lists;

@@ -1,4 +1,4 @@
-//! What has to follow in time: judged by the times of a plan, once it is found.
+//! Deadlines of trajectory constraints, checked on the times of a complete plan.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;

@@ -1,8 +1,8 @@
-//! Durations that the state or the planner decides: a number for each schema that a start sets and an end clears.
+//! Durations that depend on the state or that the planner chooses: one fluent per schema, set by the start and cleared by the end.
 //!
-//! `?duration` is what the expression comes to in the state in which the action starts \[1\]. So the start assigns it to a number of its own, from
-//! which the end and its effects take it, and the clocks. One that the planner chooses is set by an operator that never happens: to
-//! whoever asks what is in reach, it can be anything from 0 on.
+//! `?duration` has the value of the expression in the state in which the action starts \[1\]. The start assigns it
+//! to the fluent, which the end, its effects and the temporal network read. A duration that the planner chooses
+//! is set by an operator that never happens; the reachability analysis lets it be any value from 0.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 5.2.
 

@@ -1,4 +1,4 @@
-//! The variables that link a condition over all to an end are taken out of the task once both are paired.
+//! Removes the variables that link a condition over all to an end, once both are paired.
 
 use task::task::{Condition, Fact, Task, VariableId};
 

@@ -1,7 +1,7 @@
-//! What a happening reads and writes, by the rule of PDDL 2.1 that there are no moving targets \[1\].
+//! Read and write sets of happenings, by the rule of no moving targets of PDDL 2.1 \[1\].
 //!
-//! Everything that a condition or an effect mentions counts as read, whether or not it matters in a state: below a quantifier all
-//! instances of an atom, below a derived predicate all that its axioms depend on.
+//! Everything that a condition or an effect mentions counts as read, whether or not it matters in a state: all
+//! instances of an atom below a quantifier, and everything that the axioms of a derived predicate depend on.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.4.
 

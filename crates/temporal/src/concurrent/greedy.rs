@@ -1,12 +1,13 @@
-//! Lazy greedy best-first search over sequences of happenings: a plan soon, then better ones.
+//! Lazy greedy best-first search over sequences of happenings, for a first plan and then better ones.
 //!
-//! Situations are evaluated when they are taken up, not when they are found, and stand in the order of what was left before them;
-//! happenings that the relaxed plan begins with have a queue of their own \[1\]. In a third one those come first that follow a situation with a fact
-//! which no other one had before with as many goals to go [2]: a way that the relaxed plan does not see is found there. Where ends come right
-//! after starts in the sequence, far fewer situations are left, and most tasks have a plan among them; times overlap all the same. Of situations with the same state and the same actions under
-//! way only the first is pursued, so that this search may miss plans and proves nothing.
+//! Temporal states are evaluated when they are expanded, and queued by the value of their predecessor. Preferred
+//! happenings have a second queue \[1\]. A third queue prefers successors of states with a novel fact, among
+//! states with as many unsatisfied goals \[2\]. If ends directly follow their starts in the sequence, far fewer
+//! states remain, and most tasks still have a plan; times overlap all the same. Only the first state with the
+//! same facts and running actions is expanded, so this search may miss plans and proves nothing.
 //!
-//! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010. \[2\] N. Lipovetzky, H. Geffner: Best-first width search, AAAI 2017.
+//! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010.
+//! \[2\] N. Lipovetzky, H. Geffner: Best-first width search, AAAI 2017.
 
 use std::collections::hash_map::Entry;
 use std::hash::{Hash, Hasher};

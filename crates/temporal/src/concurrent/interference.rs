@@ -1,4 +1,4 @@
-//! Footprints to what a happening has to wait for, and for what it lets others wait.
+//! Interference constraints from footprints: which accesses a happening waits for, and which wait for it.
 
 use indexmap::IndexMap;
 use rustc_hash::{FxBuildHasher, FxHashSet};

@@ -1,6 +1,6 @@
-//! The exact and the greedy search in turns that get longer: what one needs, the other has as well.
+//! Interleaves exact and greedy search with growing, equal budgets.
 //!
-//! Small tasks are proved before the greedy search begins. Where it does begin, its plans are the incumbents of both.
+//! Small tasks are proved before the greedy search begins. After that, its plans are incumbents of both searches.
 
 use search::bounds::Bounds;
 use task::limits::Limits;

@@ -1,8 +1,8 @@
-//! How much time is left, at least, by each variable of the goal alone.
+//! Lower bound on the remaining time, for each goal variable separately.
 //!
-//! A variable changes its values one after another: whatever changes one has read it, so it comes a separation after the change
-//! before, and an action that holds the variable from its start to its end takes its time. The shortest path to the value of
-//! the goal is counted from when the variable got its value.
+//! A variable changes its values one after another. A change reads the variable, so it comes at least a
+//! separation after the change before, and an action that holds the variable from start to end takes its
+//! duration. The shortest path to the goal value is counted from the time of the last change.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

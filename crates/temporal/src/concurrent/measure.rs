@@ -1,4 +1,4 @@
-//! What a plan whose actions overlap is measured by: a weight for its makespan, and the costs of its actions.
+//! The metric of concurrent plans: a weight for the makespan plus the costs of actions.
 
 use pddl::ast::Direction;
 use task::error::Error;

@@ -1,10 +1,10 @@
-//! A PDDL task to a plan whose actions overlap, with the least makespan or the best weighted sum of makespan and costs.
+//! Concurrent plans of a PDDL task, with the least makespan or the best weighted sum of makespan and costs.
 //!
-//! What a plan is, the definition at the head of [`validate`](pddl::validate) says. Besides, at any time each function that the
-//! running actions require has one design, and no duration is above 0 and below the *separation* (epsilon).
+//! [`validate`](pddl::validate) defines plans. In addition, at any time each function that running actions
+//! require has one design, and no duration is above 0 and below the *separation* (epsilon).
 //!
-//! `split` makes two schemas of a durative action, `temporal_task` finds what each happening waits for, and `search` goes
-//! through all sequences of happenings that matter, with what is left of their simple temporal network in `simple_temporal_network`.
+//! `split` makes a start and an end of each durative action, `temporal_task` computes the constraints of each
+//! happening, and `search` explores sequences of happenings with their `simple_temporal_network`.
 
 mod action_invariants;
 mod builder;

@@ -1,4 +1,4 @@
-//! Whether numbers that only count in the end only grow: then what they have come to bounds what a plan is worth.
+//! Monotonicity of numbers that only the metric reads: if they only grow, their value so far is a lower bound.
 
 use rustc_hash::FxHashSet;
 use task::number::{Int, Rational};

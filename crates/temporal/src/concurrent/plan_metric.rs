@@ -1,4 +1,4 @@
-//! What a plan is worth, with what it violates.
+//! The metric of a complete plan, with violated preferences.
 
 use task::number::Int;
 use task::task::{OperatorId, State};

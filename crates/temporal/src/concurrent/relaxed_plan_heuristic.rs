@@ -1,11 +1,11 @@
-//! A situation to how far the goal is, by a relaxed plan, and which happenings that plan begins with.
+//! Relaxed-plan heuristic of temporal states, with preferred happenings.
 //!
-//! Costs add up over what a rule needs \[1\], and the cheapest rule for each proposition makes the relaxed plan \[2\]. Its goals are those of the task,
-//! and the ends of all actions under way.
+//! Costs are added over the conditions of a rule \[1\], and the cheapest rule of each proposition forms the relaxed
+//! plan \[2\]. Its goals are those of the task and the ends of all running actions.
 //!
 //! \[1\] B. Bonet, H. Geffner: Planning as heuristic search, Artificial Intelligence 129, 2001.
-//! \[2\] J. Hoffmann, B. Nebel: The FF planning system, JAIR 14, 2001; E. Keyder, H. Geffner: Heuristics for planning with action costs
-//! revisited, ECAI 2008.
+//! \[2\] J. Hoffmann, B. Nebel: The FF planning system, JAIR 14, 2001; E. Keyder, H. Geffner: Heuristics for
+//! planning with action costs revisited, ECAI 2008.
 
 use std::cmp::Reverse;
 

@@ -1,4 +1,4 @@
-//! What of the effects of happenings anybody may need: without the others a plan is as good.
+//! Relevance analysis: effects that no condition, goal or metric depends on are dropped.
 
 use search::search::{Polarity, directions};
 use task::compile::is_hidden;

@@ -1,4 +1,4 @@
-//! A rule of a relaxed task: what it needs, and what it brings about.
+//! A rule of a relaxed task: conditions, effects and cost.
 
 use rustc_hash::FxHashMap;
 

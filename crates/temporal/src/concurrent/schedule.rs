@@ -1,4 +1,4 @@
-//! A sequence of happenings to the earliest times at which they can take place.
+//! The earliest times of a sequence of happenings.
 
 use std::collections::VecDeque;
 

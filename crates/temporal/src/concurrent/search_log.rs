@@ -1,4 +1,4 @@
-//! What a search over happenings reports and counts: better plans, bounds that rise, and figures of each part.
+//! Reports and statistics of a temporal search: better plans, rising lower bounds, counts of each part.
 
 use std::time::Instant;
 

@@ -1,8 +1,8 @@
-//! How many runs of an instance, the same action with the same arguments, can be under way at a time so that it makes a difference.
+//! Upper bounds on the number of simultaneous runs of one ground action.
 //!
-//! PDDL 2.1 lets an action start while it is under way. Most cannot: their start needs what it takes away itself. And where a run begins and ends
-//! without changing anything, a plan is as good without it. Both are shown here by facts that hold as long as the action is under way; the arguments
-//! are in docs/decisions/runs-that-overlap.md.
+//! PDDL 2.1 lets an action start while it runs. Most cannot, because their start requires a fact that it deletes.
+//! A run that starts and ends without a change is redundant. Both are proved by the facts that hold while the
+//! action runs; docs/decisions/runs-that-overlap.md has the arguments.
 
 use std::collections::BTreeMap;
 

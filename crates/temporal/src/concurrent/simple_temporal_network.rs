@@ -1,13 +1,14 @@
-//! What of the past still matters for when things can happen.
+//! The temporal part of a search node: an incrementally propagated simple temporal network \[1\].
 //!
-//! A sequence of happenings with the constraints between their times is a simple temporal network \[1\]. All that the future
-//! asks of it are lower bounds: not before this, not within the separation of that. So of the past only the latest time of
-//! each kind of access to each atom is kept, as a lower bound, and, of the actions under way, their starts as *floats*: they
-//! can be put off, and what came after them with them, so that an end meets what it has to meet. An end fixes its float as
-//! early as it can be. Times of happenings that do not interfere are not ordered by their place in the sequence \[2\].
+//! The times of a sequence of happenings and the constraints between them form a simple temporal network. Later
+//! happenings only add lower bounds: not before a time, and not within the separation of a time. The network
+//! therefore keeps, for each kind of access to each atom, only the latest time as a lower bound. Starts of
+//! running actions are *time points* that can still be delayed, together with the happenings that depend on
+//! them, so that an end meets its constraints. An end fixes its time point at the earliest possible time.
+//! Happenings that do not interfere are not ordered by their position in the sequence \[2\].
 //!
-//! Times are sums over the happenings of a sequence: fewer than 2^32, as nodes are counted, and each less than 2^91 (a duration and the
-//! separation) after another. Upper bounds that are none (`Int::MAX`) are not reckoned with.
+//! Times are sums over the happenings of a sequence: fewer than 2^32 terms, each below 2^91 (a duration plus the
+//! separation). Missing upper bounds (`Int::MAX`) take no part in arithmetic.
 //!
 //! \[1\] R. Dechter, I. Meiri, J. Pearl: Temporal constraint networks, Artificial Intelligence 49, 1991.
 //! \[2\] A. Coles, A. Coles, M. Fox, D. Long: Forward-chaining partial-order planning, ICAPS 2010.

@@ -1,4 +1,4 @@
-//! What a search has found as an answer: the plan in names, or none.
+//! The result of a search as a solution: the plan in names, or none.
 
 use std::collections::VecDeque;
 

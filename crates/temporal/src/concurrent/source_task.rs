@@ -1,4 +1,4 @@
-//! The files of a task whose actions may be planned one after another as well.
+//! The PDDL task of a temporal task, from which sequential plans are computed.
 
 use std::sync::Arc;
 

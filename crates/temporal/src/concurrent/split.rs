@@ -1,9 +1,9 @@
-//! Durative actions to their starts and ends: a lifted task whose every schema is a single happening.
+//! Splits durative actions into starts and ends: a lifted task in which each schema is a single happening.
 //!
-//! A durative action becomes two instantaneous ones, after Fox and Long's *snap actions* \[1\], joined by an atom that says
-//! that the instance is under way. What must hold over all becomes a third schema, which never happens: its condition is looked
-//! up while the instance is under way. An instance that takes no time is one happening, and nothing holds over all of it. Timed
-//! initial literals become schemas without parameters, one after another.
+//! A durative action becomes two instantaneous ones, the *snap actions* of Fox and Long \[1\], joined by an atom
+//! that holds while the instance runs. Its condition over all becomes a third schema that never happens; the
+//! condition is checked while the instance runs. An instance of duration 0 is one happening without a condition
+//! over all. Timed initial literals become a sequence of schemas without parameters.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.
 

@@ -1,7 +1,7 @@
-//! The situations that the exact search has come to, packed.
+//! Packed temporal states of the exact search.
 //!
-//! Finite-domain values take as many bits as they need, and times as many bytes. Situations that can dominate each other share a *place*: the state, the
-//! actions under way and the numbers that cannot be compared.
+//! Finite-domain values take as many bits as they need, and times as many bytes. States that can dominate each
+//! other share a *place*: the state, the running actions, and the numbers that are not comparable.
 
 use std::hash::{Hash, Hasher};
 

@@ -1,4 +1,4 @@
-//! Whether a lifted task asks for more, or less, than some number that actions change.
+//! Detects strict comparisons with fluents in a lifted task.
 
 use task::lifted::{Formula, Lifted};
 

@@ -1,4 +1,4 @@
-//! Situations to those that can follow them: one happening on, or the start and the end of an action at once.
+//! Successors of a temporal state: one happening, or the start and the end of an action at once.
 
 use search::search::successor_generator::SuccessorGenerator;
 use task::number::Int;

@@ -1,4 +1,4 @@
-//! The split ground task to happenings: what pairs a start with its end, what each waits for, and integers for all times.
+//! The temporal task: happenings with paired starts and ends, their constraints, and integer times.
 
 use std::collections::BTreeMap;
 

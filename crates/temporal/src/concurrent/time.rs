@@ -1,4 +1,4 @@
-//! Times that are bounded from below, some of them relative to starts that can still be put off.
+//! Time expressions: lower bounds, some of them relative to starts that can still be delayed.
 
 use smallvec::SmallVec;
 use task::number::Int;

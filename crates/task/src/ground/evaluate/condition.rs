@@ -1,4 +1,4 @@
-//! Conditions of a schema under a binding of its parameters: what is left once everything static is decided.
+//! Partial evaluation of a schema's condition under a binding: the residual after static facts are decided.
 
 use crate::error::Error;
 use crate::ground::evaluate::expression::ground;
@@ -12,7 +12,7 @@ use crate::lifted::{Bound, Formula};
 /// Evaluates a condition that mentions no open slot. A comparison with a value that is not defined does not hold.
 ///
 /// # Errors
-/// When a value is missing, or a limit is reached.
+/// Fails when a value is missing, or a limit is reached.
 pub fn residual(
     world: &mut World<'_>,
     formula: &Formula,

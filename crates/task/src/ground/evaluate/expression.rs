@@ -10,7 +10,7 @@ use crate::task::quantity::Linear;
 /// Evaluates an expression that mentions no open slot.
 ///
 /// # Errors
-/// When a value is undefined, the expression is not linear, or a limit is reached.
+/// Fails when a value is undefined, the expression is not linear, or a limit is reached.
 pub fn ground(
     world: &mut World<'_>,
     expression: &Expression,

@@ -39,7 +39,7 @@ pub fn guards_of_forall(body: &Formula) -> Vec<Guard<'_>> {
 /// false; the variables are unbound again afterwards, unless a limit ends it all. Returns whether `visit` never returned false.
 ///
 /// # Errors
-/// When a limit is reached.
+/// Fails when a limit is reached.
 pub fn each_binding<'a>(
     world: &mut World<'a>,
     bound: &[Bound],

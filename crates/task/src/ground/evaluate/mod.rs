@@ -1,4 +1,4 @@
-//! What expressions and conditions of the lifted task come to under a binding of their parameters.
+//! Partial evaluation of lifted expressions and conditions under a binding of their parameters.
 
 pub mod condition;
 pub mod expression;

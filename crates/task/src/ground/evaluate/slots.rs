@@ -1,4 +1,4 @@
-//! Expressions with open slots: as tables over the designs that are left for each.
+//! Expressions with open slots as tables over the remaining designs.
 
 use crate::error::Error;
 use crate::ground::evaluate::expression::ground;
@@ -27,7 +27,7 @@ impl Slots<'_> {
 /// for which it is undefined are handed to `undefined`, and count as 0.
 ///
 /// # Errors
-/// When the expression is not linear, or a limit is reached.
+/// Fails when the expression is not linear, or a limit is reached.
 pub fn open(
     world: &mut World<'_>,
     expression: &Expression,

@@ -1,4 +1,4 @@
-//! Atoms to finite-domain variables, rationals to integers: the last step of grounding.
+//! The last pass of grounding: atoms to finite-domain variables, rationals to integers.
 
 mod conditions;
 mod integers;

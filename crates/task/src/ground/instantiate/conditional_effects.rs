@@ -1,4 +1,4 @@
-//! The cases of an instance: one for each way in which its conditions can turn out.
+//! Splits an instance into operators, one for each combination of outcomes of its conditions.
 
 use std::sync::Arc;
 

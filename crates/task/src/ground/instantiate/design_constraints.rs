@@ -1,4 +1,4 @@
-//! Combinations of designs that are forbidden, and whether any is left.
+//! Forbidden combinations of designs, and whether an allowed one remains.
 
 use rustc_hash::FxHashSet;
 

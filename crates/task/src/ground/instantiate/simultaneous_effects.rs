@@ -1,4 +1,4 @@
-//! What the start or the end of an instance changes.
+//! The effects of the start or of the end of an instance.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Lifted schemas, with what mentions their slots apart from the rest.
+//! Lifted schemas, split into the parts that mention slots and the rest.
 
 use crate::ground::vocabulary::atom::{Binding, Row};
 use crate::lifted::configuration::{

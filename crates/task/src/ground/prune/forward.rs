@@ -1,4 +1,4 @@
-//! Forwards: relaxed reachability once more, now over the operators that are left when everything static is decided.
+//! Forward pruning: relaxed reachability over the ground operators.
 
 use rustc_hash::FxHashMap;
 

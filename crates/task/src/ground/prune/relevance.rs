@@ -1,4 +1,4 @@
-//! Backwards: effects that no condition reads, then operators that do nothing at all.
+//! Relevance analysis: removes effects that no condition reads, then operators without effects.
 
 use rustc_hash::FxHashSet;
 

@@ -1,4 +1,4 @@
-//! What schemas and derived predicates add to the program of relaxed reachability.
+//! Rules of schemas and derived predicates in the Datalog program of relaxed reachability.
 
 use rules::{Atom, Symbol};
 

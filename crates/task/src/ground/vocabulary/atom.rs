@@ -1,4 +1,4 @@
-//! Ground atoms, and bindings of the parameters that they are made with.
+//! Ground atoms and bindings of parameters.
 
 use std::hash::Hash;
 

@@ -1,4 +1,4 @@
-//! Why something of an instance has no value.
+//! Reasons why an expression of an instance has no value.
 
 use crate::error::Error;
 use crate::limits::Interrupted;

@@ -1,4 +1,4 @@
-//! What the passes of grounding hand to each other. No file here imports a pass.
+//! Data types that the passes of grounding exchange. No file here imports a pass.
 
 pub mod atom;
 pub mod axiom;

@@ -1,4 +1,4 @@
-//! What numeric variables become when an operator is applied.
+//! Numeric effects of ground operators.
 
 use crate::lifted::Rational;
 use crate::task::quantity::{Linear, NumericId};

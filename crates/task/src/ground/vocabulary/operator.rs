@@ -1,4 +1,4 @@
-//! Operators over atoms, the designs of their slots still open.
+//! Operators over atoms, with open design slots.
 
 use std::sync::Arc;
 

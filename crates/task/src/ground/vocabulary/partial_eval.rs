@@ -1,4 +1,4 @@
-//! What is left of a condition once everything static is decided.
+//! Residual conditions after partial evaluation.
 
 use crate::ground::vocabulary::atom::AtomId;
 use crate::lifted::Rational;

@@ -1,4 +1,4 @@
-//! What relaxed reachability finds.
+//! The result of relaxed reachability.
 
 use crate::ground::vocabulary::atom::{AtomSet, Binding};
 use crate::lifted::{Arguments, PredicateId};

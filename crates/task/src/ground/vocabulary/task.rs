@@ -1,4 +1,4 @@
-//! The task over atoms, as passes change it one after another.
+//! The task over atoms, which the passes transform one after another.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 

@@ -1,4 +1,4 @@
-//! The world that grounding looks at: static facts and values, and the fluent atoms and numeric variables met so far.
+//! Static facts and values, and the fluent atoms and numeric variables found so far.
 
 use std::num::Wrapping;
 
@@ -157,7 +157,7 @@ impl<'a> World<'a> {
     /// The variable of a numeric fluent, which must have a value from the start; `total-cost` begins at 0.
     ///
     /// # Errors
-    /// When the fluent has no initial value.
+    /// Fails when the fluent has no initial value.
     pub fn numeric(
         &mut self,
         function: FunctionId,

@@ -1,4 +1,4 @@
-//! A sequence of happenings that reaches the goal to a plan: the best durations, then the earliest times.
+//! A goal sequence of happenings to a plan: optimal durations first, then the earliest times.
 
 use num_traits::One;
 use pddl::to_decimal;

@@ -1,11 +1,11 @@
-//! Linear programs in exact rationals: constraints are added one by one, and each time the optimum is found again.
+//! Linear programs in exact rationals, solved again after each added constraint.
 //!
-//! A program is kept as a *dictionary* [1]: the columns that are above 0, and what constraints have left, as expressions over the columns that
-//! are 0. A constraint that does not hold is mended by the dual simplex algorithm, which starts from where the last one has ended; another
-//! objective is minimised by the primal one. Both take the first column that will do, so that they end \[2\].
+//! A program is stored as a *dictionary* \[1\]: basic columns and slacks as expressions over the nonbasic columns.
+//! The dual simplex algorithm repairs a violated constraint from the last optimum; the primal one minimises
+//! another objective. Both use Bland's rule, so that they terminate \[2\].
 //!
-//! \[1\] V. Chvátal: Linear Programming, 1983. \[2\] R. Bland: New finite pivoting rules for the simplex method, Mathematics of Operations
-//! Research 2, 1977.
+//! \[1\] V. Chvátal: Linear Programming, 1983. \[2\] R. Bland: New finite pivoting rules for the simplex method,
+//! Mathematics of Operations Research 2, 1977.
 
 use num_traits::Zero;
 use task::number::Rational;

@@ -1,7 +1,8 @@
-//! Sequences that differ only in the order of happenings which do not interfere are one: traces \[1\].
+//! Mazurkiewicz traces \[1\]: sequences that differ only in the order of happenings that do not interfere.
 //!
-//! Such sequences have the same state, and the same linear program but for the names of its columns. Of each trace the sequence is taken that is
-//! first in lexicographic order. An end says which of the runs of its instance ends; these do not change their order.
+//! The sequences of a trace reach the same state and have the same linear program up to the names of columns.
+//! Only the lexicographically first sequence of each trace is searched. An end names the run of its instance
+//! that it ends; runs of one instance keep their order.
 //!
 //! \[1\] A. Mazurkiewicz: Concurrent program schemes and their interpretations, DAIMI PB 78, Aarhus University, 1977.
 

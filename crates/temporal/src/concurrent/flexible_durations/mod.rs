@@ -1,9 +1,10 @@
-//! Tasks in which the planner chooses how long actions take: sequences of happenings, and a linear program for each.
+//! Temporal planning with durations that the planner chooses: a linear program for each sequence of happenings.
 //!
-//! The bounds of a duration are conditions at the start of its action, and effects may depend on it. A sequence of happenings has a plan if there
-//! are times and durations for which all that is asked holds: a linear program, as in COLIN \[1\], solved here in exact numbers (`linear_program`), since no plan may be wrong by
-//! a rounded epsilon and what is infeasible takes part in proofs. A search that leaves nothing out and a greedy one take turns
-//! (`search`); where all actions can be as short as they may be, the searches for fixed durations look at that, too.
+//! The bounds of a duration are conditions at the start of its action, and effects may depend on it. A sequence
+//! has a plan if some times and durations satisfy all constraints. This is a linear program, as in COLIN \[1\].
+//! It is solved in exact arithmetic (`linear_program`): a plan must not be wrong by a rounded epsilon, and
+//! infeasibility is part of proofs. An exhaustive and a greedy search run interleaved (`search`). If every action
+//! can have its minimal duration, the searches for fixed durations are used as well.
 //!
 //! \[1\] A. Coles, A. Coles, M. Fox, D. Long: COLIN: planning with continuous linear numeric change, JAIR 44, 2012.
 

@@ -1,12 +1,12 @@
-//! Sequences of happenings whose times and durations are open: what has happened, and a linear program for when and for how long.
+//! Partial plans with open times and durations: the happenings so far and their linear program.
 //!
-//! After POPF \[1\] and COLIN [2]: each start has a column for its time, and one for its duration if the planner chooses that. Numbers of the task
-//! are expressions over the durations so far, and so are conditions, each of which is a constraint; happenings that interfere are a
-//! separation apart, in the order of the sequence. The end of an action under way is constrained as soon as what it comes after has happened.
-//! The first column is the makespan.
+//! As in POPF \[1\] and COLIN \[2\]. Each start has a column for its time, and one for its duration if the planner
+//! chooses the duration. Numeric fluents are expressions over the durations so far. So are conditions, each of
+//! which is a constraint. Interfering happenings are a separation apart, in the order of the sequence. The end
+//! of a running action is constrained as soon as its predecessors have happened. The first column is the makespan.
 //!
-//! \[1\] A. Coles, A. Coles, M. Fox, D. Long: Forward-chaining partial-order planning, ICAPS 2010. \[2\] The same: COLIN: planning with
-//! continuous linear numeric change, JAIR 44, 2012.
+//! \[1\] A. Coles, A. Coles, M. Fox, D. Long: Forward-chaining partial-order planning, ICAPS 2010.
+//! \[2\] A. Coles, A. Coles, M. Fox, D. Long: COLIN: planning with continuous linear numeric change, JAIR 44, 2012.
 
 use task::number::{Int, Rational, dense};
 use task::task::number::TaskNumber;

@@ -1,9 +1,9 @@
-//! Sequences of happenings to a plan whose durations are chosen by linear programs: a greedy search, and one that leaves nothing out.
+//! Search over sequences of happenings with durations from linear programs: greedy and exhaustive.
 //!
-//! Both are lazy: a sequence is looked at, and its program solved, when it is taken up, in the order of what the one before it promised. The greedy
-//! search goes by relaxed plans, in which a number is as good as the bounds of the durations allow, and pursues only one of the sequences
-//! with the same values, actions under way and ranges of numbers. The exhaustive one goes by the least metric that the program leaves, and pursues one
-//! sequence of each trace.
+//! Both searches are lazy: a sequence is evaluated, and its program solved, when it is expanded. The greedy
+//! search is guided by relaxed plans in which a number takes the best value that the bounds of durations allow.
+//! It keeps one sequence for each combination of values, running actions and ranges of numbers. The exhaustive
+//! search expands the sequence with the least metric of its program first, and keeps one sequence per trace.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
