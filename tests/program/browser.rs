@@ -233,8 +233,7 @@ fn a_run_that_has_a_plan_again_says_so() {
     let mut run = Run::begin(&["--serve=0"]);
     let mut events = run.events();
     let mut lines: Vec<String> = Vec::new();
-    let mut until = |line: usize| {
-        let is_last = |news: &Value| news["said"]["answer"] == "handled" && news["said"]["line"] == line;
+    let mut until = |is_last: &dyn Fn(&Value) -> bool| {
         // The first line says that it begins.
         lines.extend(events.until(is_last).iter().filter(|news| *news != &json!({})).map(Value::to_string));
         lines.clone()
@@ -246,10 +245,11 @@ fn a_run_that_has_a_plan_again_says_so() {
     let started = json!({"event": "action_started", "action": 1}).to_string();
     let lost = ["c_kinect", "c_lidar", "c_camera"].map(|component| status(component, "FALSE"));
     run.tell([started].into_iter().chain(lost), 4);
-    let told = until(4);
+    let told = until(&|news: &Value| news["said"]["answer"] == "handled" && news["said"]["line"] == 4);
     is(&run, &told, false, "There is no plan", "There is no plan: no plan reaches the goal");
     run.tell([status("c_lidar", "RECOVERED")], 5);
-    let told = until(5);
+    // A component that recovers is used again when it has been healthy for `heal` seconds.
+    let told = until(&|news: &Value| news["said"]["answer"] == "resume_action");
     let (action, cost) = ("Action 1: move wp1 wp2", "Cost 516, proved optimal.");
     is(&run, &told, false, action, cost);
     is(&run, &told, true, &format!("{action} (the run has ended)"), cost);
