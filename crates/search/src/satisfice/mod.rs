@@ -40,34 +40,34 @@ const SEARCH_SEQUENCE: [(bool, HeuristicWeight); 6] = [
     (true, HeuristicWeight::Times(1)),
 ];
 
-/// A search may take this part of the words that bytes are left for; then the next one has its turn.
+/// One part in `MEMORY_SHARE` of the available memory is the limit of one search; beyond it the next search begins.
 const MEMORY_SHARE: usize = 16;
 
-/// What came of going on for a while.
+/// Outcome of one turn of the satisficing search.
 pub enum StepResult<N> {
     /// A cheaper plan.
     Plan(GroundPlan<N>),
     /// There is no plan at all.
     Unsolvable,
-    /// Nothing yet; it may go on.
+    /// The budget of work is spent; the search can be resumed.
     Paused,
-    /// There is nothing left to be tried.
+    /// All searches of the sequence have ended.
     Ended,
 }
 
-/// Searches for a plan, and then for cheaper and cheaper ones, that can be gone on with.
+/// A resumable sequence of searches for a plan, then for cheaper ones.
 pub struct Satisficer<'a, N> {
     known: SearchContext<'a, N>,
     limits: &'a Limits,
     phase: usize,
     search: Option<Search<N>>,
-    /// Whether it was tried to tell dead ends by pairs of facts.
+    /// Whether h² mutexes were computed, or their computation was tried.
     knows_pairs: bool,
     pub figures: SearchStatistics,
 }
 
 impl<'a, N: TaskNumber> Satisficer<'a, N> {
-    /// None if an operator has too many combinations of designs.
+    /// Prepares the searches. Returns `None` if an operator has too many combinations of designs.
     ///
     /// # Errors
     /// Fails when a limit is reached.
@@ -83,7 +83,7 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
         }))
     }
 
-    /// How often it has begun anew.
+    /// Number of searches that have ended so far.
     pub fn restarts(&self) -> usize {
         self.phase
     }
