@@ -1,5 +1,5 @@
 (* Semantics of PDDL actions executed one after another: the formal counterpart of
-   pddl/src/validate/definition.md for tasks without derived predicates, timed initial literals and
+   crates/pddl/src/validate/definition.md for tasks without derived predicates, timed initial literals and
    chosen durations. This file, the statement of the theorem [optimal], and the readers are all that
    has to be believed. *)
 From Coq Require Import ZArith QArith List Bool FMapPositive.

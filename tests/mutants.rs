@@ -17,26 +17,17 @@ use std::time::{Duration, Instant};
 use serde::Deserialize;
 
 /// What is copied of the workspace.
-const PARTS: [&str; 25] = [
+const PARTS: [&str; 16] = [
     "Cargo.toml",
     "Cargo.lock",
     "README.md",
     "docs",
     "src",
-    "errors",
     "ontology",
     "rules",
     "encodings",
     "crates",
-    "pddl",
-    "certificate",
-    "mission",
-    "verify",
-    "probabilistic",
-    "picture",
-    "python",
-    "ros",
-    "fleet",
+    "integrations",
     ".ci/features",
     "tests",
     "benches",

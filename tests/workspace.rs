@@ -10,9 +10,9 @@ use libtest_mimic::{Arguments, Failed, Trial};
 
 /// The command that tests each member that is not a default one.
 const COMMANDS: [(&str, &str); 4] = [
-    ("ros", "cargo test -p metaplan-ros"),
-    ("fleet", "cargo test -p metaplan-fleet"),
-    ("python", ".ci/python"),
+    ("integrations/ros", "cargo test -p metaplan-ros"),
+    ("integrations/fleet", "cargo test -p metaplan-fleet"),
+    ("integrations/python", ".ci/python"),
     // Has no code.
     (".ci/features", ""),
 ];

@@ -38,7 +38,7 @@ impl fmt::Display for Position {
 }
 
 /// Everything that is wrong with a knowledge base.
-pub type Errors = errors::Errors<Error>;
+pub type Errors = diagnostics::Errors<Error>;
 
 /// Why a knowledge base cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -4,7 +4,7 @@ use crate::builtin::{BuiltIn, SWRLB};
 use crate::rule::RuleIdentity;
 
 /// Everything that is wrong with rules or an update.
-pub type Errors = errors::Errors<Error>;
+pub type Errors = diagnostics::Errors<Error>;
 
 /// What is wrong. R1xx: rule text; R2xx: a rule; R3xx: an update.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

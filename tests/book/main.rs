@@ -57,7 +57,7 @@ fn main() -> ExitCode {
 
 /// The README, the book, and the pages of other packages whose programs are built with these tests.
 fn pages() -> Vec<String> {
-    let mut pages = vec!["README.md".to_owned(), "verify/README.md".to_owned()];
+    let mut pages = vec!["README.md".to_owned(), "crates/verify/README.md".to_owned()];
     let mut folders = vec![PathBuf::from("docs")];
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(root().join(&folder)).expect("a folder") {
@@ -166,8 +166,8 @@ impl Page {
 
     /// Returns `true` if a library includes this page, so that cargo runs its Rust blocks.
     fn is_doctest(&self) -> bool {
-        let (library, page) = match self.path.strip_prefix("verify/") {
-            Some(page) => ("verify/src/lib.rs", page),
+        let (library, page) = match self.path.strip_prefix("crates/verify/") {
+            Some(page) => ("crates/verify/src/lib.rs", page),
             None => ("src/lib.rs", self.path.as_str()),
         };
         let library = std::fs::read_to_string(root().join(library)).expect("a library");

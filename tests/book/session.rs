@@ -151,7 +151,7 @@ fn copy_project(directory: &TempDir) {
     git.args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"]).current_dir(root());
     let files = git.output().ok().filter(|output| output.status.success());
     let Some(files) = files else {
-        for folder in ["missions", "encodings", "ontology", "rules", "docs", "ros"] {
+        for folder in ["missions", "encodings", "ontology", "rules", "docs", "integrations"] {
             copy_folder(&root().join(folder), &place.join(folder));
         }
         return;

@@ -12,20 +12,20 @@ use syn::visit::{self, Visit};
 
 /// Crates without circles.
 const CRATES: [&str; 15] = [
-    "errors/src",
-    "pddl/src",
-    "certificate/src",
+    "crates/diagnostics/src",
+    "crates/pddl/src",
+    "crates/certificate/src",
     "rules/src",
     "ontology/src",
-    "mission/src",
-    "verify/src",
+    "crates/mission/src",
+    "crates/verify/src",
     "encodings/src",
     "crates/task/src",
     "crates/search/src",
     "crates/temporal/src",
     "crates/planner/src",
-    "probabilistic/src",
-    "picture/src",
+    "crates/probabilistic/src",
+    "crates/picture/src",
     "src",
 ];
 

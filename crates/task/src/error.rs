@@ -22,7 +22,7 @@ pub struct Place {
 }
 
 /// Everything that is wrong with a task.
-pub type Errors = errors::Errors<Error>;
+pub type Errors = diagnostics::Errors<Error>;
 
 /// Why a task cannot be grounded or encoded.
 #[derive(Debug, Clone, thiserror::Error)]

@@ -248,7 +248,7 @@ fn definitions_are_those_of_ros() {
     assert_eq!(all.len(), 5);
     for (name, definition) in all {
         let (package, message) = name.split_once('/').expect("a package");
-        let file = root().join(format!("ros/interfaces/{package}/msg/{message}.msg"));
+        let file = root().join(format!("integrations/ros/interfaces/{package}/msg/{message}.msg"));
         let own = std::fs::read_to_string(&file).expect("the definition");
         let plain = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
         assert_eq!(plain(definition), plain(&own), "{name}");

@@ -1,0 +1,200 @@
+//! What planning asks of the knowledge base again and again, kept from one event to the next.
+//!
+//! An event mostly changes whether designs are available, a measured value, or the status of an objective. These are
+//! followed one by one; whatever else changes makes the whole be read anew. So the catalogue is always equal to what
+//! [`View`] reads.
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use ontology::tomasys::{Action, FunctionDesign, Individual, Measurement, View};
+use ontology::vocab::{local_name, pddl_tomasys, tomasys};
+use rules::{Delta, Engine, Fact, Literal, Symbol};
+
+/// Functions' designs, actions and measured values; and the members of classes that were asked for.
+#[derive(Debug, Clone)]
+pub struct Catalogue {
+    designs: Vec<FunctionDesign>,
+    actions: Vec<Action>,
+    measurements: Vec<Measurement>,
+    /// Shared by copies: a change of a class makes a new catalogue.
+    classes: Arc<Mutex<BTreeMap<String, Arc<[Individual]>>>>,
+}
+
+/// Properties that say whether a design is available.
+const AVAILABILITY: [&str; 3] =
+    [tomasys::FD_REALISABILITY, pddl_tomasys::FD_REALISABILITY, tomasys::FD_AVAILABLE];
+/// Properties that say a value.
+const VALUES: [&str; 2] = [tomasys::HAS_VALUE, pddl_tomasys::QA_HAS_VALUE];
+/// Properties from a design to a value.
+const ESTIMATIONS: [&str; 2] = [tomasys::HAS_QA_ESTIMATION, pddl_tomasys::HAS_QA_ESTIMATION];
+/// Properties that the catalogue has nothing of.
+const OTHERS: [&str; 12] = [
+    tomasys::C_STATUS,
+    pddl_tomasys::C_STATUS,
+    tomasys::O_STATUS,
+    tomasys::O_UPDATABLE,
+    tomasys::O_ALWAYS_IMPROVE,
+    tomasys::FG_STATUS,
+    tomasys::TYPE_F,
+    tomasys::TYPE_FD,
+    tomasys::SOLVES_O,
+    tomasys::HAS_QA_VALUE,
+    tomasys::HAS_NFR,
+    tomasys::FD_ERROR_LOG,
+];
+/// Classes that the catalogue has nothing of, unless somebody asks for their members.
+const OTHER_CLASSES: [&str; 2] = [tomasys::OBJECTIVE, tomasys::FUNCTION_GROUNDING];
+
+impl Catalogue {
+    /// Reads everything.
+    pub(super) fn new(view: &View<'_>) -> Self {
+        Self {
+            designs: view.function_designs(),
+            actions: view.actions(),
+            measurements: view.measurements(),
+            classes: Arc::default(),
+        }
+    }
+
+    /// As [`View::function_designs`].
+    pub fn designs(&self) -> &[FunctionDesign] {
+        &self.designs
+    }
+
+    /// As [`View::actions`].
+    pub(crate) fn actions(&self) -> &[Action] {
+        &self.actions
+    }
+
+    /// As [`View::measurements`].
+    pub(crate) fn measurements(&self) -> &[Measurement] {
+        &self.measurements
+    }
+
+    /// The members of a class by its IRI, or of all classes with that local name.
+    pub fn members(&self, view: &View<'_>, class: &str) -> Arc<[Individual]> {
+        let mut classes = self.classes.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = classes.get(class) {
+            return Arc::clone(known);
+        }
+        let members = if class.contains(':') {
+            view.individuals_of(class)
+        } else {
+            view.individuals_of_class_named(class)
+        };
+        let members: Arc<[Individual]> = members.into();
+        classes.insert(class.to_owned(), Arc::clone(&members));
+        members
+    }
+
+    /// Follows a change of what holds; false where the catalogue has to be read anew.
+    pub(super) fn follow(&mut self, delta: &Delta, engine: &Engine) -> bool {
+        delta.insert.iter().chain(&delta.delete).all(|fact| self.follow_fact(fact, engine))
+    }
+
+    fn follow_fact(&mut self, fact: &Fact, engine: &Engine) -> bool {
+        let name = |symbol: Symbol| engine.symbols().value(symbol).as_name().unwrap_or_default();
+        let property = name(fact.predicate);
+        let Some(&individual) = fact.arguments.first() else { return false };
+        let subject = name(individual);
+        if AVAILABILITY.contains(&property) {
+            if let Ok(place) = self.designs.binary_search_by(|own| own.individual.iri.as_str().cmp(subject)) {
+                let is_false = |property: &&str| {
+                    values(engine, individual, property).any(|value| *value == Literal::Boolean(false))
+                };
+                self.designs[place].available = !AVAILABILITY.iter().any(is_false);
+            }
+            return true;
+        }
+        if VALUES.contains(&property) {
+            let is_estimation = |property: &&str| {
+                let found = engine.symbols().find_name(property);
+                found.is_some_and(|found| engine.matching(found, &[None, Some(individual)]).next().is_some())
+            };
+            let place = self.measurements.binary_search_by(|own| own.individual.iri.as_str().cmp(subject));
+            let (Ok(place), false) = (place, ESTIMATIONS.iter().any(is_estimation)) else { return false };
+            let mut found: Vec<&Literal> =
+                VALUES.iter().flat_map(|property| values(engine, individual, property)).collect();
+            if found.len() > 1 {
+                found.sort_by_cached_key(ToString::to_string);
+            }
+            self.measurements[place].value = found.into_iter().find_map(Literal::as_rational);
+            return true;
+        }
+        if OTHER_CLASSES.contains(&property) {
+            let classes = self.classes.lock().unwrap_or_else(PoisonError::into_inner);
+            return !classes.contains_key(property) && !classes.contains_key(local_name(property));
+        }
+        OTHERS.contains(&property)
+    }
+}
+
+/// The literals that are values of a property of an individual.
+fn values<'a>(engine: &'a Engine, subject: Symbol, property: &str) -> impl Iterator<Item = &'a Literal> {
+    let symbols = engine.symbols();
+    let rows: Vec<Symbol> = symbols.find_name(property).map_or_else(Vec::new, |property| {
+        engine.matching(property, &[Some(subject), None]).map(|row| row[1]).collect()
+    });
+    rows.into_iter().filter_map(|symbol| symbols.value(symbol).as_literal())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use ontology::tomasys::change::Status;
+
+    use crate::knowledge::{COADAPTATION, Knowledge, Sources};
+
+    /// Whatever is reported and pursued, the catalogue is what the view reads.
+    #[test]
+    fn the_catalogue_keeps_in_step() {
+        for name in ["ugv", "uuv", "camara_like"] {
+            let document = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../ontology/kb/{name}.ttl"));
+            let rules = vec![COADAPTATION.to_owned()];
+            let sources = Sources { documents: vec![document], rules, ..Sources::default() };
+            let mut own = Knowledge::read(&sources).expect("the knowledge base is read");
+            let components =
+                own.view().components().into_iter().map(|known| known.individual.name).collect::<Vec<_>>();
+            let attributes =
+                own.view().attribute_types().into_iter().map(|kind| kind.name).collect::<Vec<_>>();
+            let mut random = fastrand::Rng::with_seed(11);
+            let mut kept = 0;
+            for _ in 0..300 {
+                match random.u32(..8) {
+                    0..=3 => {
+                        let statuses = [Status::Failed, Status::Recovered, Status::Working];
+                        let component = &components[random.usize(..components.len())];
+                        own.report(component, statuses[random.usize(..3)]).expect("it is known");
+                    }
+                    4..=6 if !attributes.is_empty() => {
+                        let attribute = &attributes[random.usize(..attributes.len())];
+                        own.measure(attribute, &random.u32(..100).to_string()).expect("it is known");
+                    }
+                    _ => {
+                        let designs = own.view().function_designs();
+                        let design = &designs[random.usize(..designs.len())];
+                        let pairs = design
+                            .solves
+                            .first()
+                            .map(|function| (function.name.clone(), design.individual.name.clone()));
+                        let pairs: Vec<_> = pairs.into_iter().filter(|_| random.bool()).collect();
+                        own.pursue(&pairs).expect("they are known");
+                    }
+                }
+                kept += usize::from(own.catalogue.get().is_some());
+                let (catalogue, view) = (own.catalogue(), own.view());
+                assert_eq!(catalogue.designs(), view.function_designs());
+                assert_eq!(catalogue.actions(), view.actions());
+                assert_eq!(catalogue.measurements(), view.measurements());
+                for class in ["FunctionDesign", "Function", "Component", "Action", "Objective"] {
+                    if class != "Objective" || random.u32(..10) == 0 {
+                        assert_eq!(*catalogue.members(&view, class), *view.individuals_of_class_named(class));
+                    }
+                }
+            }
+            assert!(kept > 150, "{name}: it is read anew too often: kept {kept} times");
+        }
+    }
+}

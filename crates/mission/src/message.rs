@@ -1,0 +1,274 @@
+//! What went wrong or is questionable, from whatever room it came, in one form for people and programs.
+
+use std::fmt;
+
+use pddl::{self, Diagnostic, Excerpt, Severity, Shown, Source};
+use serde::Serialize;
+
+use crate::visible::visible;
+
+/// Everything that is wrong with an input.
+pub type Errors = diagnostics::Errors<Message>;
+
+/// A message about an input.
+#[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(transparent)]
+pub struct Message(Box<Details>);
+
+impl std::ops::Deref for Message {
+    type Target = Details;
+
+    fn deref(&self) -> &Details {
+        &self.0
+    }
+}
+
+/// What a message says.
+#[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct Details {
+    /// `error` or `warning`.
+    pub severity: &'static str,
+    /// The stable code of the cause.
+    pub code: String,
+    /// One sentence.
+    pub message: String,
+    /// The file, where it is about one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// Line, from 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub line: Option<usize>,
+    /// Column, from 1, in characters.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub column: Option<usize>,
+    /// What would be right.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub help: Option<String>,
+    /// The source line, where there is one, and that of another place that matters.
+    #[serde(skip)]
+    excerpts: Vec<Excerpt>,
+    /// The message as a terminal shows it.
+    #[serde(skip)]
+    text: String,
+}
+
+impl Details {
+    /// As a terminal shows it, its parts changed by a function.
+    fn shown(&self, color: bool, part: impl Fn(&str) -> String) -> String {
+        let place = self.file.as_ref().map(|file| match (self.line, self.column) {
+            (Some(line), Some(column)) => format!("{file}:{line}:{column}"),
+            _ => file.clone(),
+        });
+        let [message, place, help] = [Some(&self.message), place.as_ref(), self.help.as_ref()]
+            .map(|text| text.map(|text| part(&one_line(text))));
+        let excerpts: Vec<Excerpt> = self.excerpts.iter().map(|excerpt| excerpt.map(&part)).collect();
+        let shown = Shown {
+            is_error: self.severity == "error",
+            code: &self.code,
+            message: &message.unwrap_or_default(),
+            place: place.as_deref(),
+            help: help.as_deref(),
+            excerpts: &excerpts,
+        };
+        shown.text(color)
+    }
+}
+
+impl Message {
+    /// An error that is about no place in a file.
+    pub fn error(code: &str, message: impl Into<String>) -> Self {
+        Self::plain("error", code, message.into(), None)
+    }
+
+    /// A fault of the program, from what a panic has said.
+    pub fn of_panic(panic: &(dyn std::any::Any + Send)) -> Self {
+        let reason = panic.downcast_ref::<String>().map(String::as_str);
+        let reason = reason.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or_default();
+        let text = format!("this is a fault of metaplan, not of your input; please report it: {reason}");
+        Self::error("M170", text)
+    }
+
+    /// A warning that is about no place in a file.
+    pub fn warning(code: &str, message: impl Into<String>) -> Self {
+        Self::plain("warning", code, message.into(), None)
+    }
+
+    /// A warning about a line and column of a file.
+    pub fn warning_at(code: &str, file: &str, place: (usize, usize), message: impl Into<String>) -> Self {
+        Self::plain("warning", code, message.into(), Some((file.to_owned(), Some(place))))
+    }
+
+    /// An error about a file as a whole, or about a line and column in it.
+    pub fn at(code: &str, file: &str, place: Option<(usize, usize)>, message: impl Into<String>) -> Self {
+        Self::plain("error", code, message.into(), Some((file.to_owned(), place)))
+    }
+
+    fn plain(
+        severity: &'static str,
+        code: &str,
+        message: String,
+        place: Option<(String, Option<(usize, usize)>)>,
+    ) -> Self {
+        let (file, place) = place.map_or((None, None), |(file, place)| (Some(file), place));
+        let (line, column) = place.unzip();
+        Self::of(Details {
+            severity,
+            code: code.to_owned(),
+            message,
+            file,
+            line,
+            column,
+            help: None,
+            excerpts: Vec::new(),
+            text: String::new(),
+        })
+    }
+
+    fn of(mut details: Details) -> Self {
+        details.text = details.shown(false, str::to_owned);
+        Self(Box::new(details))
+    }
+
+    /// The same with the line that it is about, from the text of its file.
+    #[must_use]
+    pub fn with_source(mut self, text: &str) -> Self {
+        let details = &mut *self.0;
+        if let (Some(file), Some(line), Some(column)) = (&details.file, details.line, details.column) {
+            details.excerpts = Excerpt::at(file, text, line, column).into_iter().collect();
+            details.text = details.shown(false, str::to_owned);
+        }
+        self
+    }
+
+    /// The same with what would be right.
+    #[must_use]
+    pub fn with_help(mut self, help: impl Into<String>) -> Self {
+        self.0.help = Some(help.into());
+        self.0.text = self.0.shown(false, str::to_owned);
+        self
+    }
+
+    /// Messages of the PDDL front end, with the source lines that they are about.
+    pub fn from_pddl(diagnostics: &[Diagnostic], sources: &[&Source]) -> Vec<Self> {
+        let details = |diagnostic: &Diagnostic| Details {
+            severity: if diagnostic.severity == Severity::Error { "error" } else { "warning" },
+            code: diagnostic.code.to_owned(),
+            message: diagnostic.message.clone(),
+            file: Some(diagnostic.file.clone()),
+            line: Some(diagnostic.line),
+            column: Some(diagnostic.column),
+            help: diagnostic.help.clone(),
+            excerpts: diagnostic.excerpts(sources),
+            text: String::new(),
+        };
+        diagnostics.iter().map(|diagnostic| Self::of(details(diagnostic))).collect()
+    }
+
+    /// An error of reading a knowledge base.
+    pub fn from_ontology(error: &ontology::Error) -> Self {
+        match error {
+            ontology::Error::Engine(error) => Self::from_rules(error),
+            ontology::Error::Unknown { name, known, .. } => {
+                let meant = did_you_mean(name, known.iter().map(String::as_str));
+                Self::from_text("error", error.code(), &(error.to_string() + &meant))
+            }
+            _ => Self::from_text("error", error.code(), &error.to_string()),
+        }
+    }
+
+    /// A warning of reading or lowering a knowledge base.
+    pub fn from_ontology_warning(warning: &ontology::Warning) -> Self {
+        Self::from_text("warning", warning.code(), &warning.to_string())
+    }
+
+    /// An error in rules.
+    pub fn from_rules(error: &rules::Error) -> Self {
+        let (text, code) = (error.to_string(), error.code());
+        let sentence = text.split_once(&format!("{code} ")).map_or(text.as_str(), |(_, sentence)| sentence);
+        let place = error.place().map(|(file, line, column)| (file.to_owned(), Some((line, column))));
+        Self::plain("error", code, sentence.to_owned(), place)
+    }
+
+    /// A message from `[FILE:[LINE:COLUMN:]] [SEVERITY[CODE]:] SENTENCE`, the form in which libraries print theirs.
+    fn from_text(severity: &'static str, code: &str, text: &str) -> Self {
+        let marks = [format!("{severity}[{code}]: "), format!("{code} ")];
+        let cut = marks.iter().find_map(|mark| text.find(mark.as_str()).map(|at| (at, at + mark.len())));
+        let (place, message) = cut.map_or(("", text), |(start, end)| (&text[..start], &text[end..]));
+        let place = place.trim().trim_end_matches(':');
+        let mut parts = place.rsplitn(3, ':');
+        let (column, line, file) = (parts.next(), parts.next(), parts.next());
+        let number = |part: Option<&str>| part.and_then(|part| part.parse::<usize>().ok());
+        let (file, line, column) = match (file, number(line), number(column)) {
+            (Some(file), Some(line), Some(column)) => (Some(file.to_owned()), Some(line), Some(column)),
+            _ => ((!place.is_empty()).then(|| place.to_owned()), None, None),
+        };
+        let place = file.map(|file| (file, line.zip(column)));
+        Self::plain(severity, code, message.to_owned(), place)
+    }
+
+    /// Whether it is an error.
+    pub fn is_error(&self) -> bool {
+        self.severity == "error"
+    }
+
+    /// As a terminal shows it, with a line break at its end.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The same with colours, as ANSI escapes; what would change a terminal is escaped as by [`visible`].
+    pub fn colored(&self) -> String {
+        self.shown(true, |part| visible(part).into_owned())
+    }
+}
+
+impl fmt::Display for Message {
+    /// As [`Message::text`], without the line break at its end.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.text().trim_end())
+    }
+}
+
+impl std::error::Error for Message {}
+
+const ERROR_FORMAT: &str = "metaplan-error/1";
+
+/// What every command answers that has failed.
+#[derive(Debug, Clone, Serialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+pub struct ErrorAnswer<'a> {
+    /// Name and version of this format.
+    #[cfg_attr(feature = "schema", schemars(extend("const" = ERROR_FORMAT)))]
+    format: &'static str,
+    /// All that is wrong.
+    messages: &'a [Message],
+}
+
+impl<'a> ErrorAnswer<'a> {
+    /// With all messages.
+    pub fn new(messages: &'a [Message]) -> Self {
+        Self { format: ERROR_FORMAT, messages }
+    }
+}
+
+/// A message as one line: a name or a value with a line break in it must not look like another message.
+fn one_line(text: &str) -> String {
+    text.replace('\r', "\\r").replace('\n', "\\n")
+}
+
+/// `; did you mean ...?` with the known name that is most like what was written, or nothing.
+pub fn did_you_mean<'n>(written: &str, known: impl IntoIterator<Item = &'n str>) -> String {
+    nearest(written, known).map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
+}
+
+/// The known name that is most like what was written, if one is: at most a third of its letters differ, and three.
+pub(crate) fn nearest<'n>(written: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
+    let written = written.to_lowercase();
+    let length = written.chars().count();
+    let distance = |name: &str| strsim::osa_distance(&written, &name.to_lowercase());
+    let near = known.into_iter().map(|name| (distance(name), name));
+    let near = near.filter(|(distance, _)| length > 1 && *distance <= (length / 3).clamp(1, 3));
+    near.min_by_key(|(distance, _)| *distance).map(|(_, name)| name)
+}

@@ -1,0 +1,300 @@
+//! Three servers and some workers as processes, and what can happen to them.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::time::Duration;
+
+use super::wires::{Wire, routes};
+
+/// The servers that two servers are, by the number of the third one.
+const PAIRS: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
+
+/// The disk of the third server has so much room, where it can have a disk of its own.
+const DISK: &str = "64m";
+
+fn program() -> String {
+    std::env::var("NATS_SERVER").unwrap_or_else(|_| "nats-server".to_owned())
+}
+
+/// Whether servers can be had.
+pub(super) fn is_there() -> Option<()> {
+    let out = Command::new(program()).arg("--version").stdout(Stdio::null()).status();
+    out.ok().filter(std::process::ExitStatus::success).map(|_| ())
+}
+
+/// The processes.
+#[derive(Clone)]
+pub(super) struct Cluster(Arc<Inner>);
+
+struct Inner {
+    directory: tempfile::TempDir,
+    clients: [u16; 3],
+    monitors: [u16; 3],
+    /// Between two servers, by the number of the third one.
+    wires: [Wire; 3],
+    own_disk: bool,
+    processes: Mutex<BTreeMap<String, Child>>,
+}
+
+impl Drop for Inner {
+    fn drop(&mut self) {
+        for child in self.processes.lock().unwrap_or_else(std::sync::PoisonError::into_inner).values_mut() {
+            // It may have ended by itself.
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+fn free_port() -> u16 {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port is free");
+    listener.local_addr().expect("it has an address").port()
+}
+
+/// Whether a process can have a disk of its own here.
+fn can_mount() -> bool {
+    let script = "mount -t tmpfs -o size=1m tmpfs /mnt";
+    let status = Command::new("unshare").args(["-rm", "sh", "-c", script]).stderr(Stdio::null()).status();
+    status.is_ok_and(|status| status.success())
+}
+
+impl Cluster {
+    /// Begins three servers on free ports of this machine.
+    pub(super) fn begin(seed: u64) -> Self {
+        let directory =
+            tempfile::Builder::new().prefix(&format!("chaos-{seed}-")).tempdir().expect("a directory");
+        let clients: [u16; 3] = std::array::from_fn(|_| free_port());
+        let routes: [u16; 3] = std::array::from_fn(|_| free_port());
+        let monitors: [u16; 3] = std::array::from_fn(|_| free_port());
+        let wires: [Wire; 3] = std::array::from_fn(|_| Wire::default());
+        // Servers tell each other of further ones, which lets them go round a wire that is cut: nobody listens there.
+        let nobody = free_port();
+        for own in 0..3 {
+            let others = (0..3).filter(|other| *other != own);
+            let list: Vec<String> = others
+                .map(|other| format!("nats://127.0.0.1:{}", wires[3 - own - other].lead(routes[other])))
+                .collect();
+            let folder = directory.path().join(format!("s{own}"));
+            fs::create_dir_all(&folder).expect("it can be made");
+            let text = format!(
+                "server_name: s{own}\nlisten: \"127.0.0.1:{}\"\nhttp: \"127.0.0.1:{}\"\n\
+                 jetstream {{ store_dir: \"{}\", sync_interval: always, max_file_store: 4GB }}\n\
+                 cluster {{ name: chaos, listen: \"127.0.0.1:{}\", advertise: \"127.0.0.1:{nobody}\", routes: [{}] }}\n",
+                clients[own],
+                monitors[own],
+                folder.display(),
+                routes[own],
+                list.join(", ")
+            );
+            fs::write(directory.path().join(format!("s{own}.conf")), text).expect("it can be written");
+        }
+        let own_disk = can_mount();
+        let processes = Mutex::default();
+        let cluster = Self(Arc::new(Inner { directory, clients, monitors, wires, own_disk, processes }));
+        if own_disk {
+            cluster.begin_disk();
+        }
+        for own in 0..3 {
+            cluster.begin_server(own);
+        }
+        cluster
+    }
+
+    fn processes(&self) -> MutexGuard<'_, BTreeMap<String, Child>> {
+        self.0.processes.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.directory.path().join(name)
+    }
+
+    /// Where clients find the servers.
+    pub(super) fn url(&self) -> String {
+        self.0.clients.map(|port| format!("nats://127.0.0.1:{port}")).join(",")
+    }
+
+    fn log(&self, name: &str) -> File {
+        let path = self.path(&format!("{name}.log"));
+        File::options().create(true).append(true).open(path).expect("it can be written")
+    }
+
+    fn begin_process(&self, name: &str, mut command: Command) {
+        let child = command.stdin(Stdio::null()).stdout(self.log(name)).stderr(self.log(name)).spawn();
+        self.processes().insert(name.to_owned(), child.expect("it can be begun"));
+    }
+
+    /// A small disk that is there for as long as a process holds it.
+    fn begin_disk(&self) {
+        let (folder, ready) = (self.path("s2"), self.path("s2").join("ready"));
+        let mount = format!(
+            "mount -t tmpfs -o size={DISK} tmpfs {0} && touch {0}/ready && exec sleep infinity",
+            folder.display()
+        );
+        let mut command = Command::new("unshare");
+        command.args(["-rm", "sh", "-c", &mount]);
+        self.begin_process("disk", command);
+        let pid = self.processes().get("disk").map(Child::id).expect("it has begun");
+        let seen = PathBuf::from(format!("/proc/{pid}/root{}", ready.display()));
+        for _ in 0..200 {
+            if seen.exists() {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        panic!("{}", self.logs());
+    }
+
+    fn begin_server(&self, own: usize) {
+        let configuration = self.path(&format!("s{own}.conf"));
+        let mut command = Command::new(program());
+        if own == 2 && self.0.own_disk {
+            let disk =
+                self.processes().get("disk").map(|child| child.id().to_string()).expect("it has begun");
+            command = Command::new("nsenter");
+            command.args(["--preserve-credentials", "-U", "-m", "-t", &disk, &program()]);
+        }
+        command.arg("-c").arg(configuration);
+        self.begin_process(&format!("s{own}"), command);
+    }
+
+    /// Begins a worker.
+    pub(super) fn begin_worker(&self, own: usize, partitions: u32, lease: u64) {
+        let missions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../missions");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_metaplan-fleet"));
+        command.arg("worker").args(["--nats", &self.url(), "--replicas", "3", "--threads", "2"]);
+        command.args(["--partitions", &partitions.to_string(), "--lease", &lease.to_string()]);
+        command.arg("--missions").arg(missions);
+        self.begin_process(&format!("w{own}"), command);
+    }
+
+    fn signal(&self, name: &str, signal: &str) {
+        let pid = self.processes().get(name).map(|child| child.id().to_string());
+        if let Some(pid) = pid {
+            // It may have ended.
+            let _ = Command::new("kill").args([signal, &pid]).stderr(Stdio::null()).status();
+        }
+    }
+
+    fn kill(&self, name: &str) {
+        self.signal(name, "-KILL");
+        if let Some(mut child) = self.processes().remove(name) {
+            let _ = child.wait();
+        }
+    }
+
+    /// Fills the disk of the third server, or makes room again.
+    fn fill(&self, full: bool) {
+        let pid = self.processes().get("disk").map(Child::id);
+        let Some(pid) = pid else { return };
+        let folder = self.path("s2");
+        let inside = PathBuf::from(format!("/proc/{pid}/root{}", folder.display())).join("filler");
+        if full {
+            if let Ok(mut file) = File::create(&inside) {
+                // Until there is no room any more.
+                let _ = std::io::copy(&mut std::io::repeat(0), &mut file);
+            }
+        } else {
+            let _ = fs::remove_file(inside);
+        }
+    }
+
+    /// Cuts two servers off from each other for a time; both still hear the third one.
+    fn part(&self, third: usize, millis: u64) {
+        let [one, other] = PAIRS[third];
+        self.0.wires[third].cut();
+        std::thread::sleep(Duration::from_millis(millis));
+        for (own, lost) in [(one, other), (other, one)] {
+            // A server that is busy answers nothing.
+            if let Some(routes) = routes(self.0.monitors[own]) {
+                assert!(
+                    !routes.contains(&format!("\"remote_name\": \"s{lost}\"")),
+                    "s{own} still hears s{lost}: {routes}"
+                );
+            }
+        }
+        self.0.wires[third].mend();
+    }
+
+    /// Everything that goes wrong, until it is over; then all run again. One server at a time is away.
+    pub(super) fn trouble(&self, seed: u64, over: &AtomicBool, partitions: u32, lease: u64) -> String {
+        let mut random = fastrand::Rng::with_seed(seed);
+        let mut counts: BTreeMap<&str, u32> = BTreeMap::new();
+        let wait = |millis: u64| std::thread::sleep(Duration::from_millis(millis));
+        while !over.load(Ordering::Relaxed) {
+            wait(random.u64(200..2500));
+            let worker = random.usize(0..super::WORKERS);
+            let server = random.usize(0..3);
+            let what = match random.u8(0..if self.0.own_disk { 13 } else { 12 }) {
+                0..=3 => {
+                    self.kill(&format!("w{worker}"));
+                    wait(random.u64(0..3000));
+                    self.begin_worker(worker, partitions, lease);
+                    "workers killed"
+                }
+                4..=6 => {
+                    self.signal(&format!("w{worker}"), "-STOP");
+                    wait(lease * 1000 + random.u64(500..2500));
+                    self.signal(&format!("w{worker}"), "-CONT");
+                    "workers paused beyond their lease"
+                }
+                7..=8 => {
+                    self.kill(&format!("s{server}"));
+                    wait(random.u64(500..4000));
+                    self.begin_server(server);
+                    wait(1500);
+                    "servers killed"
+                }
+                9 => {
+                    self.signal(&format!("s{server}"), "-STOP");
+                    wait(random.u64(1000..5000));
+                    self.signal(&format!("s{server}"), "-CONT");
+                    wait(1000);
+                    "servers cut off"
+                }
+                10..=11 => {
+                    self.part(server, random.u64(1000..5000));
+                    wait(1000);
+                    "connections between two servers cut"
+                }
+                _ => {
+                    self.fill(true);
+                    wait(random.u64(1000..3000));
+                    self.fill(false);
+                    self.kill("s2");
+                    self.begin_server(2);
+                    wait(2000);
+                    "disks filled"
+                }
+            };
+            *counts.entry(what).or_default() += 1;
+        }
+        counts.iter().map(|(what, count)| format!("{count} {what}")).collect::<Vec<_>>().join(", ")
+    }
+
+    /// The memory of a process, in megabytes.
+    pub(super) fn memory(&self, name: &str) -> u64 {
+        let pid = self.processes().get(name).map(Child::id).unwrap_or_default();
+        let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
+        let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap_or_default();
+        line.split_whitespace().next().and_then(|text| text.parse::<u64>().ok()).unwrap_or_default() / 1024
+    }
+
+    /// The ends of all logs.
+    pub(super) fn logs(&self) -> String {
+        let mut text = String::new();
+        for entry in fs::read_dir(self.0.directory.path()).into_iter().flatten().flatten() {
+            if entry.path().extension().is_some_and(|extension| extension == "log") {
+                let log = fs::read_to_string(entry.path()).unwrap_or_default();
+                let lines: Vec<&str> = log.lines().collect();
+                let last = lines[lines.len().saturating_sub(6)..].join("\n");
+                text.extend(["\n--- ", &entry.path().to_string_lossy(), "\n", &last]);
+            }
+        }
+        text
+    }
+}

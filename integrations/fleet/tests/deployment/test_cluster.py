@@ -1,0 +1,190 @@
+"""The command lines of the deployment files are run: three servers and their workers, on loopback.
+
+Host and port of each address become a free port of 127.0.0.1, paths of containers become directories, and nothing else
+of a command changes. `NATS_SERVER` is the server, `METAPLAN_FLEET` the worker's program.
+"""
+
+import contextlib
+import json
+import os
+import re
+import shlex
+import shutil
+import signal
+import socket
+import subprocess
+import time
+import urllib.error
+import urllib.request
+from functools import partial
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parents[4]
+EXAMPLES = ROOT / "integrations/fleet/examples"
+COMPOSE = yaml.safe_load((EXAMPLES / "compose.yaml").read_text())
+SERVERS = {name: own for name, own in COMPOSE["services"].items() if own["image"].startswith("nats:")}
+WORKER = COMPOSE["services"]["worker"]
+PODS = next(own for own in yaml.safe_load_all((EXAMPLES / "statefulset.yaml").read_text()) if own["kind"] == "StatefulSet")
+POD = PODS["spec"]["template"]["spec"]["containers"][0]
+NATS = os.environ.get("NATS_SERVER") or shutil.which("nats-server")
+PROGRAM = Path(os.environ.get("METAPLAN_FLEET", ROOT / "target/debug/metaplan-fleet"))
+SECONDS = 60
+
+pytestmark = pytest.mark.skipif(NATS is None, reason="nats-server is not there")
+
+
+def free_port():
+    with socket.socket() as own:
+        own.bind(("127.0.0.1", 0))
+        return own.getsockname()[1]
+
+
+class Cluster:
+    """Processes of containers that share 127.0.0.1."""
+
+    def __init__(self, directory):
+        self.directory = directory
+        self.ports = {}
+        self.processes = {}
+
+    def port(self, host, port):
+        return self.ports.setdefault((host, int(port)), free_port())
+
+    def mapped(self, container, text):
+        """Text of a container with addresses of this machine. `nats` is the service that Kubernetes has for the servers."""
+
+        def address(match):
+            host = {"0.0.0.0": container, "127.0.0.1": container, "nats": "nats-0"}.get(match[2], match[2])
+            scheme = (match[1] or "").replace("tls:", "nats:")
+            return f"{scheme}127.0.0.1:{self.port(host, match[3])}"
+
+        text = re.sub(r"(\w+://)?\b([\w.-]+):(\d+)\b", address, text)
+        return text.replace("/usr/share/metaplan", f"{self.directory}/image")
+
+    def start(self, container, words, **environment):
+        with (self.directory / f"{container}.log").open("w") as log:
+            own = {**os.environ, **environment}
+            self.processes[container] = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=own)
+
+    def start_server(self, name, service):
+        words = shlex.split(service["command"])
+        for index, word in enumerate(words[:-1]):
+            if word == "--http_port":
+                words[index + 1] = str(self.port(name, words[index + 1]))
+        store = service["volumes"][0].partition(":")[2]
+        words = [f"{self.directory}/{name}" if word == store else self.mapped(name, word) for word in words]
+        self.start(name, [NATS, *words, "--addr", "127.0.0.1", "--port", str(self.port(name, 4222))])
+
+    def get(self, container, url):
+        """The body of a page of a container; nothing while there is none."""
+        try:
+            with urllib.request.urlopen(self.mapped(container, url), timeout=5) as page:
+                return page.read().decode()
+        except (urllib.error.URLError, ConnectionError, TimeoutError):
+            return None
+
+    def wait(self, what, holds):
+        """Waits until something holds; all processes have to go on meanwhile."""
+        end = time.monotonic() + SECONDS
+        while not (value := holds()):
+            for name, process in self.processes.items():
+                assert process.poll() is None, f"{name} has ended with status {process.returncode}:\n{self.log(name)}"
+            assert time.monotonic() < end, f"{what}: not within {SECONDS} s\n{''.join(map(self.log, self.processes))}"
+            time.sleep(0.1)
+        return value
+
+    def log(self, name):
+        return (self.directory / f"{name}.log").read_text()[-3000:]
+
+    def stop(self):
+        for process in reversed(self.processes.values()):
+            process.send_signal(signal.SIGTERM)
+        for process in self.processes.values():
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(10)
+            process.kill()
+            process.wait()
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    own = Cluster(tmp_path_factory.mktemp("cluster"))
+    try:
+        for name, service in SERVERS.items():
+            own.start_server(name, service)
+        yield own
+    finally:
+        own.stop()
+
+
+def page(cluster, name, path):
+    text = cluster.get(name, f"http://127.0.0.1:8222/{path}")
+    return json.loads(text) if text else {}
+
+
+def is_member(cluster, name):
+    """Returns whether a server has routes to all others, and its JetStream a leader among all three."""
+    routes = {route.get("remote_name") for route in page(cluster, name, "routez").get("routes", [])}
+    meta = page(cluster, name, "jsz").get("meta_cluster", {})
+    return routes == SERVERS.keys() - {name} and meta.get("cluster_size") == 3 and meta.get("leader") in SERVERS
+
+
+def test_servers_of_compose_form_a_cluster_with_jetstream(cluster):
+    assert len(SERVERS) == 3
+    for name, service in SERVERS.items():
+        check = service["healthcheck"]["test"][-1]
+        cluster.wait(f"{name} is healthy", partial(cluster.get, name, check))
+        cluster.wait(f"{name} is a member of the cluster", partial(is_member, cluster, name))
+        described = page(cluster, name, "varz")
+        assert described["server_name"] == name and described["cluster"]["name"] == "fleet"
+
+
+def image(directory):
+    """The files that the image has besides the program."""
+    for line in (EXAMPLES / "Containerfile").read_text().splitlines():
+        if line.startswith("COPY") and "/usr/share/metaplan" in line:
+            source, target = line.split()[1:]
+            target = target.replace("/usr/share/metaplan", f"{directory}/image")
+            shutil.copytree(ROOT / source, target, dirs_exist_ok=True)
+
+
+def test_workers_of_both_files_work_on_them(cluster):
+    assert PROGRAM.exists(), f"{PROGRAM} has not been built"
+    image(cluster.directory)
+    environment = {name: cluster.mapped("", value) for name, value in WORKER["environment"].items()}
+    for name in ("compose-1", "compose-2"):
+        words = [cluster.mapped(name, word) for word in shlex.split(WORKER["command"])]
+        cluster.start(name, [PROGRAM, *words], **environment)
+    # Servers without TLS and credentials are what there is here.
+    words = [cluster.mapped("pod", word.replace("$(POD)", "pod")) for word in POD["args"] if not word.startswith("--creds")]
+    cluster.start("pod", [PROGRAM, *words])
+    ports = {port["name"]: port["containerPort"] for port in POD["ports"]}
+    for name in ("startupProbe", "readinessProbe", "livenessProbe"):
+        probe = POD[name]["httpGet"]
+        url = f"http://127.0.0.1:{ports[probe['port']]}{probe['path']}"
+        for worker in ("compose-1", "compose-2", "pod"):
+            cluster.wait(f"{name} of {worker}", partial(cluster.get, worker, url))
+
+    def ask(*words, text=None):
+        out = subprocess.run(
+            [PROGRAM, *words], env={**os.environ, **environment}, input=text, capture_output=True, text=True, timeout=SECONDS, check=True
+        )
+        return out.stdout
+
+    ask("send", text='ugv-1 {"event": "enrol", "mission": "ugv"}\n')
+    with subprocess.Popen(
+        [PROGRAM, "follow", "ugv-1", "--after", "0"], env={**os.environ, **environment}, stdout=subprocess.PIPE, text=True
+    ) as following:
+        try:
+            os.set_blocking(following.stdout.fileno(), False)
+            decided = cluster.wait("a decision", following.stdout.readline)
+        finally:
+            following.kill()
+    assert "plan_found" in decided
+    for worker in ("compose-1", "compose-2", "pod"):
+        process = cluster.processes.pop(worker)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(30) == 0, cluster.log(worker)

@@ -1,0 +1,47 @@
+"""Knowledge bases from and to other libraries."""
+
+import pickle
+from pathlib import Path
+
+import pytest
+
+rdflib = pytest.importorskip("rdflib", reason="rdflib is not there")
+
+import metaplan
+import metaplan.kb
+
+ROOT = Path(__file__).resolve().parents[3]
+UGV = ROOT / "ontology/kb/ugv.ttl"
+FILES = [ROOT / f"encodings/ugv/{name}.pddl" for name in ("domain", "problem")]
+TOMASYS = "http://metacontrol.org/tomasys#"
+
+
+def test_an_rdflib_graph_is_a_knowledge_base(tmp_path):
+    knowledge = metaplan.kb.load(rdflib.Graph().parse(UGV))
+    own = metaplan.reason(UGV, fail=["c_kinect"]).to_dict()["inferred"]
+    assert knowledge.reason(fail=["c_kinect"]).to_dict()["inferred"] == own
+    assert len(knowledge.inferred(fail=["c_kinect"])) == len(own)
+    assert metaplan.Mission.from_files(*FILES, [knowledge]).plan().cost == 408
+    copied = pickle.loads(pickle.dumps(knowledge))
+    assert copied.reason().to_dict()["inferred"] == knowledge.reason().to_dict()["inferred"]
+    kept = metaplan.kb.load(rdflib.Graph().parse(UGV), tmp_path / "kb.nt")
+    assert kept.path.read_bytes() == knowledge.path.read_bytes()
+
+
+def test_an_owlready2_world_is_a_knowledge_base(tmp_path):
+    owlready2 = pytest.importorskip("owlready2", reason="owlready2 is not there")
+    for name in ("tomasys", "ugv"):
+        metaplan.kb.load(rdflib.Graph().parse(ROOT / f"ontology/kb/{name}.ttl"), tmp_path / f"{name}.nt")
+    owlready2.onto_path.append(str(tmp_path))
+    world = owlready2.World()
+    world.get_ontology((tmp_path / "ugv.nt").as_uri()).load()
+    knowledge = metaplan.kb.load(world)
+    expected = metaplan.reason(UGV, fail=["c_kinect"]).to_dict()
+    found = knowledge.reason(fail=["c_kinect"]).to_dict()
+    assert {own["name"]: own["available"] for own in found["designs"]} == {
+        own["name"]: own["available"] for own in expected["designs"]
+    }
+    knowledge.into(world, fail=["c_kinect"])
+    design = rdflib.URIRef("http://metacontrol.org/metaplan/ugv#fd_amcl_kinect")
+    facts = list(world.as_rdflib_graph().objects(design, rdflib.URIRef(TOMASYS + "fd_realisability")))
+    assert [str(fact).lower() for fact in facts] == ["false"]
