@@ -70,7 +70,10 @@ fn the_lines_to_be_believed_are_counted_right() {
         // Words about codes decide nothing.
         let is_words = path.ends_with("/src/codes.rs");
         let path_in_crates = path.strip_prefix("crates/").unwrap_or(&path);
-        if own.iter().any(|folder| path_in_crates.starts_with(folder.as_str())) && !is_tests(&path) && !is_words {
+        if own.iter().any(|folder| path_in_crates.starts_with(folder.as_str()))
+            && !is_tests(&path)
+            && !is_words
+        {
             let row = row_of(&path, &listed).unwrap_or_else(|| panic!("{path} is linked, and in no row"));
             counts[row] += code_lines(&text);
         }

@@ -31,7 +31,10 @@ const FORBIDDEN: [(&str, &[&str]); 14] = [
     ),
     ("crates/temporal/src", &["ontology::", "encodings::", "planner::", "varisat", "oxrdf", "std::fs"]),
     ("crates/planner/src", &["ontology::", "varisat::", "oxrdf", "horned"]),
-    ("crates/picture/src", &["ontology::", "planner::", "rules::", "pddl::", "std::fs", "std::time", "std::net"]),
+    (
+        "crates/picture/src",
+        &["ontology::", "planner::", "rules::", "pddl::", "std::fs", "std::time", "std::net"],
+    ),
     ("crates/probabilistic/src", &["ontology::", "planner::", "rules::", "pddl::", "std::fs"]),
     ("src/cli", &["horned", "oxrdf", "varisat", "crepe", "json!"]),
 ];

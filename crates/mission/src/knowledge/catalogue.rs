@@ -151,7 +151,8 @@ mod tests {
     #[test]
     fn the_catalogue_keeps_in_step() {
         for name in ["ugv", "uuv", "camara_like"] {
-            let document = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../ontology/kb/{name}.ttl"));
+            let document =
+                Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../ontology/kb/{name}.ttl"));
             let rules = vec![COADAPTATION.to_owned()];
             let sources = Sources { documents: vec![document], rules, ..Sources::default() };
             let mut own = Knowledge::read(&sources).expect("the knowledge base is read");
