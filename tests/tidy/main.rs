@@ -1,11 +1,11 @@
-//! The house rules that a machine can check.
+//! Rules of style and structure that can be checked mechanically.
 
 mod believed;
 mod circles;
 mod codes;
+mod facade_layers;
 mod packages;
 mod pages;
-mod rooms;
 
 use std::path::{Path, PathBuf};
 

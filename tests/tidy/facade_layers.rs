@@ -1,89 +1,88 @@
-//! The arrows between the rooms of `src` are those that ARCHITECTURE.md lists, no more and no fewer, and they lead downwards in its
-//! picture.
+//! The modules of `src` import exactly what ARCHITECTURE.md lists, and only from lower lines of its picture.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use super::circles::imports;
 
-/// What ARCHITECTURE.md says of the rooms.
+/// Layers and imports as ARCHITECTURE.md lists them.
 struct Listed {
-    /// The picture: for each room its line, from the top.
+    /// The picture: the line of each module, counted from the top.
     lines: BTreeMap<String, usize>,
-    /// The table: for each room those that it imports from.
+    /// The table: the imports of each module.
     imports: BTreeMap<String, BTreeSet<String>>,
 }
 
-/// The names in backticks of a cell, without the ends of paths.
+/// Names in backticks in a table cell, without `/` and `.rs`.
 fn names(cell: &str) -> Vec<String> {
     let quoted = cell.split('`').skip(1).step_by(2);
     quoted.map(|name| name.trim_end_matches('/').trim_end_matches(".rs").to_owned()).collect()
 }
 
-/// The picture and the table of imports below the heading of `src`.
+/// Reads the picture and the table below the heading of `src`.
 fn listed(document: &str) -> Listed {
     let section = document.split("\n### src").nth(1).expect("a section on `src`");
     let picture = section.split("```text\n").nth(1).and_then(|rest| rest.split("```").next());
-    let picture = picture.expect("a picture of the rooms").lines().enumerate();
+    let picture = picture.expect("a picture of the modules").lines().enumerate();
     let lines =
-        picture.flat_map(|(line, rooms)| rooms.split_whitespace().map(move |room| (room.to_owned(), line)));
+        picture.flat_map(|(line, modules)| modules.split_whitespace().map(move |module| (module.to_owned(), line)));
     let table = section.split("| imports from |\n").nth(1).expect("a table of what imports from what");
     let rows = table.lines().skip(1).take_while(|line| line.starts_with('|'));
     let imports = rows.flat_map(|row| {
         let cells: Vec<&str> = row.trim_matches('|').split('|').collect();
-        let [rooms, _, from] = cells[..] else { panic!("a row has three cells: {row}") };
+        let [modules, _, from] = cells[..] else { panic!("a row has three cells: {row}") };
         let from: BTreeSet<String> = names(from).into_iter().collect();
-        names(rooms).into_iter().map(move |room| (room, from.clone()))
+        names(modules).into_iter().map(move |module| (module, from.clone()))
     });
     Listed { lines: lines.collect(), imports: imports.collect() }
 }
 
-/// For each room those from which its files import.
+/// Imports between the modules, from the source files.
 fn found(files: &[(String, String)]) -> BTreeMap<String, BTreeSet<String>> {
-    let mut rooms: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    let mut modules: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
     for (file, from) in imports(files, "src") {
-        let Some(room) = file.first() else { continue };
-        let others = from.iter().filter_map(|file| file.first()).filter(|other| *other != room);
-        rooms.entry(room.clone()).or_default().extend(others.cloned());
+        let Some(module) = file.first() else { continue };
+        let others = from.iter().filter_map(|file| file.first()).filter(|other| *other != module);
+        modules.entry(module.clone()).or_default().extend(others.cloned());
     }
-    rooms
+    modules
 }
 
-/// How the files differ from the page, and the page from itself.
+/// Differences between the files and the page, and between the picture and the table.
 fn differences(listed: &Listed, found: &BTreeMap<String, BTreeSet<String>>) -> Vec<String> {
     let mut differences = Vec::new();
     let none = BTreeSet::new();
     let all: BTreeSet<&String> =
         found.keys().chain(listed.imports.keys()).chain(listed.lines.keys()).collect();
-    for room in all {
-        if !found.contains_key(room) {
-            differences.push(format!("there is no room `{room}`"));
+    for module in all {
+        if !found.contains_key(module) {
+            differences.push(format!("there is no module `{module}`"));
         }
-        if !listed.imports.contains_key(room) {
-            differences.push(format!("the table lacks `{room}`"));
+        if !listed.imports.contains_key(module) {
+            differences.push(format!("the table lacks `{module}`"));
         }
-        let line = listed.lines.get(room);
+        let line = listed.lines.get(module);
         if line.is_none() {
-            differences.push(format!("the picture lacks `{room}`"));
+            differences.push(format!("the picture lacks `{module}`"));
         }
-        let (own, said) = (found.get(room).unwrap_or(&none), listed.imports.get(room).unwrap_or(&none));
-        differences.extend(own.difference(said).map(|other| format!("`{room}` imports from `{other}`")));
-        differences.extend(said.difference(own).map(|other| format!("`{room}` has nothing of `{other}`")));
+        let (own, said) = (found.get(module).unwrap_or(&none), listed.imports.get(module).unwrap_or(&none));
+        differences.extend(own.difference(said).map(|other| format!("`{module}` imports from `{other}`")));
+        differences.extend(said.difference(own).map(|other| format!("`{module}` has nothing of `{other}`")));
         let above = own.iter().filter(|other| listed.lines.get(*other) <= line);
-        differences.extend(above.map(|other| format!("`{other}` does not stand below `{room}`")));
+        differences.extend(above.map(|other| format!("`{other}` does not stand below `{module}`")));
     }
     differences
 }
 
 #[test]
-fn rooms_of_the_facade_import_as_the_architecture_says() {
+fn the_facade_imports_as_the_architecture_says() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("ARCHITECTURE.md");
     let page = std::fs::read_to_string(page).expect("text");
     let differences = differences(&listed(&page), &found(&super::files()));
     assert!(differences.is_empty(), "ARCHITECTURE.md and `src` differ:\n{}", differences.join("\n"));
 }
 
-/// What lies in a folder knows nothing of the file that stands for the folder.
+/// A file in a folder does not import from the module file of that folder.
 #[test]
 fn no_file_of_the_facade_imports_from_the_file_above_it() {
     let upwards = |(file, from): (Vec<String>, BTreeSet<Vec<String>>)| {
@@ -96,7 +95,7 @@ fn no_file_of_the_facade_imports_from_the_file_above_it() {
 
 #[test]
 fn a_wrong_arrow_is_found() {
-    let page = "# x\n\n### src: order\n\n```text\n  a b\n  c\n```\n\n| files | do | imports from |\n|---|---|---|\n\
+    let page = "# x\n\n### src: order\n\n```text\n  a b\n  c\n```\n\n| files | purpose | imports from |\n|---|---|---|\n\
                 | `a/`, `b.rs` | x | `c` |\n| `c` | y | |\n\n| `d` | z | `a` |\n";
     let file = |path: &str, text: &str| (format!("src/{path}"), text.to_owned());
     let check = |files: &[(String, String)], expected: &[&str]| {
@@ -118,7 +117,7 @@ fn a_wrong_arrow_is_found() {
     let found = [
         "`a` has nothing of `c`",
         "`b` has nothing of `c`",
-        "there is no room `c`",
+        "there is no module `c`",
         "the table lacks `d`",
         "the picture lacks `d`",
     ];
