@@ -20,7 +20,12 @@ fn given(text: &str) -> BTreeSet<String> {
 
 /// The crate that a file belongs to, if it has a table.
 fn owner(path: &str) -> Option<&'static str> {
-    let folder = path.trim_start_matches("crates/").split('/').next().unwrap_or_default();
+    let folder = path
+        .trim_start_matches("crates/")
+        .trim_start_matches("integrations/")
+        .split('/')
+        .next()
+        .unwrap_or_default();
     TABLES.into_iter().find(|table| *table == folder)
 }
 

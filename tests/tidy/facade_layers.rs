@@ -24,8 +24,8 @@ fn listed(document: &str) -> Listed {
     let section = document.split("\n### src").nth(1).expect("a section on `src`");
     let picture = section.split("```text\n").nth(1).and_then(|rest| rest.split("```").next());
     let picture = picture.expect("a picture of the modules").lines().enumerate();
-    let lines =
-        picture.flat_map(|(line, modules)| modules.split_whitespace().map(move |module| (module.to_owned(), line)));
+    let lines = picture
+        .flat_map(|(line, modules)| modules.split_whitespace().map(move |module| (module.to_owned(), line)));
     let table = section.split("| imports from |\n").nth(1).expect("a table of what imports from what");
     let rows = table.lines().skip(1).take_while(|line| line.starts_with('|'));
     let imports = rows.flat_map(|row| {
