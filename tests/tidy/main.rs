@@ -4,6 +4,7 @@ mod believed;
 mod circles;
 mod codes;
 mod facade_layers;
+mod language;
 mod packages;
 mod pages;
 

@@ -11,8 +11,8 @@ const README_LINES: usize = 200;
 /// Folders that hold no page of ours.
 const NO_PAGES: [&str; 3] = ["target", ".git", "node_modules"];
 
-/// All pages, relative to the root.
-fn pages(root: &Path) -> Vec<PathBuf> {
+/// All Markdown files below the root, relative to it.
+pub fn pages(root: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut folders = vec![PathBuf::new()];
     while let Some(folder) = folders.pop() {
