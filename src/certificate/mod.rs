@@ -1,4 +1,5 @@
-//! Writes certificates: a directory that `metaplan-verify` checks, where it is said what the files hold.
+//! Writes certificates: directories that `metaplan-verify` checks. Its documentation specifies the
+//! files.
 
 mod derivations;
 mod knowledge;
@@ -30,15 +31,15 @@ use crate::file::create_directory;
 use crate::message::Message;
 use crate::mission::Mission;
 
-/// What the solver writes, before it is shortened.
+/// Proof as the solver writes it, before it is trimmed.
 const DRAFT: &str = "draft.drat";
 
 /// A ground task.
 #[derive(Debug, Clone, Copy)]
 pub enum Ground<'c> {
-    /// In integers.
+    /// A task with integers.
     Integers(&'c Task),
-    /// In rationals of any size.
+    /// A task with rationals of any size.
     Exact(&'c ExactTask),
 }
 
@@ -58,23 +59,23 @@ impl Ground<'_> {
     }
 }
 
-/// What a certificate is about.
+/// Contents of a certificate.
 #[derive(Debug, Clone, Copy)]
 pub struct Contents<'c> {
     /// The mission.
     pub mission: &'c Mission,
     /// The problem as it was planned, with its metric.
     pub problem: &'c Problem,
-    /// What they ground to.
+    /// The ground task of domain and problem.
     pub task: Ground<'c>,
-    /// What was found.
+    /// The solution of the task.
     pub solution: &'c Solution,
-    /// The plan as lines with start and duration, for the mission's domain.
+    /// The plan for the mission's domain, as lines with start and duration.
     pub plan: &'c str,
 }
 
 impl Contents<'_> {
-    /// What the validator says that the plan costs; nothing if there is none.
+    /// Returns the validator's cost of the plan, or `None` without a plan.
     fn metric(&self, limits: &Limits) -> Result<Option<BigRational>, String> {
         let Some(found) = &self.solution.plan else { return Ok(None) };
         let (domain, cost) = (self.mission.domain(), found.cost.to_string());
@@ -83,7 +84,7 @@ impl Contents<'_> {
     }
 }
 
-/// Writes the certificate of a solution into a directory that does not exist yet.
+/// Writes the certificate of a solution into a new directory.
 ///
 /// # Errors
 /// The solution has no certificate, or the directory cannot be written.
@@ -127,7 +128,7 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
     };
     let whole = create_directory(directory).map_err(failed)?;
     let metric = contents.metric(limits).map_err(|reason| wrong(&reason))?;
-    // What `verify` would refuse is not written.
+    // A certificate that `verify` would reject is not written.
     check(text(&files, TASK), text(&files, ARGUMENT), metric.as_ref()).map_err(|fault| wrong(&fault))?;
     let refutation =
         refutation(whole.path(), (text(&files, TASK), text(&files, ARGUMENT)), metric.as_ref(), limits)
@@ -148,7 +149,8 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
     whole.commit().map_err(failed)
 }
 
-/// Makes the witness, and compares the task with the files as `verify` will: what cannot be compared gets no certificate.
+/// Creates the witness, and compares the task with the files as `verify` does. A task that cannot
+/// be compared gets no certificate.
 fn compared((domain, problem): (&str, &str), task: &str, limits: &Limits) -> Result<String, String> {
     let (domain, problem) = read_pddl(domain, problem)?;
     let witness =
@@ -161,7 +163,7 @@ fn compared((domain, problem): (&str, &str), task: &str, limits: &Limits) -> Res
     Ok(witness)
 }
 
-/// Writes a formula and its refutation, or nothing where there is none.
+/// Writes a formula and its refutation, if there is one.
 fn refutation(
     directory: &Path,
     documents: (&str, &str),

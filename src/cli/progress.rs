@@ -1,4 +1,5 @@
-//! How far a command is, on standard error: a line that changes on a terminal, and elsewhere a line every few seconds.
+//! Progress of a command on standard error: a changing line on a terminal, otherwise a line every
+//! few seconds.
 
 use std::io::IsTerminal as _;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -11,13 +12,13 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use crate::cli::common::Common;
 use crate::cli::output;
 
-/// What takes less is not worth a line.
+/// Delay before the first progress line, so that short commands show none.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// From one line to the next.
+/// Time between two lines.
 const INTERVAL: Duration = Duration::from_secs(5);
 
-/// What is shown until it is finished or dropped.
+/// A progress display that ends when it is finished or dropped.
 pub(super) struct Progress {
     bar: ProgressBar,
     message: Arc<Mutex<String>>,
@@ -25,7 +26,7 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// Begins to show what is being done, in a word.
+    /// Starts the display for an activity.
     pub(super) fn new(what: &'static str, common: &Common) -> Self {
         let is_terminal = std::io::stderr().is_terminal();
         let is_shown = is_terminal && !common.quiet;
@@ -43,19 +44,19 @@ impl Progress {
         Self { bar, message, teller }
     }
 
-    /// How far it is.
+    /// Sets the text of the current progress.
     pub(super) fn set_message(&self, text: String) {
         text.clone_into(&mut self.message.lock().unwrap_or_else(PoisonError::into_inner));
         self.bar.set_message(text);
     }
 
-    /// There is nothing more to show.
+    /// Ends the display.
     pub(super) fn finish(self) {
         drop(self);
     }
 }
 
-/// Does something, and shows what as long as it takes.
+/// Runs `work` and shows the activity while it runs.
 pub(super) fn during<T>(what: &'static str, common: &Common, work: impl FnOnce() -> T) -> T {
     let _progress = Progress::new(what, common);
     work()
@@ -66,7 +67,7 @@ impl Drop for Progress {
         self.bar.finish_and_clear();
         if let Some((sender, thread)) = self.teller.take() {
             drop(sender);
-            // It ends at once: its sender is gone.
+            // The thread ends at once, because its channel is closed.
             let _ = thread.join();
         }
     }

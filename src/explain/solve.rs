@@ -1,4 +1,4 @@
-//! The best plan for a mission as it is, or with other designs.
+//! Computes the best plan for a mission, optionally with other designs.
 
 use planner::{Config, Limits, Status, optimize};
 
@@ -27,7 +27,7 @@ pub(super) fn solve(
     }
     let (mut problem, _) = mission.filled()?;
     let domain = mission.allow(&mut problem, allowed);
-    // Later queries need time, too.
+    // Half of the time is reserved for later queries.
     let limits = &limits.half();
     let task = match ground_with(mission, &domain, &problem, &[], limits) {
         Ok(task) => task,

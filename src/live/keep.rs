@@ -1,10 +1,10 @@
-//! Which lines say how things are, until another says otherwise.
+//! Determines the lines that describe the current state until a later line replaces them.
 
 use std::borrow::Cow;
 
 use serde::Deserialize;
 
-/// What of an answer says what it is about.
+/// Fields of an answer that identify its subject.
 #[derive(Deserialize)]
 struct About<'a> {
     #[serde(borrow, default)]
@@ -27,18 +27,19 @@ struct Objective {
     objective: String,
 }
 
-/// The word for how a design is.
+/// Key of a design's state.
 pub(super) fn design_key(design: &str) -> String {
     format!("design {design}")
 }
 
-/// What an answer is the last word on, for now.
+/// Returns the keys whose current state an answer defines.
 pub(super) fn keys(answer: &str) -> Vec<String> {
     let Ok(about) = serde_json::from_str::<About>(answer) else { return Vec::new() };
     match about.answer.as_ref() {
         "request_action" | "goal_reached" => vec!["action".to_owned()],
         "suspend_action" | "resume_action" | "cancel_action" => vec!["suspension".to_owned()],
-        // A plan that is found, lost or kept: lines on all three are repeated in their order, since the cost of a kept plan is in the first.
+        // A plan that is found, lost or kept: lines of all three kinds are repeated in their order,
+        // since the cost of a kept plan is in the first.
         kind @ ("plan_found" | "plan_none" | "plan_kept" | "ready" | "contradicted" | "unconcluded") => {
             vec![kind.to_owned()]
         }

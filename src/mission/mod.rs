@@ -1,6 +1,7 @@
-//! What the robot is and what it has to do, joined by `metaplan-mission`, and planned with.
+//! Planning for missions: grounding, validation and export of plans.
 //!
-//! The only room that sees both OWL and the planner.
+//! Invariant: no other module uses both OWL and the planner's task. `metaplan-mission` joins the
+//! knowledge base and the PDDL files.
 
 mod blocking;
 mod btcpp;

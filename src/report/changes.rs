@@ -1,4 +1,4 @@
-//! What differs between a mission as its files have it and in a situation, and why that matters.
+//! Differences between a mission as its files define it and in a situation, with their causes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use crate::mission::Mission;
 use crate::number::decimal;
 use crate::report::designs::because;
 
-/// What a component's or an attribute's state is called where nobody says any.
+/// Name of an unknown state of a component or an attribute.
 const UNSAID: &str = "not said";
 
 /// The cost of a plan, or the reason for the lack of a plan.
@@ -17,13 +17,14 @@ const UNSAID: &str = "not said";
 pub enum Cost {
     /// The metric, as text.
     Of(String),
-    /// It is proved that there is no plan.
+    /// The mission is proved to have no plan.
     NoPlan,
-    /// No plan was found, within limits.
+    /// No plan was found within the limits.
     NotFound,
 }
 
-/// From causes to effects: what is reported, what the task is, which designs that makes available, and what the plan costs.
+/// Returns the differences from causes to effects: reports, task, availability of designs, and
+/// costs of the plans.
 pub fn changes(before: (&Mission, &Plan), after: (&Mission, &Plan), costs: &[Cost; 2]) -> Vec<Change> {
     let mut changes = Vec::new();
     let mut say = |text: String| changes.push(Change { text, because: Vec::new() });
@@ -36,7 +37,7 @@ pub fn changes(before: (&Mission, &Plan), after: (&Mission, &Plan), costs: &[Cos
     changes
 }
 
-/// `name: old before, new now` for what differs.
+/// Formats the values that differ: `name: old before, new now`.
 fn differences(
     before: &BTreeMap<String, String>,
     after: &BTreeMap<String, String>,
@@ -67,7 +68,7 @@ fn measured(mission: &Mission) -> BTreeMap<String, String> {
     value.collect()
 }
 
-/// What the problem states otherwise than before.
+/// Returns the differences of the problems.
 fn task(before: &Mission, after: &Mission) -> Vec<String> {
     let (old, new) = (stated(before), stated(after));
     let only = |own: &BTreeSet<String>, other: &BTreeSet<String>| {
@@ -103,11 +104,11 @@ fn shown(atom: &Atom) -> String {
     format!("({})", words.join(" "))
 }
 
-/// The designs that are lost or gained, with the reasons.
+/// Returns the designs that are lost or gained, with the reasons.
 fn designs(before: &Mission, after: &Mission) -> Vec<Change> {
     let available = |mission: &Mission| -> BTreeMap<String, bool> {
-        let known = mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
-        known.map(|design| (design.individual.name.clone(), design.available)).collect()
+        let designs = mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
+        designs.map(|design| (design.individual.name.clone(), design.available)).collect()
     };
     let (old, new) = (available(before), available(after));
     let changed = new.iter().filter(|(design, now)| old.get(*design) != Some(now));
@@ -119,7 +120,7 @@ fn designs(before: &Mission, after: &Mission) -> Vec<Change> {
     changes.collect()
 }
 
-/// How the plans differ.
+/// Returns the differences of the plans.
 fn plans(before: &Plan, after: &Plan, costs: &[Cost; 2]) -> Vec<String> {
     let text = match costs {
         [Cost::Of(old), Cost::Of(new)] => return both(before, after, [old, new]),
@@ -163,8 +164,8 @@ fn both(before: &Plan, after: &Plan, [old_cost, new_cost]: [&str; 2]) -> Vec<Str
 fn kept(before: &Plan, after: &Plan) -> String {
     let mut old: Vec<&str> = before.steps.iter().map(|step| step.label.as_str()).collect();
     let in_both = after.steps.iter().filter(|step| {
-        let found = old.iter().position(|label| *label == step.label);
-        found.map(|position| old.swap_remove(position)).is_some()
+        let position = old.iter().position(|label| *label == step.label);
+        position.map(|position| old.swap_remove(position)).is_some()
     });
     let (kept, new, old) = (in_both.count(), after.steps.len(), before.steps.len());
     let plural = |count: usize| if count == 1 { "1 action".to_owned() } else { format!("{count} actions") };

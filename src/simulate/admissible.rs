@@ -17,8 +17,8 @@ pub(super) struct Admission<'p> {
 }
 
 impl<'p> Admission<'p> {
-    /// Conditions of a step. `done` is the share of the step that is done, if it is under way. Conditions that mention
-    /// the designs of the functions in `undecided` are omitted.
+    /// Collects the conditions of a step. `done` is the completed share of the step, if it is
+    /// running. Conditions that mention the designs of the functions in `undecided` are omitted.
     pub(super) fn new(
         domain: &Domain,
         problem: &'p Problem,
@@ -43,7 +43,7 @@ impl<'p> Admission<'p> {
         Self { domain, problem }
     }
 
-    /// Whether the step can be done as far as its designs are chosen.
+    /// Returns `true` if the step is possible with its designs, as far as they are chosen.
     pub(super) fn admits(&self, step: &PlannedStep) -> bool {
         advance(&self.domain, self.problem, &step.to_plan_step(), false).is_ok()
     }

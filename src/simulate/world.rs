@@ -1,9 +1,9 @@
-//! A simulated robot: what is true, as it changes with time, disturbances and the action under way.
+//! The simulated robot: its state, which changes by time, disturbances and the running action.
 //!
-//! What an action needs, takes and does is what the mission's own domain says, with a seeded share more or less time. An
-//! action whose designs are not available, or whose conditions do not hold for what is left of it, stands still, and
-//! fails when its patience is over. Everything random is drawn from the seed alone, so that all ways of control meet the
-//! same world.
+//! Conditions, durations and effects of actions follow the mission's own domain, with a seeded
+//! deviation of the duration. An action stalls if its designs are not available, or if its
+//! conditions do not hold for the remaining part, and fails when it has stalled for its `patience`.
+//! The seed alone determines everything random, so all strategies face the same world.
 
 use std::cell::OnceCell;
 
@@ -19,23 +19,23 @@ use crate::number;
 use crate::simulate::check::Watched;
 use crate::simulate::settings::{Disturbance, Simulation};
 
-/// Times and shares are rounded to this part of a unit.
+/// Times and shares are rounded to multiples of 1 / `GRAIN`.
 const GRAIN: f64 = 1e6;
 
-/// The action under way.
+/// The running action.
 #[derive(Debug, Clone)]
 struct Job {
     action: u64,
     step: PlannedStep,
-    /// From 0 to 1.
+    /// Completed share of the action, from 0 to 1.
     progress: f64,
-    /// How long it has stood still.
+    /// Time for which the action has stalled.
     waited: f64,
-    /// Whether it was asked to.
+    /// `true` if the controller has suspended the action.
     suspended: bool,
 }
 
-/// A failure or recovery that is to come.
+/// A scheduled failure or recovery.
 #[derive(Debug, Clone)]
 struct Upset {
     time: f64,
@@ -43,27 +43,27 @@ struct Upset {
     status: Status,
 }
 
-/// The true state of robot and surroundings.
+/// The true state of the robot and its environment.
 #[derive(Debug, Clone)]
 pub struct World {
     truth: Mission,
-    /// Its problem with what the knowledge base contributes, once that is asked for.
+    /// The problem with the contributions of the knowledge base, filled on first use.
     filled: OnceCell<Problem>,
     settings: Simulation,
     watched: Watched,
     seed: u64,
-    /// Since the start of the mission, in the domain's time unit.
+    /// Time since the start of the mission, in the domain's time unit.
     pub time: f64,
     job: Option<Job>,
     phases: Vec<f64>,
     upsets: Vec<Upset>,
-    /// When each disturbance takes place, once that is known; infinite once it has.
+    /// Time of each disturbance, once determined; infinite after the disturbance has happened.
     times: Vec<Option<f64>>,
-    /// Whether the robot has come to its end.
+    /// `true` if the robot is lost.
     pub lost: bool,
-    /// How much of the action that inspects is done, at most so far.
+    /// Greatest completed share of the inspection so far.
     pub inspected: f64,
-    /// When the pipeline was found.
+    /// Time at which the pipeline was found.
     pub found: Option<f64>,
 }
 
@@ -77,7 +77,7 @@ fn rounded(value: f64) -> f64 {
 }
 
 impl World {
-    /// A robot at the beginning of its mission.
+    /// Creates the world at the beginning of a mission.
     pub fn new(truth: Mission, settings: Simulation, watched: Watched, seed: u64) -> Self {
         let mut random = fastrand::Rng::with_seed(seed);
         let phases =
@@ -132,13 +132,13 @@ impl World {
         })
     }
 
-    /// The truth, to change it.
+    /// Returns the true state for modification.
     fn change(&mut self) -> &mut Mission {
         self.filled.take();
         &mut self.truth
     }
 
-    /// Does as the controller says; what that leads to at once.
+    /// Executes an effect of the controller. Returns the immediate events.
     pub fn obey(&mut self, effect: &Effect) -> Vec<Event> {
         match &effect.command {
             Command::Request { step } => {
@@ -165,12 +165,12 @@ impl World {
         }
     }
 
-    /// Whether the action under way can go on; there need not be one.
+    /// Returns `true` if the running action can proceed, or if no action is running.
     pub fn goes_on(&self) -> bool {
         self.job.as_ref().is_none_or(|job| self.left(job).is_some())
     }
 
-    /// How long what is left of an action takes, if it can go on.
+    /// Returns the time that the remaining part of an action takes, if it can proceed.
     fn left(&self, job: &Job) -> Option<f64> {
         if job.suspended {
             return None;
@@ -180,7 +180,8 @@ impl World {
         Some(number::to_f64(&advance.duration) * self.slowness(&job.step))
     }
 
-    /// How much longer than expected an action takes here, whatever its designs.
+    /// Factor by which an action takes longer than expected in this world, independent of its
+    /// designs.
     fn slowness(&self, step: &PlannedStep) -> f64 {
         let mut text = step.action.clone();
         for word in step.context().into_iter().flatten() {
@@ -192,16 +193,16 @@ impl World {
         1.0 + self.settings.noise * (2.0 * fastrand::Rng::with_seed(seed).f64() - 1.0)
     }
 
-    /// Lets time pass, at most one step, and reports.
+    /// Advances time by at most one step, and reports events.
     ///
     /// # Errors
     /// A disturbance or a signal that does not fit the mission.
     pub fn pass(&mut self) -> Result<Vec<Event>, Message> {
         let mut events = Vec::new();
-        let left = self.job.as_ref().and_then(|job| self.left(job));
-        let step = left.map_or(self.settings.step, |left| left.min(self.settings.step));
+        let remaining = self.job.as_ref().and_then(|job| self.left(job));
+        let step = remaining.map_or(self.settings.step, |remaining| remaining.min(self.settings.step));
         self.time = rounded(self.time + step);
-        self.work(step, left, &mut events);
+        self.work(step, remaining, &mut events);
         self.disturb(&mut events)?;
         self.swing(&mut events)?;
         events.push(Event::Tick);
@@ -242,7 +243,7 @@ impl World {
         self.look();
     }
 
-    /// What a share of an action changes, and at its end all else that it changes.
+    /// Applies the changes of a share of an action and, if `whole`, all its effects at the end.
     fn use_up(&mut self, step: &PlannedStep, share: f64, whole: bool, events: &mut Vec<Event>) {
         let Ok(mut advance) = advance(self.truth.domain(), self.filled(), &step.to_plan_step(), true) else {
             return;
@@ -271,7 +272,8 @@ impl World {
         }
     }
 
-    /// Records when the pipeline is found, and schedules events whose conditions hold for the first time.
+    /// Records the time at which the pipeline is found, and schedules events whose conditions hold
+    /// for the first time.
     fn look(&mut self) {
         if self.found.is_none() && self.watched.found.as_ref().is_some_and(|found| self.holds(found)) {
             self.found = Some(self.time);
@@ -286,7 +288,7 @@ impl World {
         }
     }
 
-    /// Whether a condition holds now.
+    /// Returns `true` if a condition holds in the current state.
     fn holds(&self, condition: &Condition) -> bool {
         let goal = condition.clone();
         is_valid(self.truth.domain(), &Problem { goal, constraints: Vec::new(), ..self.filled().clone() })
@@ -324,7 +326,7 @@ impl World {
         Ok(())
     }
 
-    /// What the signals are at the beginning.
+    /// Returns the initial values of the signals.
     ///
     /// # Errors
     /// As [`World::pass`].
@@ -350,25 +352,26 @@ impl World {
         Ok(())
     }
 
-    /// Whether the goal holds.
+    /// Returns `true` if the goal holds.
     pub fn reached(&self) -> bool {
         is_valid(self.truth.domain(), self.filled())
     }
 
-    /// The mission's metric so far; the time without one.
+    /// Returns the value of the mission's metric so far, or the time if it has no metric.
     pub fn cost(&self) -> f64 {
         let metric = metric_after(self.truth.domain(), self.filled(), &exact(self.time));
         metric.map_or(self.time, |metric| number::to_f64(&metric))
     }
 
-    /// How much was inspected, in the unit of the length; none where the mission does not inspect.
+    /// Returns the inspected length, in the unit of the length. `None` if the mission does not
+    /// inspect.
     pub fn distance(&self) -> Option<f64> {
         let length = self.truth.value(self.watched.length.as_ref()?)?;
         Some(number::to_f64(&length) * self.inspected)
     }
 }
 
-/// Whether the empty plan solves a problem.
+/// Returns `true` if the empty plan solves the problem.
 fn is_valid(domain: &Domain, problem: &Problem) -> bool {
     validate(domain, problem, &PlanText::default(), &Options::default()).valid
 }

@@ -1,5 +1,5 @@
-//! Numbers that a mission lacks, or that cannot be intended. They prevent actions and designs from ever being used,
-//! although no file is malformed.
+//! Detects missing and unintended numbers. They make actions and designs unusable although no file
+//! is malformed.
 
 mod analysis;
 mod syntax;
@@ -24,11 +24,11 @@ pub fn note_doubts(mission: &mut Mission) {
     }
 }
 
-/// Warnings about numbers that are missing and about durations below 0.
+/// Returns warnings about missing numbers and about negative durations.
 pub fn doubts(mission: &Mission) -> Vec<Message> {
     let numbers = Numbers::new(mission);
     let (missing, negative) = numbers.check();
-    // Functions without any value have a warning of their own (M206).
+    // Functions without any value have a separate warning (M206).
     let missing: Vec<MissingValue> =
         missing.into_iter().filter(|own| !own.is_silent && own.is_likely).collect();
     let estimations = missing.iter().filter_map(|own| Some((own, own.estimation.as_ref()?)));
@@ -43,16 +43,16 @@ pub fn doubts(mission: &Mission) -> Vec<Message> {
     doubts
 }
 
-/// Numeric functions without a value that actions need: those that are probably omitted by mistake, and all of them
-/// if no omission seems to be one.
+/// Returns the numeric functions without a value that actions need: the probable mistakes, or all
+/// of them if none is a probable mistake.
 pub fn missing_values(mission: &Mission) -> Vec<MissingValue> {
-    let all = Numbers::new(mission).check().0;
+    let values = Numbers::new(mission).check().0;
     let is_told = |own: &MissingValue| own.is_likely || own.is_silent;
-    let is_any = all.iter().any(is_told);
-    all.into_iter().filter(|own| !is_any || is_told(own)).collect()
+    let is_any = values.iter().any(is_told);
+    values.into_iter().filter(|own| !is_any || is_told(own)).collect()
 }
 
-/// Reasons why a design can never be used although it may be available, as sentences.
+/// Returns the reasons why a design can never be used although it may be available, as sentences.
 pub fn against(mission: &Mission, design: &str) -> Vec<String> {
     let (missing, negative) = Numbers::new(mission).check();
     let missing = missing.iter().filter_map(|own| {

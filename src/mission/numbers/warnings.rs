@@ -11,7 +11,7 @@ use crate::message::{Message, did_you_mean};
 /// Maximum number of functions without a value that a warning names; further ones are only counted.
 const NAMED: usize = 3;
 
-/// The warnings.
+/// Messages about missing and negative numbers.
 impl Numbers<'_> {
     pub(super) fn no_estimation(&self, own: &MissingValue, design: &str, attribute: &str) -> Message {
         let individual = self.design(design);
@@ -27,13 +27,13 @@ impl Numbers<'_> {
     pub(super) fn no_value(&self, missing: &[&MissingValue]) -> Message {
         let names: Vec<String> =
             missing.iter().take(NAMED).map(|own| format!("`{}`", own.function)).collect();
-        let more = missing.len().saturating_sub(NAMED);
-        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let omitted = missing.len().saturating_sub(NAMED);
+        let omitted = if omitted > 0 { format!(" and {omitted} more") } else { String::new() };
         let actions: BTreeSet<&String> = missing.iter().flat_map(|own| &own.needed_by).collect();
         let actions: Vec<String> = actions.into_iter().cloned().collect();
         let have = if missing.len() == 1 { "has" } else { "have" };
         let text = format!(
-            "{}{more} {have} no value, so {} can never be done where it is needed",
+            "{}{omitted} {have} no value, so {} can never be done where it is needed",
             names.join(", "),
             quoted(&actions)
         );
