@@ -42,8 +42,8 @@ pub enum Part {
     Value,
     /// The key at the end of a path.
     Key,
-    /// The position at this number of bytes from the beginning of a string. It is the beginning of the string if the
-    /// file does not contain the text of the string literally.
+    /// The position at this number of bytes from the beginning of a string. It is the beginning of
+    /// the string if the file does not contain the text of the string literally.
     Inside(usize),
 }
 

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 /// Maximum number of characters, and of powers of ten, of an accepted number; larger ones would
 /// only consume memory.
-const LONGEST: usize = 40;
+const MAX_CHARACTERS: usize = 40;
 
 /// Number of decimals of values in the problem. Floating-point numbers of a robot would otherwise
 /// make the planner's integers huge.
@@ -15,12 +15,12 @@ const DECIMALS: u32 = 6;
 /// Parses a decimal, with or without an exponent: `-12`, `0.25`, `1e-2`.
 pub(crate) fn exact(text: &str) -> Option<BigRational> {
     let text = text.trim();
-    if text.len() > LONGEST {
+    if text.len() > MAX_CHARACTERS {
         return None;
     }
     let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
     let exponent: i32 =
-        exponent.parse().ok().filter(|power: &i32| power.unsigned_abs() as usize <= LONGEST)?;
+        exponent.parse().ok().filter(|power: &i32| power.unsigned_abs() as usize <= MAX_CHARACTERS)?;
     let literal = rules::Literal::parse(mantissa, Some("http://www.w3.org/2001/XMLSchema#decimal"), None);
     let power = num_traits::pow(BigRational::from_integer(10.into()), exponent.unsigned_abs() as usize);
     let value = literal.as_rational()?;

@@ -294,11 +294,11 @@ impl PlanAnswer {
     /// Adds the missing numbers.
     #[must_use]
     pub fn with_missing_values(mut self, missing: &[MissingValue]) -> Self {
-        let part = |own: &MissingValue| MissingValuePart {
-            function: own.function.clone(),
-            needed_by: own.needed_by.clone(),
-            design: own.estimation.as_ref().map(|(design, _)| design.clone()),
-            file: own.file.clone(),
+        let part = |value: &MissingValue| MissingValuePart {
+            function: value.function.clone(),
+            needed_by: value.needed_by.clone(),
+            design: value.estimation.as_ref().map(|(design, _)| design.clone()),
+            file: value.file.clone(),
         };
         let parts: Vec<MissingValuePart> = missing.iter().map(part).collect();
         self.missing_values = Some(parts).filter(|parts| !parts.is_empty());
@@ -408,7 +408,8 @@ impl AlternativesPart {
     fn of(found: &Alternatives) -> Self {
         let forced = found.forced.as_ref().map(|steps| {
             let each = steps.iter();
-            each.map(|own| ForcedPart { action: own.action, functions: own.functions.clone() }).collect()
+            each.map(|forced| ForcedPart { action: forced.action, functions: forced.functions.clone() })
+                .collect()
         });
         Self { plans: found.plans.iter().map(steps).collect(), complete: found.complete, forced }
     }

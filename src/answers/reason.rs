@@ -151,7 +151,7 @@ impl<'a> ReasonAnswer<'a> {
 
 impl DesignPart {
     fn of(design: FunctionDesign) -> Self {
-        let names = |all: Vec<Individual>| all.into_iter().map(|own| own.name).collect();
+        let names = |all: Vec<Individual>| all.into_iter().map(|individual| individual.name).collect();
         Self {
             name: design.individual.name,
             iri: design.individual.iri,
@@ -188,15 +188,15 @@ pub fn statuses(knowledge: &Knowledge) -> Vec<(String, String)> {
 impl<'a> EntailmentAnswer<'a> {
     /// Answer about all statements.
     pub fn new(found: &'a [Entailment]) -> Self {
-        let statement = |one: &'a Entailment| {
-            let (follows, reason): (bool, &str) = match &one.answer {
+        let statement = |entailment: &'a Entailment| {
+            let (follows, reason): (bool, &str) = match &entailment.answer {
                 Answer::Follows(reason) => (true, reason),
                 Answer::Open(reason) => (false, reason),
             };
-            StatementPart { statement: &one.statement, follows, reason }
+            StatementPart { statement: &entailment.statement, follows, reason }
         };
         let statements: Vec<StatementPart<'a>> = found.iter().map(statement).collect();
-        let entailed = statements.iter().all(|one| one.follows);
+        let entailed = statements.iter().all(|statement| statement.follows);
         Self { format: ENTAILS, entailed, statements }
     }
 }

@@ -45,7 +45,7 @@ impl ReadyLine {
             seq: beliefs.sequence(),
             missing: beliefs.missing(),
             cut_bytes: recovery.cut,
-            warnings: recovery.warnings.iter().map(|own| own.message.clone()).collect(),
+            warnings: recovery.warnings.iter().map(|warning| warning.message.clone()).collect(),
         });
     }
 }

@@ -120,12 +120,14 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
         }
         None => Claim::Unsolvable,
     };
+    // The checker rejects larger files.
     if files.iter().map(|(_, text)| text.len() as u64).sum::<u64>() > TEXT_LIMIT {
         return Err(wrong(&format_args!("its files have more than {TEXT_LIMIT} bytes")));
     }
     let failed = |error: std::io::Error| {
         Message::at("M109", &name, None, format!("the directory cannot be written: {}", error.kind()))
     };
+    // The files are written to a temporary directory that is renamed at the end.
     let whole = create_directory(directory).map_err(failed)?;
     let metric = contents.metric(limits).map_err(|reason| wrong(&reason))?;
     // A certificate that `verify` would reject is not written.
@@ -137,6 +139,7 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
     for (name, text) in &files {
         fs::write(whole.path().join(name), text).map_err(failed)?;
     }
+    // Without a refutation, its files do not exist.
     let streamed = STREAMED.iter().filter(|_| matches!(refutation, Refutation::Steps(_)));
     for name in files.iter().map(|(name, _)| name).chain(streamed) {
         let (bytes, sha256) = digest_of(&whole.path().join(name)).map_err(failed)?;
@@ -178,6 +181,7 @@ fn refutation(
     let remove = |names: &[&str]| names.iter().try_for_each(|name| fs::remove_file(directory.join(name)));
     let size = |name: &str| fs::metadata(directory.join(name)).map(|file| file.len());
     let mut reasons = Vec::new();
+    // The second bound on the number of steps is tried only if the first one gives no refutation.
     for by in [StepBound::Spent, StepBound::Potential] {
         let outputs = RefutationOutputs {
             formula: &mut create(FORMULA)?,

@@ -121,7 +121,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let progress = Progress::new("checking", common);
     let evaluate = arguments.evaluate.as_deref().map(read_policy).transpose()?;
     let (model, listed, declarations) = (&model, &queries.listed[..], &declarations);
-    let checked = Checked { arguments, model, listed, declarations, evaluate, progress: &progress };
+    let checked = CheckContext { arguments, model, listed, declarations, evaluate, progress: &progress };
     let mut answered = Vec::new();
     for combination in &value_combinations {
         let reports = checked.check(combination).map_err(failed)?;
@@ -195,7 +195,7 @@ fn asked(arguments: &Arguments) -> Result<Queries, Failure> {
 }
 
 /// Data shared by all combinations of constants.
-struct Checked<'a> {
+struct CheckContext<'a> {
     arguments: &'a Arguments,
     model: &'a Model,
     listed: &'a [Listed],
@@ -204,9 +204,9 @@ struct Checked<'a> {
     progress: &'a Progress,
 }
 
-impl Checked<'_> {
+impl CheckContext<'_> {
     fn check(&self, combination: &Combination) -> Result<Vec<Result<Report, Error>>, Error> {
-        let Checked { arguments, model, listed, declarations, evaluate, progress } = self;
+        let CheckContext { arguments, model, listed, declarations, evaluate, progress } = self;
         let report_states = |states: usize| {
             progress.set_message(format!("{states} states"));
             true

@@ -116,7 +116,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         return Err(Failure::usage(Message::error("M129", text)));
     }
     if let Some(loss) = &coadaptation.loss
-        && !coadaptation.configurations.iter().any(|known| known.components.contains(&loss.component))
+        && !coadaptation
+            .configurations
+            .iter()
+            .any(|configuration| configuration.components.contains(&loss.component))
     {
         let text = format!("no configuration needs a component `{}` that could be lost", loss.component);
         return Err(Failure::usage(Message::error("M125", text)));
@@ -126,23 +129,23 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         None => Vec::new(),
     };
     let missions = missions(arguments, &mission, coadaptation, &roles)?;
-    so_far.change(|own| {
-        (own.of, own.added, own.csv) = (Some(missions.len()), added, arguments.csv.clone());
-        (own.mission, own.pages) = (mission.name.clone(), arguments.pages.clone());
+    so_far.change(|results| {
+        (results.of, results.added, results.csv) = (Some(missions.len()), added, arguments.csv.clone());
+        (results.mission, results.pages) = (mission.name.clone(), arguments.pages.clone());
     });
     let progress = Progress::new("comparing", common);
     let total = missions.len();
     for (number, (pair, mission, coadaptation)) in missions.into_iter().enumerate() {
         let mut report = |candidates: &[Candidate], costs: &Costs| {
             let (pair, candidates, costs) = (pair.clone(), candidates.to_vec(), costs.clone());
-            so_far.change(|own| own.begun = Some(Begun { pair, candidates, costs }));
+            so_far.change(|results| results.begun = Some(Begun { pair, candidates, costs }));
         };
         let (mission, coadaptation, tasked) = (&mission, &coadaptation, tasked.as_ref());
         let compared = Compared { mission, roles: &roles, coadaptation, tasked };
         let comparison = one(arguments, &compared, &mut report)?;
-        so_far.change(|own| {
-            own.begun = None;
-            own.done.push((pair, comparison));
+        so_far.change(|results| {
+            results.begun = None;
+            results.done.push((pair, comparison));
         });
         progress.set_message(format!("{} of {total} missions", number + 1));
     }

@@ -1,7 +1,7 @@
 //! Results of a comparison: all of them, or those that are available at the time limit.
 //!
-//! The comparison does not check the clock. So a separate thread waits for the time limit or for Ctrl-C, shows the
-//! results that are available then, and ends the program.
+//! The comparison does not check the clock. So a separate thread waits for the time limit or for
+//! Ctrl-C, shows the results that are available then, and ends the program.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -68,8 +68,8 @@ impl Shared {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
-    /// Shows the available results at the time limit or at Ctrl-C, with a message, and ends the program. A second
-    /// Ctrl-C ends it at once.
+    /// Shows the available results at the time limit or at Ctrl-C, with a message, and ends the
+    /// program. A second Ctrl-C ends it at once.
     pub fn show_after(&self, time: Option<Duration>, common: &Common) {
         let limits = time.map_or_else(Limits::none, |time| Limits::none().with_time(time));
         let (common, shared, interrupt) = (common.clone(), self.clone(), limits.interrupt());
@@ -132,7 +132,10 @@ impl SoFar {
     /// Writes the answer, with a message if it is incomplete.
     fn show(mut self, common: &Common, message: Option<Message>) -> Result<(), Failure> {
         let done = self.done.iter().flat_map(|(pair, comparison)| rows(pair.as_ref(), comparison));
-        let begun = self.begun.iter().flat_map(|own| begun_rows(own.pair.as_ref(), &own.candidates));
+        let begun = self
+            .begun
+            .iter()
+            .flat_map(|comparison| begun_rows(comparison.pair.as_ref(), &comparison.candidates));
         let measured: Vec<Row> = done.chain(begun).collect();
         let is_empty = measured.is_empty();
         let added = std::mem::take(&mut self.added);
@@ -147,8 +150,9 @@ impl SoFar {
             let done =
                 self.done.iter().map(|(pair, comparison)| ComparisonAnswer::new(pair.as_ref(), comparison));
             let begun = self.begun.iter();
-            let begun =
-                begun.map(|own| ComparisonAnswer::begun(own.pair.as_ref(), &own.candidates, &own.costs));
+            let begun = begun.map(|comparison| {
+                ComparisonAnswer::begun(comparison.pair.as_ref(), &comparison.candidates, &comparison.costs)
+            });
             let messages: Vec<Message> = message.into_iter().collect();
             output::json_answer(&CompareAnswer::new(done.chain(begun).collect(), &added, &messages));
             return Ok(());

@@ -156,8 +156,8 @@ fn text(configuration: &Configuration, wishes: &Wishes) -> String {
     }
     let rows = configuration.choices.iter().map(|choice| {
         let function = choice.function.clone().unwrap_or_default();
-        let chosen = choice.considered.iter().find(|own| own.verdict == Verdict::Chosen);
-        let utility = chosen.map(|own| output::decimal(&own.utility)).unwrap_or_default();
+        let chosen = choice.considered.iter().find(|considered| considered.verdict == Verdict::Chosen);
+        let utility = chosen.map(|considered| output::decimal(&considered.utility)).unwrap_or_default();
         let design = choice.design.clone().unwrap_or_else(|| "none can be used".to_owned());
         vec![choice.objective.clone(), function, design, utility, choice.need.join(", ")]
     });

@@ -184,7 +184,7 @@ fn why_text(why: &Availability) -> String {
     if let ([way], false) = (&why.ways[..], why.available)
         && way.len() > 1
     {
-        let names = way.iter().map(|own| own.name.as_str()).collect::<Vec<_>>().join(", ");
+        let names = way.iter().map(|alteration| alteration.name.as_str()).collect::<Vec<_>>().join(", ");
         let _ = writeln!(text, "{} causes, all of which have to go: {names}", way.len());
     }
     text

@@ -84,7 +84,7 @@ impl Guard {
             if let Some(megabytes) = memory {
                 let _ = memory::watch(megabytes.saturating_add(megabytes / 10), Arc::clone(&too_large));
             }
-            let late = Late { started: Instant::now(), time, too_large };
+            let late = Deadline { started: Instant::now(), time, too_large };
             give_up_late(limits.clone(), Arc::clone(&has_read), late, common.clone());
         }
         Ok(Self { limits, has_read })
@@ -119,14 +119,14 @@ fn nothing_to_show() -> Message {
 }
 
 /// Deadline of a command that has read its input and has no answer.
-struct Late {
+struct Deadline {
     started: Instant,
     time: Option<Duration>,
     /// Set when the process occupies a tenth more than its memory limit.
     too_large: Arc<AtomicBool>,
 }
 
-impl Late {
+impl Deadline {
     fn is_reached(&self) -> bool {
         let is_over = |time: Duration| {
             let end = time.saturating_add(time / 10).saturating_add(GRACE);
@@ -152,7 +152,7 @@ fn processor_time() -> Option<Duration> {
 }
 
 /// Ends the program late. Reading does not poll the limits; all later stages do, except for faults.
-fn give_up_late(limits: Limits, has_read: Arc<AtomicBool>, late: Late, common: Common) {
+fn give_up_late(limits: Limits, has_read: Arc<AtomicBool>, late: Deadline, common: Common) {
     std::thread::spawn(move || {
         while !has_read.load(Ordering::Relaxed) && !limits.reached() {
             std::thread::sleep(INTERVAL);

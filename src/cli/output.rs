@@ -40,6 +40,7 @@ pub fn document(text: &str) {
     let mut stdout = std::io::stdout().lock();
     HAS_BEGUN.store(true, Ordering::Relaxed);
     if let Err(error) = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush())
+        // A closed pipe is the decision of the reader, for example `head`.
         && error.kind() != ErrorKind::BrokenPipe
     {
         ANSWER_LOST.store(true, Ordering::Relaxed);
@@ -53,8 +54,8 @@ pub fn answer_lost() -> bool {
     ANSWER_LOST.load(Ordering::Relaxed)
 }
 
-/// Returns `true` if an answer, or a part of one, is being written or has been written. The result stays valid while
-/// the caller holds the lock of standard output.
+/// Returns `true` if an answer, or a part of one, is being written or has been written. The result
+/// stays valid while the caller holds the lock of standard output.
 pub fn has_begun() -> bool {
     HAS_BEGUN.load(Ordering::Relaxed)
 }
@@ -118,6 +119,7 @@ pub fn failure(common: &Common, messages: &[Message]) {
 /// Writes a file atomically, see [`file::write`].
 pub fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
     {
+        // The thread of the time limit holds this lock while it decides whether to end the program.
         let _stdout = std::io::stdout().lock();
         HAS_BEGUN.store(true, Ordering::Relaxed);
     }
@@ -149,8 +151,7 @@ pub fn require_directory(path: &Path) -> Result<(), Failure> {
 }
 
 /// Returns the number of columns for answers: `COLUMNS`, or the width of the terminal. `None` if
-/// neither is known, or if
-/// it is 0.
+/// neither is known, or if it is 0.
 pub fn columns() -> Option<u16> {
     let requested = std::env::var("COLUMNS").ok().and_then(|columns| columns.trim().parse().ok());
     let of_terminal = || {
@@ -208,6 +209,7 @@ fn keep_words(table: &mut Table, columns: u16) {
             u16::try_from(longest).unwrap_or(u16::MAX).saturating_add(column.padding_width())
         })
         .collect();
+    // A narrow terminal has to break words.
     if widths.iter().copied().fold(0, u16::saturating_add) > columns {
         return;
     }
@@ -233,7 +235,7 @@ mod tests {
     use super::counted;
 
     #[test]
-    fn one_is_singular() {
+    fn a_count_of_one_is_singular() {
         let texts = [0_usize, 1, 2].map(|count| counted(count, "solver call"));
         assert_eq!(texts, ["0 solver calls", "1 solver call", "2 solver calls"]);
     }

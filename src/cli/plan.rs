@@ -357,9 +357,9 @@ const MISSING_SHOWN: usize = 10;
 
 /// Lists the missing numbers, one per line.
 fn missing_text(missing: &[MissingValue]) -> String {
-    let line = |own: &MissingValue| {
-        let (function, actions, file) = (&own.function, own.needed_by.join(", "), &own.file);
-        match &own.estimation {
+    let line = |value: &MissingValue| {
+        let (function, actions, file) = (&value.function, value.needed_by.join(", "), &value.file);
+        match &value.estimation {
             Some((design, attribute)) => {
                 format!("    the estimation of {attribute} of {design}, for {actions}, in {file}\n")
             }

@@ -13,7 +13,7 @@ use crate::cli::common::Common;
 use crate::cli::output;
 
 /// Delay before the first progress line, so that short commands show none.
-const PATIENCE: Duration = Duration::from_secs(3);
+const INITIAL_DELAY: Duration = Duration::from_secs(3);
 
 /// Time between two lines.
 const INTERVAL: Duration = Duration::from_secs(5);
@@ -78,7 +78,7 @@ fn tell(what: &'static str, message: Arc<Mutex<String>>) -> (Sender<()>, JoinHan
     let (sender, receiver) = channel();
     let started = Instant::now();
     let thread = std::thread::spawn(move || {
-        let mut wait = PATIENCE;
+        let mut wait = INITIAL_DELAY;
         while receiver.recv_timeout(wait) == Err(RecvTimeoutError::Timeout) {
             let text = message.lock().unwrap_or_else(PoisonError::into_inner).clone();
             output::note(&line(what, started.elapsed(), &text));
@@ -100,7 +100,7 @@ mod tests {
     use super::line;
 
     #[test]
-    fn lines_say_what_is_known() {
+    fn lines_contain_the_current_message() {
         assert_eq!(line("planning", Duration::from_millis(3_100), ""), "planning, 3 s\n");
         assert_eq!(line("planning", Duration::from_secs(8), "cost 4"), "planning, 8 s: cost 4\n");
     }

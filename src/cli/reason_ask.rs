@@ -87,7 +87,8 @@ impl Questions {
                 }
             }
         }
-        let count = entailments.iter().filter(|one| matches!(one.answer, Answer::Follows(_))).count();
+        let count =
+            entailments.iter().filter(|entailment| matches!(entailment.answer, Answer::Follows(_))).count();
         let verb = if entailments.len() == 1 { "follows" } else { "follow" };
         let _ = writeln!(text, "{count} of {} {verb}", output::counted(entailments.len(), "statement"));
         let json = output::pretty(&EntailmentAnswer::new(&entailments));

@@ -140,7 +140,8 @@ fn keep(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     output::warnings(common, knowledge.warnings());
     let configurator = arguments.wanted.configurator(knowledge)?;
     consistent(Some(configurator.knowledge()))?;
-    let objectives = configurator.objectives().into_iter().map(|own| own.individual.name).collect();
+    let objectives =
+        configurator.objectives().into_iter().map(|objective| objective.individual.name).collect();
     let filters = filters(arguments.adaptation.as_deref(), configurator.knowledge())?;
     let keeper = Keeper::new(configurator, None).with_filters(&filters);
     let events = Lines::open(&arguments.events)?;

@@ -39,7 +39,7 @@ enum Input {
 }
 
 /// A search for plans on another thread.
-struct Thinking {
+struct PlanSearch {
     question: u64,
     stop: Arc<AtomicBool>,
     is_stopped: bool,
@@ -66,7 +66,7 @@ pub(super) struct Session<'a> {
     line: Arc<AtomicU64>,
     /// The last line and the time of reading it, while further answers to it are possible.
     open: Option<(u64, Instant)>,
-    thinking: Option<Thinking>,
+    thinking: Option<PlanSearch>,
     stopped: u32,
     /// `true` if a line had a time of its own: then time advances with lines only.
     has_times: bool,
@@ -255,9 +255,9 @@ impl<'a> Session<'a> {
         self.say(&answers)
     }
 
-    /// Returns `true` if a line is about an action or effect that does not exist yet, and no
-    /// running search could produce it. The writer of such a line knows the loop's answers in
-    /// advance, as in a file that is piped.
+    /// Returns `true` if a line is about an action or effect that does not exist yet, and no action
+    /// is running that might require a reaction. The writer of such a line knows the loop's answers
+    /// in advance, as in a file that is piped.
     fn is_early(&self, line: &Line) -> bool {
         let is_idle = self.control.has_agenda() && self.control.beliefs().running().is_none();
         is_idle && self.control.is_ahead(&Observation::parse(&line.text))
@@ -273,7 +273,8 @@ impl<'a> Session<'a> {
         if self.thinking.is_none() {
             return self.deliberate(sender);
         }
-        let place = waiting.iter().position(|own| matches!(own, Input::Thoughts(_)));
+        // The result of the search is handled before the lines that wait for it.
+        let place = waiting.iter().position(|input| matches!(input, Input::Thoughts(_)));
         match place.and_then(|place| waiting.remove(place)).map_or_else(|| inputs.recv(), Ok) {
             Ok(Input::Thoughts(thoughts)) => self.conclude(thoughts),
             Ok(other) => {
@@ -287,6 +288,7 @@ impl<'a> Session<'a> {
     /// Cancels the search for plans if the planning problem has changed.
     fn stop_thinking(&mut self) {
         let Some(thinking) = &mut self.thinking else { return };
+        // A search for an unchanged problem stays useful.
         if thinking.question != self.control.question() && !thinking.is_stopped && self.stopped < MAX_STOPPED
         {
             thinking.is_stopped = true;
@@ -303,7 +305,7 @@ impl<'a> Session<'a> {
         }
         let thinker = self.control.thinker();
         let (question, stop) = (self.control.question(), thinker.stop());
-        self.thinking = Some(Thinking { question, stop, is_stopped: false });
+        self.thinking = Some(PlanSearch { question, stop, is_stopped: false });
         let sender = sender.clone();
         std::thread::spawn(move || {
             // The receiver is closed if the run has ended.
@@ -315,7 +317,7 @@ impl<'a> Session<'a> {
     /// Deliberates with the result of another thread. A result for an outdated problem is
     /// discarded, and the search is repeated.
     fn conclude(&mut self, thoughts: Thoughts) -> Result<Flow, Failure> {
-        let was_stopped = self.thinking.take().is_some_and(|own| own.is_stopped);
+        let was_stopped = self.thinking.take().is_some_and(|search| search.is_stopped);
         let is_late = self.stopped >= MAX_STOPPED;
         if let Some(answers) = self.control.deliberate_with(thoughts, is_late) {
             self.stopped = 0;

@@ -147,7 +147,7 @@ pub fn check(arguments: &Arguments, directory: &Path, common: &Common) -> Result
 
 /// Results of the simulated missions, by strategy and seed, and a log of the observations and
 /// answers of the first mission of each strategy.
-struct Played {
+struct SimulationResults {
     runs: Vec<Run>,
     log: String,
 }
@@ -160,7 +160,7 @@ fn play(
     arguments: &Arguments,
     limits: &Limits,
     common: &Common,
-) -> Result<Played, Failure> {
+) -> Result<SimulationResults, Failure> {
     let total = strategies.len() as u64 * u64::from(arguments.runs);
     let progress = Progress::new("simulating", common);
     let (mut runs, mut logs) = (Vec::new(), vec![String::new(); strategies.len()]);
@@ -179,7 +179,7 @@ fn play(
     }
     progress.finish();
     runs.sort_by_key(|(index, run)| (*index, run.seed));
-    Ok(Played { runs: runs.into_iter().map(|(_, run)| run).collect(), log: logs.concat() })
+    Ok(SimulationResults { runs: runs.into_iter().map(|(_, run)| run).collect(), log: logs.concat() })
 }
 
 fn write_log(log: &mut String, strategy: Strategy, observation: &Observation, answers: &[Answer]) {

@@ -114,9 +114,9 @@ pub struct Arc {
 }
 
 /// Maximum number of places in the number of a state.
-const PLACES: usize = 1 << 16;
+const MAX_PLACES: usize = 1 << 16;
 /// Maximum number of configurations in the number of a state.
-const CONFIGURATIONS: usize = 1 << 12;
+const MAX_CONFIGURATIONS: usize = 1 << 12;
 
 /// A configuration: a design of the function that moving requires.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -206,11 +206,12 @@ impl Coadaptation {
             }
         }
         designs.extend(facts.of(&roles.available).iter().filter_map(|arguments| arguments.first().cloned()));
+        // Start and goal may occur in no arc, so they were added before.
         natural(&mut places);
         natural(&mut designs);
         fits(places.len(), designs.len())?;
-        let place = |name: &str| places.iter().position(|known| known == name).unwrap_or_default();
-        let design = |name: &str| designs.iter().position(|known| known == name).unwrap_or_default();
+        let place = |name: &str| places.iter().position(|place| place == name).unwrap_or_default();
+        let design = |name: &str| designs.iter().position(|design| design == name).unwrap_or_default();
         let view = mission.knowledge().map(crate::knowledge::Knowledge::view);
         let configurations: Vec<_> = designs
             .iter()
@@ -329,7 +330,7 @@ impl Coadaptation {
     pub fn without(&self, component: &str) -> Self {
         let mut result = self.clone();
         for configuration in &mut result.configurations {
-            configuration.available &= !configuration.components.iter().any(|known| known == component);
+            configuration.available &= !configuration.components.iter().any(|needed| needed == component);
         }
         result
     }
@@ -337,11 +338,11 @@ impl Coadaptation {
 
 /// Checks that the number of a state can encode `places` and `configurations`.
 pub(super) fn fits(places: usize, configurations: usize) -> Result<(), Errors> {
-    if places <= PLACES && configurations <= CONFIGURATIONS {
+    if places <= MAX_PLACES && configurations <= MAX_CONFIGURATIONS {
         return Ok(());
     }
     let text = format!(
-        "a process has at most {PLACES} places and {CONFIGURATIONS} configurations, not {places} and {configurations}"
+        "a process has at most {MAX_PLACES} places and {MAX_CONFIGURATIONS} configurations, not {places} and {configurations}"
     );
     Err(vec![Message::error("M127", text)].into())
 }
@@ -357,7 +358,7 @@ fn natural(names: &mut Vec<String>) {
 }
 
 pub(super) fn components(view: &View<'_>, design: &str) -> Vec<String> {
-    let declared = view.function_designs().into_iter().find(|known| known.individual.name == design);
+    let declared = view.function_designs().into_iter().find(|candidate| candidate.individual.name == design);
     declared
         .map(|declared| declared.components.iter().map(|component| component.name.clone()).collect())
         .unwrap_or_default()
@@ -391,8 +392,9 @@ impl Facts {
 
     /// The arcs with their traversals.
     fn arcs(&self, roles: &Roles, places: &[String], designs: &[String]) -> Result<Vec<Arc>, Errors> {
-        let index =
-            |names: &[String], name: &str| names.iter().position(|known| known == name).unwrap_or_default();
+        let index = |names: &[String], name: &str| {
+            names.iter().position(|candidate| candidate == name).unwrap_or_default()
+        };
         let (place, design) = (|name: &str| index(places, name), |name: &str| index(designs, name));
         let mut problems = Vec::new();
         let mut arcs: BTreeMap<(usize, usize), Arc> = BTreeMap::new();

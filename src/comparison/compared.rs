@@ -91,11 +91,15 @@ fn solve(
 /// names.
 fn action(mission: &Coadaptation, arguments: &[String]) -> Option<Action> {
     let is_equal = |a: &str, b: &str| a.eq_ignore_ascii_case(b);
-    let place = |name: &String| mission.places.iter().position(|known| is_equal(known, name));
+    let place = |name: &String| mission.places.iter().position(|place| is_equal(place, name));
     let places: Vec<usize> = arguments.iter().filter_map(place).collect();
     if let [from, to] = places[..] {
         return mission.arcs.iter().position(|arc| (arc.from, arc.to) == (from, to)).map(Action::Move);
     }
     let design = arguments.last()?;
-    mission.configurations.iter().position(|known| is_equal(&known.name, design)).map(Action::Change)
+    mission
+        .configurations
+        .iter()
+        .position(|configuration| is_equal(&configuration.name, design))
+        .map(Action::Change)
 }

@@ -55,6 +55,7 @@ pub(super) fn report(
     for done in 0..=plan.len() {
         let moved = done == 0 || matches!(plan[done - 1], Action::Move(_));
         if moved {
+            // A component is lost only by moves, so changes of configuration need no entry.
             let lost = Valuation { lost: true, ..at };
             let spent = time_of(mission, &plan[..done]);
             let remaining = &plan[done..];
@@ -82,17 +83,18 @@ pub(super) fn report(
 }
 
 /// Number of actions after which a run counts as infinite.
-const LONGEST: usize = 100_000;
+const MAX_ACTIONS: usize = 100_000;
 
 /// Returns the time of a policy if the component is lost after `moves` moves and nothing else
 /// fails.
 fn anticipated(referee: &Referee<'_>, policy: &[u32], start: Valuation, moves: usize) -> Option<f64> {
     let mission = referee.mission;
     let (mut at, mut left, mut time) = (start, moves, 0.0);
-    for _ in 0..LONGEST {
+    for _ in 0..MAX_ACTIONS {
         if at.place == mission.goal {
             return Some(time);
         }
+        // The loss happens after the given number of moves.
         at.lost |= left == 0;
         let action = referee.decision(policy, at)?;
         time += time_from(mission, at.configuration, &[action]);
@@ -182,10 +184,12 @@ pub fn hindsight(mission: &Coadaptation, risk: Risk, penalty: f64, spent: Spent)
         let value = bounds[start].min(penalty);
         expected += left * rate * value;
         left *= 1.0 - rate;
+        // The remaining terms of the sum cannot change the result noticeably.
         if left < 1e-15 || (value - never[start]).abs() < 1e-12 {
             break;
         }
     }
+    // With the remaining probability, the component is not lost in time to matter.
     let expected = expected + left * never[start].min(penalty);
     Hindsight { least, expected: Some(expected).filter(|value| value.is_finite()) }
 }
@@ -200,6 +204,7 @@ fn relaxed(mission: &Coadaptation, spent: Spent, lost: bool, later: Option<&[f64
     for design in 0..designs {
         best[at(mission.goal, design)] = 0.0;
     }
+    // Bellman-Ford: relaxation of arcs and switches until nothing changes.
     loop {
         let mut changed = false;
         for arc in &mission.arcs {

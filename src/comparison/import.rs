@@ -121,14 +121,14 @@ const SPEEDS: [Speed; 3] = [
 
 /// A legal configuration: a localisation method at a speed.
 #[derive(Clone, Copy)]
-struct Legal {
+struct LegalConfiguration {
     design: &'static Design,
     speed: &'static Speed,
     /// `true` if the speed is a component, because there are several speeds.
     several: bool,
 }
 
-impl Legal {
+impl LegalConfiguration {
     fn all(options: &MapOptions) -> impl Iterator<Item = Self> + use<> {
         let several = options.speeds;
         let speeds = &SPEEDS[..if several { SPEEDS.len() } else { 1 }];
@@ -166,9 +166,9 @@ const SPEED: f64 = 0.68;
 /// Energy per metre and milliwatt at that speed, in the map's unit.
 const ENERGY: f64 = 0.01;
 /// Maximum number of places that the message about an unknown place lists.
-const SHOWN: usize = 20;
+const MAX_LISTED_PLACES: usize = 20;
 /// Battery levels kept in reserve.
-const RESERVE: u32 = 500;
+const RESERVE_LEVELS: u32 = 500;
 
 type Corridor = (String, String);
 
@@ -211,8 +211,8 @@ pub fn import_map(file: &str, text: &str, options: &MapOptions) -> Result<Files,
         .filter(|name| !places.contains(name.as_str()))
         .map(|name| {
             let suggestion = did_you_mean(name, places.iter().copied());
-            let names = places.iter().take(SHOWN).copied().collect::<Vec<_>>().join(", ");
-            let ellipsis = if places.len() > SHOWN { ", …" } else { "" };
+            let names = places.iter().take(MAX_LISTED_PLACES).copied().collect::<Vec<_>>().join(", ");
+            let ellipsis = if places.len() > MAX_LISTED_PLACES { ", …" } else { "" };
             let text = format!("the map has no place `{name}`; it has: {names}{ellipsis}{suggestion}");
             Message::at("M124", file, None, text)
         })
@@ -264,12 +264,13 @@ fn knowledge(options: &MapOptions) -> String {
          :f_move a owl:NamedIndividual , t:Function .\n\
          :a_move a owl:NamedIndividual , t:Action ; t:requiresF :f_move .\n\n"
     );
-    let components: BTreeSet<String> = Legal::all(options).flat_map(Legal::components).collect();
+    let components: BTreeSet<String> =
+        LegalConfiguration::all(options).flat_map(LegalConfiguration::components).collect();
     for component in components {
         let _ = writeln!(text, ":c_{component} a owl:NamedIndividual , t:Component .");
     }
     text.push('\n');
-    for legal in Legal::all(options) {
+    for legal in LegalConfiguration::all(options) {
         let components: Vec<_> =
             legal.components().iter().map(|component| format!(":c_{component}")).collect();
         let _ = writeln!(
@@ -340,7 +341,7 @@ fn problem(map: &Map<'_>, options: &MapOptions) -> String {
     let arcs: BTreeSet<Corridor> = map
         .nodes
         .iter()
-        .flat_map(|node| node.neighbours.iter().map(|other| pair(&node.id.text, &other.text)))
+        .flat_map(|node| node.neighbours.iter().map(|neighbour| pair(&node.id.text, &neighbour.text)))
         .collect();
     let length =
         |(a, b): &Corridor| (at[a.as_str()].x - at[b.as_str()].x).hypot(at[a.as_str()].y - at[b.as_str()].y);
@@ -356,7 +357,7 @@ fn problem(map: &Map<'_>, options: &MapOptions) -> String {
     };
     let mut init = String::new();
     for arc in &arcs {
-        for legal in Legal::all(options) {
+        for legal in LegalConfiguration::all(options) {
             let Design(_, power, sees, source, _) = legal.design;
             if dark.contains(arc) && !sees {
                 continue;
@@ -388,8 +389,8 @@ fn problem(map: &Map<'_>, options: &MapOptions) -> String {
             }
         }
     }
-    for old in Legal::all(options) {
-        for new in Legal::all(options).filter(|new| new.object() != old.object()) {
+    for old in LegalConfiguration::all(options) {
+        for new in LegalConfiguration::all(options).filter(|new| new.object() != old.object()) {
             let (before, after) = (old.components(), new.components());
             let off = before.iter().filter(|component| !after.contains(component)).count();
             let on = after.iter().filter(|component| !before.contains(component)).count();
@@ -401,9 +402,10 @@ fn problem(map: &Map<'_>, options: &MapOptions) -> String {
     places.extend([object(&options.start), object(&options.goal)]);
     places.sort_by_key(|name| (name.len(), name.clone()));
     places.dedup();
-    let designs: Vec<_> = Legal::all(options).map(Legal::object).collect();
-    let battery =
-        options.battery.map(|battery| format!("    (= (battery) {battery}) (= (reserve) {RESERVE})\n"));
+    let designs: Vec<_> = LegalConfiguration::all(options).map(LegalConfiguration::object).collect();
+    let battery = options
+        .battery
+        .map(|battery| format!("    (= (battery) {battery}) (= (reserve) {RESERVE_LEVELS})\n"));
     let battery = battery.unwrap_or_default();
     let initial = format!("fd_{}", object(&options.configuration));
     format!(

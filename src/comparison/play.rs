@@ -15,14 +15,14 @@ use crate::comparison::process::{Process, State};
 pub type Decide<'a> = dyn FnMut(State, u32) -> Option<u32> + 'a;
 
 /// The process with a fixed decision rule.
-struct Played<'a, 'b, N> {
+struct FixedProcess<'a, 'b, N> {
     process: &'a Process<N>,
     decide: RefCell<&'a mut Decide<'b>>,
     /// `true` if decisions depend on the number of steps.
     counts: bool,
 }
 
-impl<N: Number> Generator<N> for Played<'_, '_, N> {
+impl<N: Number> Generator<N> for FixedProcess<'_, '_, N> {
     type State = (State, u32);
 
     fn initial(&self) -> (State, u32) {
@@ -95,7 +95,7 @@ pub fn play<N: Number>(
     replans: &dyn Fn(State) -> bool,
     decide: &mut Decide<'_>,
 ) -> Result<Measures, Error> {
-    let played = Played { process, decide: RefCell::new(decide), counts };
+    let played = FixedProcess { process, decide: RefCell::new(decide), counts };
     let chain = explore(&played, &Bounds::default())?;
     Ok(measure(process, &chain, penalty, reserve, replans))
 }
@@ -118,6 +118,7 @@ fn measure<N: Number>(
     let hit = set(&|state| state.situation().hit);
     let mut end = FixedBitSet::with_capacity(n);
     for state in 0..n {
+        // Exploration marks states without a decision by a deadlock action.
         let stays = chain.mdp.choices(state).all(|c| chain.mdp.action(c) == probabilistic::explore::DEADLOCK);
         end.set(state, stays);
     }
@@ -126,15 +127,19 @@ fn measure<N: Number>(
     };
     let first = |rewards: Option<&[N]>, terminal: &FixedBitSet| {
         let solution = value(&chain.mdp, rewards, terminal)?;
+        // State 0 is the initial state.
         (!solution.infinite.contains(0)).then(|| solution.values[0].to_f64())
     };
     let reached = value(&chain.mdp, None, &goal).map(|solution| solution.values).unwrap_or_default();
     let success = reached.first().map_or(0.0, Number::to_f64);
     let policy: Vec<u32> = (0..n).map(|state| chain.mdp.choices(state).start as u32).collect();
     let if_successful = |reward: usize| {
+        // A conditional expectation needs a condition of positive probability.
         if success <= 0.0 {
             return None;
         }
+        // Conditioning on success reweights each transition by the success probability of its
+        // target.
         let (mdp, origin) = conditioned(&chain.mdp, &policy, &reached, &goal);
         let rewards: Vec<N> = origin.iter().map(|c| chain.rewards[reward][*c as usize].clone()).collect();
         let solution = value(&mdp, Some(&rewards), &goal)?;

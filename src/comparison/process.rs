@@ -138,7 +138,7 @@ impl<N: Number> Process<N> {
     pub fn new(mission: &Coadaptation, risk: Risk, rewards: &[&str]) -> Self {
         let number = |value: &BigRational| N::from_rational(value);
         let indices: Vec<usize> =
-            rewards.iter().filter_map(|name| REWARDS.iter().position(|known| known == name)).collect();
+            rewards.iter().filter_map(|name| REWARDS.iter().position(|reward| reward == name)).collect();
         let rewards_of = |all: [N; 5]| indices.iter().map(|index| all[*index].clone()).collect::<Vec<N>>();
         let levels = |energy: &BigRational| if risk.battery { mission.levels(energy) } else { 0 };
         // Complements are computed exactly, before numbers are rounded to `N`.
@@ -233,7 +233,8 @@ impl<N: Number> Process<N> {
         if !self.risk.battery {
             return Some(0);
         }
-        battery.checked_sub(levels).filter(|left| *left >= self.reserve || levels == 0)
+        // Actions without energy stay possible below the reserve.
+        battery.checked_sub(levels).filter(|remaining| *remaining >= self.reserve || levels == 0)
     }
 }
 
@@ -249,6 +250,7 @@ pub enum Action {
 impl Action {
     /// Decodes the number that a process assigns to an action.
     pub fn from_number(number: u32) -> Self {
+        // The lowest bit distinguishes changes from moves.
         if number & 1 == 0 { Self::Move(number as usize >> 1) } else { Self::Change(number as usize >> 1) }
     }
 
@@ -280,12 +282,15 @@ impl<N: Number> Generator<N> for Process<N> {
 
     fn code(&self, state: &State) -> usize {
         let s = state.situation();
+        // Mixed radix: the most significant digit is the battery, the least significant one the
+        // configuration.
         let flags = usize::from(s.hit) | usize::from(s.failed) << 1 | usize::from(s.lost) << 2;
         ((s.battery as usize * self.moves.len() + s.place) * 8 + flags) * self.lost.len() + s.configuration
     }
 
     fn successors(&self, state: &State, choices: &mut Choices<State, N>) -> Result<(), Error> {
         let s = state.situation();
+        // Goal and failure states are absorbing.
         if s.place == self.goal || s.failed {
             return Ok(());
         }
@@ -304,9 +309,9 @@ impl<N: Number> Generator<N> for Process<N> {
         for step in &self.moves[s.place][s.configuration] {
             let Some(battery) = self.enough(s.battery, step.levels) else { continue };
             let arrived = Valuation { place: step.to, battery, ..s };
-            // The battery and the collisions of a failed mission are irrelevant, so all such states
-            // are merged.
+            // A failed mission is over, so its battery and its collisions affect no later choice.
             let failed = Valuation { failed: true, battery, ..s };
+            // The loss happens during the move, so each outcome exists with and without it.
             for (lost, ends) in [s.lost, true].into_iter().zip(&step.outcomes) {
                 let ways = [
                     Valuation { lost, ..arrived },

@@ -137,6 +137,7 @@ impl ProcessWriter<'_> {
         }
         let enough =
             Expr::name("b").op(BinaryOp::GreaterEqual, Expr::int(levels + i64::from(battery.reserve)));
+        // The guard keeps the reserve, so the battery never becomes negative.
         (Some(enough), vec![assign("b", Expr::name("b").op(BinaryOp::Minus, Expr::int(levels)))])
     }
 
@@ -164,6 +165,7 @@ impl ProcessWriter<'_> {
                     all([self.running(), equals("c", old)].into_iter().chain(self.kept(new)).chain(enough));
                 let mut changed = spent.clone();
                 changed.push(assign("c", Expr::int(new as i64)));
+                // A failed change takes energy and keeps the configuration.
                 let failure = BigRational::one() - &switch.success;
                 let updates = updates([(switch.success.clone(), changed), (failure, spent)]);
                 commands.push(command(self.set(new), guard, updates));
@@ -232,6 +234,7 @@ impl ProcessWriter<'_> {
                 if let Some(traversal) = traversal {
                     let success =
                         if self.risk.failures { traversal.success.clone() } else { BigRational::one() };
+                    // The expected number of collisions of a move is its probability of one.
                     let hits = if self.risk.collisions { success * &traversal.hit } else { zero.clone() };
                     add_reward(
                         &self.go(index),

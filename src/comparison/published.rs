@@ -20,7 +20,7 @@ pub(super) const ROUTES: usize = 5;
 /// Weight of the priority property, and of each other property.
 const WEIGHTS: [f64; 2] = [0.6, 0.2];
 /// Maximum number of partial routes in the search for routes.
-const SEARCH: usize = 2_000_000;
+const MAX_PARTIAL_ROUTES: usize = 2_000_000;
 
 /// Decision of the procedure, with its predicted values.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,6 +56,8 @@ pub fn shortest_routes(mission: &Coadaptation, wanted: usize) -> Vec<Vec<usize>>
     };
     // The queue needs totally ordered lengths, so they are rounded to millionths of the time unit.
     let scaled = |arc: usize| (length(arc) * 1e6).round() as u64;
+    // The exact distance to the goal is the A* heuristic, so routes are completed in ascending
+    // length.
     let distances = to_goal(mission, &scaled);
     let mut queue =
         BinaryHeap::from([Reverse((distances[mission.start].unwrap_or(u64::MAX), Vec::<usize>::new()))]);
@@ -66,7 +68,7 @@ pub fn shortest_routes(mission: &Coadaptation, wanted: usize) -> Vec<Vec<usize>>
     let (mut found, mut steps) = (Vec::new(), 0);
     while let Some(Reverse((estimate, route))) = queue.pop() {
         steps += 1;
-        if estimate == u64::MAX || steps > SEARCH {
+        if estimate == u64::MAX || steps > MAX_PARTIAL_ROUTES {
             break;
         }
         let at = route.last().map_or(mission.start, |arc| mission.arcs[*arc].to);
@@ -82,6 +84,7 @@ pub fn shortest_routes(mission: &Coadaptation, wanted: usize) -> Vec<Vec<usize>>
             route.iter().map(|arc| mission.arcs[*arc].from).chain(std::iter::once(at)).collect();
         for number in &leaving[at] {
             let arc = &mission.arcs[*number];
+            // Routes are simple paths.
             if !visited.contains(&arc.to)
                 && let Some(distance) = distances[arc.to]
             {
@@ -103,6 +106,7 @@ fn to_goal(mission: &Coadaptation, length: &dyn Fn(usize) -> u64) -> Vec<Option<
     let mut best: Vec<Option<u64>> = vec![None; mission.places.len()];
     let mut queue = BinaryHeap::from([Reverse((0_u64, mission.goal))]);
     while let Some(Reverse((so_far, place))) = queue.pop() {
+        // Dijkstra's algorithm: the first visit has the least distance.
         if best[place].is_some() {
             continue;
         }
@@ -127,6 +131,7 @@ fn believed(mission: &Coadaptation, route: &[usize], configuration: usize) -> Op
     let begin = switch.map_or([0.0; 2], |switch| [switch.time.to_f64(), switch.energy.to_f64()]);
     let time = way.iter().fold(begin[0], |sum, traversal| sum + traversal.time.to_f64());
     let energy = way.iter().fold(begin[1], |sum, traversal| sum + traversal.energy.to_f64());
+    // The published model overwrites its collision flag, so only the last risky move counts.
     let last_risky = way.iter().rev().map(|traversal| traversal.hit.to_f64()).find(|hit| *hit > 0.0);
     Some([time, energy, 1.0 - last_risky.unwrap_or(0.0)])
 }

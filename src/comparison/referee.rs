@@ -84,6 +84,7 @@ impl Referee<'_> {
         let mut terminal = goal.clone();
         let mut worth = vec![0.0; n];
         for (state, worth) in worth.iter_mut().enumerate() {
+            // The mission has failed in such a state, so the penalty is due.
             if reachable.values[state] <= 0.0 {
                 terminal.insert(state);
                 *worth = self.penalty;
@@ -135,6 +136,7 @@ impl Referee<'_> {
         while let Some(state) = queue.get(at).copied() {
             at += 1;
             let choice = policy[state];
+            // The mission has ended.
             if choice == NONE || mdp.action(choice as usize) == DEADLOCK {
                 continue;
             }
@@ -149,11 +151,14 @@ impl Referee<'_> {
 
     pub fn play_policy(&self, policy: &[u32]) -> Result<Measures, Error> {
         let mut decide = |state: State, _: u32| self.decision(policy, state.situation()).map(Action::number);
+        // Values are computed in rationals, although the policy was computed in floating-point
+        // numbers.
         play(&self.exact(), false, self.penalty, self.reserve(), &|_| false, &mut decide)
     }
 
     pub fn play_plan(&self, plan: &[Action]) -> Result<Measures, Error> {
         let mut decide = |_: State, step: u32| plan.get(step as usize).map(|action| action.number());
+        // The action of a plan depends on the number of steps.
         play(&self.exact(), true, self.penalty, self.reserve(), &|_| false, &mut decide)
     }
 

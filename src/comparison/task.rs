@@ -22,7 +22,7 @@ use crate::message::{Errors, Message};
 use crate::mission::{Mission, Planning as _};
 
 /// Maximum number of states of a task that is converted to a process.
-const STATES: usize = 50_000;
+const MAX_STATES: usize = 50_000;
 
 /// A mission as a process, with the mapping back to its actions.
 #[derive(Debug, Clone)]
@@ -82,6 +82,7 @@ impl Tasked {
     pub fn problem(&self, mission: &Mission, situation: &Valuation) -> Result<Problem, Errors> {
         let mut way = Vec::new();
         let mut place = situation.place;
+        // Predecessor links give the actions in reverse order.
         while let Some((before, act)) = &self.origins[place] {
             way.push(act);
             place = *before;
@@ -107,6 +108,8 @@ impl Tasked {
                 )]
             })?;
             done.apply(&mut current.init);
+            // The actions were executed before the loss, so they are applied to the changed
+            // problem, too.
             done.apply(&mut left.init);
         }
         Ok(left)
@@ -121,6 +124,7 @@ impl Tasked {
                 break;
             }
             let (arc, needed) = *self.moves[place].get(&(step.action.clone(), step.arguments.clone()))?;
+            // The process has explicit reconfigurations, which the plan does not.
             if needed != configuration {
                 actions.push(Action::Change(needed));
                 configuration = needed;
@@ -154,9 +158,10 @@ impl Explorer<'_> {
         self.numbers.insert(start, 0);
         let mut at = 0;
         while at < self.places.len() {
-            if self.places.len() > STATES {
-                let text =
-                    format!("the task has more than {STATES} states, too many for a process of its states");
+            if self.places.len() > MAX_STATES {
+                let text = format!(
+                    "the task has more than {MAX_STATES} states, too many for a process of its states"
+                );
                 return Err(vec![Message::error("M127", text)].into());
             }
             let state = self.places[at].clone();
@@ -179,6 +184,7 @@ impl Explorer<'_> {
         let before = self.task.metric(state);
         let after = self.task.metric(&transition.after);
         let time = after.to_rational() - before.to_rational();
+        // States that differ only in the metric are merged.
         let target = transition.after.unpaid();
         let to = self.numbers.get(&target).copied().unwrap_or_else(|| {
             self.numbers.insert(target.clone(), self.places.len());
@@ -189,12 +195,15 @@ impl Explorer<'_> {
         let (designs, arguments_without_functions): (Vec<&String>, Vec<&String>) =
             transition.arguments.iter().partition(|argument| self.designs.contains(*argument));
         let name = designs.iter().map(|design| design.as_str()).collect::<Vec<_>>().join("+");
+        // Actions without designs have a configuration of their own.
         let name = if name.is_empty() { "none".to_owned() } else { name };
         let configuration =
-            self.configurations.iter().position(|known| *known == name).unwrap_or_else(|| {
-                self.configurations.push(name);
-                self.configurations.len() - 1
-            });
+            self.configurations.iter().position(|configuration| *configuration == name).unwrap_or_else(
+                || {
+                    self.configurations.push(name);
+                    self.configurations.len() - 1
+                },
+            );
         let arguments_without_functions =
             arguments_without_functions.into_iter().filter(|argument| !self.functions.contains(*argument));
         let key: Vec<&String> = arguments_without_functions.chain(designs).collect();
@@ -207,7 +216,7 @@ impl Explorer<'_> {
         };
         let by = self.arcs.entry((from, to)).or_default();
         // Of two equivalent actions, the faster one is kept.
-        if by.get(&configuration).is_none_or(|known| traversal.time < known.time) {
+        if by.get(&configuration).is_none_or(|slower| traversal.time < slower.time) {
             by.insert(configuration, traversal);
         }
         self.moves[from].insert((transition.action, transition.arguments), (to, configuration));

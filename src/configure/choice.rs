@@ -143,6 +143,7 @@ pub(super) fn choose(
             needing.push(group);
         } else {
             let current = group.current().map(ToOwned::to_owned);
+            // A fixed group still uses its components and its share of the budgets.
             group.candidates.retain(|offer| Some(&offer.design) == current.as_ref());
             fixed.push(group);
         }
@@ -171,8 +172,12 @@ pub(super) fn choose(
         functions.push(choices);
     }
     let chosen = configure(&functions, &remaining, limits);
-    let designs: Vec<Option<usize>> =
-        chosen.designs.iter().zip(&positions).map(|(own, at)| own.map(|own| at[own])).collect();
+    let designs: Vec<Option<usize>> = chosen
+        .designs
+        .iter()
+        .zip(&positions)
+        .map(|(chosen_index, at)| chosen_index.map(|chosen_index| at[chosen_index]))
+        .collect();
     let whole = Whole {
         knowledge,
         wishes,
@@ -214,6 +219,7 @@ impl<'a> Offers<'a> {
         let nothing = (Vec::new(), BTreeMap::new());
         let offer = |candidate: ontology::runtime::Candidate| {
             let (components, estimations) = self.designs.get(&candidate.design.iri).unwrap_or(&nothing);
+            // The optimizer maximises, so the sign of a minimised attribute is changed.
             let worth = candidate.utility;
             let utility = if matches!(self.wishes.worth, Worth::Least(_)) { -worth } else { worth };
             let demand =
@@ -283,6 +289,7 @@ impl Whole<'_> {
                 offer.rejections.iter().flat_map(|rejection| self.reasons(&offer.design, rejection));
             return Verdict::RuledOut(reasons.collect());
         }
+        // Candidates are sorted by preference.
         if self.designs[at].is_some_and(|chosen| chosen < position) {
             return Verdict::Less;
         }

@@ -57,10 +57,11 @@ impl Configurator {
         knowledge.limit(STEPS);
         let view = knowledge.view();
         let attributes: Vec<String> = view.attribute_types().into_iter().map(|kind| kind.name).collect();
-        let components: Vec<String> = view.components().into_iter().map(|own| own.individual.name).collect();
+        let components: Vec<String> =
+            view.components().into_iter().map(|component| component.individual.name).collect();
         let mut wrong = Vec::new();
         let mut check = |kind: &str, name: &str, known: &[String]| {
-            if !known.iter().any(|own| own == name) {
+            if !known.iter().any(|candidate| candidate == name) {
                 let suggestion = did_you_mean(name, known.iter().map(String::as_str));
                 let text = format!(
                     "the knowledge base has no {kind} `{name}`; it has: {}{suggestion}",

@@ -156,6 +156,7 @@ impl Keeper {
     pub fn handle_at(&mut self, observation: &Observation, now: Duration) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
         self.now = self.now.max(observation.time.unwrap_or(now));
+        // A line that was received before must not have an effect again.
         if let Some(refusal) = observation.sequence.and_then(|seq| self.numbers.refused(seq)) {
             return vec![KeeperAnswer::Loop(refusal)];
         }
@@ -169,6 +170,7 @@ impl Keeper {
                 }
             }
         }
+        // A rejected line may be sent again with the same number.
         if understood && let Some(seq) = observation.sequence {
             self.numbers.insert(seq);
         }
@@ -267,8 +269,9 @@ impl Keeper {
 
     fn give_up(&mut self, name: &str, answers: &mut Vec<KeeperAnswer>) -> Result<(), Refusal> {
         let objectives = self.configurator.objectives();
-        let is_it =
-            |own: &&ontology::runtime::Objective| own.individual.name == name || own.individual.iri == name;
+        let is_it = |objective: &&ontology::runtime::Objective| {
+            objective.individual.name == name || objective.individual.iri == name
+        };
         let objective_by_name = objectives.iter().find(is_it);
         self.configurator.give_up(name).map_err(|message| Refusal::new("M306", message.message.clone()))?;
         if let Some(objective) = objective_by_name
@@ -285,6 +288,7 @@ impl Keeper {
                 effect: self.effects,
             }));
         }
+        // A failed change of a removed objective needs no undo.
         self.asked.retain(|_, asked| asked.objective != name);
         self.unserved.remove(name);
         Ok(())
@@ -322,6 +326,7 @@ impl Keeper {
         }
         let Some(design) = &choice.design else {
             let because = said(choice);
+            // The same reasons are reported only once.
             if self.unserved.get(&objective) != Some(&because) {
                 self.unserved.insert(objective.clone(), because.clone());
                 answers.push(KeeperAnswer::Service(Service::Unserved { objective, function, because }));
@@ -337,6 +342,7 @@ impl Keeper {
                 to: design.clone(),
             };
             self.asked.insert(self.effects, change);
+            // The oldest change is the least likely to fail.
             if self.asked.len() > MAX_CHANGES {
                 self.asked.pop_first();
             }

@@ -1,9 +1,9 @@
 //! Causes that rule a design out, and the smallest sets of alterations that make it available.
 //!
-//! Sets of alterations are tried in ascending order of size, by reasoning in a copy of the knowledge. So each listed
-//! set is known to suffice, and contains no other listed set. These sets are the diagnoses of \[1\]. Each alteration
-//! of such a set removes one cause. The conclusions that remain once all other alterations of the set have come true
-//! are due to that cause.
+//! Sets of alterations are tried in ascending order of size, by reasoning in a copy of the
+//! knowledge. So each listed set is known to suffice, and contains no other listed set. These sets
+//! are the diagnoses of \[1\]. Each alteration of such a set removes one cause. The conclusions
+//! that remain once all other alterations of the set have come true are due to that cause.
 //!
 //! \[1\] R. Reiter: A theory of diagnosis from first principles, Artificial Intelligence 32, 1987.
 
@@ -39,9 +39,9 @@ pub struct Availability {
     pub because: Vec<String>,
     /// Failed components and measurements that contribute to the availability.
     pub causes: Vec<Cause>,
-    /// If the design is not available: the smallest sets of alterations that make it available. Each set suffices if
-    /// all of its alterations come true, and no proper subset suffices. If the design is available: single
-    /// alterations, each of which makes it unavailable.
+    /// If the design is not available: the smallest sets of alterations that make it available.
+    /// Each set suffices if all of its alterations come true, and no proper subset suffices. If the
+    /// design is available: single alterations, each of which makes it unavailable.
     pub ways: Vec<Vec<Alteration>>,
 }
 
@@ -50,7 +50,8 @@ pub struct Availability {
 pub struct Cause {
     /// The alteration that removes this cause; other causes may remain.
     pub alteration: Alteration,
-    /// The rules and facts by which the design is ruled out once the other alterations of a smallest set have come true.
+    /// The rules and facts by which the design is ruled out once the other alterations of a
+    /// smallest set have come true.
     pub because: Vec<String>,
     /// Knowledge after these other alterations, for further analysis.
     pub knowledge: Knowledge,
@@ -68,7 +69,8 @@ pub struct Causes {
     /// The causes. Empty if the design is available, or if neither a component nor a measurement is
     /// a cause.
     pub causes: Vec<Cause>,
-    /// `true` if the design becomes available only when all causes have gone; `false` if smaller sets of them suffice.
+    /// `true` if the design becomes available only when all causes have gone; `false` if smaller
+    /// sets of them suffice.
     pub are_all_needed: bool,
 }
 
@@ -81,16 +83,16 @@ pub fn causes(knowledge: &Knowledge, design: &FunctionDesign) -> Causes {
     Causes { causes: causes_of(knowledge, design, &ways), are_all_needed: ways.len() == 1 }
 }
 
-/// Causes in the smallest sets of alterations. Once all other alterations of a set have come true, the remaining
-/// conclusions are due to one cause.
+/// Causes in the smallest sets of alterations. Once all other alterations of a set have come true,
+/// the remaining conclusions are due to one cause.
 fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alteration>]) -> Vec<Cause> {
     let mut causes: Vec<Cause> = Vec::new();
-    for (way, own) in ways.iter().flat_map(|way| way.iter().map(move |own| (way, own))) {
-        let is_known = causes.iter().any(|cause| cause.alteration == *own);
-        let remaining = way.iter().filter(|other| *other != own);
+    for (way, alteration) in ways.iter().flat_map(|way| way.iter().map(move |alteration| (way, alteration))) {
+        let is_known = causes.iter().any(|cause| cause.alteration == *alteration);
+        let remaining = way.iter().filter(|other| *other != alteration);
         if let Some(knowledge) = altered(knowledge, remaining).filter(|_| !is_known) {
             let because = ruled_out(&knowledge, &design.individual.name);
-            causes.push(Cause { alteration: own.clone(), because, knowledge });
+            causes.push(Cause { alteration: alteration.clone(), because, knowledge });
         }
     }
     causes
@@ -117,11 +119,12 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
     };
     let Some(knowledge) = mission.knowledge() else { return availability };
     if design.available {
-        let loses = |own: &Alteration| {
-            altered(knowledge, [own]).is_some_and(|knowledge| !is_available(&knowledge, design))
+        let loses = |alteration: &Alteration| {
+            altered(knowledge, [alteration]).is_some_and(|knowledge| !is_available(&knowledge, design))
         };
         let candidates = candidates(knowledge, design).into_iter();
-        availability.ways = candidates.filter(loses).map(|own| vec![own]).collect();
+        // For an available design, each alteration alone that makes it unavailable is listed.
+        availability.ways = candidates.filter(loses).map(|alteration| vec![alteration]).collect();
         return availability;
     }
     availability.ways = ways(knowledge, design);
@@ -146,29 +149,33 @@ fn repairs(
         altered(knowledge, set.iter().copied()).is_some_and(|knowledge| is_available(&knowledge, design))
     };
     let available_changes: Vec<&Alteration> = candidates.iter().collect();
-    let without = |own: &Alteration| {
-        available_changes.iter().copied().filter(|other| *other != own).collect::<Vec<_>>()
+    let without = |alteration: &Alteration| {
+        available_changes.iter().copied().filter(|other| *other != alteration).collect::<Vec<_>>()
     };
     // An alteration that no others can replace is in every set.
     let (needed, rest): (Vec<&Alteration>, Vec<&Alteration>) = if suffice(&available_changes) {
-        available_changes.iter().copied().partition(|own| !suffice(&without(own)))
+        available_changes.iter().copied().partition(|alteration| !suffice(&without(alteration)))
     } else {
         (Vec::new(), available_changes.clone())
     };
     let mut minimal_sets: Vec<Vec<&Alteration>> = Vec::new();
     let subsets = std::iter::once(Vec::new()).chain(subsets(rest.len()));
     for positions in subsets.take(MAX_TRIED) {
-        let is_in = |own: &&Alteration| {
-            needed.contains(own) || positions.iter().any(|position| rest[*position] == *own)
+        let is_in = |alteration: &&Alteration| {
+            needed.contains(alteration) || positions.iter().any(|position| rest[*position] == *alteration)
         };
         let set: Vec<&Alteration> = available_changes.iter().copied().filter(is_in).collect();
-        let contains = |known: &Vec<&Alteration>| known.iter().all(|own| set.contains(own));
+        // Supersets of a minimal set are not minimal.
+        let contains = |subset: &Vec<&Alteration>| subset.iter().all(|alteration| set.contains(alteration));
         // A value cannot be altered to two targets at once.
-        let is_twice =
-            |(at, own): (usize, &&Alteration)| set[..at].iter().any(|other| other.name == own.name);
+        let is_twice = |(at, alteration): (usize, &&Alteration)| {
+            set[..at].iter().any(|other| other.name == alteration.name)
+        };
         let is_open =
             !set.is_empty() && !set.iter().enumerate().any(is_twice) && !minimal_sets.iter().any(contains);
         if is_open && suffice(&set) {
+            // Availability need not be monotone, so the set is minimised although smaller sets were
+            // tried before.
             minimal_sets.push(minimal(set, &suffice));
         }
     }
@@ -183,6 +190,7 @@ fn repairs(
 fn subsets(count: usize) -> impl Iterator<Item = Vec<usize>> {
     (1..=count).flat_map(move |size| {
         std::iter::successors(Some((0..size).collect::<Vec<usize>>()), move |last| {
+            // Rightmost position that can still be advanced.
             let at = (0..size).rev().find(|at| last[*at] < count - size + at)?;
             let mut next = last.clone();
             for (position, element) in next[at..].iter_mut().zip(last[at] + 1..) {
@@ -198,6 +206,7 @@ fn minimal<'a>(
     mut set: Vec<&'a Alteration>,
     suffice: &dyn Fn(&[&'a Alteration]) -> bool,
 ) -> Vec<&'a Alteration> {
+    // Backwards, so that removals do not shift the remaining positions.
     for position in (0..set.len()).rev() {
         let mut smaller = set.clone();
         smaller.remove(position);
@@ -228,7 +237,7 @@ fn altered<'a>(
 
 fn is_available(knowledge: &Knowledge, design: &FunctionDesign) -> bool {
     let designs = knowledge.view().function_designs();
-    designs.iter().any(|own| own.individual == design.individual && own.available)
+    designs.iter().any(|candidate| candidate.individual == design.individual && candidate.available)
 }
 
 /// Computes the best plan after alterations. At a limit, returns the best plan found until then.
@@ -266,10 +275,11 @@ pub(super) fn singly(mission: &Mission, repairs: &[Repair], limits: &Limits) -> 
     Ok(changes)
 }
 
-/// Alterations that may change whether a design is available: of its components, and of measurements that it depends
-/// on, to the values at which its requirements and estimations begin or cease to hold.
+/// Alterations that may change whether a design is available: of its components, and of
+/// measurements that it depends on, to the values at which its requirements and estimations begin
+/// or cease to hold.
 fn candidates(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Alteration> {
-    let is_own = |component: &str| design.components.iter().any(|own| own.iri == component);
+    let is_own = |component: &str| design.components.iter().any(|needed| needed.iri == component);
     let mut alterations = components(knowledge, design.available, &is_own);
     for (attribute, from) in measured(knowledge) {
         let bounds = design.requirements.iter().filter(|requirement| requirement.attribute == attribute);
@@ -286,7 +296,8 @@ fn candidates(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Alteration>
     alterations
 }
 
-/// Adds alterations of all failed components, and of the measurements that any design depends on, to the candidates.
+/// Adds alterations of all failed components, and of the measurements that any design depends on,
+/// to the candidates.
 fn all_candidates(knowledge: &Knowledge, mut all: Vec<Alteration>) -> Vec<Alteration> {
     let designs = knowledge.view().function_designs();
     let additional = designs.iter().flat_map(|design| candidates(knowledge, design));

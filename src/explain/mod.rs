@@ -68,7 +68,7 @@ fn find(mission: &Mission, name: &str) -> Result<(FunctionDesign, Vec<FunctionDe
         return Ok((found.clone(), designs));
     }
     let names: Vec<&str> = designs.iter().map(|design| design.individual.name.as_str()).collect();
-    let suggestion = crate::message::did_you_mean(name, names.iter().map(|own| &**own));
+    let suggestion = crate::message::did_you_mean(name, names.iter().map(|name| &**name));
     let text = format!("there is no design `{name}`; there are: {}{suggestion}", names.join(", "));
     Err(vec![Message::error("M112", text)].into())
 }
@@ -104,8 +104,8 @@ pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignEx
 }
 
 impl Availability {
-    /// Adds the results of planning. `hear` is called with a short description of each planning query before that
-    /// starts.
+    /// Adds the results of planning. `hear` is called with a short description of each planning
+    /// query before that starts.
     ///
     /// # Errors
     /// The mission cannot be planned for.

@@ -69,8 +69,8 @@ pub enum Target {
 }
 
 impl Target {
-    /// A value that meets the target: the bound itself, or, if the bound is strict, a value beyond it by `little()`.
-    /// Returns 0 for components.
+    /// A value that meets the target: the bound itself, or, if the bound is strict, a value beyond
+    /// it by `little()`. Returns 0 for components.
     pub(super) fn example(&self) -> BigRational {
         let little = little();
         match self {

@@ -16,7 +16,8 @@ pub fn best(mission: &Mission, limits: &Limits) -> Result<BestPlan, Errors> {
     solve(mission, limits, &|_, available| available)
 }
 
-/// Computes the best plan with the designs for which `allowed` returns `true`, given the name and whether it is available.
+/// Computes the best plan with the designs for which `allowed` returns `true`, given the name and
+/// whether it is available.
 pub(super) fn solve(
     mission: &Mission,
     limits: &Limits,

@@ -13,7 +13,7 @@ use crate::number;
 
 /// Bisection ends at an interval of the value divided by this number; then a number with fewer
 /// digits is tried.
-const FINENESS: i64 = 1000;
+const BISECTION_RESOLUTION: i64 = 1000;
 
 /// The smallest changes that lead to another plan.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,7 +44,7 @@ pub fn smallest_changes(
     if !result.best.proved {
         return Ok(result);
     }
-    let tried = Tried { mission, base: result.best.clone(), limits };
+    let tried = VariedMission { mission, base: result.best.clone(), limits };
     let attributes = mission.knowledge().map(measured).unwrap_or_default();
     for (attribute, from) in attributes {
         hear(&attribute);
@@ -84,13 +84,13 @@ enum Outcome {
 }
 
 /// A mission whose values are varied, and its best plan for comparison.
-struct Tried<'a> {
+struct VariedMission<'a> {
     mission: &'a Mission,
     base: BestPlan,
     limits: &'a Limits,
 }
 
-impl Tried<'_> {
+impl VariedMission<'_> {
     /// Computes the best plan with another value. Returns `None` at a limit.
     fn with(&self, name: &str, value: &BigRational) -> Result<Option<BestPlan>, Errors> {
         if self.limits.reached() {
@@ -129,10 +129,12 @@ impl Tried<'_> {
 
     /// Searches for the nearest value of a function, on one side, with another plan.
     fn bisected(&self, function: &str, from: &BigRational, upwards: bool) -> Result<Outcome, Errors> {
+        // Relative steps need a positive start value.
         if *from <= BigRational::default() {
             return Ok(Outcome::None);
         }
         let whole = |value: i64| BigRational::from_integer(value.into());
+        // Exponential search brackets the change before bisection.
         let (mut same, mut other) = (from.clone(), None);
         for percent in [1, 2, 5, 10, 20, 50, 100] {
             let part = from * whole(percent) / whole(100);
@@ -145,7 +147,7 @@ impl Tried<'_> {
             same = value;
         }
         let Some((mut value, mut then)) = other else { return Ok(Outcome::None) };
-        let fine = from / whole(FINENESS);
+        let fine = from / whole(BISECTION_RESOLUTION);
         loop {
             let distance = if upwards { &value - &same } else { &same - &value };
             if distance <= fine {
@@ -177,6 +179,8 @@ impl Tried<'_> {
         let step = if upwards { little() } else { -little() };
         let (before, beyond) = (&bound - &step, &bound + &step);
         let Some(at) = self.with(function, &bound)? else { return Ok(Outcome::AtLimit) };
+        // The plan may change at the bound itself or just beyond it, which decides between a closed
+        // and an open bound.
         if self.is_other(&at) {
             let Some(plan) = self.with(function, &before)? else { return Ok(Outcome::AtLimit) };
             if !self.is_other(&plan) {
@@ -243,6 +247,7 @@ fn thresholds(mission: &Mission, attribute: &str, from: &BigRational, upwards: b
         if upwards { distance } else { -distance }
     };
     targets.sort_by_key(distance);
+    // Several designs may have the same requirement.
     targets.dedup();
     targets
 }
@@ -254,7 +259,7 @@ mod tests {
     use super::shortest_decimal;
 
     #[test]
-    fn the_shortest_decimal_of_an_interval() {
+    fn the_shortest_decimal_lies_in_the_interval() {
         let number = |value: i64| BigRational::new(value.into(), 1_000_000.into());
         let check =
             |low, high, expected| assert_eq!(shortest_decimal(&number(low), &number(high)), number(expected));

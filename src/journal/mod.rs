@@ -109,6 +109,7 @@ impl Journal {
         let mut recovery = Recovery::default();
         let directory = directory.to_owned();
         if contents.segments.is_empty() && contents.snapshots.is_empty() {
+            // The lock file proves that the journal had records before.
             if lock.records > 0 {
                 return Err(broken(&directory, &format!("{} is missing", name("journal", 0))));
             }
@@ -127,6 +128,7 @@ impl Journal {
         for (number, line) in anew {
             write_snapshot(&directory, number, &line).map_err(failed)?;
         }
+        // A machine that lost power may have lost records that were not flushed.
         if lock.records > link.next {
             let text = format!(
                 "the last {} records of the journal are missing; send again what follows `seq`",
@@ -193,6 +195,7 @@ impl Journal {
     fn again(&mut self, control: &Loop, mut answers: Vec<Answer>) -> io::Result<Vec<Answer>> {
         self.file.sync_data()?;
         self.lock.note(self.link.next)?;
+        // Effects of the new answers must not be repeated.
         let fresh: Vec<u64> = answers.iter().filter_map(Answer::effect).map(|effect| effect.number).collect();
         let again = control.repeat().into_iter();
         let is_fresh = |answer: &Answer| answer.effect().is_some_and(|effect| fresh.contains(&effect.number));
@@ -252,6 +255,7 @@ impl Journal {
 
     /// Flushes answers to the disk according to the policy.
     fn keep(&mut self, answers: &[Answer]) -> io::Result<()> {
+        // Only effects change the world, so the loss of other answers is harmless.
         let must = match self.policy.sync {
             Sync::Always => true,
             Sync::Effects => answers.iter().any(|answer| answer.effect().is_some()),
@@ -322,6 +326,7 @@ fn resume<'c>(
     let digest = control.digest();
     let (from, segments) =
         usable(contents, &mut recovery.warnings).map_err(|text| broken(directory, &text))?;
+    // Other files or settings would lead to other decisions during the replay.
     if segments.iter().any(|segment| segment.digest != digest) {
         let text = "it belongs to another mission, or the mission's files or settings have changed";
         return Err(broken(directory, text));
@@ -334,6 +339,7 @@ fn resume<'c>(
     let mut replay = Replay { directory, control, recovery, observations: 0, unfinished: None };
     let mut anew = Vec::new();
     for segment in &segments {
+        // A crash between the creation of a segment and its snapshot leaves the snapshot missing.
         if segment.number > from && contents.start(segment.number).is_err() {
             let line = snapshot_line(&segment.before, &digest, segment.number, replay.control);
             anew.push((segment.number, line));
@@ -365,6 +371,7 @@ fn write_snapshot(directory: &Path, number: u64, line: &str) -> io::Result<()> {
     let mut file = tempfile::NamedTempFile::new_in(directory)?;
     file.write_all(line.as_bytes())?;
     file.as_file().sync_all()?;
+    // A damaged snapshot may help to find the cause of the damage.
     if name.exists() {
         let mut beside = name.clone().into_os_string();
         beside.push(".damaged");

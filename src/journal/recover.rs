@@ -76,11 +76,17 @@ impl Replay<'_> {
     /// Replays a segment.
     pub(super) fn segment(&mut self, segment: &Segment) -> Result<(), Message> {
         self.observations = 0;
+        // The end record only links segments.
         let mut records = segment.records.iter().filter(|record| record.kind != "end").peekable();
         while let Some(record) = records.next() {
             let wrong =
                 || broken(self.directory, &format!("record {} is not where it belongs", record.number));
-            if self.unfinished.take().is_some_and(|own| matches!(own, Unfinished::Observation(..))) {
+            // Only the last observation of a journal may lack its answers.
+            if self
+                .unfinished
+                .take()
+                .is_some_and(|unfinished| matches!(unfinished, Unfinished::Observation(..)))
+            {
                 return Err(wrong());
             }
             match record.kind.as_str() {
@@ -116,6 +122,8 @@ impl Replay<'_> {
         };
         let (observation, now) = (Observation::recorded(line), Duration::from_micros(now));
         let answers = match next.kind.as_str() {
+            // A reaction is replayed without planning; a decision is replayed with the recorded
+            // plans.
             "reaction" => self.control.react(&observation, now),
             _ => self.control.handle_again(&observation, now, &next.list(1)),
         };
@@ -147,6 +155,7 @@ pub(super) fn settle(
         }
         let name = path(directory, "journal", segment.number);
         let mut file = open_private(&name, OpenOptions::new().read(true).write(true))?;
+        // The incomplete record is kept in a separate file before it is cut off.
         if let End::Incomplete(bytes) = segment.end {
             recovery.cut += bytes;
             keep_cut(&name, segment.sound)?;
@@ -156,6 +165,7 @@ pub(super) fn settle(
         if segment.end == End::Unbroken {
             file.write_all(b"\n")?;
         }
+        // A crash may have prevented the record that links to the next segment.
         if !is_last && !segment.is_closed() {
             file.write_all(closing(&segment.after, segment.number).0.as_bytes())?;
         }
@@ -176,6 +186,7 @@ fn keep_cut(name: &Path, sound: u64) -> io::Result<()> {
         let mut beside = name.as_os_str().to_owned();
         beside.push(format!(".cut{number}"));
         match open_private(Path::new(&beside), OpenOptions::new().create_new(true).write(true)) {
+            // Earlier crashes may have left such files.
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => number += 1,
             other => return other.and_then(|mut file| file.write_all(remaining)),
         }

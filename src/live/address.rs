@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn hosts_of_this_machine_are_told_from_others() {
+    fn loopback_hosts_are_recognised() {
         let check = |host: &str, expected: bool| assert_eq!(is_local_host(host), expected, "{host}");
         for host in
             ["localhost", "LocalHost:8420", "127.0.0.1", "127.0.0.1:80", "127.9.9.9", "[::1]", "[::1]:80"]

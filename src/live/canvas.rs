@@ -44,7 +44,7 @@ impl Canvas {
         let drawn: Arc<str> =
             format!("<div id=\"drawn\" data-first=\"{}\">{}</div>", outlook.first, visible(&part)).into();
         let mut state = self.lock();
-        if state.outlook.as_ref().is_some_and(|own| Arc::ptr_eq(own, &outlook)) {
+        if state.outlook.as_ref().is_some_and(|current| Arc::ptr_eq(current, &outlook)) {
             state.drawn = Some(Arc::clone(&drawn));
         }
         drawn

@@ -101,6 +101,7 @@ impl Hub {
         }
         state.bytes += line.len();
         state.lines.push_back(line);
+        // The newest line is always retained, even if it exceeds the limit alone.
         while state.lines.len() > 1 && (state.lines.len() > MAX_LINES || state.bytes > BYTES) {
             let removed = state.lines.pop_front();
             state.bytes -= removed.map_or(0, |line| line.len());
@@ -199,6 +200,7 @@ impl Mouth {
         let at = self.begun.elapsed().as_secs_f64();
         let bytes = said.bytes();
         let waiting = self.behind.bytes.fetch_add(bytes, Ordering::Relaxed);
+        // The loop must not wait for slow clients, so lines beyond the limit are dropped.
         let is_taken = waiting.saturating_add(bytes) <= WAITING_BYTES
             && !matches!(self.said.try_send(Some((at, said))), Err(TrySendError::Full(_)));
         if !is_taken {
@@ -211,7 +213,9 @@ impl Mouth {
 fn listen(hub: &Hub, received: &Receiver<Option<(f64, Entry)>>, behind: &Backlog) {
     while let Ok(Some((at, said))) = received.recv() {
         behind.bytes.fetch_sub(said.bytes(), Ordering::Relaxed);
+        // Milliseconds are precise enough for a page.
         let at = (at * 1000.0).round() / 1000.0;
+        // The page shows the number of dropped lines.
         let missing = behind.left_out.swap(0, Ordering::Relaxed);
         if missing > 0 {
             hub.take(json!({"at": at, "left_out": missing}).to_string().into(), Vec::new());
@@ -222,7 +226,7 @@ fn listen(hub: &Hub, received: &Receiver<Option<(f64, Entry)>>, behind: &Backlog
                 hub.take(line.to_string().into(), Vec::new());
             }
             Entry::Designs(designs) => {
-                let keys = designs.iter().map(|own| design_key(&own.design)).collect();
+                let keys = designs.iter().map(|design| design_key(&design.design)).collect();
                 hub.take(json!({"at": at, "known": designs}).to_string().into(), keys);
             }
             Entry::Planned { exists, under_way } => {
@@ -248,7 +252,7 @@ mod tests {
     use super::{Hub, Mouth, News, WAITING_BYTES};
 
     #[test]
-    fn what_waits_is_bounded_by_its_bytes() {
+    fn the_queue_is_bounded_by_its_bytes() {
         let hub = Arc::new(Hub::default());
         let mouth = Mouth::of(Arc::clone(&hub));
         let long = "x".repeat(1 << 20);
@@ -277,6 +281,6 @@ mod tests {
                 News::Ended => break,
             }
         }
-        assert_eq!(seen, 1, "what comes then is there");
+        assert_eq!(seen, 1, "lines after an overflow are delivered");
     }
 }

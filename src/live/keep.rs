@@ -45,9 +45,9 @@ pub(super) fn keys(answer: &str) -> Vec<String> {
         }
         "reconfigure" => about.function.map(|function| format!("function {function}")).into_iter().collect(),
         "inferred" => {
-            let designs = about.designs.iter().map(|own| design_key(&own.design));
+            let designs = about.designs.iter().map(|design| design_key(&design.design));
             designs
-                .chain(about.objectives.into_iter().map(|own| format!("objective {}", own.objective)))
+                .chain(about.objectives.into_iter().map(|change| format!("objective {}", change.objective)))
                 .collect()
         }
         _ => Vec::new(),
@@ -59,7 +59,7 @@ mod tests {
     use super::keys;
 
     #[test]
-    fn answers_are_the_last_word_on_something() {
+    fn answers_have_state_keys() {
         let check = |answer: &str, expected: &[&str]| assert_eq!(keys(answer), expected, "{answer}");
         check(r#"{"answer":"ready"}"#, &["ready"]);
         check(r#"{"answer":"plan_found","cost":1,"steps":[]}"#, &["plan_found"]);

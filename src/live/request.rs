@@ -63,8 +63,8 @@ impl Request {
             return Some(Err((405, "Method Not Allowed")));
         }
         let header = |name: &str| {
-            let mut values = parsed.headers.iter().filter(|own| own.name.eq_ignore_ascii_case(name));
-            let first = values.next().map(|own| own.value);
+            let mut values = parsed.headers.iter().filter(|header| header.name.eq_ignore_ascii_case(name));
+            let first = values.next().map(|header| header.value);
             if values.next().is_some() { Err((400, "Bad Request")) } else { Ok(first) }
         };
         let (host, authorization) = match (header("host"), header("authorization")) {
@@ -86,7 +86,7 @@ mod tests {
     use super::Request;
 
     #[test]
-    fn requests_are_read_or_refused() {
+    fn requests_are_parsed_or_rejected() {
         let check = |bytes: &str, expected: Option<Result<(&str, Option<&str>), u16>>| {
             let request = Request::parse(bytes.as_bytes());
             let request = request.map(|request| match request {

@@ -56,6 +56,7 @@ impl Live {
     /// # Errors
     /// The token is missing, or the address cannot be served.
     pub fn open(address: Address, token: Option<Token>, painter: Option<Painter>) -> Result<Self, Message> {
+        // Other machines on the network could otherwise read the run.
         if !address.is_loopback() && token.is_none() {
             let text = format!("who can reach {} can look at the run: a token is needed there", address.0);
             return Err(Message::error("M332", text));
@@ -105,7 +106,7 @@ impl Live {
 
     /// Replaces the plan, or removes it. Never blocks; the plan is drawn on the next request.
     pub fn planned(&self, outlook: Option<Outlook>) {
-        let under_way = outlook.as_ref().filter(|own| own.is_under_way).map(|own| own.first);
+        let under_way = outlook.as_ref().filter(|plan| plan.is_under_way).map(|plan| plan.first);
         let exists = outlook.is_some();
         self.house.canvas.take(outlook);
         self.mouth.planned(exists, under_way);
@@ -175,6 +176,7 @@ fn may_look(house: &SharedState, request: &Request) -> Result<(), Refused> {
         let fits = request.authorization.as_deref().is_some_and(|given| token.fits(given));
         return if fits { Ok(()) } else { Err((401, "Unauthorized")) };
     }
+    // Without a token, the Host header protects against DNS rebinding.
     let is_local = request.host.as_deref().is_some_and(is_local_host);
     if is_local { Ok(()) } else { Err((403, "Forbidden")) }
 }
@@ -225,7 +227,9 @@ fn events(house: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
                 send(stream, &stanzas(&lines))?;
                 next += lines.len() as u64;
             }
+            // A comment keeps the connection alive and detects disconnected clients.
             News::Nothing => send(stream, ":\n\n")?,
+            // The browser reconnects and then receives the current state.
             News::Missed => return Ok(()),
             News::Ended => return send(stream, "event: end\ndata: {}\n\n"),
         }
@@ -241,6 +245,7 @@ fn send(stream: &mut TcpStream, text: &str) -> io::Result<()> {
     let begun = Instant::now();
     let mut remaining = text.as_bytes();
     while !remaining.is_empty() {
+        // The timeout applies to the whole text, not to each write.
         let timeout = CLIENT_TIMEOUT.saturating_sub(begun.elapsed());
         if timeout.is_zero() {
             return Err(io::ErrorKind::TimedOut.into());

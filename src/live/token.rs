@@ -76,7 +76,7 @@ mod tests {
     use super::Token;
 
     #[test]
-    fn a_token_fits_as_a_password_and_as_a_bearer() {
+    fn tokens_match_as_password_and_as_bearer() {
         let token = Token::of(b"open sesame, now");
         let check = |header: &str, fits: bool| assert_eq!(token.fits(header.as_bytes()), fits, "{header}");
         check("Bearer open sesame, now", true);

@@ -81,8 +81,9 @@ fn solvable_with(
     let mut problem = problem.clone();
     // The metric does not affect solvability.
     problem.metric = None;
-    let domain =
-        mission.allow(&mut problem, &|design, own| own || available.iter().any(|other| other == design));
+    let domain = mission.allow(&mut problem, &|design, is_available| {
+        is_available || available.iter().any(|name| name == design)
+    });
     let task = ground_with(mission, &domain, &problem, &[], &config.limits).ok()?;
     match optimize(&task, config, &mut |_| {}).status {
         Status::Optimal | Status::Feasible => Some(true),

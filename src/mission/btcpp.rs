@@ -15,7 +15,7 @@ use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
 
 /// Name of the node that changes the design of a function.
-const CHANGE: &str = "ChangeMode";
+const CHANGE_NODE: &str = "ChangeMode";
 /// Attributes that BehaviorTree.CPP reserves.
 const RESERVED: [&str; 2] = ["name", "ID"];
 
@@ -43,7 +43,11 @@ fn nodes(mission: &Mission, plan: &Plan) -> Vec<Node> {
             if at_work.insert(function, design) != Some(design) {
                 let service = ("service_name".to_owned(), format!("/{function}/change_mode"));
                 let ports = vec![service, ("mode_name".to_owned(), design.clone())];
-                nodes.push(Node { id: CHANGE.to_owned(), name: format!("{function} = {design}"), ports });
+                nodes.push(Node {
+                    id: CHANGE_NODE.to_owned(),
+                    name: format!("{function} = {design}"),
+                    ports,
+                });
             }
         }
         let words: Vec<&str> =

@@ -14,7 +14,7 @@ use crate::mission::confirm::Reading;
 
 /// Maximum number of actions. Each candidate is validated, so the effort grows with the square of
 /// the length.
-const LONGEST: usize = 200;
+const MAX_ACTIONS: usize = 200;
 
 /// Removes actions of cost 0 that the plan does not need, as far as the limits permit.
 pub fn lean(
@@ -24,7 +24,7 @@ pub fn lean(
     reading: &Reading,
     limits: &Limits,
 ) -> Plan {
-    if plan.steps.len() > LONGEST {
+    if plan.steps.len() > MAX_ACTIONS {
         return plan;
     }
     for index in (0..plan.steps.len()).rev() {
@@ -77,7 +77,7 @@ mod tests {
     }
 
     #[test]
-    fn what_nothing_needs_is_left_out() {
+    fn superfluous_actions_are_removed() {
         let problem = |rest: &str| {
             format!(
                 "(define (problem p) (:domain d) (:objects a b c) (:init) (:goal (and (done a) (done b))) {rest})"

@@ -1,7 +1,6 @@
 //! Planning for missions: grounding, validation and export of plans.
 //!
-//! Invariant: no other module uses both OWL and the planner's task. `metaplan-mission` joins the
-//! knowledge base and the PDDL files.
+//! The crate `metaplan-mission` joins the knowledge base and the PDDL files. This module adds the planner.
 
 mod blocking;
 mod btcpp;

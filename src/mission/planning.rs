@@ -15,8 +15,7 @@ use crate::narrow::narrowed;
 /// Planning for a mission.
 pub trait Planning {
     /// Returns the domain and the problem that are grounded for a filled problem. They have the
-    /// same plans as the mission's own, and are
-    /// smaller if its knowledge base completes its domain.
+    /// same plans as the mission's own, and are smaller if its knowledge base completes its domain.
     fn narrowed<'m>(&'m self, problem: &'m Problem) -> (Cow<'m, Domain>, Cow<'m, Problem>);
 
     /// Grounds a problem that [`Mission::filled`] has made. Non-empty `objectives` replace its
@@ -26,7 +25,8 @@ pub trait Planning {
     /// All constructs that the planner does not support, or a limit that was reached.
     fn ground(&self, problem: &Problem, objectives: &[Metric], limits: &Limits) -> Result<Task, Errors>;
 
-    /// Grounds a problem as [`Planning::ground`], with exact rationals, so that numbers of any size are accepted.
+    /// Grounds a problem as [`Planning::ground`], with exact rationals, so that numbers of any size
+    /// are accepted.
     ///
     /// # Errors
     /// As [`Planning::ground`].
@@ -161,7 +161,7 @@ mod tests {
 
     /// The checker does not link the planner, so the names are defined in both.
     #[test]
-    fn the_defaults_are_those_of_the_planner() {
+    fn default_names_equal_those_of_the_planner() {
         let sorted = |mut names: Vec<Name>| {
             names.sort();
             names

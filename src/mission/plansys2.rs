@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn what_follows_begins_a_thousandth_later() {
+    fn successors_begin_a_thousandth_later() {
         let sequence = [("long", 0, 5000), ("now", 5000, 0), ("short", 5000, 2000), ("now", 9000, 0)];
         let spaced =
             "0.000: (long)  [5.000]\n5.001: (now)  [0.001]\n5.003: (short)  [2.000]\n9.000: (now)  [0.001]\n";
@@ -137,7 +137,7 @@ mod tests {
 
     /// A fact that is true only from 5 to 7 fixes the times, so that no gap fits.
     #[test]
-    fn times_that_must_be_stay() {
+    fn plans_without_room_for_gaps_are_unchanged() {
         let steps = [("now", 5000, 0), ("short", 5000, 2000)];
         let expected = "5.000: (now)  [0.001]\n5.000: (short)  [2.000]\n";
         check("(at 5 (p)) (at 7 (not (p)))", false, &steps, expected);

@@ -271,7 +271,8 @@ impl<S> Scenario<S> {
         Errors::unless_empty(self.mistakes(mission).into_iter().map(|mistake| mistake.message))
     }
 
-    /// Applies the situation as [`Scenario::apply`] does. Returns all settings that do not fit, with their places.
+    /// Applies the situation as [`Scenario::apply`] does. Returns all settings that do not fit,
+    /// with their places.
     pub fn mistakes(&self, mission: &mut Mission) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
         // If the mission's own files are faulty, errors of PDDL may not be caused by the settings.

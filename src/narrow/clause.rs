@@ -67,7 +67,8 @@ pub(super) fn clauses(derived: &Derived) -> Option<Vec<Clause>> {
     let head = &derived.head;
     let mut variables: BTreeSet<Name> = BTreeSet::new();
     let typed = typed(&head.parameters, &mut variables)?;
-    let parameters = head.parameters.iter().map(|own| Operand::Variable(own.identifier.name.clone()));
+    let parameters =
+        head.parameters.iter().map(|parameter| Operand::Variable(parameter.identifier.name.clone()));
     let arguments: Vec<Operand> = parameters.collect();
     let name = &head.identifier.name;
     let clause = |body: Vec<Literal>| {
@@ -149,7 +150,7 @@ impl Clause {
         let atoms = self.body.iter().filter(|part| matches!(part, Literal::Holds(..)) && !part.is_type());
         let bound: BTreeSet<&Operand> = atoms.flat_map(Literal::operands).collect();
         let operands = self.body.iter().flat_map(Literal::operands).chain(&self.arguments);
-        operands.into_iter().all(|own| matches!(own, Operand::Constant(_)) || bound.contains(own))
+        operands.into_iter().all(|operand| matches!(operand, Operand::Constant(_)) || bound.contains(operand))
     }
 
     /// Eliminates equalities and repeated atoms. `None` if the body is never true.
@@ -164,7 +165,7 @@ impl Clause {
                 _ => return None,
             }
         }
-        let constant = |own: &Operand| matches!(own, Operand::Constant(_));
+        let constant = |operand: &Operand| matches!(operand, Operand::Constant(_));
         for part in &self.body {
             if let Literal::Equal(false, left, right) = part
                 && left == right
@@ -183,11 +184,11 @@ impl Clause {
 
     /// Substitutes the variables in the map.
     fn with(self, map: &BTreeMap<Name, Operand>) -> Self {
-        let substitute = |own: Operand| match &own {
-            Operand::Variable(name) => map.get(name).cloned().unwrap_or(own),
-            Operand::Constant(_) => own,
+        let substitute = |operand: Operand| match &operand {
+            Operand::Variable(name) => map.get(name).cloned().unwrap_or(operand),
+            Operand::Constant(_) => operand,
         };
-        let substitute_all = |own: Vec<Operand>| own.into_iter().map(substitute).collect();
+        let substitute_all = |operands: Vec<Operand>| operands.into_iter().map(substitute).collect();
         let part = |part: Literal| match part {
             Literal::Holds(name, operands) => Literal::Holds(name, substitute_all(operands)),
             Literal::Equal(same, left, right) => Literal::Equal(same, substitute(left), substitute(right)),

@@ -46,7 +46,7 @@ impl Folded {
 
     /// Removes the axioms of settled predicates from a domain.
     pub fn shorten(&self, domain: &mut Domain) {
-        domain.derived.retain(|own| !self.settled.contains_key(&own.head.identifier.name));
+        domain.derived.retain(|axiom| !self.settled.contains_key(&axiom.head.identifier.name));
         self.possible.restrict(domain);
     }
 
@@ -125,8 +125,8 @@ fn fixpoint(
         let mut new = Vec::new();
         for clause in clauses.iter().copied().filter(is_due) {
             let order = relations.order(&clause.body);
-            relations.matches(&order, &mut BTreeMap::new(), &mut |found| {
-                relations.heads(clause, found, &mut new);
+            relations.matches(&order, &mut BTreeMap::new(), &mut |bindings| {
+                relations.heads(clause, bindings, &mut new);
             });
         }
         let mut changed = BTreeSet::new();
@@ -180,22 +180,25 @@ impl Relations<'_> {
     /// Orders the conjuncts: atoms that share variables with earlier ones first, small relations
     /// first; types and inequalities as soon as their variables are bound.
     fn order<'b>(&self, body: &'b [Literal]) -> Vec<&'b Literal> {
+        // Greedy join ordering: each step takes the cheapest remaining conjunct.
         let (mut left, mut order): (Vec<&Literal>, Vec<&Literal>) = (body.iter().collect(), Vec::new());
         let mut bound: BTreeSet<&Name> = BTreeSet::new();
         while !left.is_empty() {
             let cost = |part: &Literal| {
                 let operands = part.operands();
                 let is_free =
-                    |own: &&&Operand| matches!(own, Operand::Variable(name) if !bound.contains(name));
+                    |operand: &&&Operand| matches!(operand, Operand::Variable(name) if !bound.contains(name));
                 let free = operands.iter().filter(is_free).count();
                 let rows = part.name().map_or(0, |name| self.rows(name).len());
                 let is_test = part.name().is_none() || part.is_type();
                 let is_apart = free == operands.len() && !bound.is_empty();
+                // Lexicographic: fully bound conjuncts, no unbound tests, no Cartesian products,
+                // few new variables, and small relations come first.
                 (free > 0, is_test && free > 0, is_apart && free > 0, free, rows)
             };
             let best = (0..left.len()).min_by_key(|&index| cost(left[index])).unwrap_or(0);
             let next = left.remove(best);
-            bound.extend(next.operands().into_iter().filter_map(|own| match own {
+            bound.extend(next.operands().into_iter().filter_map(|operand| match operand {
                 Operand::Variable(name) => Some(name),
                 Operand::Constant(_) => None,
             }));
@@ -211,7 +214,7 @@ impl Relations<'_> {
         each: &mut dyn FnMut(&Bindings<'k>),
     ) {
         let Some((part, rest)) = order.split_first() else { return each(found) };
-        let free = part.operands().into_iter().find(|own| value(own, found).is_none());
+        let free = part.operands().into_iter().find(|operand| value(operand, found).is_none());
         match (part, free) {
             // No atom binds this variable, so it ranges over all objects.
             (Literal::Equal(..), Some(Operand::Variable(name))) => {
@@ -228,6 +231,7 @@ impl Relations<'_> {
             }
             (Literal::Holds(predicate, operands), _) => {
                 for row in self.rows(predicate) {
+                    // A partial match may have bound some variables before it failed.
                     let before = found.clone();
                     if row.len() == operands.len()
                         && operands.iter().zip(row).all(|(operand, argument)| bind(operand, argument, found))

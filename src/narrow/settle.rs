@@ -20,8 +20,9 @@ use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Effect, Name, Term}
 use super::clause::{Clause, Fact, Literal, Operand};
 
 /// Maximum depth of unfolding.
-const DEPTH: usize = 8;
-const CLAUSES: usize = 1000;
+const MAX_DEPTH: usize = 8;
+/// Maximum number of clauses that are examined while one predicate is unfolded.
+const MAX_CLAUSES: usize = 1000;
 
 /// Guards: the arguments at a position of facts that actions add are members of a class. A guard is
 /// a predicate, a position and a class.
@@ -87,6 +88,7 @@ fn classes<'c>(asked: &[&'c Condition], varying: &BTreeSet<Name>) -> Vec<(Name, 
         match part {
             Condition::And(more) => parts.extend(more),
             Condition::Atom(atom) if !varying.contains(&atom.predicate.name) => {
+                // Only unary predicates are classes.
                 if let [own] = &atom.arguments[..] {
                     found.push((atom.predicate.name.clone(), own));
                 }
@@ -110,6 +112,7 @@ fn added<'e>(effect: &'e Effect, bound: &[&'e Name], found: &mut Vec<(&'e Atom, 
             let quantified = variables.iter().map(|variable| &variable.identifier.name);
             added(inner, &bound.iter().copied().chain(quantified).collect::<Vec<_>>(), found);
         }
+        // The condition of the effect only restricts the added facts, so ignoring it is safe.
         Effect::When(_, inner) => added(inner, bound, found),
         Effect::Delete(_) | Effect::Assign(..) => {}
     }
@@ -151,6 +154,7 @@ pub(super) fn settle(
             let settled = settled.into_iter().filter_map(|(head, clauses)| Some((head, clauses?)));
             return (settled.collect(), open);
         };
+        // A newly settled predicate may make further predicates settled, so the loop starts again.
         all.insert(head, Some(clauses));
     }
 }
@@ -192,18 +196,21 @@ impl Unfold<'_> {
         let (mut done, mut count) = (BTreeSet::new(), 0);
         while let Some((clause, depth)) = agenda.pop() {
             count += 1;
-            if count > CLAUSES {
+            // Unfolding may grow exponentially; an unsettled predicate is merely less efficient.
+            if count > MAX_CLAUSES {
                 return None;
             }
             if self.says_nothing(&clause) {
                 continue;
             }
+            // A set removes the duplicates that different unfoldings produce.
             let Some(at) = first_open(&clause, self.open) else {
                 done.insert(clause);
                 continue;
             };
             let Literal::Holds(name, _) = &clause.body[at] else { return None };
-            if depth >= DEPTH || name == self.head {
+            // Recursive clauses cannot be unfolded completely.
+            if depth >= MAX_DEPTH || name == self.head {
                 return None;
             }
             // Predicates that actions change have no clauses, and not all axioms of a domain are

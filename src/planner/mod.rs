@@ -217,6 +217,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         if let Some(plan) = solution.plan.take() {
             let mut problem = self.problem.clone();
             problem.metric = objectives.metrics.first().cloned().or(problem.metric);
+            // The other half of the extended time remains for the validator.
             solution.plan = Some(lean(self.mission, &problem, plan, &reading, &limits.extended().half()));
         }
         let point = valued(solution, &objectives);
@@ -228,6 +229,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         let config = self.config.clone();
         let task = match self.mission.ground(&self.problem, &objectives.metrics, &config.limits) {
             Ok(task) => task,
+            // Rationals of any size are slower, so integers are tried first.
             Err(refused) if is_too_large(&refused) && self.alternatives.is_none() => {
                 return self.exact(objectives, refused);
             }
@@ -245,6 +247,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         };
         let mut planned = self.planned(point, objectives, Ground::Integers(task), reading, ground)?;
         planned.alternatives = alternatives;
+        // The explanation needs further planning, which is only useful after a proof.
         if planned.solution.status == Status::Unsolvable {
             planned.blocking = blocking(planned.mission, &planned.problem, &config);
             planned.missing_values = missing_values(planned.mission);
@@ -254,6 +257,7 @@ impl<'m, 'r> Planner<'m, 'r> {
 
     /// Plans by search alone, in exact rationals.
     fn exact(self, objectives: Objectives, refused: Errors) -> Result<Planned<'m>, Errors> {
+        // The search in rationals supports a single objective.
         if objectives.metrics.len() > 1 {
             return Err(refused);
         }
@@ -278,6 +282,7 @@ impl<'m, 'r> Planner<'m, 'r> {
             match confirm(self.mission, &self.problem, &found.plans[index], &reading, limits) {
                 Ok(()) => {}
                 Err(Unconfirmed::Interrupted) => {
+                    // Plans that were not validated must not be returned.
                     found.plans.truncate(index);
                     found.complete = false;
                     break;
@@ -352,8 +357,12 @@ impl fmt::Debug for Planner<'_, '_> {
 /// M110 for each contradiction.
 pub fn consistent(knowledge: Option<&Knowledge>) -> Result<(), Errors> {
     let contradictions = knowledge.map(Knowledge::contradictions).unwrap_or_default();
-    Errors::unless_empty(contradictions.iter().map(|found| {
-        let text = format!("the knowledge is inconsistent: {}: {}", found.violated, found.facts.join(", "));
+    Errors::unless_empty(contradictions.iter().map(|contradiction| {
+        let text = format!(
+            "the knowledge is inconsistent: {}: {}",
+            contradiction.violated,
+            contradiction.facts.join(", ")
+        );
         Message::error("M110", text)
     }))
 }

@@ -14,7 +14,7 @@ use crate::recording::write::{Form, Recording};
 pub const INTERVAL: Duration = Duration::from_secs(1);
 
 /// Capacity of the queue. Senders block while it is full.
-const WAITING: usize = 1024;
+const QUEUE_CAPACITY: usize = 1024;
 
 /// A recording that a separate thread writes; copies share the file.
 #[derive(Debug, Clone)]
@@ -43,7 +43,7 @@ impl Recorder {
         let recording = Recording::begin(file, mission, form)?;
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let begun = (u64::try_from(since.as_nanos()).unwrap_or(u64::MAX), Instant::now());
-        let (entries, received) = sync_channel(WAITING);
+        let (entries, received) = sync_channel(QUEUE_CAPACITY);
         let thread = std::thread::spawn(move || write(recording, &received));
         Ok(Self { entries, thread: Arc::new(Mutex::new(Some(thread))), begun })
     }

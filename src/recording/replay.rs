@@ -117,6 +117,7 @@ impl<R: Read> Replay<R> {
             Some(Ok(LinearReadEvent::Record { opcode, data })) => {
                 mcap::parse_record(opcode, data).map_err(damaged)?.into_owned()
             }
+            // A crash leaves a file without its end record.
             None | Some(Err(McapError::UnexpectedEof)) => return self.end(State::Unfinished),
             Some(Err(error)) => return Err(damaged(error)),
         };
@@ -131,6 +132,7 @@ impl<R: Read> Replay<R> {
 
     fn end(&mut self, state: State) -> io::Result<()> {
         self.state = state;
+        // A truncated file may end before its channels.
         if self.channels.is_empty() && state == State::Finished {
             let text = format!("there is neither {} nor {} in it", schema::EVENTS, messages::DIAGNOSTICS);
             return Err(io::Error::other(text));
@@ -192,6 +194,8 @@ impl<R: Read> Replay<R> {
             Some(Kind::Diagnostics) => {
                 let array =
                     from_cdr::<DiagnosticArray>(data).map_err(|why| wrong(messages::DIAGNOSTICS, why))?;
+                // A foreign recording has no start of a mission, so its first message defines time
+                // 0.
                 let first = *self.first.get_or_insert(header.log_time);
                 let now = Duration::from_nanos(header.log_time.saturating_sub(first));
                 // Serialisation cannot fail for texts and numbers.

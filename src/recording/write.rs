@@ -83,6 +83,7 @@ impl<W: Write + Seek> Recording<W> {
         let options = WriteOptions::new()
             .profile("ros2")
             .library(format!("metaplan {} {}", env!("CARGO_PKG_VERSION"), mcap::LIBRARY_IDENTIFIER))
+            // Without compression, a truncated file can be read up to its last complete chunk.
             .compression(None)
             // Without seeking, a chunk is written as a whole.
             .disable_seeking(true);
@@ -141,6 +142,7 @@ impl<W: Write + Seek> Recording<W> {
     /// The file cannot be written, now or since an error before.
     pub fn answer(&mut self, time: u64, answer: &str) -> io::Result<()> {
         let kind = serde_json::from_str::<Kind>(answer).map(|kind| schema::topic(&kind.answer));
+        // The last topic takes the kinds that no other topic lists.
         let topic = kind.unwrap_or(schema::ANSWERS.len() - 1);
         let bytes = bytes(self.form, answer.to_owned());
         self.writer.message(&mut self.answers[topic], time, &bytes)

@@ -10,7 +10,7 @@ use crate::number::decimal;
 use crate::report::designs::because;
 
 /// Name of an unknown state of a component or an attribute.
-const UNSAID: &str = "not said";
+const UNKNOWN: &str = "not said";
 
 /// The cost of a plan, or the reason for the lack of a plan.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -28,8 +28,8 @@ pub enum Cost {
 pub fn changes(before: (&Mission, &Plan), after: (&Mission, &Plan), costs: &[Cost; 2]) -> Vec<Change> {
     let mut changes = Vec::new();
     let mut say = |text: String| changes.push(Change { text, because: Vec::new() });
-    differences(&components(before.0), &components(after.0), UNSAID).into_iter().for_each(&mut say);
-    differences(&measured(before.0), &measured(after.0), UNSAID).into_iter().for_each(&mut say);
+    differences(&components(before.0), &components(after.0), UNKNOWN).into_iter().for_each(&mut say);
+    differences(&measured(before.0), &measured(after.0), UNKNOWN).into_iter().for_each(&mut say);
     task(before.0, after.0).into_iter().for_each(&mut say);
     changes.extend(designs(before.0, after.0));
     changes
@@ -54,16 +54,22 @@ fn differences(
 
 fn components(mission: &Mission) -> BTreeMap<String, String> {
     let components = mission.knowledge().map(|knowledge| knowledge.view().components()).unwrap_or_default();
-    let status = components.into_iter().map(|own| {
-        (format!("The status of {}", own.individual.name), own.status.unwrap_or_else(|| UNSAID.to_owned()))
+    let status = components.into_iter().map(|component| {
+        (
+            format!("The status of {}", component.individual.name),
+            component.status.unwrap_or_else(|| UNKNOWN.to_owned()),
+        )
     });
     status.collect()
 }
 
 fn measured(mission: &Mission) -> BTreeMap<String, String> {
     let measured = mission.knowledge().map(|knowledge| knowledge.view().measurements()).unwrap_or_default();
-    let value = measured.into_iter().filter_map(|own| {
-        Some((format!("Measured {} ({})", own.attribute, own.individual.name), decimal(own.value.as_ref()?)))
+    let value = measured.into_iter().filter_map(|measurement| {
+        Some((
+            format!("Measured {} ({})", measurement.attribute, measurement.individual.name),
+            decimal(measurement.value.as_ref()?),
+        ))
     });
     value.collect()
 }
@@ -159,8 +165,8 @@ fn both(before: &Plan, after: &Plan, [old_cost, new_cost]: [&str; 2]) -> Vec<Str
     texts
 }
 
-/// Sentence with the number of actions that both plans have. An action counts as often as it is in both plans. Its
-/// designs do not matter.
+/// Sentence with the number of actions that both plans have. An action counts as often as it is in
+/// both plans. Its designs do not matter.
 fn kept(before: &Plan, after: &Plan) -> String {
     let mut old: Vec<&str> = before.steps.iter().map(|step| step.label.as_str()).collect();
     let in_both = after.steps.iter().filter(|step| {
@@ -192,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn plans_are_compared_in_plain_words() {
+    fn plan_differences_are_sentences() {
         let of = |cost: &str| Cost::Of(cost.to_owned());
         let (there, back) = ("go a b", "go b a");
         check(

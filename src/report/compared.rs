@@ -46,7 +46,8 @@ fn labels<'k>(kinds: &[(&'k Option<Pair>, &'k str)]) -> Vec<String> {
 /// Points for time and the probability of a success without collision: the front, and each
 /// candidate with a finite time. A point has the label of its row in the table.
 fn front(comparison: &Comparison) -> Points {
-    let kinds: Vec<String> = comparison.candidates.iter().map(|own| own.kind.to_string()).collect();
+    let kinds: Vec<String> =
+        comparison.candidates.iter().map(|candidate| candidate.kind.to_string()).collect();
     let kinds: Vec<(&Option<Pair>, &str)> = kinds.iter().map(|kind| (&None, kind.as_str())).collect();
     let points = comparison.candidates.iter().zip(labels(&kinds)).filter_map(|(own, label)| {
         let (time, success) = (own.measures.time?, own.measures.no_collision);
@@ -158,8 +159,8 @@ fn accomplished(done: usize, all: usize) -> String {
     }
 }
 
-/// Text for a strategy that has no costs, since none of its missions was accomplished. It is short enough for a
-/// telephone.
+/// Text for a strategy that has no costs, since none of its missions was accomplished. It is short
+/// enough for a telephone.
 fn none_accomplished(missions: usize) -> String {
     format!("0 of {missions} accomplished")
 }

@@ -60,7 +60,7 @@ fn required(requirement: &Requirement, measurements: &[Measurement]) -> String {
             let _ = write!(text, " {word} {}", decimal(bound));
         }
     }
-    let measured = measurements.iter().find(|own| own.attribute == requirement.attribute);
+    let measured = measurements.iter().find(|measurement| measurement.attribute == requirement.attribute);
     match measured.and_then(|measured| measured.value.as_ref()) {
         Some(value) => format!("{text} (now {})", decimal(value)),
         None => text,

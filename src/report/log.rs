@@ -85,14 +85,17 @@ fn told(answer: &Value) -> (Kind, String, Vec<Reason>) {
 
 /// Converts changed designs and objectives, with the reasons.
 fn inferred(answer: &Value) -> (Kind, String, Vec<Reason>) {
-    let designs = list(&answer["designs"]).iter().map(|own| {
-        let is = if own["available"] == Value::Bool(true) { "is available" } else { "is not available" };
-        Reason { text: format!("{} {is}", plain(&own["design"])), supports: lines(&own["because"]) }
+    let designs = list(&answer["designs"]).iter().map(|design| {
+        let is = if design["available"] == Value::Bool(true) { "is available" } else { "is not available" };
+        Reason { text: format!("{} {is}", plain(&design["design"])), supports: lines(&design["because"]) }
     });
-    let objectives = list(&answer["objectives"]).iter().map(|own| {
-        let statuses: Vec<String> = list(&own["statuses"]).iter().map(plain).collect();
+    let objectives = list(&answer["objectives"]).iter().map(|objective| {
+        let statuses: Vec<String> = list(&objective["statuses"]).iter().map(plain).collect();
         let statuses = if statuses.is_empty() { "all is well".to_owned() } else { statuses.join(", ") };
-        Reason { text: format!("{}: {statuses}", plain(&own["objective"])), supports: lines(&own["because"]) }
+        Reason {
+            text: format!("{}: {statuses}", plain(&objective["objective"])),
+            supports: lines(&objective["because"]),
+        }
     });
     let reasons: Vec<Reason> = designs.chain(objectives).collect();
     let text: Vec<&str> = reasons.iter().map(|reason| reason.text.as_str()).collect();
@@ -116,7 +119,7 @@ fn list(value: &Value) -> &[Value] {
 /// Converts a list of sentences, or a single one.
 fn lines(value: &Value) -> Vec<Reason> {
     match value {
-        Value::Array(all) => all.iter().map(|own| leaf(plain(own))).collect(),
+        Value::Array(all) => all.iter().map(|entry| leaf(plain(entry))).collect(),
         Value::String(text) => vec![leaf(text.clone())],
         _ => Vec::new(),
     }

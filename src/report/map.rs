@@ -59,13 +59,14 @@ struct Moving<'d> {
     places: Vec<Name>,
 }
 
-/// Selects the kind of places with most moves of the plan, then the one with most
-/// actions. Designs are not places.
+/// Selects the kind of places with most moves of the plan, then the one with most actions. Designs
+/// are not places.
 fn places_of_most<'d>(scene: Scene<'_>, plan: &Plan, movements: &'d [Movement<'d>]) -> Option<Moving<'d>> {
     let designs: BTreeSet<Name> = scene.designs.keys().map(|design| Name::new(design)).collect();
     let mut kinds: BTreeMap<Vec<Name>, Vec<&'d Movement<'d>>> = BTreeMap::new();
     for movement in movements {
         let objects = objects(scene.domain, scene.problem, movement.r#type);
+        // A change of designs has the form of a movement.
         if objects.len() > 1 && !objects.iter().any(|object| designs.contains(object)) {
             kinds.entry(objects).or_default().push(movement);
         }
@@ -95,7 +96,7 @@ fn moves(action: &Action) -> Vec<Movement<'_>> {
     }
     let parameter = |term: Option<&Term>| match term {
         Some(Term::Variable(variable)) => {
-            action.parameters.iter().position(|own| own.identifier.name == variable.name)
+            action.parameters.iter().position(|parameter| parameter.identifier.name == variable.name)
         }
         _ => None,
     };
@@ -105,7 +106,7 @@ fn moves(action: &Action) -> Vec<Movement<'_>> {
         else {
             continue;
         };
-        let types = [left, right].map(|own| &action.parameters[own].r#type);
+        let types = [left, right].map(|position| &action.parameters[position].r#type);
         if left != right && same_but_last(from, to) && names(types[0]).eq(names(types[1])) {
             let (action, predicate) = (&action.identifier.name, &from.predicate.name);
             movements.push(Movement { action, predicate, parameters: (left, right), r#type: types[1] });
@@ -115,7 +116,7 @@ fn moves(action: &Action) -> Vec<Movement<'_>> {
 }
 
 fn names(r#type: &TypeExpression) -> impl Iterator<Item = &Name> {
-    r#type.alternatives.iter().map(|own| &own.name)
+    r#type.alternatives.iter().map(|name| &name.name)
 }
 
 fn same_but_last(left: &Atom, right: &Atom) -> bool {
@@ -138,6 +139,7 @@ fn name_of(term: &Term) -> &Name {
 fn objects(domain: &Domain, problem: &Problem, r#type: &TypeExpression) -> Vec<Name> {
     let object = Name::new("object");
     let mut below: BTreeSet<&Name> = names(r#type).collect();
+    // Without a type, PDDL assumes `object`, the supertype of all types.
     let is_everything = below.is_empty() || below.contains(&object);
     loop {
         let is_below = |entry: &&TypedName| names(&entry.r#type).any(|above| below.contains(above));
@@ -162,7 +164,7 @@ fn ends<'p>(atoms: impl Iterator<Item = &'p Atom>, predicates: &BTreeSet<&Name>)
     matching.filter_map(|atom| atom.arguments.last()).map(|term| name_of(term).clone()).collect()
 }
 
-/// Returns the conjuncts of a goal.
+/// Returns the atoms among the conjuncts of a goal.
 fn goals(goal: &Condition) -> impl Iterator<Item = &Atom> {
     let mut parts = vec![goal];
     std::iter::from_fn(move || {
@@ -191,6 +193,7 @@ fn ways(problem: &Problem, number: &BTreeMap<&Name, usize>, moving: &BTreeSet<&N
             && one != other
             && !moving.contains(&atom.predicate.name)
         {
+            // Neighbourhood is symmetric in the picture.
             found.insert((one.min(other), one.max(other)));
         }
     }

@@ -34,9 +34,8 @@ pub(super) fn curves(scene: Scene<'_>, plan: &Plan, steps: &[Step], axis: Axis) 
 }
 
 /// Values of the problem's metric if the plan ended after each start and end of an action. `None`
-/// if a value
-/// is undefined, or if the last value is not the cost of the plan. For example, the cost of the remainder of a
-/// mission does not include earlier costs.
+/// if a value is undefined, or if the last value is not the cost of the plan. For example, the cost
+/// of the remainder of a mission does not include earlier costs.
 fn metric(scene: Scene<'_>, plan: &Plan, course: &Course, axis: Axis) -> Option<Vec<(f64, f64)>> {
     let first = metric_after(scene.domain, scene.problem, &BigRational::default())?;
     let mut points = vec![(0.0, number::to_f64(&first))];
@@ -47,8 +46,9 @@ fn metric(scene: Scene<'_>, plan: &Plan, course: &Course, axis: Axis) -> Option<
     ((last - cost).abs() <= 1e-6 * cost.abs().max(1.0)).then_some(points)
 }
 
-/// Cost of the plan after each step. If actions overlap, costs that belong to no step are spread evenly over time,
-/// since the makespan is not a sum over steps. Otherwise they are added before the first step.
+/// Cost of the plan after each step. If actions overlap, costs that belong to no step are spread
+/// evenly over time, since the makespan is not a sum over steps. Otherwise they are added before
+/// the first step.
 fn spent(plan: &Plan, steps: &[Step], axis: Axis) -> Vec<(f64, f64)> {
     let costs = plan.steps.iter().map(|step| step.cost.to_f64());
     let remainder = plan.cost.to_f64() - costs.clone().sum::<f64>();
@@ -86,6 +86,7 @@ fn numbers(course: &Course, steps: &[Step], axis: Axis) -> Vec<Curve> {
             let curve = curves.entry(name).or_insert_with(|| Curve { name: bare(name), ..Curve::default() });
             set(&mut curve.points, at, number::to_f64(value));
         }
+        // The painter draws only the first steps of a long plan.
         let Some(step) = steps.get(moment.step) else { continue };
         for bound in &moment.bounds {
             let requirement = format!("step {} ({}) needs", moment.step + 1, step.label);
@@ -96,6 +97,7 @@ fn numbers(course: &Course, steps: &[Step], axis: Axis) -> Vec<Curve> {
     for bound in &course.goal {
         add(&mut curves, bound, (end, end), "the goal needs");
     }
+    // Constant numbers without limits would only hide the other curves.
     let is_of_interest = |curve: &Curve| curve.points.len() > 1 || !curve.bounds.is_empty();
     curves.into_values().filter(is_of_interest).collect()
 }

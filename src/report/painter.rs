@@ -11,7 +11,7 @@ use crate::report::positions::Positions;
 use crate::report::seen::{Designs, Scene, known_designs};
 
 /// Maximum number of drawn steps. Later steps are drawn as the plan advances.
-const NEXT: usize = 500;
+const MAX_STEPS: usize = 500;
 
 /// Draws the remaining plan of a loop.
 #[derive(Debug, Clone)]
@@ -29,7 +29,7 @@ impl Painter {
     /// Formats the remaining plan as HTML: timeline, numbers and map, in the style
     /// [`picture::STYLE`].
     pub fn part(&self, outlook: &Outlook) -> String {
-        let later = outlook.steps.len().saturating_sub(NEXT);
+        let later = outlook.steps.len().saturating_sub(MAX_STEPS);
         let mut problem = outlook.problem.clone();
         if later > 0 {
             // A prefix of the plan need not reach the goal.
@@ -43,7 +43,7 @@ impl Painter {
         };
         let mut picture = drawn(scene, &plan(&outlook.steps[..outlook.steps.len() - later]));
         if later > 0 {
-            picture.verdict = format!("The next {NEXT} steps; {later} more follow.");
+            picture.verdict = format!("The next {MAX_STEPS} steps; {later} more follow.");
         }
         picture.part()
     }

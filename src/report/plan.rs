@@ -58,6 +58,7 @@ fn axis(plan: &Plan) -> Axis {
     let ends = plan.steps.iter().map(|step| step.start.to_rational() + step.duration.to_rational());
     let is_sequence = plan.steps.iter().skip(1).zip(ends).all(|(next, end)| end <= next.start.to_rational());
     let takes_none = plan.steps.iter().any(|step| step.duration.is_zero());
+    // Actions without duration would be invisible on a time axis.
     if is_sequence && takes_none { Axis::Steps } else { Axis::Time }
 }
 

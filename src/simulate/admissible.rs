@@ -1,8 +1,10 @@
-//! Designs with which an action can be done now, for ways of control that choose them function by function.
+//! Designs with which an action can be done now, for ways of control that choose them function by
+//! function.
 //!
-//! A design is *admissible* for a function of an action if it is available and all conditions of the action hold now with
-//! this design. They include the bounds of the action in its context (`t:requiresQuality`), and that the battery suffices.
-//! Conditions that mention the design of another function are omitted while that design is not chosen, and are checked once it is.
+//! A design is *admissible* for a function of an action if it is available and all conditions of
+//! the action hold now with this design. They include the bounds of the action in its context
+//! (`t:requiresQuality`), and that the battery suffices. Conditions that mention the design of
+//! another function are omitted while that design is not chosen, and are checked once it is.
 
 use num_rational::BigRational;
 use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Expression, Name, Problem, Term};

@@ -160,6 +160,7 @@ impl Controller {
             // A plan may exist if the availability of designs changes.
             self.replan();
             if let Some(step) = self.plan.pop_front() {
+                // The recursive call requests the step, and ends because the plan is not empty.
                 self.plan.push_front(step);
                 self.go_on(answers);
             }
@@ -182,12 +183,17 @@ impl Controller {
         let functions: Vec<&str> = functions.filter(|function| concerns(function)).collect();
         for (index, function) in functions.iter().enumerate() {
             let designs = self.control.designs_for(function);
+            // Conditions on the later functions are ignored until their designs are chosen.
             let undecided = &functions[index + 1..];
             let admission = Admission::new(mission.domain(), &problem, &chosen, done, undecided);
             let admits = |design: &&String| admission.admits(&chosen.with_design(function, design));
             let admissible: Vec<String> = designs.iter().filter(admits).cloned().collect();
+            // Without an admissible design, the design of the plan has the best chance to become
+            // possible.
             let is_kept = admissible.is_empty()
-                && chosen.design(function).is_some_and(|design| designs.iter().any(|own| own == design));
+                && chosen
+                    .design(function)
+                    .is_some_and(|design| designs.iter().any(|candidate| candidate == design));
             if is_kept {
                 continue;
             }

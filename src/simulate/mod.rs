@@ -88,8 +88,9 @@ impl Experiment {
         self.time_unit
     }
 
-    /// Runs the mission once. `log` is called with every observation and its answers, with times in seconds. Returns
-    /// `None` if a limit was reached before the end, since a part of a mission is not a result.
+    /// Runs the mission once. `log` is called with every observation and its answers, with times in
+    /// seconds. Returns `None` if a limit was reached before the end, since a part of a mission is
+    /// not a result.
     ///
     /// # Errors
     /// The mission cannot be planned for.

@@ -61,7 +61,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_by_hand() {
+    fn statistics_match_manual_results() {
         check(&[5.0], 5.0, 0.0, 0.0);
         check(&[1.0, 3.0], 2.0, 1.414, 12.706);
         check(&[2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0], 5.0, 2.138, 1.788);

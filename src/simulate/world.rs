@@ -37,7 +37,7 @@ struct Job {
 
 /// A scheduled failure or recovery.
 #[derive(Debug, Clone)]
-struct Upset {
+struct ComponentChange {
     time: f64,
     component: String,
     status: Status,
@@ -56,7 +56,7 @@ pub struct World {
     pub time: f64,
     job: Option<Job>,
     phases: Vec<f64>,
-    upsets: Vec<Upset>,
+    upsets: Vec<ComponentChange>,
     /// Time of each disturbance, once determined; infinite after the disturbance has happened.
     times: Vec<Option<f64>>,
     /// `true` if the robot is lost.
@@ -86,21 +86,23 @@ impl World {
         for failure in &settings.failures {
             let mut time = 0.0;
             loop {
+                // Inverse transform sampling of an exponential distribution.
                 time += -(1.0 - random.f64()).ln() * failure.mean_time;
                 if time > settings.time_budget {
                     break;
                 }
                 let component = failure.component.clone();
-                upsets.push(Upset {
+                upsets.push(ComponentChange {
                     time: rounded(time),
                     component: component.clone(),
                     status: Status::Failed,
                 });
                 let Some(recovery) = failure.recovery else { break };
                 time += recovery;
-                upsets.push(Upset { time: rounded(time), component, status: Status::Recovered });
+                upsets.push(ComponentChange { time: rounded(time), component, status: Status::Recovered });
             }
         }
+        // Failures of different components are generated one component after the other.
         upsets.sort_by(|left, right| left.time.total_cmp(&right.time));
         let times = settings
             .events
@@ -211,6 +213,7 @@ impl World {
 
     fn work(&mut self, step: f64, left: Option<f64>, events: &mut Vec<Event>) {
         let Some(mut job) = self.job.take() else { return };
+        // The action has stalled.
         let Some(left) = left else {
             job.waited += step;
             if job.waited >= self.settings.patience {
@@ -222,6 +225,7 @@ impl World {
             return;
         };
         job.waited = 0.0;
+        // The last step ends exactly with the action.
         let whole = step >= left;
         let share = if whole { 1.0 - job.progress } else { (1.0 - job.progress) * step / left };
         job.progress = rounded(job.progress + share);
@@ -263,7 +267,7 @@ impl World {
         self.change().set_init(init);
         for change in &advance.values {
             let lifeline = self.watched.lifeline.as_ref();
-            let is_lifeline = lifeline.is_some_and(|own| own.eq_ignore_ascii_case(&change.text));
+            let is_lifeline = lifeline.is_some_and(|lifeline| lifeline.eq_ignore_ascii_case(&change.text));
             self.lost |= is_lifeline && change.after <= BigRational::default();
             let name = change.text.trim_matches(['(', ')']).to_owned();
             if !whole {
@@ -281,6 +285,8 @@ impl World {
         for (index, event) in self.settings.events.iter().enumerate() {
             let condition = self.watched.events[index].as_ref().filter(|_| self.times[index].is_none());
             if condition.is_some_and(|condition| self.holds(condition)) {
+                // A separate generator for each event keeps the delays independent of the order of
+                // the events.
                 let seed = self.seed.wrapping_add(index as u64 + 1);
                 let delay = fastrand::Rng::with_seed(seed).f64() * event.within;
                 self.times[index] = Some(rounded(self.time + delay));
@@ -299,6 +305,7 @@ impl World {
             .filter(|&index| self.times[index].is_some_and(|time| time <= self.time))
             .collect();
         for index in due {
+            // Each disturbance happens once.
             self.times[index] = Some(f64::INFINITY);
             let Disturbance { fail, recover, set, .. } = self.settings.events[index].clone();
             for (components, status) in [(fail, Status::Failed), (recover, Status::Recovered)] {
@@ -343,6 +350,7 @@ impl World {
         for (signal, phase) in self.settings.signals.iter().zip(&self.phases) {
             let turn = std::f64::consts::TAU * (self.time / signal.period + phase);
             let value = signal.mean + signal.amplitude * turn.sin();
+            // Two decimals keep the exact numbers small.
             let value = exact((value * 100.0).round() / 100.0);
             if let Some(knowledge) = self.truth.knowledge_mut() {
                 knowledge.observe(&signal.attribute, &value)?;

@@ -16,7 +16,7 @@ use crate::message::{Errors, Message};
 pub(super) const FORMAT: &str = "metaplan-sweep/1";
 
 /// Reason for rejecting the file of another study.
-const OTHER: &str = "it belongs to another study, or the study or its files have changed";
+const OTHER_STUDY: &str = "it belongs to another study, or the study or its files have changed";
 
 /// The first line of a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -96,7 +96,7 @@ impl Results {
             }
             let (found, lines) = parse(&path, &text[..whole])?;
             if found != header {
-                return Err(wrong(&path, OTHER));
+                return Err(wrong(&path, OTHER_STUDY));
             }
             done = lines.into_iter().map(|line| (line.run, line)).collect();
         }
@@ -174,7 +174,7 @@ pub fn read_lines(directory: &Path, study: &Study) -> Result<Vec<Line>, Errors> 
             Err(message) => mistakes.push(message),
             Ok((header, lines)) => {
                 if header.study != study.digest {
-                    mistakes.push(wrong(path, OTHER));
+                    mistakes.push(wrong(path, OTHER_STUDY));
                     continue;
                 }
                 for line in lines {

@@ -228,7 +228,7 @@ impl Study {
                 "`vary.pair` and `pairs` are two lists for one key".to_owned(),
             ));
         }
-        let generated = sections.generate.iter().flat_map(|own| &own.run).enumerate();
+        let generated = sections.generate.iter().flat_map(|generate| &generate.run).enumerate();
         let generated =
             generated.map(|(index, word)| (vec!["generate".into(), "run".into(), index.into()], word));
         let command = sections.command.iter().enumerate();
@@ -269,8 +269,9 @@ impl Study {
         self.origin.quote([Message::at("M150", self.origin.file(), place, text)]).swap_remove(0)
     }
 
-    /// The first run, and for each value of each key a run that differs from the first one in this value only, with
-    /// the path to that value. Ranges of numbers and pairs contribute their last value only.
+    /// The first run, and for each value of each key a run that differs from the first one in this
+    /// value only, with the path to that value. Ranges of numbers and pairs contribute their last
+    /// value only.
     pub fn samples(&self) -> Vec<(Vec<Key>, Planned)> {
         if self.is_empty() {
             return Vec::new();
@@ -312,6 +313,7 @@ impl Study {
         let mut remaining = number;
         let mut vary = Vec::new();
         for (key, values) in self.keys.iter().rev() {
+            // The number of a run is a mixed-radix number whose digits select the values.
             vary.push((key.clone(), values[remaining % values.len()].clone()));
             remaining /= values.len();
         }
@@ -343,7 +345,8 @@ impl Study {
     pub fn words(&self, run: &Planned, directory: &Path) -> Vec<String> {
         let mut words: Vec<String> =
             self.sections.command.iter().map(|word| filled(word, &run.vary, directory)).collect();
-        let generator = self.sections.generate.iter().flat_map(|own| &own.run);
+        let generator = self.sections.generate.iter().flat_map(|generate| &generate.run);
+        // Keys without a placeholder become options of the command.
         let named: BTreeSet<&str> =
             self.sections.command.iter().chain(generator).flat_map(|word| placeholders(word)).collect();
         for (key, value) in run.vary.iter().filter(|(key, _)| !named.contains(key.as_str())) {
@@ -428,15 +431,18 @@ fn places(mission: &Path, most: Option<usize>) -> Result<Vec<Value>, Errors> {
         })
         .collect();
     let count = most.unwrap_or(pairs.len()).clamp(1, pairs.len().max(1)).min(pairs.len());
+    // A limited number of pairs is spread evenly over all pairs.
     Ok((0..count).map(|number| json!(pairs[number * pairs.len() / count])).collect())
 }
 
 fn digest(sections: &Sections, keys: &[(String, Vec<Value>)], directory: &Path) -> String {
     let mut hash = Sha256::new();
     let mut part = |bytes: &[u8]| {
+        // The length separates the parts, so that different studies cannot have the same input.
         hash.update((bytes.len() as u64).to_le_bytes());
         hash.update(bytes);
     };
+    // Another version may give other answers, so its results must not be mixed with these.
     part(env!("CARGO_PKG_VERSION").as_bytes());
     part(format!("{:?} {:?} {:?}", sections.command, sections.time_limit, sections.generate).as_bytes());
     part(json!(keys).to_string().as_bytes());
@@ -478,7 +484,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_all_at_once() {
+    fn all_mistakes_are_reported_together() {
         let text =
             "command = []\nrows = 'x'\ntime_limit = 0\n[vary]\na = []\nb = {from = 1, to = 2, step = 0}\n";
         let errors = study(text).expect_err("it is wrong");

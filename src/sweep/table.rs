@@ -109,7 +109,7 @@ impl Table {
             self.rows.iter().filter_map(|row| row.cells[column].as_ref()).all(|value| figure(value).is_some())
         };
         let counts: Vec<bool> =
-            (0..self.columns.len()).map(|own| own >= self.keys && is_number(own)).collect();
+            (0..self.columns.len()).map(|column| column >= self.keys && is_number(column)).collect();
         let is_status = |column: usize| self.columns[column] == STATUS;
         let is_common = |column: usize| {
             !counts[column] && !is_status(column) && !repetitions.contains(&self.columns[column])

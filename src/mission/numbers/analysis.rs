@@ -192,7 +192,8 @@ impl<'m> Numbers<'m> {
             let function = &atom.predicate.name;
             let is_own =
                 function.as_str().eq_ignore_ascii_case("total-cost") || !checked.insert(written(atom));
-            // A function that an action assigns may lack a value before, unless actions increase or decrease it.
+            // A function that an action assigns may lack a value before, unless actions increase or
+            // decrease it.
             let is_stock = || self.domain.actions.iter().any(|action| grows(action, function));
             if is_own || (self.assigned.contains(function) && !is_stock()) {
                 continue;
@@ -311,8 +312,8 @@ impl<'m> Numbers<'m> {
         }
     }
 
-    /// Truth of a condition in every state. Returns `None` if it depends on actions or on variables that are not
-    /// bound, or if it contains comparisons or quantifiers that decide it.
+    /// Truth of a condition in every state. Returns `None` if it depends on actions or on variables
+    /// that are not bound, or if it contains comparisons or quantifiers that decide it.
     fn truth(&self, condition: &Condition, binding: &Binding<'_>) -> Option<bool> {
         match condition {
             Condition::And(parts) => parts
@@ -342,7 +343,7 @@ impl<'m> Numbers<'m> {
             Condition::Atom(atom) => {
                 let arguments =
                     known(atom, binding).filter(|_| !self.dynamic.contains(&atom.predicate.name))?;
-                Some(self.facts.get(&atom.predicate.name).is_some_and(|own| own.contains(&arguments)))
+                Some(self.facts.get(&atom.predicate.name).is_some_and(|facts| facts.contains(&arguments)))
             }
             Condition::Equal(left, right, _) => Some(object(left, binding)? == object(right, binding)?),
             Condition::Compare(..) | Condition::Exists(..) | Condition::ForAll(..) => None,

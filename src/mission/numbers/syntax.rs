@@ -46,7 +46,8 @@ pub(super) fn variables_of<'a>(
     let mut variables: Vec<(&Name, &TypeExpression)> = Vec::new();
     for term in &atom.arguments {
         let Term::Variable(variable) = term else { continue };
-        let parameter = action.parameters.iter().find(|own| own.identifier.name == variable.name)?;
+        let parameter =
+            action.parameters.iter().find(|parameter| parameter.identifier.name == variable.name)?;
         if !variables.iter().any(|(name, _)| **name == variable.name) {
             variables.push((&parameter.identifier.name, &parameter.r#type));
         }

@@ -1,4 +1,5 @@
-//! Warnings about missing numbers and negative durations, with the file and the place where they can be corrected.
+//! Warnings about missing numbers and negative durations, with the file and the place where they
+//! can be corrected.
 
 use std::collections::BTreeSet;
 
@@ -15,7 +16,7 @@ const NAMED: usize = 3;
 impl Numbers<'_> {
     pub(super) fn no_estimation(&self, own: &MissingValue, design: &str, attribute: &str) -> Message {
         let individual = self.design(design);
-        let estimated = individual.iter().flat_map(|known| known.estimations.keys().map(String::as_str));
+        let estimated = individual.iter().flat_map(|design| design.estimations.keys().map(String::as_str));
         let text = format!(
             "the design `{design}` has no estimation of `{attribute}`, which {} needs, so it can never be used there{}",
             quoted(&own.needed_by),
@@ -26,10 +27,10 @@ impl Numbers<'_> {
 
     pub(super) fn no_value(&self, missing: &[&MissingValue]) -> Message {
         let names: Vec<String> =
-            missing.iter().take(NAMED).map(|own| format!("`{}`", own.function)).collect();
+            missing.iter().take(NAMED).map(|value| format!("`{}`", value.function)).collect();
         let omitted = missing.len().saturating_sub(NAMED);
         let omitted = if omitted > 0 { format!(" and {omitted} more") } else { String::new() };
-        let actions: BTreeSet<&String> = missing.iter().flat_map(|own| &own.needed_by).collect();
+        let actions: BTreeSet<&String> = missing.iter().flat_map(|value| &value.needed_by).collect();
         let actions: Vec<String> = actions.into_iter().cloned().collect();
         let have = if missing.len() == 1 { "has" } else { "have" };
         let text = format!(
