@@ -255,7 +255,7 @@ impl Journal {
 
     /// Flushes answers to the disk according to the policy.
     fn keep(&mut self, answers: &[Answer]) -> io::Result<()> {
-        // Only effects change the world, so the loss of other answers is harmless.
+        // `Effects` is sufficient, because only effects change the world.
         let must = match self.policy.sync {
             Sync::Always => true,
             Sync::Effects => answers.iter().any(|answer| answer.effect().is_some()),

@@ -203,8 +203,8 @@ impl Unfold<'_> {
             if self.says_nothing(&clause) {
                 continue;
             }
-            // A set removes the duplicates that different unfoldings produce.
             let Some(at) = first_open(&clause, self.open) else {
+                // A set removes the duplicates that different unfoldings produce.
                 done.insert(clause);
                 continue;
             };

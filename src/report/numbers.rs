@@ -86,7 +86,6 @@ fn numbers(course: &Course, steps: &[Step], axis: Axis) -> Vec<Curve> {
             let curve = curves.entry(name).or_insert_with(|| Curve { name: bare(name), ..Curve::default() });
             set(&mut curve.points, at, number::to_f64(value));
         }
-        // The painter draws only the first steps of a long plan.
         let Some(step) = steps.get(moment.step) else { continue };
         for bound in &moment.bounds {
             let requirement = format!("step {} ({}) needs", moment.step + 1, step.label);
