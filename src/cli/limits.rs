@@ -3,7 +3,7 @@
 //! While a mission is read and reasoned about, there is no answer to save. So a signal ends the
 //! program at once, and a separate thread ends it at the time limit, unless an answer is being
 //! written. Commands that do not plan need nothing else. In commands that plan, the planner handles
-//! the first signal from then on, and returns the best plan so far. A second signal ends the
+//! the first signal from then on, and returns the best plan found. A second signal ends the
 //! program at once.
 //!
 //! The loops of the planner, of the validator and of the later stages poll the limits. If one of
@@ -104,7 +104,7 @@ impl Guard {
         #[cfg(unix)]
         let _ = signal_hook::flag::register(signal_hook::consts::SIGXCPU, Arc::clone(&interrupt));
         // A second handler cannot exist. If the platform rejects this one, Ctrl-C ends the program
-        // as usual. A user who presses Ctrl-C again does not want the best plan so far.
+        // as usual. A user who presses Ctrl-C again does not want the best plan found either.
         let _ = ctrlc::set_handler(move || {
             if interrupt.swap(true, Ordering::Relaxed) {
                 std::process::exit(130);

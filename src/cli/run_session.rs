@@ -229,7 +229,7 @@ impl<'a> Session<'a> {
         self.say(&answers)
     }
 
-    /// Returns the time until the next deadline. `None` if there is none, or if lines have times of
+    /// Returns the time until the next deadline. `None` without a deadline, or if lines have times of
     /// their own.
     fn pause(&mut self) -> Option<Duration> {
         let due = self.control.due().filter(|_| !self.has_times)?;

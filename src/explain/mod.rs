@@ -82,7 +82,7 @@ pub fn availability(mission: &Mission, name: &str) -> Result<Availability, Error
     Ok(causes::availability(mission, &found))
 }
 
-/// Explains one design, by its local name. At a limit, returns the results so far.
+/// Explains one design, by its local name. At a limit, returns the partial results.
 ///
 /// ```
 /// use std::path::Path;

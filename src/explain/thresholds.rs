@@ -28,7 +28,7 @@ pub struct SmallestChanges {
 }
 
 /// Searches for the smallest changes, upwards and downwards, of each measured attribute and each
-/// value of the problem that lead to another plan. At a limit, returns the results so far. `hear`
+/// value of the problem that lead to another plan. At a limit, returns the partial results. `hear`
 /// is called with the name of each value before it is varied.
 ///
 /// # Errors

@@ -157,7 +157,7 @@ type Bindings<'k> = BTreeMap<&'k Name, &'k Name>;
 /// The arguments for which a predicate holds, in the order of their discovery and as a set.
 type Rows = (Vec<Vec<Name>>, HashSet<Vec<Name>>);
 
-/// Facts derived so far, by predicate.
+/// Derived facts, by predicate.
 struct Relations<'o> {
     relations: HashMap<Name, Rows>,
     objects: &'o BTreeSet<Name>,

@@ -101,7 +101,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         self
     }
 
-    /// Sets the limits. A limit ends planning with the best plan so far. [`Limits::interrupt`] is a
+    /// Sets the limits. A limit ends planning with the best plan found. [`Limits::interrupt`] is a
     /// flag that another thread can set.
     #[must_use]
     pub fn limits(mut self, limits: Limits) -> Self {
@@ -110,7 +110,7 @@ impl<'m, 'r> Planner<'m, 'r> {
     }
 
     /// Sets a time limit from now, grounding included. At the limit, planning ends with the best
-    /// plan so far.
+    /// plan found.
     #[must_use]
     pub fn time_limit(self, time: Duration) -> Self {
         let limits = self.config.limits.clone().with_time(time);
@@ -142,7 +142,7 @@ impl<'m, 'r> Planner<'m, 'r> {
     }
 
     /// Sets the callback for every better plan and better bound. Planning ends with the best plan
-    /// so far if it returns `Break`.
+    /// found if it returns `Break`.
     #[must_use]
     pub fn on_improvement(mut self, report: impl FnMut(&Improvement) -> ControlFlow<()> + 'r) -> Self {
         self.report = Box::new(report);

@@ -61,7 +61,7 @@ pub struct World {
     times: Vec<Option<f64>>,
     /// `true` if the robot is lost.
     pub lost: bool,
-    /// Greatest completed share of the inspection so far.
+    /// Greatest completed share of the inspection until now.
     pub inspected: f64,
     /// Time at which the pipeline was found.
     pub found: Option<f64>,
@@ -365,7 +365,7 @@ impl World {
         is_valid(self.truth.domain(), self.filled())
     }
 
-    /// Returns the value of the mission's metric so far, or the time if it has no metric.
+    /// Returns the value of the mission's metric until now, or the time if it has no metric.
     pub fn cost(&self) -> f64 {
         let metric = metric_after(self.truth.domain(), self.filled(), &exact(self.time));
         metric.map_or(self.time, |metric| number::to_f64(&metric))
