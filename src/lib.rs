@@ -1,9 +1,10 @@
-//! Metaplan adapts a robot's task plan and its software architecture together.
+//! Metaplan plans a robot's actions and its software architecture together.
 //!
-//! This facade joins the libraries: [`ontology`] (what the robot is), [`rules`] (what follows) and `metaplan-planner` (what to
-//! do about it); and `metaplan-probabilistic`, model checking of decision processes, which [`comparison`] brings to a mission.
-//! `metaplan-mission` joins OWL and PDDL, [`mission`] plans with both, and `metaplan-verify` checks what is claimed of plans. Order lives
-//! here, not logic.
+//! This facade joins the libraries: [`ontology`] (OWL model of the robot), [`rules`] (inference),
+//! `metaplan-planner` (planning) and `metaplan-probabilistic` (model checking of decision
+//! processes, applied to missions by [`comparison`]). `metaplan-mission` joins OWL and PDDL,
+//! [`mission`] plans with both, and `metaplan-verify` checks the certificates of plans. The facade
+//! contains the sequence of the stages, not their algorithms.
 
 pub use ::{probabilistic, verify};
 pub use ::mission::{Errors, Message, file, knowledge, message, visible};
@@ -33,7 +34,7 @@ pub mod simulate;
 pub mod sweep;
 pub mod templates;
 
-/// The examples of the book are compiled and run with the tests.
+/// Compiles and runs the examples of the book as doc tests.
 #[cfg(doctest)]
 mod book {
     #[doc = include_str!("../docs/how-to/built-ins.md")]

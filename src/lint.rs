@@ -1,4 +1,4 @@
-//! All that is wrong or questionable about a mission, found without planning.
+//! Collects all errors and warnings about a mission without planning.
 
 use std::time::Duration;
 
@@ -9,10 +9,10 @@ use crate::message::Message;
 use crate::mission::{Mission, Planning as _, numbers};
 use crate::setup::Setup;
 
-/// How long it may take to find what the planner does not handle.
-const PATIENCE: Duration = Duration::from_secs(20);
+/// Time limit of the grounding that detects constructs the planner does not support.
+const TIME_LIMIT: Duration = Duration::from_secs(20);
 
-/// What there is to say of a mission that could be read, errors first.
+/// Returns all errors and warnings about a mission, errors first.
 ///
 /// ```
 /// use std::path::Path;
@@ -40,14 +40,15 @@ pub fn lint(setup: &Setup) -> Vec<Message> {
     in_order(messages)
 }
 
-/// What the planner does not handle. That numbers are too large, and that it takes long to find out, is not a fault of a mission.
+/// Returns the constructs that the planner does not support. Numbers that are too large (E304) and
+/// an exceeded limit (E306) are not faults of a mission.
 fn refused(mission: &Mission, problem: &Problem) -> impl Iterator<Item = Message> {
-    let limits = Limits::none().with_time(PATIENCE);
+    let limits = Limits::none().with_time(TIME_LIMIT);
     let refused = mission.ground(problem, &[], &limits).err().into_iter().flatten();
     refused.filter(|message| !["E304", "E306"].contains(&message.code.as_str()))
 }
 
-/// Messages, each once: errors first, then as they stand in files.
+/// Sorts messages, errors first, then by place in the files, and removes duplicates.
 pub fn in_order(mut messages: Vec<Message>) -> Vec<Message> {
     let key = |message: &Message| {
         let place = (message.file.clone(), message.line, message.column);

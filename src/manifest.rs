@@ -1,4 +1,5 @@
-//! A manifest's text to data, read once. Which sections there are, and what stands in them, is known to whoever asks.
+//! Parses mission manifests (TOML) into the sections that the caller defines, and locates their
+//! entries for messages.
 
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
@@ -41,12 +42,12 @@ pub enum Part {
     Value,
     /// The key at the end of a path.
     Key,
-    /// The position at this number of bytes from the beginning of a string. It is the beginning of the string if the
-    /// file does not contain the text of the string literally.
+    /// The position at this number of bytes from the beginning of a string. It is the beginning of
+    /// the string if the file does not contain the text of the string literally.
     Inside(usize),
 }
 
-/// Where a manifest was read from.
+/// Origin of a manifest: its file, its directory and its text.
 #[derive(Debug, Clone, Default)]
 pub struct ManifestPath {
     file: String,
@@ -54,19 +55,20 @@ pub struct ManifestPath {
     text: Arc<str>,
 }
 
-/// Reads a manifest; `-` is standard input, and paths are relative to the current directory then.
+/// Reads a manifest. `-` reads standard input; paths are then relative to the current directory.
 ///
 /// # Errors
-/// The file cannot be read, is not a manifest, or has other sections or keys: all that is wrong with them.
+/// The file cannot be read or is not a manifest; otherwise all faults of its sections and keys.
 pub fn read<S: DeserializeOwned>(file: &Path) -> Result<(S, ManifestPath), Errors> {
     let source = source(file)?;
     parse(source.name(), source.text(), &file.parent().map(Path::to_owned).unwrap_or_default())
 }
 
-/// A manifest from its text, whose paths are relative to a directory; `name` stands for the file in messages.
+/// Parses the text of a manifest whose paths are relative to `directory`. Messages use `name` as
+/// the name of the file.
 ///
 /// # Errors
-/// It is not a manifest, or has other sections or keys: all that is wrong with them.
+/// The text is not a manifest; otherwise all faults of its sections and keys.
 pub fn parse<S: DeserializeOwned>(
     name: &str,
     text: &str,
@@ -79,12 +81,13 @@ pub fn parse<S: DeserializeOwned>(
 }
 
 impl ManifestPath {
-    /// A path of the manifest, from the current directory: in the manifest it is relative to the manifest. It goes up no further than it
-    /// has to.
+    /// Converts a path relative to the manifest to a path relative to the current directory, with
+    /// as few `..` components as possible.
     pub fn path(&self, path: &Path) -> PathBuf {
         let whole = self.directory.join(path);
         let short = shortened(&whole);
-        // Behind a link to a directory, up leads elsewhere.
+        // After a symbolic link to a directory, `..` leads to another directory than the text
+        // suggests.
         match (whole.canonicalize(), short.canonicalize()) {
             (Ok(whole_target), Ok(short_target)) if whole_target != short_target => whole,
             (Ok(_), Err(_)) => whole,
@@ -92,7 +95,7 @@ impl ManifestPath {
         }
     }
 
-    /// Messages about the manifest with the lines that they are about.
+    /// Adds the quoted lines of the manifest to messages.
     pub fn quote(&self, messages: impl IntoIterator<Item = Message>) -> Vec<Message> {
         let is_own = |message: &Message| message.file.as_ref() == Some(&self.file);
         let quoted =
@@ -100,18 +103,19 @@ impl ManifestPath {
         messages.into_iter().map(quoted).collect()
     }
 
-    /// The manifest's own name.
+    /// Returns the name of the manifest's file.
     pub fn file(&self) -> &str {
         &self.file
     }
 
-    /// Line and column, both from 1, of what stands at an offset in bytes.
+    /// Returns the line and the column, both from 1, of an offset in bytes.
     pub fn place(&self, offset: usize) -> (usize, usize) {
         line_and_column(&self.text, offset)
     }
 
-    /// Line and column of a place in the manifest. Returns `None` for the manifest as a whole, or if it cannot be
-    /// parsed. If a part of the path is missing, returns the place of the part before it.
+    /// Returns the line and the column of an entry of the manifest. `None` for the manifest as a
+    /// whole, or if it cannot be parsed. If a part of the path is missing, returns the place of the
+    /// part before it.
     pub fn place_of(&self, path: &[Key], part: Part) -> Option<(usize, usize)> {
         let document = DeTable::parse(&self.text).ok()?;
         let mut span = document.span();
@@ -143,15 +147,15 @@ impl ManifestPath {
         (!path.is_empty()).then(|| self.place(span.start + inside))
     }
 
-    /// That the value which stands at an offset in bytes is wrong.
+    /// Error about the value at an offset in bytes.
     pub fn wrong(&self, offset: usize, text: impl Into<String>) -> Message {
         Message::at("M105", &self.file, Some(self.place(offset)), text).with_source(&self.text)
     }
 
-    /// The value of a key as an exact number: a decimal, not negative.
+    /// Returns the value of a key as an exact, non-negative number.
     ///
     /// # Errors
-    /// It is something else.
+    /// The value is not a non-negative decimal.
     pub fn number(&self, key: &str, value: &Spanned<toml::Value>) -> Result<BigRational, Message> {
         let text = match value.get_ref() {
             toml::Value::String(text) => text.clone(),
@@ -167,12 +171,12 @@ impl ManifestPath {
     }
 }
 
-/// The JSON Schema of a value that [`ManifestPath::number`] reads.
+/// JSON Schema of a value that [`ManifestPath::number`] reads.
 pub fn decimal(_: &mut SchemaGenerator) -> Schema {
     json_schema!({ "type": ["number", "string"], "minimum": 0 })
 }
 
-/// A path without the parts that it goes down only to go up again.
+/// Removes pairs of a directory and `..` from a path.
 fn shortened(path: &Path) -> PathBuf {
     let mut parts: Vec<Component<'_>> = Vec::new();
     for part in path.components() {
@@ -185,35 +189,38 @@ fn shortened(path: &Path) -> PathBuf {
     parts.into_iter().collect()
 }
 
-/// All that is wrong with a manifest, in its order; of it one thing is known: where an entry is wrong, the rest is read without it.
+/// Collects the faults of a manifest, sorted by place. The parser reports only the first fault, so
+/// each faulty entry is blanked and the text is parsed again.
 fn mistakes<S: DeserializeOwned>(text: &str, first: toml::de::Error, name: &str) -> Vec<Message> {
     let mut messages: Vec<(Option<(usize, usize)>, Message)> = Vec::new();
-    let (mut rest, mut error) = (text.to_owned(), first);
+    let (mut remaining, mut error) = (text.to_owned(), first);
     loop {
-        let said = error.message();
-        let is_new = messages.iter().all(|(_, message)| !message.message.starts_with(said));
-        // What is missing may be what was left out.
-        let counts = is_new && (messages.is_empty() || !said.starts_with("missing field"));
+        let description = error.message();
+        let is_new = messages.iter().all(|(_, message)| !message.message.starts_with(description));
+        // An earlier iteration may have blanked the entry that is reported as missing.
+        let counts = is_new && (messages.is_empty() || !description.starts_with("missing field"));
         if counts {
             let place = error.span().map(|span| line_and_column(text, span.start));
-            let message = Message::at("M104", name, place, said.to_owned() + &meant(said)).with_source(text);
+            let message = Message::at("M104", name, place, description.to_owned() + &meant(description))
+                .with_source(text);
             messages.push((place, message));
         }
-        let is_toml = rest.parse::<toml::Table>().is_ok();
-        let Some(left) = error.span().filter(|_| is_toml).and_then(|span| without(&rest, span)) else {
+        let is_toml = remaining.parse::<toml::Table>().is_ok();
+        let Some(blanked) = error.span().filter(|_| is_toml).and_then(|span| without(&remaining, span))
+        else {
             break;
         };
-        match toml::from_str::<S>(&left) {
+        match toml::from_str::<S>(&blanked) {
             Ok(_) => break,
-            Err(next) => (rest, error) = (left, next),
+            Err(next) => (remaining, error) = (blanked, next),
         }
     }
     messages.sort_by_key(|(place, _)| *place);
     messages.into_iter().map(|(_, message)| message).collect()
 }
 
-/// The text with blanks in place of the entry that a place lies in, so that all other places stay; a section goes with its entries.
-/// Nothing where there is nothing to be left out.
+/// Returns the text with blanks in place of the entry (or the whole section) at `place`, so that
+/// all other places keep their offsets. `None` if the text does not change.
 fn without(text: &str, place: std::ops::Range<usize>) -> Option<String> {
     let begin = text.get(..place.start)?.rfind('\n').map_or(0, |at| at + 1);
     let line_end =
@@ -224,12 +231,13 @@ fn without(text: &str, place: std::ops::Range<usize>) -> Option<String> {
         end = next.map_or(text.len(), |(at, _)| end + at);
     }
     let blank: String = text.get(begin..end)?.chars().map(|c| if c == '\n' { c } else { ' ' }).collect();
-    // Blanks are as long as what they replace only where that is ASCII; columns are counted within lines, and those are gone.
-    let left = format!("{}{blank}{}", text.get(..begin)?, text.get(end..)?);
-    (left != text).then_some(left)
+    // A blank may be shorter than a character that is not ASCII. Columns stay right, since whole
+    // lines are blanked.
+    let blanked = format!("{}{blank}{}", text.get(..begin)?, text.get(end..)?);
+    (blanked != text).then_some(blanked)
 }
 
-/// Which key was meant, where the message of the parser lists those that there are.
+/// Suggestion for a misspelt key, if the parser's message lists the valid keys.
 fn meant(message: &str) -> String {
     let mut quoted = message.split('`').skip(1).step_by(2);
     match (["unknown field", "unknown variant"].iter().any(|start| message.starts_with(start)), quoted.next())

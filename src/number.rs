@@ -1,38 +1,39 @@
-//! Exact numbers as text and JSON, and back: what robots report is decimal, and stays so.
+//! Conversion of exact numbers from and to decimal text and JSON.
 
 use num_rational::BigRational;
 use num_traits::{ToPrimitive, Zero};
 use serde_json::Value;
 
-/// Numbers of more characters, or with more powers of ten than this, are refused: they would only fill memory.
-const LONGEST: usize = 40;
+/// Maximum number of characters, and of powers of ten, of an accepted number; larger ones would
+/// only consume memory.
+const MAX_CHARACTERS: usize = 40;
 
-/// Values of the problem are rounded to so many decimals, so that a robot's floating-point numbers do not make the
-/// planner's integers huge.
+/// Number of decimals of values in the problem. Floating-point numbers of a robot would otherwise
+/// make the planner's integers huge.
 const DECIMALS: u32 = 6;
 
-/// An exact number from a decimal, with or without an exponent: `-12`, `0.25`, `1e-2`.
+/// Parses a decimal, with or without an exponent: `-12`, `0.25`, `1e-2`.
 pub(crate) fn exact(text: &str) -> Option<BigRational> {
     let text = text.trim();
-    if text.len() > LONGEST {
+    if text.len() > MAX_CHARACTERS {
         return None;
     }
     let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
     let exponent: i32 =
-        exponent.parse().ok().filter(|power: &i32| power.unsigned_abs() as usize <= LONGEST)?;
+        exponent.parse().ok().filter(|power: &i32| power.unsigned_abs() as usize <= MAX_CHARACTERS)?;
     let literal = rules::Literal::parse(mantissa, Some("http://www.w3.org/2001/XMLSchema#decimal"), None);
     let power = num_traits::pow(BigRational::from_integer(10.into()), exponent.unsigned_abs() as usize);
     let value = literal.as_rational()?;
     Some(if exponent < 0 { value / power } else { value * power })
 }
 
-/// The nearest number with few decimals.
+/// Rounds a number to [`DECIMALS`] decimals.
 pub(crate) fn rounded(value: &BigRational) -> BigRational {
     let scale = BigRational::from_integer(10_i64.pow(DECIMALS).into());
     (value * &scale).round() / scale
 }
 
-/// A number of JSON, or a string that is one.
+/// Parses a JSON number, or a string that contains a number.
 pub(crate) fn from_json(value: &Value) -> Option<BigRational> {
     match value {
         Value::Number(number) => exact(&number.to_string()),
@@ -41,17 +42,18 @@ pub(crate) fn from_json(value: &Value) -> Option<BigRational> {
     }
 }
 
-/// As decimal text; a fraction that is not a decimal is rounded.
+/// Formats a number as decimal text. A fraction without a finite decimal expansion is rounded.
 pub(crate) fn decimal(value: &BigRational) -> String {
     rules::Decimal::from_rational(value).to_string()
 }
 
-/// As a number of JSON.
+/// Returns a number as a JSON number.
 pub(crate) fn to_json(value: &BigRational) -> Value {
     decimal(value).parse::<serde_json::Number>().map_or(Value::Null, Value::Number)
 }
 
-/// An exact number of the planner as a number of JSON; a fraction that is not a decimal, rounded to a double.
+/// Converts an exact number of the planner to a JSON number. A fraction without a finite decimal
+/// expansion is rounded to a double.
 pub(crate) fn exact_to_json(value: &planner::Exact) -> Value {
     value.to_string().parse::<serde_json::Number>().map_or_else(|_| value.to_f64().into(), Value::Number)
 }
@@ -61,7 +63,7 @@ pub(crate) fn to_f64(value: &BigRational) -> f64 {
     if value.is_zero() { 0.0 } else { value.to_f64().unwrap_or(f64::MAX) }
 }
 
-/// An exact number of the planner.
+/// Converts an exact number of the planner.
 pub(crate) fn of_plan(value: &planner::Exact) -> BigRational {
     value.to_rational()
 }

@@ -1,4 +1,5 @@
-//! JSON Schemas of all that is read and answered in JSON, and of manifests: from the types that read and write it.
+//! JSON Schemas of manifests and of all JSON inputs and outputs, derived from the types that read
+//! and write them.
 
 use schemars::{Schema, schema_for};
 use serde_json::{Map, Value, json};
@@ -14,10 +15,11 @@ use crate::recording::answer_schema;
 use crate::setup;
 use crate::sweep::{self, SweepAnswer};
 
-/// A format, what it is about, and its schemas: one of them describes a document.
+/// A format: its name, its title, and its schemas, one of which describes a document.
 type Entry = (&'static str, &'static str, fn() -> Vec<Schema>);
 
-/// All formats by name. What `metaplan` answers has the name of its `format`, without `metaplan-` and the version.
+/// All formats by name. An answer of `metaplan` has the name of its `format` without `metaplan-`
+/// and the version.
 pub const FORMATS: [Entry; 25] = [
     ("manifest", "a mission's manifest", || vec![setup::schema()]),
     ("study", "a study of metaplan sweep", || vec![sweep::schema()]),
@@ -46,7 +48,7 @@ pub const FORMATS: [Entry; 25] = [
     ("verification", "metaplan verify", || vec![schema_for!(VerificationAnswer)]),
 ];
 
-/// The schema of a format; none where there is no such format.
+/// Returns the schema of a format, or `None` if the format does not exist.
 pub fn schema(name: &str) -> Option<Value> {
     let (_, about, schemas) = FORMATS.into_iter().find(|(format, ..)| *format == name)?;
     let mut schemas: Vec<Value> = schemas().into_iter().map(Value::from).collect();
@@ -60,7 +62,8 @@ pub fn schema(name: &str) -> Option<Value> {
     Some(schema)
 }
 
-/// One of several schemas. What they define stands at the root, where their references look for it.
+/// Joins alternative schemas by `anyOf`. Their definitions move to the root, because their
+/// references are resolved there.
 fn either(mut schemas: Vec<Value>) -> Value {
     let mut definitions = Map::new();
     for schema in schemas.iter_mut().filter_map(Value::as_object_mut) {

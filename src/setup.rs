@@ -1,6 +1,8 @@
-//! A manifest to all that it sets up: the mission, how it is adapted, compared and simulated.
+//! Reads a manifest with all its sections: the mission and the settings of adaptation, comparison
+//! and simulation.
 //!
-//! Each room defines its own section. Here they stand side by side, so that a key that none of them has is refused.
+//! Each module defines its own section. `Sections` joins them, so that a key which no section
+//! defines is rejected.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -50,20 +52,20 @@ struct Sections {
     scenarios: BTreeMap<String, Scenario<Simulation>>,
 }
 
-/// A mission, and what goes with it.
+/// A mission with the settings of its manifest.
 #[derive(Debug, Clone)]
 pub struct Setup {
     /// The mission.
     pub mission: Mission,
-    /// What it is about, in a sentence.
+    /// Description of the mission in one sentence.
     pub description: String,
-    /// How eager the adaptation loop is.
+    /// Settings of the adaptation loop.
     pub settings: Settings,
     /// The unit of the domain's times.
     pub time_unit: TimeUnit,
     /// The symbols of the co-adaptation process, where they differ from the defaults.
     pub roles: Roles,
-    /// Situations by name.
+    /// Scenarios by name.
     pub scenarios: BTreeMap<String, Scenario<Simulation>>,
     report: ReportSection,
     origin: ManifestPath,
@@ -84,16 +86,17 @@ impl Setup {
     /// ```
     ///
     /// # Errors
-    /// All that is wrong with the manifest and with the files that it names.
+    /// All faults of the manifest and of the files that it names.
     pub fn read(manifest: &Path) -> Result<Self, Errors> {
         let (sections, origin) = manifest::read(manifest)?;
         Self::of(sections, origin)
     }
 
-    /// Reads a manifest from its text, and the files that it names by paths relative to a directory; `name` stands for the file in messages.
+    /// Parses the text of a manifest and reads the files that it names by paths relative to
+    /// `directory`. Messages use `name` as the name of the manifest.
     ///
     /// # Errors
-    /// All that is wrong with the manifest and with the files that it names.
+    /// All faults of the manifest and of the files that it names.
     pub fn parse(name: &str, text: &str, directory: &Path) -> Result<Self, Errors> {
         let (sections, origin) = manifest::parse(name, text, directory)?;
         Self::of(sections, origin)
@@ -114,7 +117,7 @@ impl Setup {
                 Mission::new(&sections.name, Some(knowledge), bindings, domain, problem)
                     .map(|mission| (mission, settings))
             }
-            // What the bindings were meant to be is not known.
+            // The mission cannot be checked, because faulty bindings leave its symbols undefined.
             _ => {
                 Err(knowledge.err().into_iter().flatten().chain(domain.err()).chain(problem.err()).collect())
             }
@@ -131,20 +134,23 @@ impl Setup {
         Ok(Self { mission, description, settings, time_unit, roles, scenarios, report, origin })
     }
 
-    /// Brings the mission into a situation of the manifest.
+    /// Applies a scenario of the manifest to the mission.
     ///
     /// # Errors
-    /// M108, there is no such scenario; or all of its settings that do not fit the mission.
+    /// M108 if the scenario does not exist; otherwise all settings of the scenario that do not fit
+    /// the mission.
     pub fn apply(&mut self, scenario: &str) -> Result<(), Errors> {
         let Some(found) = self.scenarios.get(scenario) else { return Err(self.no_scenario(scenario).into()) };
         let mistakes = found.mistakes(&mut self.mission);
         Errors::unless_empty(mistakes.into_iter().map(|mistake| self.in_scenario(scenario, mistake)))
     }
 
-    /// The mission in a situation of the manifest that can be simulated, with what a simulated robot meets.
+    /// Returns the simulation of a scenario: the mission in its situation and the simulated robot's
+    /// environment.
     ///
     /// # Errors
-    /// M108, there is no such scenario, or it says nothing about a simulation; or all that is wrong with it.
+    /// M108 if the scenario does not exist or has no section `simulation`; otherwise all its
+    /// faults.
     pub fn experiment(&self, scenario: &str) -> Result<Experiment, Errors> {
         let Some(found) = self.scenarios.get(scenario) else {
             return Err(self.not_simulated(scenario, "there is none of that name").into());
@@ -158,59 +164,60 @@ impl Setup {
         Experiment::new(mission, self.settings.clone(), simulation.clone(), self.time_unit)
     }
 
-    /// All that is wrong with the scenarios, each message with its place.
+    /// Returns all faults of the scenarios, each with its place.
     pub fn mistakes(&self) -> Vec<Message> {
         self.scenarios.iter().flat_map(|(name, scenario)| self.situation(name, scenario).1).collect()
     }
 
-    /// The mission in the situation of a scenario, and all that is wrong with that and with its simulation.
+    /// Returns the mission in the situation of a scenario, and all faults of the scenario and of
+    /// its simulation.
     fn situation(&self, name: &str, scenario: &Scenario<Simulation>) -> (Mission, Vec<Message>) {
         let mut mission = self.mission.clone();
         let is_sound = mission.filled().is_ok();
         let mut mistakes = scenario.mistakes(&mut mission);
         if let Some(simulation) = &scenario.simulation {
-            let more = simulation.mistakes(&mission).into_iter();
-            let more = more.filter(|mistake| is_sound || !mistake.is_of_pddl());
+            let simulation_mistakes = simulation.mistakes(&mission).into_iter();
+            let simulation_mistakes = simulation_mistakes.filter(|mistake| is_sound || !mistake.is_of_pddl());
             let below = |mistake: Mistake| {
                 let path = std::iter::once(Key::from("simulation")).chain(mistake.path).collect();
                 Mistake { path, ..mistake }
             };
-            mistakes.extend(more.map(below));
+            mistakes.extend(simulation_mistakes.map(below));
         }
         (mission, mistakes.into_iter().map(|mistake| self.in_scenario(name, mistake)).collect())
     }
 
     fn no_scenario(&self, name: &str) -> Message {
-        let known: Vec<_> = self.scenarios.keys().map(String::as_str).collect();
+        let names: Vec<_> = self.scenarios.keys().map(String::as_str).collect();
         let text = format!(
             "the mission has no scenario `{name}`; it has: {}{}",
-            known.join(", "),
-            did_you_mean(name, known.iter().copied())
+            names.join(", "),
+            did_you_mean(name, names.iter().copied())
         );
         Message::error("M108", text)
     }
 
     fn not_simulated(&self, name: &str, why: &str) -> Message {
         let simulated = self.scenarios.iter().filter(|(_, scenario)| scenario.simulation.is_some());
-        let known: Vec<&str> = simulated.map(|(name, _)| name.as_str()).collect();
-        let others = if known.is_empty() {
+        let names: Vec<&str> = simulated.map(|(name, _)| name.as_str()).collect();
+        let alternatives = if names.is_empty() {
             "no scenario of this mission can".to_owned()
         } else {
-            format!("these can: {}", known.join(", "))
+            format!("these can: {}", names.join(", "))
         };
-        let meant = did_you_mean(name, known.iter().copied());
-        Message::error("M108", format!("`{name}` cannot be simulated: {why}; {others}{meant}"))
+        let suggestion = did_you_mean(name, names.iter().copied());
+        Message::error("M108", format!("`{name}` cannot be simulated: {why}; {alternatives}{suggestion}"))
     }
 
-    /// Where the places lie, which only pictures ask for.
+    /// Coordinates of the places, which only pictures need.
     ///
     /// # Errors
-    /// The file of positions cannot be read, or what is wrong with it.
+    /// The file of positions cannot be read or is faulty.
     pub fn positions(&self) -> Result<Positions, Errors> {
         self.report.positions(&self.origin)
     }
 
-    /// A mistake in a scenario as a message about the manifest.
+    /// Converts a mistake in a scenario to a message about the manifest.
     fn in_scenario(&self, name: &str, Mistake { path, part, message }: Mistake) -> Message {
         let path: Vec<Key> = ["scenarios".into(), name.into()].into_iter().chain(path).collect();
         let text = format!("scenario `{name}`: {}", message.message);
@@ -222,18 +229,18 @@ impl Setup {
         self.origin.quote([wrong]).swap_remove(0)
     }
 
-    /// The manifest's own name; empty for a mission without.
+    /// Returns the name of the manifest's file; empty for a mission without a manifest.
     pub fn file(&self) -> &str {
         self.origin.file()
     }
 }
 
-/// The JSON Schema of a manifest.
+/// Returns the JSON Schema of a manifest.
 pub fn schema() -> Schema {
     schema_for!(Sections)
 }
 
-/// A mission without a manifest: all else is as it is unless said otherwise.
+/// A mission without a manifest, with default settings.
 impl From<Mission> for Setup {
     fn from(mission: Mission) -> Self {
         Self {

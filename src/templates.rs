@@ -1,4 +1,4 @@
-//! Missions to start from: small, commented, and planned as they are.
+//! Templates of missions: small, commented, and solvable without changes.
 
 use std::io;
 use std::path::Path;
@@ -8,28 +8,29 @@ use planner::shipped;
 
 use crate::file::create_directory;
 
-/// The manifest's file in every template.
+/// Name of the manifest's file in every template.
 pub const MANIFEST: &str = "mission.toml";
 
-/// The file beside it by which editors know its keys.
+/// Name of the JSON Schema file, by which editors complete the manifest's keys.
 pub const SCHEMA: &str = "mission.schema.json";
 
-/// A mission to start from.
+/// A template of a mission.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Template {
-    /// One function, two designs, one action.
+    /// A mission with one function, two designs and one action.
     Blank,
     /// The ground vehicle of the Metaplan paper, with a plain domain.
     Ugv,
-    /// A robot with an arm in a warehouse: two functions with three designs each, a battery, a charger, a dark aisle.
+    /// A robot with an arm in a warehouse: two functions with three designs each, a battery, a
+    /// charger, a dark aisle.
     Warehouse,
 }
 
 impl Template {
-    /// All of them.
+    /// All templates.
     pub const ALL: [Self; 3] = [Self::Blank, Self::Ugv, Self::Warehouse];
 
-    /// Its name.
+    /// Returns the name of the template.
     pub fn name(self) -> &'static str {
         match self {
             Self::Blank => "blank",
@@ -38,7 +39,8 @@ impl Template {
         }
     }
 
-    /// Its files, each a name and a text, for a mission with a name; `schema` is the JSON Schema of manifests.
+    /// Returns the names and texts of the template's files for a mission called `mission`; `schema`
+    /// is the JSON Schema of manifests.
     pub fn files(self, mission: &str, schema: &str) -> Vec<(&'static str, String)> {
         let texts: &[(&str, &str)] = match self {
             Self::Blank => &[
@@ -68,10 +70,11 @@ impl Template {
         texts.iter().map(named).chain([(SCHEMA, schema.to_owned())]).collect()
     }
 
-    /// Writes the files into a new directory, which is there with all of them afterwards or not at all.
+    /// Writes the files into a new directory, atomically.
     ///
     /// # Errors
-    /// There is something of that name already, the directory above it is not there, or it cannot be written.
+    /// The name already exists, the parent directory does not exist, or the directory cannot be
+    /// written.
     pub fn write(self, directory: &Path, mission: &str, schema: &str) -> io::Result<()> {
         if directory.symlink_metadata().is_ok() {
             return Err(io::ErrorKind::AlreadyExists.into());
@@ -84,7 +87,8 @@ impl Template {
     }
 }
 
-/// A manifest with another name of the mission, and with the line that editors find its schema by.
+/// Returns a manifest with another name of the mission, and with the line by which editors find its
+/// schema.
 fn named(manifest: &str, mission: &str) -> String {
     let name = toml::Value::String(mission.to_owned());
     let line = |line: &str| match line.strip_prefix("name = ") {

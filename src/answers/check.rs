@@ -1,4 +1,4 @@
-//! What `metaplan check` answers.
+//! JSON answer of `metaplan check`.
 
 use std::collections::BTreeMap;
 
@@ -174,7 +174,7 @@ impl ValuePart {
 impl<'a> CheckAnswer<'a> {
     /// The answer to a property.
     pub fn new(property: &'a str, report: &Report) -> Self {
-        let found = match &report.outcome {
+        let value = match &report.outcome {
             Outcome::Value(answer) => Found::Value(ValuePart::of(answer)),
             Outcome::Truth(holds, answer) => {
                 Found::Truth { value: answer.as_ref().map(ValuePart::of), holds: Some(*holds) }
@@ -206,10 +206,10 @@ impl<'a> CheckAnswer<'a> {
             milliseconds,
         };
         let (name, constants) = (None, None);
-        Self { format: CHECK, property, name, constants, found, statistics }
+        Self { format: CHECK, property, name, constants, found: value, statistics }
     }
 
-    /// The same with the name of the property, and with the values of constants that have several.
+    /// Adds the name of the property, and the values of the constants that vary.
     #[must_use]
     pub fn told(
         mut self,
@@ -224,7 +224,7 @@ impl<'a> CheckAnswer<'a> {
 }
 
 impl<'a> ChecksAnswer<'a> {
-    /// The answers that there are, in their order.
+    /// Answer with the results of several properties, in order.
     pub fn new(answers: Vec<CheckAnswer<'a>>) -> Self {
         Self { format: CHECKS, answers, refused: Vec::new() }
     }

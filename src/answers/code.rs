@@ -1,4 +1,4 @@
-//! What `metaplan explain CODE` answers.
+//! JSON answer of `metaplan explain CODE`.
 
 use schemars::JsonSchema;
 use serde::Serialize;

@@ -1,4 +1,4 @@
-//! What `metaplan compare` answers, and the rows of its table.
+//! JSON answer of `metaplan compare`, and the rows of its table.
 
 use std::time::Duration;
 
@@ -10,7 +10,7 @@ use crate::message::Message;
 
 const FORMAT: &str = "metaplan-compare/1";
 
-/// Start and goal, where a comparison is one of many.
+/// Start and goal of a comparison that is one of several.
 pub type Pair = (String, String);
 
 /// The measures of the table, in its order.
@@ -32,13 +32,13 @@ pub const MEASURES: [&str; 12] = [
 /// A row of the table.
 #[derive(Debug, Clone)]
 pub struct Row {
-    /// What it is about, if there are several comparisons.
+    /// The compared pair, if there are several comparisons.
     pub pair: Option<Pair>,
-    /// Which kind of candidate it is: `a` to `f`, or `+`.
+    /// Kind of the candidate: `a` to `f`, or `+`.
     pub kind: String,
-    /// What it is.
+    /// Name of the candidate.
     pub name: String,
-    /// By measure.
+    /// Values of the row, in the order of [`MEASURES`].
     pub values: Vec<Option<f64>>,
 }
 
@@ -83,7 +83,7 @@ pub fn begun_rows(pair: Option<&Pair>, candidates: &[Candidate]) -> Vec<Row> {
     measured.collect()
 }
 
-/// The rows of a comparison, bounds among them.
+/// Returns the rows of a comparison, including those of the bounds.
 pub fn rows(pair: Option<&Pair>, comparison: &Comparison) -> Vec<Row> {
     let mut rows = begun_rows(pair, &comparison.candidates);
     let [time, energy] = comparison.hindsight;
@@ -117,7 +117,7 @@ pub struct CompareAnswer<'a> {
 }
 
 impl<'a> CompareAnswer<'a> {
-    /// With rows that the user adds; not complete if there is a message.
+    /// Answer with additional rows of the user. It is incomplete if there is a message.
     pub fn new(comparisons: Vec<ComparisonAnswer>, published: &'a [Row], messages: &'a [Message]) -> Self {
         let complete = messages.is_empty();
         Self { format: FORMAT, complete, comparisons, published, messages }
@@ -230,7 +230,7 @@ struct Milliseconds {
 }
 
 impl ComparisonAnswer {
-    /// A comparison that is done.
+    /// Part for a finished comparison.
     pub fn new(pair: Option<&Pair>, comparison: &Comparison) -> Self {
         let figures = Figures {
             front: comparison.front.clone(),
@@ -244,7 +244,7 @@ impl ComparisonAnswer {
         Self::of(pair, rows(pair, comparison), Some(figures), &comparison.costs)
     }
 
-    /// A comparison that is not done.
+    /// Part for an unfinished comparison.
     pub fn begun(pair: Option<&Pair>, candidates: &[Candidate], costs: &Costs) -> Self {
         Self::of(pair, begun_rows(pair, candidates), None, costs)
     }

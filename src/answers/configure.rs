@@ -1,4 +1,4 @@
-//! What `metaplan configure` answers, and the first line of its loop.
+//! JSON answer of `metaplan configure`, and the first line of its loop.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -62,7 +62,7 @@ struct ConsideredPart<'a> {
 }
 
 impl<'a> ConfigureAnswer<'a> {
-    /// All of it.
+    /// Answer with a configuration and warnings.
     pub fn new(configuration: &'a Configuration, warnings: &'a [Message]) -> Self {
         Self {
             format: CONFIGURE,
@@ -118,7 +118,7 @@ pub struct KeeperReadyLine {
 }
 
 impl KeeperReadyLine {
-    /// A loop with these objectives.
+    /// First line of a loop with these objectives.
     pub fn new(objectives: Vec<String>) -> Self {
         Self { answer: "ready", format: FORMAT, objectives }
     }

@@ -1,4 +1,4 @@
-//! What `metaplan explain` answers.
+//! JSON answers of `metaplan explain`.
 
 use num_rational::BigRational;
 use schemars::JsonSchema;
@@ -122,7 +122,7 @@ struct RepairPart<'a> {
 }
 
 impl<'a> ChangesAnswer<'a> {
-    /// The smallest changes that lead to another plan than the best.
+    /// Answer with the smallest changes that lead to another plan.
     pub fn new(mission: &'a str, found: &'a SmallestChanges) -> Self {
         Self {
             format: FORMAT,
@@ -135,7 +135,7 @@ impl<'a> ChangesAnswer<'a> {
 }
 
 impl<'a> DesignAnswer<'a> {
-    /// A design beside the best plan.
+    /// Answer that compares a design with the best plan.
     pub fn new(mission: &'a str, found: &'a DesignExplanation) -> Self {
         let availability = &found.availability;
         Self {

@@ -1,4 +1,4 @@
-//! What `metaplan export` and `metaplan import` answer.
+//! JSON answers of `metaplan export` and `metaplan import`.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -40,21 +40,21 @@ pub struct ImportAnswer {
 }
 
 impl MissionExport {
-    /// The texts of domain and problem.
+    /// Answer with the texts of domain and problem.
     pub fn new(domain: String, problem: String) -> Self {
         Self { format: EXPORT, domain, problem }
     }
 }
 
 impl ModelExport {
-    /// The text of the model.
+    /// Answer with the text of the model.
     pub fn new(model: String) -> Self {
         Self { format: EXPORT, model }
     }
 }
 
 impl ImportAnswer {
-    /// The path of the manifest.
+    /// Answer with the path of the manifest.
     pub fn new(mission: String) -> Self {
         Self { format: IMPORT, mission }
     }

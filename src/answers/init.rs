@@ -1,4 +1,4 @@
-//! What `metaplan init` answers.
+//! JSON answer of `metaplan init`.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -20,7 +20,7 @@ pub struct InitAnswer<'a> {
 }
 
 impl<'a> InitAnswer<'a> {
-    /// The files of a template in a directory.
+    /// Answer with the files of a template in a directory.
     pub fn new(directory: &'a str, template: &'static str, files: Vec<&'static str>) -> Self {
         Self { format: FORMAT, directory, template, files }
     }

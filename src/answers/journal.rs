@@ -1,4 +1,4 @@
-//! What `metaplan journal` answers.
+//! JSON answer of `metaplan journal`.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -46,7 +46,7 @@ struct RecordPart<'a> {
 }
 
 impl<'a> JournalAnswer<'a> {
-    /// The report, with the records if `shows`.
+    /// Answer with the report, and with the records if `shows`.
     pub fn new(report: &'a JournalReport, shows: bool) -> Self {
         Self {
             format: FORMAT,

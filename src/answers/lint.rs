@@ -1,4 +1,4 @@
-//! What `metaplan lint` answers.
+//! JSON answer of `metaplan lint`.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -22,13 +22,13 @@ pub struct LintAnswer<'a> {
 }
 
 impl<'a> LintAnswer<'a> {
-    /// With all messages.
+    /// Answer with all messages.
     pub fn new(messages: &'a [Message]) -> Self {
         let errors = messages.iter().filter(|message| message.is_error()).count();
         Self { format: FORMAT, errors, warnings: messages.len() - errors, messages }
     }
 
-    /// How many errors and how many warnings.
+    /// Returns the numbers of errors and of warnings.
     pub fn counts(&self) -> (usize, usize) {
         (self.errors, self.warnings)
     }

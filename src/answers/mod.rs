@@ -1,7 +1,7 @@
-//! What each command answers in JSON: a type for each answer, with the fields of its format in their order. `docs/reference/json.md` lists
-//! them.
+//! JSON answers of the commands: a type for each answer, whose fields have the order of the format.
+//! `docs/reference/json.md` lists them.
 //!
-//! An answer is built from what the library has found. The command line only writes it.
+//! The types are built from results of the library. The command line only writes them.
 
 mod check;
 mod code;

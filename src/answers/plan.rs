@@ -1,4 +1,5 @@
-//! What `metaplan plan` answers: `metaplan-plan/1`, and for several objectives at once `metaplan-pareto/1`.
+//! JSON answers of `metaplan plan`: `metaplan-plan/1`, and `metaplan-pareto/1` for several
+//! objectives.
 
 use std::time::Duration;
 
@@ -222,12 +223,12 @@ struct ForcedPart {
     functions: Vec<String>,
 }
 
-/// The time that was spent before the optimizer has begun.
+/// Times of the stages before the optimizer.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Preparation {
-    /// To read the files and to reason.
+    /// Time of reading the files and of reasoning.
     pub read: Duration,
-    /// To ground the task.
+    /// Time of grounding the task.
     pub ground: Duration,
 }
 
@@ -237,7 +238,7 @@ pub fn milliseconds(duration: Duration) -> f64 {
 }
 
 impl PlanAnswer {
-    /// The answer to a mission of this name.
+    /// Answer for the mission called `mission`.
     pub fn new(mission: &str, solution: &Solution, preparation: &Preparation) -> Self {
         let statistics = &solution.statistics;
         Self {
@@ -259,28 +260,28 @@ impl PlanAnswer {
         }
     }
 
-    /// Adds the values by objective; of a plan that was made for the mission's own metric there are none.
+    /// Adds the values by objective. Empty for a plan by the mission's own metric.
     #[must_use]
     pub fn with_objectives(mut self, objectives: Vec<Objective>) -> Self {
         self.objectives = Some(objectives).filter(|objectives| !objectives.is_empty());
         self
     }
 
-    /// Adds further plans that are as good.
+    /// Adds further optimal plans.
     #[must_use]
     pub fn with_alternatives(mut self, found: Option<&Alternatives>) -> Self {
         self.alternatives = found.map(AlternativesPart::of);
         self
     }
 
-    /// Adds how long a plan takes whose actions overlap.
+    /// Adds the duration of a plan whose actions overlap.
     #[must_use]
     pub fn with_makespan(mut self, makespan: Option<&Exact>) -> Self {
         self.makespan = makespan.map(exact_to_json);
         self
     }
 
-    /// Adds the designs that keep the mission from having a plan, if it is for designs.
+    /// Adds the unavailable designs that prevent a plan, if designs are the reason.
     #[must_use]
     pub fn with_blocking(mut self, blocking: Option<&Blocking>) -> Self {
         self.blocking = match blocking {
@@ -290,14 +291,14 @@ impl PlanAnswer {
         self
     }
 
-    /// Adds the numbers that are missing.
+    /// Adds the missing numbers.
     #[must_use]
     pub fn with_missing_values(mut self, missing: &[MissingValue]) -> Self {
-        let part = |own: &MissingValue| MissingValuePart {
-            function: own.function.clone(),
-            needed_by: own.needed_by.clone(),
-            design: own.estimation.as_ref().map(|(design, _)| design.clone()),
-            file: own.file.clone(),
+        let part = |value: &MissingValue| MissingValuePart {
+            function: value.function.clone(),
+            needed_by: value.needed_by.clone(),
+            design: value.estimation.as_ref().map(|(design, _)| design.clone()),
+            file: value.file.clone(),
         };
         let parts: Vec<MissingValuePart> = missing.iter().map(part).collect();
         self.missing_values = Some(parts).filter(|parts| !parts.is_empty());
@@ -306,7 +307,7 @@ impl PlanAnswer {
 }
 
 impl ParetoAnswer {
-    /// The points with a plan; `objectives` are the texts of the objectives.
+    /// Answer with the points that have a plan; `objectives` are the texts of the objectives.
     pub fn new(mission: &str, objectives: &[String], front: &Front, preparation: &Preparation) -> Self {
         let solved = front.points.iter().filter(|point| point.solution.plan.is_some());
         let point = |point: &Point| {
@@ -324,7 +325,7 @@ impl ParetoAnswer {
 }
 
 impl Objective {
-    /// The values of a plan by the objectives with these texts.
+    /// Returns the values of a plan by the objectives with these texts.
     pub fn all(texts: &[String], values: &[Exact]) -> Vec<Self> {
         let pairs = texts.iter().zip(values);
         pairs.map(|(text, value)| Self { minimize: text.clone(), value: exact_to_json(value) }).collect()
@@ -407,7 +408,8 @@ impl AlternativesPart {
     fn of(found: &Alternatives) -> Self {
         let forced = found.forced.as_ref().map(|steps| {
             let each = steps.iter();
-            each.map(|own| ForcedPart { action: own.action, functions: own.functions.clone() }).collect()
+            each.map(|forced| ForcedPart { action: forced.action, functions: forced.functions.clone() })
+                .collect()
         });
         Self { plans: found.plans.iter().map(steps).collect(), complete: found.complete, forced }
     }

@@ -1,4 +1,4 @@
-//! What `metaplan reason` answers: what follows, and why.
+//! JSON answers of `metaplan reason`: inferred facts and their derivations.
 
 use ontology::entail::{Answer, Entailment, Schema, SchemaEntity};
 use ontology::tomasys::{FunctionDesign, Individual};
@@ -132,7 +132,7 @@ struct EntityPart<'a> {
 }
 
 impl<'a> ReasonAnswer<'a> {
-    /// All that follows now.
+    /// Answer with all inferred facts.
     pub fn new(knowledge: &'a Knowledge, contradictions: &'a [Contradiction]) -> Self {
         let triples = ontology::ntriples(knowledge.engine().symbols(), &knowledge.inferred());
         let objectives = statuses(knowledge).into_iter();
@@ -151,7 +151,7 @@ impl<'a> ReasonAnswer<'a> {
 
 impl DesignPart {
     fn of(design: FunctionDesign) -> Self {
-        let names = |all: Vec<Individual>| all.into_iter().map(|own| own.name).collect();
+        let names = |all: Vec<Individual>| all.into_iter().map(|individual| individual.name).collect();
         Self {
             name: design.individual.name,
             iri: design.individual.iri,
@@ -162,10 +162,10 @@ impl DesignPart {
     }
 }
 
-/// Objectives with their statuses, by local name, sorted.
+/// Returns the objectives with their statuses, by local name, sorted.
 pub fn statuses(knowledge: &Knowledge) -> Vec<(String, String)> {
     let symbols = knowledge.engine().symbols();
-    let mut found: Vec<_> = knowledge
+    let mut assertions: Vec<_> = knowledge
         .engine()
         .facts()
         .filter(|fact| match symbols.value(fact.predicate) {
@@ -181,42 +181,42 @@ pub fn statuses(knowledge: &Knowledge) -> Vec<(String, String)> {
             (local_name(subject.trim_matches(['<', '>'])).to_owned(), value)
         })
         .collect();
-    found.sort();
-    found
+    assertions.sort();
+    assertions
 }
 
 impl<'a> EntailmentAnswer<'a> {
-    /// The answers to all statements.
+    /// Answer about all statements.
     pub fn new(found: &'a [Entailment]) -> Self {
-        let statement = |one: &'a Entailment| {
-            let (follows, reason): (bool, &str) = match &one.answer {
+        let statement = |entailment: &'a Entailment| {
+            let (follows, reason): (bool, &str) = match &entailment.answer {
                 Answer::Follows(reason) => (true, reason),
                 Answer::Open(reason) => (false, reason),
             };
-            StatementPart { statement: &one.statement, follows, reason }
+            StatementPart { statement: &entailment.statement, follows, reason }
         };
         let statements: Vec<StatementPart<'a>> = found.iter().map(statement).collect();
-        let entailed = statements.iter().all(|one| one.follows);
+        let entailed = statements.iter().all(|statement| statement.follows);
         Self { format: ENTAILS, entailed, statements }
     }
 }
 
 impl ReasonsAnswer {
-    /// The answers about all assertions.
+    /// Answer about all assertions.
     pub fn new(answers: Vec<AssertionAnswer>) -> Self {
         Self { format: REASONS, answers }
     }
 }
 
 impl<'a> SchemaAnswer<'a> {
-    /// All of it.
+    /// Answer with all entities of the schema.
     pub fn new(schema: &'a Schema) -> Self {
-        let all = |entities: &'a [SchemaEntity]| entities.iter().map(EntityPart::of).collect();
+        let parts = |entities: &'a [SchemaEntity]| entities.iter().map(EntityPart::of).collect();
         Self {
             format: SCHEMA,
-            classes: all(&schema.classes),
-            object_properties: all(&schema.object_properties),
-            data_properties: all(&schema.data_properties),
+            classes: parts(&schema.classes),
+            object_properties: parts(&schema.object_properties),
+            data_properties: parts(&schema.data_properties),
         }
     }
 }

@@ -1,4 +1,5 @@
-//! What `metaplan run` answers beside the answers of the loop, a line each; and the log of `metaplan simulate`.
+//! JSON lines of `metaplan run` in addition to the answers of the loop, and the log of `metaplan
+//! simulate`.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -8,7 +9,7 @@ use crate::mapek::{Beliefs, FORMAT, Planning};
 use crate::number::to_json;
 use crate::simulate::Strategy;
 
-/// The first line: the loop is ready, and where it goes on.
+/// First line of a loop: its mission, and its position in the journal.
 #[derive(Debug, Clone, Serialize)]
 pub struct ReadyLine {
     answer: &'static str,
@@ -18,25 +19,25 @@ pub struct ReadyLine {
     recovered: Option<RecoveryPart>,
 }
 
-/// What a loop with a journal says of it.
+/// State of the journal of a loop.
 #[derive(Debug, Clone, Serialize)]
 struct RecoveryPart {
     resumed: bool,
     lines: u64,
     seq: Option<u64>,
-    /// Ranges of numbers below `seq` that were not seen, with both ends.
+    /// Ranges of skipped numbers below `seq`, with both ends.
     missing: Vec<[u64; 2]>,
     cut_bytes: u64,
     warnings: Vec<String>,
 }
 
 impl ReadyLine {
-    /// A loop without a journal.
+    /// First line of a loop without a journal.
     pub fn new(mission: String) -> Self {
         Self { answer: "ready", format: FORMAT, mission, recovered: None }
     }
 
-    /// The same with a journal that was opened.
+    /// Adds the state of an opened journal.
     pub fn resume(&mut self, beliefs: &Beliefs, recovery: &Recovery) {
         self.recovered = Some(RecoveryPart {
             resumed: recovery.replayed.is_some(),
@@ -44,12 +45,12 @@ impl ReadyLine {
             seq: beliefs.sequence(),
             missing: beliefs.missing(),
             cut_bytes: recovery.cut,
-            warnings: recovery.warnings.iter().map(|own| own.message.clone()).collect(),
+            warnings: recovery.warnings.iter().map(|warning| warning.message.clone()).collect(),
         });
     }
 }
 
-/// A sign of life while a plan is looked for.
+/// Heartbeat during planning.
 #[derive(Debug, Clone, Serialize)]
 pub struct PlanningLine {
     answer: &'static str,
@@ -60,7 +61,7 @@ pub struct PlanningLine {
 }
 
 impl PlanningLine {
-    /// So many seconds after planning for a line of input has begun.
+    /// Heartbeat `seconds` seconds after planning for a line of input began.
     pub fn new(planning: &Planning, seconds: u64, line: u64) -> Self {
         Self {
             answer: "planning",
@@ -72,7 +73,7 @@ impl PlanningLine {
     }
 }
 
-/// An answer with the number of the line that it is about.
+/// Answer with the number of the input line that caused it.
 #[derive(Debug, Clone, Serialize)]
 pub struct NumberedAnswer<'a, A> {
     #[serde(flatten)]
@@ -81,13 +82,13 @@ pub struct NumberedAnswer<'a, A> {
 }
 
 impl<'a, A> NumberedAnswer<'a, A> {
-    /// An answer to a line.
+    /// Answer caused by a line.
     pub fn new(answer: &'a A, line: u64) -> Self {
         Self { answer, line }
     }
 }
 
-/// That a line was handled.
+/// Acknowledgement of a line.
 #[derive(Debug, Clone, Serialize)]
 pub struct HandledLine {
     answer: &'static str,
@@ -96,7 +97,7 @@ pub struct HandledLine {
 }
 
 impl HandledLine {
-    /// So many microseconds after it was read.
+    /// Acknowledgement of a line, `microseconds` microseconds after it was read.
     pub fn new(line: u64, microseconds: u128) -> Self {
         Self { answer: "handled", line, microseconds }
     }
@@ -111,7 +112,7 @@ pub struct LogLine {
 }
 
 impl LogLine {
-    /// An object of the format, and who has decided.
+    /// Adds the strategy that decided to an object of the format.
     pub fn new(line: Value, strategy: Strategy) -> Self {
         Self { line, strategy: strategy.name() }
     }

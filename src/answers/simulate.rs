@@ -1,4 +1,4 @@
-//! What `metaplan simulate` answers, and the figures of its table.
+//! JSON answer of `metaplan simulate`, and the figures of its table.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -105,7 +105,7 @@ struct RunPart {
 }
 
 impl<'a> SimulateAnswer<'a> {
-    /// All runs of these ways of control in a scenario.
+    /// Answer with all runs of the strategies in a scenario.
     pub fn new(mission: &'a str, scenario: &'a str, strategies: &[Strategy], runs: &[Run]) -> Self {
         Self {
             format: FORMAT,
@@ -122,13 +122,13 @@ impl<'a> SimulateAnswer<'a> {
 }
 
 impl SimulateAnswer<'_> {
-    /// With the unit of its times.
+    /// Sets the unit of the times.
     #[must_use]
     pub fn timed(self, time_unit: TimeUnit) -> Self {
         Self { time_unit, ..self }
     }
 
-    /// Sets the number of missions that were requested, and messages. The answer is not complete if there is a
+    /// Sets the number of requested missions, and messages. The answer is incomplete if there is a
     /// message.
     #[must_use]
     pub fn of(self, missions: usize, messages: Vec<Message>) -> Self {
@@ -184,12 +184,13 @@ impl RunPart {
     }
 }
 
-/// The runs of a strategy.
+/// Returns the runs of a strategy.
 pub fn runs_of(runs: &[Run], strategy: Strategy) -> impl Iterator<Item = &Run> + Clone {
     runs.iter().filter(move |run| run.strategy == strategy)
 }
 
-/// Missions in which a strategy did better than the loop, and in which it did worse; none where the loop has none.
+/// Returns the numbers of missions in which a strategy did better and worse than the loop. `None`
+/// if the loop has no runs.
 pub fn beside_joint(runs: &[Run], strategy: Strategy) -> Option<(usize, usize)> {
     let mut joint = runs_of(runs, Strategy::Joint).peekable();
     joint.peek()?;
@@ -199,12 +200,12 @@ pub fn beside_joint(runs: &[Run], strategy: Strategy) -> Option<(usize, usize)> 
     }))
 }
 
-/// A figure of the runs of a strategy, of those that have it.
+/// Returns the statistics of a figure over the runs of a strategy that have this figure.
 pub fn sample(runs: &[Run], strategy: Strategy, figure: impl Fn(&Run) -> Option<f64>) -> Option<Sample> {
     Sample::of(&runs_of(runs, strategy).filter_map(figure).collect::<Vec<_>>())
 }
 
-/// What an accomplished mission costs.
+/// Returns the cost of an accomplished mission.
 pub fn accomplished_cost(run: &Run) -> Option<f64> {
     run.accomplished.then_some(run.cost)
 }

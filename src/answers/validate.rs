@@ -1,4 +1,4 @@
-//! What `metaplan validate` answers.
+//! JSON answer of `metaplan validate`.
 
 use num_rational::BigRational;
 use pddl::validate::{Unmet, Verdict, Violation};
@@ -59,7 +59,7 @@ struct UnmetPart<'a> {
 }
 
 impl<'a> VerdictAnswer<'a> {
-    /// The verdict of the validator.
+    /// Answer with the verdict of the validator.
     pub fn new(verdict: &'a Verdict) -> Self {
         let value = |(name, value): (&String, &BigRational)| (name.clone(), to_json(value));
         Self {

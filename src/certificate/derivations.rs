@@ -1,11 +1,11 @@
-//! Everything that follows from a mission's knowledge, with why, as a file: to be replayed by `rules::replay`, which shares no
-//! code with the engine's evaluation.
+//! Exports all conclusions from a mission's knowledge with their derivations. `rules::replay`,
+//! which shares no code with the engine's evaluation, checks them.
 
 use rules::{DerivationStep, Engine, Literal, Reason, Symbol, Value};
 
 use ::verify::derivations::{Document, FORMAT, Rule, Step, Term};
 
-/// Writes what an engine holds.
+/// Serialises the facts and derivations of an engine.
 pub(super) fn write(engine: &Engine) -> serde_json::Result<String> {
     let derivation = engine.everything();
     let mut terms: Vec<Option<u32>> = vec![None; engine.symbols().len()];

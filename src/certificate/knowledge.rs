@@ -1,4 +1,5 @@
-//! Where a mission's problem comes from, as files: its knowledge base, what has changed since, and why what follows from them does.
+//! Exports the origin of a mission's problem: its knowledge base, later changes, and the
+//! derivations of the conclusions.
 
 use ontology::OutputSyntax;
 use pddl::print_problem;
@@ -13,13 +14,13 @@ use crate::knowledge::{Stated, rule_text};
 use crate::message::Message;
 use crate::mission::Mission;
 
-/// The files of a mission with a knowledge base.
+/// Returns the files about the knowledge base of a mission, if it has one.
 pub(super) fn files(mission: &Mission) -> Result<Option<[(&'static str, String); 3]>, Message> {
     let Some(knowledge) = mission.knowledge() else { return Ok(None) };
     let sources = knowledge.sources();
     let first = |messages: Vec<Message>| {
-        let other = || Message::error("M120", "the knowledge base cannot be read again");
-        messages.into_iter().next().unwrap_or_else(other)
+        let unreadable = || Message::error("M120", "the knowledge base cannot be read again");
+        messages.into_iter().next().unwrap_or_else(unreadable)
     };
     let (document, _) = ontology::convert_files(&sources.documents, &sources.options, OutputSyntax::NTriples)
         .map_err(|errors| first(errors.iter().map(Message::from_ontology).collect()))?;
@@ -37,7 +38,7 @@ pub(super) fn files(mission: &Mission) -> Result<Option<[(&'static str, String);
         changes: knowledge.statements(),
     };
     let wrong = |error: &dyn std::fmt::Display| Message::error("M120", format!("no certificate: {error}"));
-    // Rules are told apart by where they stand, so that it has to be this document that is reasoned with.
+    // Rules are identified by their positions, so reasoning has to use this document.
     let Stated { symbols, program, facts, .. } = stated(&document, &origin).map_err(|error| wrong(&error))?;
     let engine = Engine::new(symbols, program, facts)
         .map_err(|errors| first(errors.iter().map(Message::from_rules).collect()))?;

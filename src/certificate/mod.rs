@@ -1,4 +1,5 @@
-//! Writes certificates: a directory that `metaplan-verify` checks, where it is said what the files hold.
+//! Writes certificates: directories that `metaplan-verify` checks. Its documentation specifies the
+//! files.
 
 mod derivations;
 mod knowledge;
@@ -30,15 +31,15 @@ use crate::file::create_directory;
 use crate::message::Message;
 use crate::mission::Mission;
 
-/// What the solver writes, before it is shortened.
+/// Proof as the solver writes it, before it is trimmed.
 const DRAFT: &str = "draft.drat";
 
 /// A ground task.
 #[derive(Debug, Clone, Copy)]
 pub enum Ground<'c> {
-    /// In integers.
+    /// A task with integers.
     Integers(&'c Task),
-    /// In rationals of any size.
+    /// A task with rationals of any size.
     Exact(&'c ExactTask),
 }
 
@@ -58,23 +59,23 @@ impl Ground<'_> {
     }
 }
 
-/// What a certificate is about.
+/// Contents of a certificate.
 #[derive(Debug, Clone, Copy)]
 pub struct Contents<'c> {
     /// The mission.
     pub mission: &'c Mission,
     /// The problem as it was planned, with its metric.
     pub problem: &'c Problem,
-    /// What they ground to.
+    /// The ground task of domain and problem.
     pub task: Ground<'c>,
-    /// What was found.
+    /// The solution of the task.
     pub solution: &'c Solution,
-    /// The plan as lines with start and duration, for the mission's domain.
+    /// The plan for the mission's domain, as lines with start and duration.
     pub plan: &'c str,
 }
 
 impl Contents<'_> {
-    /// What the validator says that the plan costs; nothing if there is none.
+    /// Returns the validator's cost of the plan, or `None` without a plan.
     fn metric(&self, limits: &Limits) -> Result<Option<BigRational>, String> {
         let Some(found) = &self.solution.plan else { return Ok(None) };
         let (domain, cost) = (self.mission.domain(), found.cost.to_string());
@@ -83,7 +84,7 @@ impl Contents<'_> {
     }
 }
 
-/// Writes the certificate of a solution into a directory that does not exist yet.
+/// Writes the certificate of a solution into a new directory.
 ///
 /// # Errors
 /// The solution has no certificate, or the directory cannot be written.
@@ -119,15 +120,17 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
         }
         None => Claim::Unsolvable,
     };
+    // The checker rejects larger files.
     if files.iter().map(|(_, text)| text.len() as u64).sum::<u64>() > TEXT_LIMIT {
         return Err(wrong(&format_args!("its files have more than {TEXT_LIMIT} bytes")));
     }
     let failed = |error: std::io::Error| {
         Message::at("M109", &name, None, format!("the directory cannot be written: {}", error.kind()))
     };
+    // The files are written to a temporary directory that is renamed at the end.
     let whole = create_directory(directory).map_err(failed)?;
     let metric = contents.metric(limits).map_err(|reason| wrong(&reason))?;
-    // What `verify` would refuse is not written.
+    // A certificate that `verify` would reject is not written.
     check(text(&files, TASK), text(&files, ARGUMENT), metric.as_ref()).map_err(|fault| wrong(&fault))?;
     let refutation =
         refutation(whole.path(), (text(&files, TASK), text(&files, ARGUMENT)), metric.as_ref(), limits)
@@ -136,6 +139,7 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
     for (name, text) in &files {
         fs::write(whole.path().join(name), text).map_err(failed)?;
     }
+    // Without a refutation, its files do not exist.
     let streamed = STREAMED.iter().filter(|_| matches!(refutation, Refutation::Steps(_)));
     for name in files.iter().map(|(name, _)| name).chain(streamed) {
         let (bytes, sha256) = digest_of(&whole.path().join(name)).map_err(failed)?;
@@ -148,7 +152,8 @@ pub fn write(directory: &Path, contents: &Contents<'_>, limits: &Limits) -> Resu
     whole.commit().map_err(failed)
 }
 
-/// Makes the witness, and compares the task with the files as `verify` will: what cannot be compared gets no certificate.
+/// Creates the witness, and compares the task with the files as `verify` does. A task that cannot
+/// be compared gets no certificate.
 fn compared((domain, problem): (&str, &str), task: &str, limits: &Limits) -> Result<String, String> {
     let (domain, problem) = read_pddl(domain, problem)?;
     let witness =
@@ -161,7 +166,7 @@ fn compared((domain, problem): (&str, &str), task: &str, limits: &Limits) -> Res
     Ok(witness)
 }
 
-/// Writes a formula and its refutation, or nothing where there is none.
+/// Writes a formula and its refutation, if there is one.
 fn refutation(
     directory: &Path,
     documents: (&str, &str),
@@ -176,6 +181,7 @@ fn refutation(
     let remove = |names: &[&str]| names.iter().try_for_each(|name| fs::remove_file(directory.join(name)));
     let size = |name: &str| fs::metadata(directory.join(name)).map(|file| file.len());
     let mut reasons = Vec::new();
+    // The second bound on the number of steps is tried only if the first one gives no refutation.
     for by in [StepBound::Spent, StepBound::Potential] {
         let outputs = RefutationOutputs {
             formula: &mut create(FORMULA)?,

@@ -1,4 +1,4 @@
-//! `metaplan plan --alternatives`: further plans that are as good, and what all of them share.
+//! `metaplan plan --alternatives`: further optimal plans, and their common parts.
 
 use std::fmt::Write as _;
 
@@ -7,7 +7,8 @@ use planner::Alternatives;
 
 use crate::cli::plan_text::steps_text;
 
-/// The further plans as tables, and for each step of the first one which of its choices are forced.
+/// Formats the further plans as tables, and lists for each step of the first plan the choices that
+/// all plans share.
 pub(super) fn text(found: Option<&Alternatives>, planned: &Planned<'_>, columns: Option<u16>) -> String {
     let Some(found) = found else {
         return "\nothers that are as good were not looked for: it is not proved that none is better\n"
@@ -27,10 +28,10 @@ pub(super) fn text(found: Option<&Alternatives>, planned: &Planned<'_>, columns:
     };
     let steps = planned.solution.plan.iter().flat_map(|plan| &plan.steps);
     for ((step, forced), number) in steps.zip(found.forced.iter().flatten()).zip(1..) {
-        let own = if forced.action { vec![step.action.as_str()] } else { Vec::new() };
-        let all: Vec<_> = own.into_iter().chain(forced.functions.iter().map(String::as_str)).collect();
-        let all = if all.is_empty() { "nothing".to_owned() } else { all.join(", ") };
-        let _ = writeln!(text, "step {number}: in every plan that is as good: {all}");
+        let action = if forced.action { vec![step.action.as_str()] } else { Vec::new() };
+        let names: Vec<_> = action.into_iter().chain(forced.functions.iter().map(String::as_str)).collect();
+        let names = if names.is_empty() { "nothing".to_owned() } else { names.join(", ") };
+        let _ = writeln!(text, "step {number}: in every plan that is as good: {names}");
     }
     if found.complete || found.forced.is_some() {
         text += "idle actions are not counted: they cost nothing, and nothing depends on their effects\n";

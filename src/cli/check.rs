@@ -86,16 +86,16 @@ fn width(text: &str) -> Result<f64, String> {
     text.parse::<f64>().ok().filter(|width| *width > 0.0 && width.is_finite()).ok_or_else(wrong)
 }
 
-/// What is asked, and the file that it comes from.
-struct Asked {
+/// The queried properties, and the file that they come from.
+struct Queries {
     listed: Vec<Listed>,
     declarations: Declarations,
     file: String,
     text: String,
 }
 
-/// What came out for one combination of values.
-struct Answered<'a> {
+/// Results for one combination of values.
+struct CombinationResult<'a> {
     combination: &'a Combination,
     reports: Vec<Result<Report, Error>>,
 }
@@ -106,12 +106,12 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let file = source(&arguments.model)?;
     let model_text = (file.name(), file.text());
     let model = prism::parse(file.text()).map_err(|error| process_failure(error, model_text, ("", "")))?;
-    let mut asked = asked(arguments)?;
-    let declarations = std::mem::take(&mut asked.declarations);
-    let (file, text) = (asked.file.clone(), asked.text.clone());
+    let mut queries = asked(arguments)?;
+    let declarations = std::mem::take(&mut queries.declarations);
+    let (file, text) = (queries.file.clone(), queries.text.clone());
     let failed = |error| process_failure(error, model_text, (&file, &text));
-    let all = combinations(&arguments.constants)?;
-    let is_series = all.len() > 1;
+    let value_combinations = combinations(&arguments.constants)?;
+    let is_series = value_combinations.len() > 1;
     if is_series && arguments.policy.is_some() {
         return Err(Failure::usage(Message::error(
             "M107",
@@ -120,19 +120,19 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     }
     let progress = Progress::new("checking", common);
     let evaluate = arguments.evaluate.as_deref().map(read_policy).transpose()?;
-    let (model, listed, declarations) = (&model, &asked.listed[..], &declarations);
-    let one = Checked { arguments, model, listed, declarations, evaluate, progress: &progress };
+    let (model, listed, declarations) = (&model, &queries.listed[..], &declarations);
+    let checked = CheckContext { arguments, model, listed, declarations, evaluate, progress: &progress };
     let mut answered = Vec::new();
-    for combination in &all {
-        let reports = one.check(combination).map_err(failed)?;
-        answered.push(Answered { combination, reports });
+    for combination in &value_combinations {
+        let reports = checked.check(combination).map_err(failed)?;
+        answered.push(CombinationResult { combination, reports });
     }
     progress.finish();
-    if asked.listed.len() == 1 && !is_series && arguments.props.is_none() {
+    if queries.listed.len() == 1 && !is_series && arguments.props.is_none() {
         let report = answered.swap_remove(0).reports.swap_remove(0).map_err(failed)?;
-        return single(arguments, common, &asked.listed[0].text, &report);
+        return single(arguments, common, &queries.listed[0].text, &report);
     }
-    write_all(arguments, common, &asked.listed, &answered)?;
+    write_all(arguments, common, &queries.listed, &answered)?;
     let mut messages = Vec::new();
     let mut exit = Exit::Done;
     for report in answered.into_iter().flat_map(|answered| answered.reports) {
@@ -146,22 +146,22 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     if messages.is_empty() {
         return Ok(exit);
     }
-    // Among the answers for programs they have their place.
+    // JSON answers contain the warnings.
     if common.format != Format::Json {
         output::warnings(common, &messages);
     }
     Ok(Exit::BadInput)
 }
 
-/// The property of the command line, or those of a file that are asked for.
-fn asked(arguments: &Arguments) -> Result<Asked, Failure> {
+/// Returns the property of the command line, or the selected properties of a file.
+fn asked(arguments: &Arguments) -> Result<Queries, Failure> {
     let Some(path) = &arguments.props else {
         let text = arguments.property.clone().unwrap_or_default();
         let property =
             property::parse(&text).map_err(|error| process_failure(error, ("", ""), ("property", &text)))?;
         let listed =
             vec![Listed { name: None, property, text: text.clone(), place: probabilistic::Place::default() }];
-        return Ok(Asked {
+        return Ok(Queries {
             listed,
             declarations: Declarations::default(),
             file: "property".to_owned(),
@@ -169,33 +169,33 @@ fn asked(arguments: &Arguments) -> Result<Asked, Failure> {
         });
     };
     let file = source(path)?;
-    let found = property::parse_file(file.text())
+    let parsed = property::parse_file(file.text())
         .map_err(|error| process_failure(error, ("", ""), (file.name(), file.text())))?;
     let (name, text) = (file.name().to_owned(), file.text().to_owned());
-    let property::File { declarations, properties } = found;
+    let property::File { declarations, properties } = parsed;
     if arguments.prop.is_empty() {
-        return Ok(Asked { listed: properties, declarations, file: name, text });
+        return Ok(Queries { listed: properties, declarations, file: name, text });
     }
     let mut listed = Vec::new();
     for wanted in &arguments.prop {
         let number = wanted.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
         let named = properties.iter().find(|property| property.name.as_ref() == Some(wanted));
         let Some(property) = named.or_else(|| properties.get(number?)) else {
-            let known: Vec<_> = properties.iter().filter_map(|property| property.name.as_deref()).collect();
+            let names: Vec<_> = properties.iter().filter_map(|property| property.name.as_deref()).collect();
             let text = format!(
                 "there is no property `{wanted}` in {name}, which has {}; their names: {}",
                 properties.len(),
-                known.join(", ")
+                names.join(", ")
             );
             return Err(Failure::usage(Message::error("M107", text)));
         };
         listed.push(property.clone());
     }
-    Ok(Asked { listed, declarations, file: name, text })
+    Ok(Queries { listed, declarations, file: name, text })
 }
 
-/// What is the same for all values of constants.
-struct Checked<'a> {
+/// Data shared by all combinations of constants.
+struct CheckContext<'a> {
     arguments: &'a Arguments,
     model: &'a Model,
     listed: &'a [Listed],
@@ -204,16 +204,16 @@ struct Checked<'a> {
     progress: &'a Progress,
 }
 
-impl Checked<'_> {
+impl CheckContext<'_> {
     fn check(&self, combination: &Combination) -> Result<Vec<Result<Report, Error>>, Error> {
-        let Checked { arguments, model, listed, declarations, evaluate, progress } = self;
-        let told = |states: usize| {
+        let CheckContext { arguments, model, listed, declarations, evaluate, progress } = self;
+        let report_states = |states: usize| {
             progress.set_message(format!("{states} states"));
             true
         };
         let options = Options::default()
             .with_settings(combination.settings.clone())
-            .with_bounds(Bounds::default().with_states(arguments.state_limit).with_progress(&told))
+            .with_bounds(Bounds::default().with_states(arguments.state_limit).with_progress(&report_states))
             .with_exactness(match (arguments.exact, arguments.inexact) {
                 (true, _) => Exactness::Always,
                 (_, true) => Exactness::Never,
@@ -233,7 +233,7 @@ fn precision(arguments: &Arguments) -> Option<Precision> {
     precision.map(if absolute { Precision::Absolute } else { Precision::Relative })
 }
 
-/// Whether the answer is as sure and as tight as was asked for.
+/// Returns `true` if the answer has the requested certainty and precision.
 fn is_proved(arguments: &Arguments, report: &Report) -> bool {
     let fits = precision(arguments).is_none_or(|precision| report.outcome.is_within(precision));
     fits && !matches!(report.outcome, Outcome::Undecided(_))
@@ -254,12 +254,13 @@ fn single(arguments: &Arguments, common: &Common, property: &str, report: &Repor
     Ok(if is_proved(arguments, report) { Exit::Done } else { Exit::NotProved })
 }
 
-/// Several answers: a line for each property, or a table with a line for each combination of values.
+/// Writes several answers: a line for each property, or a table with a line for each combination of
+/// values.
 fn write_all(
     arguments: &Arguments,
     common: &Common,
     listed: &[Listed],
-    answered: &[Answered<'_>],
+    answered: &[CombinationResult<'_>],
 ) -> Result<(), Failure> {
     let heads: Vec<&str> =
         listed.iter().map(|listed| listed.name.as_deref().unwrap_or(&listed.text)).collect();
@@ -270,7 +271,7 @@ fn write_all(
     }
     if common.format == Format::Json {
         let mut answers = Vec::new();
-        for Answered { combination, reports } in answered {
+        for CombinationResult { combination, reports } in answered {
             for (listed, report) in listed.iter().zip(reports) {
                 let Ok(report) = report else { continue };
                 let constants = combination.varied.iter().map(|(name, value)| (&name[..], &value[..]));
@@ -278,7 +279,7 @@ fn write_all(
             }
         }
         let mut answer = ChecksAnswer::new(answers);
-        for Answered { reports, .. } in answered {
+        for CombinationResult { reports, .. } in answered {
             for (listed, report) in listed.iter().zip(reports) {
                 if let Err(error) = report {
                     answer.refuse(&listed.text, listed.name.as_deref(), said(error));
@@ -291,17 +292,17 @@ fn write_all(
     } else {
         let mut text = String::new();
         for (head, report) in heads.iter().zip(&answered[0].reports) {
-            let shown =
+            let content =
                 report.as_ref().map_or("no answer\n".to_owned(), |report| as_text(report, common.verbose));
-            let between = if shown.trim_end().contains('\n') { "\n" } else { " " };
-            let _ = write!(text, "{head}:{between}{shown}");
+            let between = if content.trim_end().contains('\n') { "\n" } else { " " };
+            let _ = write!(text, "{head}:{between}{content}");
         }
         output::answer(&text);
     }
     Ok(())
 }
 
-/// What is wrong, in words.
+/// Formats an error.
 fn said(error: &Error) -> Vec<String> {
     match error.diagnostics() {
         [] => vec![error.to_string()],

@@ -1,4 +1,4 @@
-//! Series of constants, and the tables that they make.
+//! Series of constant values, and tables of their results.
 
 use metaplan::message::Message;
 use num_bigint::BigInt;
@@ -13,30 +13,30 @@ use crate::cli::check_text::{number, shown};
 use crate::cli::common::Failure;
 use crate::cli::output;
 
-/// Values that a series may have, and combinations of them.
+/// Maximum number of values in a series, and of combinations.
 const MOST: usize = 100_000;
 
-/// Values of all constants that are set.
+/// Values of all given constants.
 pub struct Combination {
     pub settings: Settings,
-    /// Those of the constants that have several, in the order of the command line.
+    /// The constants with several values, in the order of the command line.
     pub varied: Vec<(String, String)>,
 }
 
-/// A combination with what was found for each property.
+/// A combination of values with the result of each property.
 pub type Row<'a> = (&'a Combination, &'a [Result<Report, Error>]);
 
-/// All combinations of the values of the constants; those of the last one change first.
+/// Returns all combinations of the constants' values. The value of the last constant changes first.
 pub fn combinations(constants: &[(String, String)]) -> Result<Vec<Combination>, Failure> {
-    let mut all = vec![Combination { settings: Settings::new(), varied: Vec::new() }];
+    let mut combinations = vec![Combination { settings: Settings::new(), varied: Vec::new() }];
     for (name, text) in constants {
         let values = values(name, text).map_err(|text| Failure::usage(Message::error("M107", text)))?;
-        if all.len().saturating_mul(values.len()) > MOST {
+        if combinations.len().saturating_mul(values.len()) > MOST {
             let text = format!("more than {MOST} combinations of the values of constants");
             return Err(Failure::usage(Message::error("M107", text)));
         }
         let mut next = Vec::new();
-        for known in &all {
+        for known in &combinations {
             for value in &values {
                 let mut settings = known.settings.clone();
                 settings.insert(name.clone(), value.clone());
@@ -47,12 +47,13 @@ pub fn combinations(constants: &[(String, String)]) -> Result<Vec<Combination>, 
                 next.push(Combination { settings, varied });
             }
         }
-        all = next;
+        combinations = next;
     }
-    Ok(all)
+    Ok(combinations)
 }
 
-/// The values of a constant: one, or those of a series, as PRISM writes it: `first:last`, `first:step:last`.
+/// Parses the values of a constant: one value, or a series in PRISM's form `first:last` or
+/// `first:step:last`.
 fn values(name: &str, text: &str) -> Result<Vec<String>, String> {
     let parts: Vec<&str> = text.split(':').map(str::trim).collect();
     let (first, step, last) = match parts[..] {
@@ -80,16 +81,16 @@ fn values(name: &str, text: &str) -> Result<Vec<String>, String> {
     if count >= BigInt::from(MOST) {
         return Err(format!("the series `{name}={text}` has more than {MOST} values"));
     }
-    let mut all = Vec::new();
+    let mut values = Vec::new();
     let mut value = first;
     while value <= last {
-        all.push(decimal(&value));
+        values.push(decimal(&value));
         value += &step;
     }
-    Ok(all)
+    Ok(values)
 }
 
-/// A decimal as it is written; all values of a series are sums of such.
+/// Formats a decimal. All values of a series are sums of decimals.
 fn decimal(value: &BigRational) -> String {
     let (mut scaled, mut places) = (value.clone(), 0_usize);
     while !scaled.denom().is_one() {
@@ -102,7 +103,7 @@ fn decimal(value: &BigRational) -> String {
     if fraction.is_empty() { format!("{sign}{whole}") } else { format!("{sign}{whole}.{fraction}") }
 }
 
-/// What was found, in one cell.
+/// Formats a result for a cell.
 fn cell(report: &Result<Report, Error>, text: impl Fn(&Answer) -> String) -> String {
     match report {
         Err(_) => "no answer".to_owned(),
@@ -121,7 +122,7 @@ fn cell(report: &Result<Report, Error>, text: impl Fn(&Answer) -> String) -> Str
     }
 }
 
-/// As a table for people.
+/// Formats the results as a text table.
 pub fn table(heads: &[&str], rows: &[Row<'_>]) -> String {
     let header = header(heads, rows);
     let lines = rows.iter().map(|(combination, reports)| {
@@ -136,7 +137,8 @@ fn header<'a>(heads: &[&'a str], rows: &[Row<'a>]) -> Vec<&'a str> {
     varied.iter().map(|(name, _)| &name[..]).chain(heads.iter().copied()).collect()
 }
 
-/// As comma-separated values; a value is exact where that is known and short, and the nearest double otherwise.
+/// Formats the results as CSV. A value is exact if its exact form is known and short, and otherwise
+/// the nearest double.
 pub fn csv(heads: &[&str], rows: &[Row<'_>]) -> String {
     let plain = |answer: &Answer| match answer {
         Answer::Finite(quantity) => number(quantity.value),

@@ -1,4 +1,4 @@
-//! What `metaplan check` has found, for people.
+//! Formats the results of `metaplan check` as text.
 
 use std::fmt::Write as _;
 
@@ -59,7 +59,7 @@ fn states_text(variables: &[(String, bool)], states: &[Listed]) -> String {
     output::table(&header, rows)
 }
 
-/// A value for people: exactly, or with its bounds.
+/// Formats a value exactly, or with its bounds.
 pub fn shown(answer: &Answer) -> String {
     match answer {
         Answer::Infinite => "infinite".to_owned(),
@@ -79,7 +79,7 @@ pub fn shown(answer: &Answer) -> String {
     }
 }
 
-/// A double, with an exponent where there would be many zeros.
+/// Formats a double, with an exponent if it would have many zeros.
 pub fn number(value: f64) -> String {
     let size = value.abs();
     if value != 0.0 && size < 1e-6 || size >= 1e21 { format!("{value:e}") } else { value.to_string() }

@@ -1,4 +1,4 @@
-//! What all commands share: the exit status, why there is no answer, and how one is written.
+//! Shared parts of all commands: exit status, failures, and the output of answers.
 
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -23,7 +23,7 @@ pub(super) enum Exit {
     Fault = 70,
 }
 
-/// Why a command has no answer.
+/// Reason for a command without answer.
 pub(super) struct Failure {
     pub(super) exit: Exit,
     pub(super) messages: Errors,
@@ -34,7 +34,7 @@ impl Failure {
         Self { exit: Exit::Usage, messages: message.into() }
     }
 
-    /// Why there is no answer of the planner.
+    /// Failure of the planner.
     pub(super) fn planning(messages: Errors, limits: &Limits) -> Self {
         let is = |code: &str| messages.iter().any(|message| message.code == code);
         let exit = if is("M170") {
@@ -89,7 +89,7 @@ pub(super) struct Common {
 }
 
 impl Common {
-    /// Whether what goes there has colours.
+    /// Returns `true` if output to the stream is coloured.
     pub(super) fn colors(&self, stream: &impl IsTerminal) -> bool {
         let is_set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
         let is_dumb = std::env::var_os("TERM").is_some_and(|terminal| terminal == "dumb");
@@ -114,7 +114,7 @@ pub(super) enum Format {
     Turtle,
 }
 
-/// What the library reports of a model and a property, each with its name and its text.
+/// Converts an error about a model and a property, each given by its name and its text.
 pub(super) fn process_failure(error: Error, model: (&str, &str), property: (&str, &str)) -> Failure {
     match error {
         Error::Model(problems) => in_file(&problems, model),

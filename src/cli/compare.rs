@@ -116,7 +116,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         return Err(Failure::usage(Message::error("M129", text)));
     }
     if let Some(loss) = &coadaptation.loss
-        && !coadaptation.configurations.iter().any(|known| known.components.contains(&loss.component))
+        && !coadaptation
+            .configurations
+            .iter()
+            .any(|configuration| configuration.components.contains(&loss.component))
     {
         let text = format!("no configuration needs a component `{}` that could be lost", loss.component);
         return Err(Failure::usage(Message::error("M125", text)));
@@ -126,23 +129,23 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         None => Vec::new(),
     };
     let missions = missions(arguments, &mission, coadaptation, &roles)?;
-    so_far.change(|own| {
-        (own.of, own.added, own.csv) = (Some(missions.len()), added, arguments.csv.clone());
-        (own.mission, own.pages) = (mission.name.clone(), arguments.pages.clone());
+    so_far.change(|results| {
+        (results.of, results.added, results.csv) = (Some(missions.len()), added, arguments.csv.clone());
+        (results.mission, results.pages) = (mission.name.clone(), arguments.pages.clone());
     });
     let progress = Progress::new("comparing", common);
     let total = missions.len();
     for (number, (pair, mission, coadaptation)) in missions.into_iter().enumerate() {
         let mut report = |candidates: &[Candidate], costs: &Costs| {
             let (pair, candidates, costs) = (pair.clone(), candidates.to_vec(), costs.clone());
-            so_far.change(|own| own.begun = Some(Begun { pair, candidates, costs }));
+            so_far.change(|results| results.begun = Some(Begun { pair, candidates, costs }));
         };
         let (mission, coadaptation, tasked) = (&mission, &coadaptation, tasked.as_ref());
         let compared = Compared { mission, roles: &roles, coadaptation, tasked };
         let comparison = one(arguments, &compared, &mut report)?;
-        so_far.change(|own| {
-            own.begun = None;
-            own.done.push((pair, comparison));
+        so_far.change(|results| {
+            results.begun = None;
+            results.done.push((pair, comparison));
         });
         progress.set_message(format!("{} of {total} missions", number + 1));
     }
@@ -150,7 +153,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     so_far.end(common)
 }
 
-/// The mission itself, or the same mission between other places.
+/// Returns the mission itself, or variants of it with other starts and goals.
 fn missions(
     arguments: &Arguments,
     mission: &Mission,
@@ -160,33 +163,33 @@ fn missions(
     let places = coadaptation.places.len();
     let between = |start: usize, goal: usize| -> Result<_, Failure> {
         let (start_name, goal_name) = (&coadaptation.places[start], &coadaptation.places[goal]);
-        let mut other = mission.clone();
-        other.set(&roles.location, start_name).map_err(Failure::from)?;
-        other.aim(&roles.location, goal_name);
+        let mut variant = mission.clone();
+        variant.set(&roles.location, start_name).map_err(Failure::from)?;
+        variant.aim(&roles.location, goal_name);
         let moved = Coadaptation { start, goal, ..coadaptation.clone() };
-        Ok((Some((start_name.clone(), goal_name.clone())), other, moved))
+        Ok((Some((start_name.clone(), goal_name.clone())), variant, moved))
     };
     if let Some((start, goal)) = &arguments.pair {
         let place = |name: &String| {
-            let found = coadaptation.places.iter().position(|place| place.eq_ignore_ascii_case(name));
-            found.ok_or_else(|| {
-                let meant = did_you_mean(name, coadaptation.places.iter().map(String::as_str));
-                Failure::usage(Message::error("M129", format!("there is no place `{name}`{meant}")))
+            let position = coadaptation.places.iter().position(|place| place.eq_ignore_ascii_case(name));
+            position.ok_or_else(|| {
+                let suggestion = did_you_mean(name, coadaptation.places.iter().map(String::as_str));
+                Failure::usage(Message::error("M129", format!("there is no place `{name}`{suggestion}")))
             })
         };
         return Ok(vec![between(place(start)?, place(goal)?)?]);
     }
-    let Some(wanted) = arguments.pairs else { return Ok(vec![(None, mission.clone(), coadaptation)]) };
-    let all: Vec<(usize, usize)> = (0..places)
+    let Some(count) = arguments.pairs else { return Ok(vec![(None, mission.clone(), coadaptation)]) };
+    let pairs: Vec<(usize, usize)> = (0..places)
         .flat_map(|start| (0..places).filter(move |goal| *goal != start).map(move |goal| (start, goal)))
         .collect();
-    let mut found = Vec::new();
-    let wanted = wanted.clamp(1, all.len().max(1));
-    for number in 0..wanted.min(all.len()) {
-        let (start, goal) = all[number * all.len() / wanted];
-        found.push(between(start, goal)?);
+    let mut chosen = Vec::new();
+    let count = count.clamp(1, pairs.len().max(1));
+    for number in 0..count.min(pairs.len()) {
+        let (start, goal) = pairs[number * pairs.len() / count];
+        chosen.push(between(start, goal)?);
     }
-    Ok(found)
+    Ok(chosen)
 }
 
 fn one(

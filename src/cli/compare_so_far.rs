@@ -1,7 +1,7 @@
 //! Results of a comparison: all of them, or those that are available at the time limit.
 //!
-//! The comparison does not check the clock. So a separate thread waits for the time limit or for Ctrl-C, shows the
-//! results that are available then, and ends the program.
+//! The comparison does not check the clock. So a separate thread waits for the time limit or for
+//! Ctrl-C, shows the results that are available then, and ends the program.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -20,27 +20,27 @@ use crate::cli::compare_table::{as_text, costs_text, csv};
 use crate::cli::drawn::Pages;
 use crate::cli::output;
 
-/// How often the clock is looked at.
+/// Polling interval of the clock.
 const INTERVAL: Duration = Duration::from_millis(10);
 
-/// The comparisons that are done, and the one that is not.
+/// The finished comparisons, and the current one.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SoFar {
-    /// How many there will be; none while files are read.
+    /// Total number of comparisons. `None` while files are read.
     pub of: Option<usize>,
     pub done: Vec<(Option<Pair>, Comparison)>,
     pub begun: Option<Begun>,
     /// Rows that the user adds.
     pub added: Vec<Row>,
-    /// Where the table is to go as CSV.
+    /// File for the table in CSV.
     pub csv: Option<PathBuf>,
     /// The mission's name.
     pub mission: String,
-    /// Where pictures are to go.
+    /// Destinations of the pictures.
     pub pages: Pages,
 }
 
-/// A comparison that is not done.
+/// An unfinished comparison.
 #[derive(Debug, Clone)]
 pub(super) struct Begun {
     pub pair: Option<Pair>,
@@ -48,7 +48,7 @@ pub(super) struct Begun {
     pub costs: Costs,
 }
 
-/// What is shared with the thread that waits; none once somebody shows it.
+/// Results shared with the waiting thread. `None` once they are being shown.
 #[derive(Debug, Clone)]
 pub(super) struct Shared(Arc<Mutex<Option<SoFar>>>);
 
@@ -57,7 +57,7 @@ impl Shared {
         Self(Arc::new(Mutex::new(Some(SoFar::default()))))
     }
 
-    /// Changes what is there; nothing is, once time is up, since the program ends.
+    /// Changes the results. Does nothing once the time is over, since the program ends.
     pub fn change(&self, change: impl FnOnce(&mut SoFar)) {
         if let Some(so_far) = &mut *self.0.lock().unwrap_or_else(PoisonError::into_inner) {
             change(so_far);
@@ -68,12 +68,12 @@ impl Shared {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
-    /// Shows the available results at the time limit or at Ctrl-C, with a message, and ends the program. A second
-    /// Ctrl-C ends it at once.
+    /// Shows the available results at the time limit or at Ctrl-C, with a message, and ends the
+    /// program. A second Ctrl-C ends it at once.
     pub fn show_after(&self, time: Option<Duration>, common: &Common) {
         let limits = time.map_or_else(Limits::none, |time| Limits::none().with_time(time));
         let (common, shared, interrupt) = (common.clone(), self.clone(), limits.interrupt());
-        // If the platform refuses a handler, Ctrl-C ends the program as usual.
+        // Without a handler, Ctrl-C ends the program as usual.
         let _ = ctrlc::set_handler(move || {
             if interrupt.swap(true, Ordering::Relaxed) {
                 std::process::exit(130);
@@ -95,13 +95,13 @@ impl Shared {
         });
     }
 
-    /// Shows all of it.
+    /// Shows all results.
     ///
     /// # Errors
     /// The table cannot be written.
     pub fn end(&self, common: &Common) -> Result<Exit, Failure> {
         let Some(so_far) = self.take() else {
-            // The other thread has begun to show what is there, and ends the program.
+            // The other thread is showing the results and will end the program.
             loop {
                 std::thread::park();
             }
@@ -112,7 +112,7 @@ impl Shared {
 }
 
 impl SoFar {
-    /// That time was up, and how much there is.
+    /// Message about the reached time limit and the number of available results.
     fn message(&self) -> Message {
         let Some(of) = self.of else {
             return Message::error(
@@ -129,10 +129,13 @@ impl SoFar {
         Message::error("M130", text)
     }
 
-    /// Writes the answer; with a message if it is not all.
+    /// Writes the answer, with a message if it is incomplete.
     fn show(mut self, common: &Common, message: Option<Message>) -> Result<(), Failure> {
         let done = self.done.iter().flat_map(|(pair, comparison)| rows(pair.as_ref(), comparison));
-        let begun = self.begun.iter().flat_map(|own| begun_rows(own.pair.as_ref(), &own.candidates));
+        let begun = self
+            .begun
+            .iter()
+            .flat_map(|comparison| begun_rows(comparison.pair.as_ref(), &comparison.candidates));
         let measured: Vec<Row> = done.chain(begun).collect();
         let is_empty = measured.is_empty();
         let added = std::mem::take(&mut self.added);
@@ -147,8 +150,9 @@ impl SoFar {
             let done =
                 self.done.iter().map(|(pair, comparison)| ComparisonAnswer::new(pair.as_ref(), comparison));
             let begun = self.begun.iter();
-            let begun =
-                begun.map(|own| ComparisonAnswer::begun(own.pair.as_ref(), &own.candidates, &own.costs));
+            let begun = begun.map(|comparison| {
+                ComparisonAnswer::begun(comparison.pair.as_ref(), &comparison.candidates, &comparison.costs)
+            });
             let messages: Vec<Message> = message.into_iter().collect();
             output::json_answer(&CompareAnswer::new(done.chain(begun).collect(), &added, &messages));
             return Ok(());

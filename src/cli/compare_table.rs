@@ -1,4 +1,4 @@
-//! A comparison to a table for people, JSON and CSV; and rows that users add to it.
+//! Formats a comparison as text, JSON and CSV, and reads additional rows of users.
 
 use std::fmt::Write as _;
 
@@ -133,14 +133,15 @@ pub fn costs_text(k: &Costs) -> String {
     )
 }
 
-/// The greatest resident memory since this was last asked, in megabytes; none where the system does not forget it.
+/// Returns the peak resident memory since the last call, in megabytes. `None` if the system cannot
+/// reset the peak.
 pub fn memory_since() -> Option<u64> {
     let peak = peak_memory();
     // Linux: 5 resets the peak.
     std::fs::write("/proc/self/clear_refs", "5").ok().and(peak)
 }
 
-/// The greatest resident memory of this program in megabytes, where the system tells it.
+/// Returns the peak resident memory of this program in megabytes, if the system reports it.
 pub fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -1,4 +1,4 @@
-//! `metaplan completions` and `metaplan man`: what shells and `man` know of the command line, from its own description.
+//! `metaplan completions` and `metaplan man`, generated from the description of the command line.
 
 use std::path::PathBuf;
 

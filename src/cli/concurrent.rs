@@ -25,7 +25,7 @@ fn positive(text: &str) -> Result<BigRational, String> {
 }
 
 impl Overlap {
-    /// The separation of actions that interfere; none if actions are executed one after another.
+    /// Returns the separation of interfering happenings. `None` for sequential plans.
     pub(super) fn separation(&self) -> Option<&BigRational> {
         self.concurrent.then_some(&self.epsilon)
     }

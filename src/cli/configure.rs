@@ -1,4 +1,4 @@
-//! `metaplan configure`, and what `metaplan run --configure` shares with it.
+//! `metaplan configure`, and the arguments that it shares with `metaplan run --configure`.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -71,7 +71,7 @@ fn requirement(text: &str) -> Result<(String, String, BigRational), String> {
 }
 
 impl Wanted {
-    /// Whether anything is said.
+    /// Returns `true` if no option is given.
     pub(super) fn is_empty(&self) -> bool {
         self.objectives.is_empty()
             && self.requirements.is_empty()
@@ -81,7 +81,7 @@ impl Wanted {
             && self.least.is_none()
     }
 
-    /// What serves it, from a knowledge base.
+    /// Creates the configurator for a knowledge base.
     ///
     /// # Errors
     /// All names that are not in the knowledge base.
@@ -95,7 +95,7 @@ impl Wanted {
         let wishes = Wishes { worth, budgets: self.budgets.clone(), exclusive };
         let (mut configurator, mut wrong) = match Configurator::new(knowledge.clone(), wishes) {
             Ok(configurator) => (configurator, Vec::new()),
-            // What else is wrong is told, too.
+            // Further faults are reported together with these.
             Err(wrong) => (Configurator::new(knowledge, Wishes::default())?, wrong.into_vec()),
         };
         let functions = if self.objectives.is_empty() && configurator.objectives().is_empty() {
@@ -113,8 +113,9 @@ impl Wanted {
             }
         }
         for function in &functions {
-            let own = self.requirements.iter().filter(|(of, ..)| of == function);
-            let requirements = own.map(|(_, attribute, bound)| (attribute.clone(), bound.clone())).collect();
+            let requirements = self.requirements.iter().filter(|(of, ..)| of == function);
+            let requirements =
+                requirements.map(|(_, attribute, bound)| (attribute.clone(), bound.clone())).collect();
             wrong.extend(configurator.pursue(&Goal { requirements, ..Goal::of(function) }).err());
         }
         if wrong.is_empty() {
@@ -155,8 +156,8 @@ fn text(configuration: &Configuration, wishes: &Wishes) -> String {
     }
     let rows = configuration.choices.iter().map(|choice| {
         let function = choice.function.clone().unwrap_or_default();
-        let chosen = choice.considered.iter().find(|own| own.verdict == Verdict::Chosen);
-        let utility = chosen.map(|own| output::decimal(&own.utility)).unwrap_or_default();
+        let chosen = choice.considered.iter().find(|considered| considered.verdict == Verdict::Chosen);
+        let utility = chosen.map(|considered| output::decimal(&considered.utility)).unwrap_or_default();
         let design = choice.design.clone().unwrap_or_else(|| "none can be used".to_owned());
         vec![choice.objective.clone(), function, design, utility, choice.need.join(", ")]
     });
@@ -181,11 +182,12 @@ fn text(configuration: &Configuration, wishes: &Wishes) -> String {
     text
 }
 
-/// Why designs were not chosen that would be better, or cannot be used; and what the chosen one misses.
+/// Reasons why better designs were not chosen or cannot be used, and the requirements that the
+/// chosen design misses.
 fn reasons(choice: &Choice) -> String {
     let mut text = String::new();
     for considered in &choice.considered {
-        let said: Vec<&str> = match &considered.verdict {
+        let reasons: Vec<&str> = match &considered.verdict {
             Verdict::Chosen => {
                 for missed in &considered.missed {
                     let _ = writeln!(
@@ -202,7 +204,7 @@ fn reasons(choice: &Choice) -> String {
         };
         let utility = output::decimal(&considered.utility);
         let _ = writeln!(text, "\nnot {} ({utility}) for {}:", considered.design, choice.objective);
-        for reason in said {
+        for reason in reasons {
             let _ = writeln!(text, "    {reason}");
         }
     }

@@ -1,4 +1,5 @@
-//! Answers as pictures: `metaplan plan --svg` and `--picture`, and the pages and files of answers with several pictures.
+//! Answers as pictures: `metaplan plan --svg` and `--picture`, and the pages and files of answers
+//! with several pictures.
 
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
@@ -13,7 +14,7 @@ use planner::Solution;
 use crate::cli::common::Failure;
 use crate::cli::output;
 
-/// So wide is a picture where nobody says how wide the terminal is.
+/// Width of a picture if the width of the terminal is unknown.
 const COLUMNS: u16 = 100;
 
 /// Where a plan is drawn.
@@ -50,12 +51,12 @@ pub(super) struct Pages {
 }
 
 impl Pages {
-    /// Whether any picture is wanted.
+    /// Returns `true` if a picture is requested.
     pub(super) fn are_wanted(&self) -> bool {
         self.report.is_some() || self.svg.is_some()
     }
 
-    /// Writes what is wanted.
+    /// Writes the requested files.
     pub(super) fn write(&self, sheet: &Sheet) -> Result<(), Failure> {
         if let Some(directory) = &self.svg {
             write_pictures(directory, &sheet.pictures())?;
@@ -74,18 +75,19 @@ pub(super) fn write_pictures(directory: &Path, pictures: &[(String, String)]) ->
 }
 
 impl Drawing {
-    /// Whether a file is wanted.
+    /// Returns `true` if a file is requested.
     pub(super) fn is_file_wanted(&self) -> bool {
         self.svg.is_some()
     }
 
-    /// Writes the pictures of a front: it has one.
+    /// Writes the only picture of a front.
     pub(super) fn draw_front(&self, sheet: &Sheet) -> Result<(), Failure> {
         let (Some(file), [(_, picture)]) = (&self.svg, &sheet.pictures()[..]) else { return Ok(()) };
         output::write_file(file, &visible(picture))
     }
 
-    /// Writes the file, and returns the picture for a terminal: nothing where it is not wanted, or where there is too little room.
+    /// Writes the file, and returns the picture for a terminal. Empty if it is not requested, or if
+    /// the terminal is too small.
     pub(super) fn draw(
         &self,
         mission: &Mission,

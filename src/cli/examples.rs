@@ -1,4 +1,5 @@
-//! What `metaplan help COMMAND` shows below the options. A test runs every line, in the order of the commands.
+//! Examples below the options in `metaplan help COMMAND`. A test runs every line, in the order of
+//! the commands.
 
 pub(super) const INIT: &str = "\
 Examples:

@@ -61,7 +61,8 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(if complete { Exit::Done } else { Exit::NotProved })
 }
 
-/// Explains a design: why it is available or not at once, and the rest once it is planned. Returns whether all is proved.
+/// Explains a design: the reasons for its availability at once, the comparison with the best plan
+/// after planning. Returns `true` if everything is proved.
 fn explain_design(
     mission: &Mission,
     why: Availability,
@@ -72,26 +73,26 @@ fn explain_design(
     if is_text {
         output::answer(&why_text(&why));
     }
-    let found = planning(common, limits, |hear| why.plan(mission, limits, hear))?;
+    let explanation = planning(common, limits, |hear| why.plan(mission, limits, hear))?;
     if is_text {
-        output::answer(&design_text(&found));
+        output::answer(&design_text(&explanation));
     } else {
-        output::json_answer(&DesignAnswer::new(&mission.name, &found));
+        output::json_answer(&DesignAnswer::new(&mission.name, &explanation));
     }
-    Ok(found.complete)
+    Ok(explanation.complete)
 }
 
-/// Explains what would change the plan. Returns whether all is proved.
+/// Explains which changes lead to another plan. Returns `true` if everything is proved.
 fn explain_plan(mission: &Mission, limits: &Limits, common: &Common) -> Result<bool, Failure> {
-    let found = planning(common, limits, |hear| smallest_changes(mission, limits, hear))?;
+    let changes = planning(common, limits, |hear| smallest_changes(mission, limits, hear))?;
     match common.format {
-        Format::Json => output::json_answer(&ChangesAnswer::new(&mission.name, &found)),
-        _ => output::answer(&changes_text(&found)),
+        Format::Json => output::json_answer(&ChangesAnswer::new(&mission.name, &changes)),
+        _ => output::answer(&changes_text(&changes)),
     }
-    Ok(found.complete)
+    Ok(changes.complete)
 }
 
-/// Plans, and shows what is being planned.
+/// Runs planning queries and shows their progress.
 fn planning<T>(
     common: &Common,
     limits: &Limits,
@@ -103,12 +104,12 @@ fn planning<T>(
     outcome.map_err(|messages| Failure::planning(messages, limits))
 }
 
-/// What a code means.
+/// Explains a message code.
 fn code(name: &str, common: &Common) -> Result<Exit, Failure> {
     let Some(found) = codes::find(name) else {
-        let all = codes::all();
-        let meant = did_you_mean(name, all.iter().map(|code| code.code));
-        let text = format!("there is no code `{name}`, and no file of that name{meant}");
+        let catalogue = codes::all();
+        let suggestion = did_you_mean(name, catalogue.iter().map(|code| code.code));
+        let text = format!("there is no code `{name}`, and no file of that name{suggestion}");
         return Err(Failure::usage(Message::error("M138", text)));
     };
     if common.format == Format::Json {
@@ -120,12 +121,12 @@ fn code(name: &str, common: &Common) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// The steps of a plan, each on a line.
+/// Formats the steps of a plan, one per line.
 fn plan_text(answer: &BestPlan) -> String {
     answer.steps.iter().fold(String::new(), |text, step| text + "    " + &step.summary() + "\n")
 }
 
-/// A metric, and how it differs from that of the best plan.
+/// Formats a metric, with its difference from that of the best plan.
 fn cost_text(answer: &BestPlan, best: &BestPlan) -> String {
     let cost = match (&answer.cost, answer.proved) {
         (None, true) => return "there is no plan".to_owned(),
@@ -156,7 +157,7 @@ fn cost_text(answer: &BestPlan, best: &BestPlan) -> String {
     }
 }
 
-/// An alteration; `about` if its bound is not exact.
+/// Formats an alteration; `about` marks an inexact bound.
 fn alteration_text(alteration: &Alteration, about: bool) -> String {
     let Alteration { name, from, to } = alteration;
     let now = from.as_ref().map(|from| format!(" (now {})", decimal(from))).unwrap_or_default();
@@ -183,7 +184,7 @@ fn why_text(why: &Availability) -> String {
     if let ([way], false) = (&why.ways[..], why.available)
         && way.len() > 1
     {
-        let names = way.iter().map(|own| own.name.as_str()).collect::<Vec<_>>().join(", ");
+        let names = way.iter().map(|alteration| alteration.name.as_str()).collect::<Vec<_>>().join(", ");
         let _ = writeln!(text, "{} causes, all of which have to go: {names}", way.len());
     }
     text

@@ -86,7 +86,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(Exit::Done)
 }
 
-/// The co-adaptation process with everything that is uncertain in it.
+/// Returns the co-adaptation process with all its uncertain parts.
 fn process(
     arguments: &Arguments,
     common: &Common,
@@ -107,7 +107,7 @@ fn process(
     };
     let text = match arguments.target {
         Language::Jani => match probabilistic::jani::write(&mission.name, &model) {
-            // Indented it is three times as long, and nobody reads it.
+            // Indentation would triple the size of a file that only programs read.
             Ok(json) => format!("{json}\n"),
             Err(error) => {
                 let message =

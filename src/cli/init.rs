@@ -47,20 +47,20 @@ impl From<Start> for Template {
 /// Runs the command.
 pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let (directory, template) = (arguments.directory.as_path(), Template::from(arguments.from));
-    let shown = directory.display().to_string();
+    let path = directory.display().to_string();
     let Some(name) = directory.file_name().and_then(|name| name.to_str()) else {
-        let text = format!("`{shown}` does not name a new directory; give a name, such as `my-robot`");
+        let text = format!("`{path}` does not name a new directory; give a name, such as `my-robot`");
         return Err(Failure::usage(Message::error("M107", text)));
     };
     let schema = output::pretty(&schema("manifest"));
-    template.write(directory, name, &schema).map_err(|error| refused(directory, &shown, error.kind()))?;
+    template.write(directory, name, &schema).map_err(|error| refused(directory, &path, error.kind()))?;
     let files: Vec<&str> = template.files(name, &schema).into_iter().map(|(file, _)| file).collect();
     if common.format == Format::Json {
-        output::json_answer(&InitAnswer::new(&shown, template.name(), files));
+        output::json_answer(&InitAnswer::new(&path, template.name(), files));
     } else {
         let manifest = directory.join(MANIFEST);
         let next = format!("metaplan plan {}", manifest.display());
-        output::answer(&format!("{shown}: {}\nnext: {next}\n", files.join(", ")));
+        output::answer(&format!("{path}: {}\nnext: {next}\n", files.join(", ")));
     }
     Ok(Exit::Done)
 }

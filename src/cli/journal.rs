@@ -1,4 +1,4 @@
-//! `metaplan journal`: what is in the journal of a loop.
+//! `metaplan journal`: the contents of a loop's journal.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -79,7 +79,7 @@ fn line(entry: &Entry) -> String {
         let _ = write!(text, "  {:.3} s", time as f64 / 1e6);
     }
     let content = match &entry.content {
-        // A timer.
+        // An empty line is the event of a timer.
         Value::String(line) if line.is_empty() => "time has passed".to_owned(),
         Value::String(line) => line.clone(),
         Value::Array(answers) if answers.is_empty() => "nothing".to_owned(),

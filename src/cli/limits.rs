@@ -1,12 +1,14 @@
 //! Time limits and signals, from the first file read to the last proof.
 //!
-//! While a mission is read and reasoned about, there is no answer to save. So a signal ends the program at once, and
-//! a separate thread ends it at the time limit, unless an answer is being written. Commands that do not plan need
-//! nothing else. In commands that plan, the planner handles the first signal from then on, and returns the best plan
-//! found until then. A second signal ends the program at once.
+//! While a mission is read and reasoned about, there is no answer to save. So a signal ends the
+//! program at once, and a separate thread ends it at the time limit, unless an answer is being
+//! written. Commands that do not plan need nothing else. In commands that plan, the planner handles
+//! the first signal from then on, and returns the best plan found. A second signal ends the
+//! program at once.
 //!
-//! The loops of the planner, of the validator and of what follows poll the limits. If one of them does not, the separate thread ends
-//! the program a tenth of the limit later, as long as nothing is shown.
+//! The loops of the planner, of the validator and of the later stages poll the limits. If one of
+//! them does not, the separate thread ends the program a tenth of the limit later, unless an answer
+//! is being shown.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,7 +23,7 @@ use crate::cli::common::{Common, Exit, Failure};
 use crate::cli::output;
 use crate::cli::values::seconds;
 
-/// Time between two looks at the clock.
+/// Polling interval of the clock.
 const INTERVAL: Duration = Duration::from_millis(10);
 
 /// Processor time in addition to a tenth of the limit after which a command without an answer is ended.
@@ -37,10 +39,10 @@ pub(super) struct TimeLimit {
 }
 
 impl TimeLimit {
-    /// Begins to measure time.
+    /// Starts to measure time.
     ///
     /// # Errors
-    /// The time limit is 0: it has been reached before anything was read.
+    /// The time limit is 0, and so reached before anything is read.
     pub(super) fn guard(&self, common: &Common) -> Result<Guard, Failure> {
         if self.time_limit.is_some_and(|limit| limit.is_zero()) {
             return Err(Failure { exit: Exit::NothingFound, messages: nothing_to_show().into() });
@@ -49,17 +51,17 @@ impl TimeLimit {
     }
 }
 
-/// The limits of a command that reads first, and plans then.
+/// Limits of a command while it reads its input; [`Guard::plan`] passes them to the planner.
 pub(super) struct Guard {
     limits: Limits,
     has_read: Arc<AtomicBool>,
 }
 
 impl Guard {
-    /// Begins to measure time and memory.
+    /// Starts to measure time and memory.
     ///
     /// # Errors
-    /// The platform does not tell how much memory the process occupies.
+    /// The platform does not report the memory of the process.
     pub(super) fn new(time: Option<Duration>, memory: Option<u64>, common: &Common) -> Result<Self, Failure> {
         let mut limits = Limits::none();
         if let Some(time) = time {
@@ -72,7 +74,7 @@ impl Guard {
             return Err(Failure::usage(Message::error("M115", text)));
         }
         if let Some(megabytes) = memory {
-            // Formulas and what is ground take the other half.
+            // Formulas and ground tasks take the other half.
             let half = usize::try_from(megabytes).unwrap_or(usize::MAX).saturating_mul(1 << 19);
             limits = limits.with_room(half);
         }
@@ -82,26 +84,27 @@ impl Guard {
             if let Some(megabytes) = memory {
                 let _ = memory::watch(megabytes.saturating_add(megabytes / 10), Arc::clone(&too_large));
             }
-            let late = Late { started: Instant::now(), time, too_large };
+            let late = Deadline { started: Instant::now(), time, too_large };
             give_up_late(limits.clone(), Arc::clone(&has_read), late, common.clone());
         }
         Ok(Self { limits, has_read })
     }
 
-    /// All has been read. Signals, time and memory are the planner's business from now on.
+    /// Ends the reading stage. From now on the planner handles signals, time and memory.
     pub(super) fn plan(self) -> Limits {
         if self.has_read.swap(true, Ordering::Relaxed) {
-            // The other thread has begun to say that time is up, and ends the program.
+            // The other thread is reporting the time limit and will end the program.
             loop {
                 std::thread::park();
             }
         }
         let interrupt = self.limits.interrupt();
-        // The soft limit on processor time; the hard one ends the program.
+        // The system sends this signal at the soft limit on processor time, and kills the program
+        // at the hard limit.
         #[cfg(unix)]
         let _ = signal_hook::flag::register(signal_hook::consts::SIGXCPU, Arc::clone(&interrupt));
-        // A second handler cannot be there; if the platform refuses one, Ctrl-C ends the program as usual. Who presses it
-        // again does not want the best plan so far, either.
+        // A second handler cannot exist. If the platform rejects this one, Ctrl-C ends the program
+        // as usual. A user who presses Ctrl-C again does not want the best plan found either.
         let _ = ctrlc::set_handler(move || {
             if interrupt.swap(true, Ordering::Relaxed) {
                 std::process::exit(130);
@@ -115,30 +118,32 @@ fn nothing_to_show() -> Message {
     Message::error("M130", "a limit was reached before there was anything to show")
 }
 
-/// When a command without an answer is ended after it has read its input.
-struct Late {
+/// Deadline of a command that has read its input and has no answer.
+struct Deadline {
     started: Instant,
     time: Option<Duration>,
     /// Set when the process occupies a tenth more than its memory limit.
     too_large: Arc<AtomicBool>,
 }
 
-impl Late {
+impl Deadline {
     fn is_reached(&self) -> bool {
         let is_over = |time: Duration| {
             let end = time.saturating_add(time / 10).saturating_add(GRACE);
             let elapsed = self.started.elapsed();
-            // On a busy machine the answer may take longer.
+            // Processor time also has to exceed the limit, since an answer takes longer on a busy
+            // machine.
             elapsed > end && processor_time().unwrap_or(elapsed) > end
         };
         self.too_large.load(Ordering::Relaxed) || self.time.is_some_and(is_over)
     }
 }
 
-/// The processor time of this process, in steps of 10 ms. Returns `None` where the platform does not report it in this way.
+/// Returns the processor time of this process, in steps of 10 ms. `None` where the platform does
+/// not report it in this way.
 fn processor_time() -> Option<Duration> {
     let text = std::fs::read_to_string("/proc/self/stat").ok()?;
-    // The name of the program stands in parentheses, and may contain anything.
+    // The name of the program is in parentheses and may contain any characters.
     let (_, fields) = text.rsplit_once(')')?;
     let mut times = fields.split_whitespace().skip(11);
     let mut ticks = || times.next()?.parse::<u64>().ok();
@@ -146,8 +151,8 @@ fn processor_time() -> Option<Duration> {
     Some(Duration::from_millis(user.saturating_add(system).saturating_mul(10)))
 }
 
-/// Reading does not look at the limits. What follows does, but for faults.
-fn give_up_late(limits: Limits, has_read: Arc<AtomicBool>, late: Late, common: Common) {
+/// Ends the program late. Reading does not poll the limits; all later stages do, except for faults.
+fn give_up_late(limits: Limits, has_read: Arc<AtomicBool>, late: Deadline, common: Common) {
     std::thread::spawn(move || {
         while !has_read.load(Ordering::Relaxed) && !limits.reached() {
             std::thread::sleep(INTERVAL);
@@ -160,9 +165,9 @@ fn give_up_late(limits: Limits, has_read: Arc<AtomicBool>, late: Late, common: C
     });
 }
 
-/// Ends the program, unless there is something to show, or another condition holds.
+/// Ends the program, unless an answer is being shown, or `condition` holds.
 fn end_unless(common: &Common, condition: impl FnOnce() -> bool) {
-    // A thread that writes an answer holds this lock, and completes the answer.
+    // A thread that writes an answer holds this lock until the answer is complete.
     let _stdout = std::io::stdout().lock();
     if !output::has_begun() && !condition() {
         output::failure(common, &[nothing_to_show()]);

@@ -1,4 +1,5 @@
-//! Arguments to calls of the library, answers to standard output, everything else to standard error.
+//! The command line: parses arguments, calls the library, and writes answers to standard output and
+//! everything else to standard error.
 
 mod alternatives;
 mod check;
@@ -123,16 +124,16 @@ enum Subcommands {
     Man(completions::ManArguments),
 }
 
-/// The width of help where it is not known how wide a line may be.
+/// Width of help texts if the width of the terminal is unknown.
 const HELP_COLUMNS: usize = 80;
 
-/// Longer lines of help are hard to read.
+/// Maximum width of help texts; longer lines are hard to read.
 const MAX_HELP_COLUMNS: usize = 100;
 
 /// Runs the program.
 pub fn main() -> ExitCode {
     let cli = parse();
-    // The default hook would print a stack trace at users; what matters is printed below.
+    // The default hook would print a stack trace to users; a short message is printed below.
     std::panic::set_hook(Box::new(|_| {}));
     let outcome = std::panic::catch_unwind(|| traced(&cli));
     let exit = match outcome {
@@ -150,7 +151,8 @@ pub fn main() -> ExitCode {
     ExitCode::from(exit as u8)
 }
 
-/// Runs the command, with a trace if one is wanted. A trace that cannot be written is an error once the answer is there.
+/// Runs the command, with a trace if requested. A trace that cannot be written is an error after
+/// the answer.
 fn traced(cli: &Cli) -> Result<Exit, Failure> {
     let trace = cli.common.trace.as_deref().map(Trace::begin).transpose()?;
     let outcome = run(cli);
@@ -160,7 +162,7 @@ fn traced(cli: &Cli) -> Result<Exit, Failure> {
     }
 }
 
-/// The command line. What is wrong with it is said in colours where `--color` asks for that, wherever it stands.
+/// Parses the command line. `--color` applies to messages about faulty arguments at any position.
 fn parse() -> Cli {
     let words: Vec<String> = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
     let beside = words.iter().zip(words.iter().skip(1)).filter(|(word, _)| *word == "--color");

@@ -1,4 +1,4 @@
-//! What plans come to by the objectives of `--minimize` and `--pareto`, as text.
+//! Formats the values of plans by the objectives of `--minimize` and `--pareto`.
 
 use std::fmt::Write as _;
 
@@ -7,7 +7,7 @@ use planner::{Exact, Front, Status};
 use crate::cli::plan_answer::answer_text;
 use crate::cli::plan_text::steps_text;
 
-/// A line with the values by objective, where there are several.
+/// Formats the values of several objectives in a line.
 pub(super) fn values_text(objectives: &[String], values: &[Exact]) -> String {
     if objectives.len() < 2 || values.is_empty() {
         return String::new();
@@ -15,7 +15,7 @@ pub(super) fn values_text(objectives: &[String], values: &[Exact]) -> String {
     format!("in order: {}\n", pairs(objectives, values))
 }
 
-/// A front as tables.
+/// Formats a front as tables.
 pub(super) fn front_text(name: &str, objectives: &[String], front: &Front, columns: Option<u16>) -> String {
     let solved: Vec<_> = front.points.iter().filter(|point| point.solution.plan.is_some()).collect();
     let mut text = String::new();
@@ -32,7 +32,7 @@ pub(super) fn front_text(name: &str, objectives: &[String], front: &Front, colum
         }
         (Status::Feasible, _) => {
             let proved = solved.iter().filter(|point| point.solution.status == Status::Optimal).count();
-            // Of the last point a better one by the first objective may exist.
+            // A point with a better first objective may exist beyond the last one.
             let open = if proved < solved.len() { ", and one more that is not proved to be" } else { "" };
             let _ = writeln!(
                 text,

@@ -1,4 +1,4 @@
-//! Writing: answers, messages, tables, files that are either whole or not there.
+//! Output of answers, messages and tables, and atomic writing of files.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -17,28 +17,30 @@ use serde::Serialize;
 
 use crate::cli::common::{Common, Failure, Format};
 
-/// Whether an answer could not be written.
+/// Set if an answer could not be written.
 static ANSWER_LOST: AtomicBool = AtomicBool::new(false);
 
-/// Whether an answer, or a part of one, is being written or has been written.
+/// Set once an answer, or a part of one, is being written.
 static HAS_BEGUN: AtomicBool = AtomicBool::new(false);
 
-/// How many messages are shown before the rest is only counted.
+/// Maximum number of messages shown; further messages are only counted.
 const MESSAGE_LIMIT: usize = 20;
 
-/// How many warnings of one code are shown before the rest is only counted.
+/// Maximum number of warnings shown per code; further warnings are only counted.
 const KIND_LIMIT: usize = 10;
 
-/// Writes an answer for people to standard output, see [`visible`].
+/// Writes an answer for people to standard output, with control characters made visible by
+/// [`visible`].
 pub fn answer(text: &str) {
     document(&visible(text));
 }
 
-/// Writes a document as it is to standard output; a reader that has gone away is not a fault, a full disk is.
+/// Writes a document unchanged to standard output. A closed pipe is not an error; a full disk is.
 pub fn document(text: &str) {
     let mut stdout = std::io::stdout().lock();
     HAS_BEGUN.store(true, Ordering::Relaxed);
     if let Err(error) = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush())
+        // A closed pipe is the decision of the reader, for example `head`.
         && error.kind() != ErrorKind::BrokenPipe
     {
         ANSWER_LOST.store(true, Ordering::Relaxed);
@@ -47,13 +49,13 @@ pub fn document(text: &str) {
     }
 }
 
-/// Whether an answer could not be written.
+/// Returns `true` if an answer could not be written.
 pub fn answer_lost() -> bool {
     ANSWER_LOST.load(Ordering::Relaxed)
 }
 
-/// Returns `true` if an answer, or a part of one, is being written or has been written. The result stays valid while
-/// the caller holds the lock of standard output.
+/// Returns `true` if an answer, or a part of one, is being written or has been written. The result
+/// stays valid while the caller holds the lock of standard output.
 pub fn has_begun() -> bool {
     HAS_BEGUN.load(Ordering::Relaxed)
 }
@@ -63,22 +65,22 @@ pub fn json_answer(answer: &impl Serialize) {
     document(&visible_json(&pretty(answer)));
 }
 
-/// An answer for programs as one line.
+/// Formats an answer for programs as one line.
 pub fn line(answer: &impl Serialize) -> String {
     serde_json::to_string(answer).unwrap_or_default() + "\n"
 }
 
-/// A sentence for people beside the answer, on standard error.
+/// Writes a sentence for people to standard error.
 pub fn note(text: &str) {
     let _ = std::io::stderr().write_all(visible(text).as_bytes());
 }
 
-/// A message as a terminal shows it.
+/// Formats a message for a terminal.
 pub fn shown(message: &Message, colors: bool) -> Cow<'_, str> {
     if colors { message.colored().into() } else { visible(message.text()) }
 }
 
-/// Messages beside the answer, on standard error; warnings only unless asked to be quiet.
+/// Writes messages to standard error. `--quiet` suppresses warnings.
 pub fn warnings<'a>(common: &Common, messages: impl IntoIterator<Item = &'a Message>) {
     let mut stderr = std::io::stderr().lock();
     let colors = common.colors(&stderr);
@@ -90,13 +92,13 @@ pub fn warnings<'a>(common: &Common, messages: impl IntoIterator<Item = &'a Mess
             let _ = stderr.write_all(shown(message, colors).as_bytes());
         }
     }
-    let more = counts.into_iter().filter(|(_, count)| !common.quiet && *count > KIND_LIMIT);
-    for (code, count) in more {
+    let omitted = counts.into_iter().filter(|(_, count)| !common.quiet && *count > KIND_LIMIT);
+    for (code, count) in omitted {
         let _ = writeln!(stderr, "… and {} more {code}; `--format json` lists all", count - KIND_LIMIT);
     }
 }
 
-/// Errors: text on standard error, or a JSON object as the answer.
+/// Reports errors: text on standard error, or a JSON object as the answer.
 pub fn failure(common: &Common, messages: &[Message]) {
     if common.format == Format::Json {
         json_answer(&ErrorAnswer::new(messages));
@@ -104,31 +106,32 @@ pub fn failure(common: &Common, messages: &[Message]) {
     }
     let mut stderr = std::io::stderr().lock();
     let colors = common.colors(&stderr);
-    let told: Vec<_> = messages.iter().filter(|message| message.is_error() || !common.quiet).collect();
-    for message in told.iter().take(MESSAGE_LIMIT) {
+    let visible: Vec<_> = messages.iter().filter(|message| message.is_error() || !common.quiet).collect();
+    for message in visible.iter().take(MESSAGE_LIMIT) {
         let _ = stderr.write_all(shown(message, colors).as_bytes());
     }
-    if told.len() > MESSAGE_LIMIT {
-        let rest = told.len() - MESSAGE_LIMIT;
-        let _ = writeln!(stderr, "… and {rest} more; `--format json` lists all");
+    if visible.len() > MESSAGE_LIMIT {
+        let omitted = visible.len() - MESSAGE_LIMIT;
+        let _ = writeln!(stderr, "… and {omitted} more; `--format json` lists all");
     }
 }
 
-/// Writes a file so that it is either whole or untouched, see [`file::write`].
+/// Writes a file atomically, see [`file::write`].
 pub fn write_file(path: &Path, text: &str) -> Result<(), Failure> {
     {
+        // The thread of the time limit holds this lock while it decides whether to end the program.
         let _stdout = std::io::stdout().lock();
         HAS_BEGUN.store(true, Ordering::Relaxed);
     }
     file::write(path, text).map_err(Failure::from)
 }
 
-/// The file that `--output` names. Returns `None` for standard output, which `-` means, too.
+/// Returns the file that `--output` names. `None` for standard output, the meaning of `-`.
 pub fn file_named(output: Option<&PathBuf>) -> Option<&Path> {
     output.map(PathBuf::as_path).filter(|path| !file::is_stdout(path))
 }
 
-/// Makes a directory for several files, with those above it.
+/// Creates a directory for several files, with its parent directories.
 pub fn make_directory(path: &Path) -> Result<(), Failure> {
     require_directory(path)?;
     std::fs::create_dir_all(path).map_err(|error| {
@@ -137,7 +140,7 @@ pub fn make_directory(path: &Path) -> Result<(), Failure> {
     })
 }
 
-/// Refuses standard output in the place of a directory.
+/// Rejects `-`, which is not a directory.
 pub fn require_directory(path: &Path) -> Result<(), Failure> {
     if path.as_os_str() != "-" {
         return Ok(());
@@ -147,23 +150,24 @@ pub fn require_directory(path: &Path) -> Result<(), Failure> {
     Err(Failure::usage(Message::error("M107", text)))
 }
 
-/// Number of columns for answers: `COLUMNS`, or the width of the terminal. Returns `None` if neither is known, or if
-/// it is 0.
+/// Returns the number of columns for answers: `COLUMNS`, or the width of the terminal. `None` if
+/// neither is known, or if it is 0.
 pub fn columns() -> Option<u16> {
-    let wanted = std::env::var("COLUMNS").ok().and_then(|columns| columns.trim().parse().ok());
+    let requested = std::env::var("COLUMNS").ok().and_then(|columns| columns.trim().parse().ok());
     let of_terminal = || {
         let size = std::io::stdout().is_terminal().then(|| Term::stdout().size_checked()).flatten();
         size.map(|(_, columns)| columns)
     };
-    wanted.or_else(of_terminal).filter(|columns| *columns > 0)
+    requested.or_else(of_terminal).filter(|columns| *columns > 0)
 }
 
-/// A table without borders, for standard output: cells are wrapped where it is too wide.
+/// Formats a table without borders for standard output. Cells of a table that is too wide are
+/// wrapped.
 pub fn table(header: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     table_within(columns(), header, rows)
 }
 
-/// A table without borders, at most this many columns wide.
+/// Formats a table without borders, at most `columns` columns wide.
 pub fn table_within(
     columns: Option<u16>,
     header: &[&str],
@@ -188,7 +192,7 @@ pub fn table_within(
     })
 }
 
-/// Breaks cells between words only, if there are columns enough for the longest words.
+/// Breaks cells only between words, if the width suffices for the longest words.
 fn keep_words(table: &mut Table, columns: u16) {
     let mut longest = vec![0; table.column_count()];
     for row in table.header().into_iter().chain(table.row_iter()) {
@@ -205,6 +209,7 @@ fn keep_words(table: &mut Table, columns: u16) {
             u16::try_from(longest).unwrap_or(u16::MAX).saturating_add(column.padding_width())
         })
         .collect();
+    // A narrow terminal has to break words.
     if widths.iter().copied().fold(0, u16::saturating_add) > columns {
         return;
     }
@@ -213,12 +218,13 @@ fn keep_words(table: &mut Table, columns: u16) {
     }
 }
 
-/// An exact number as decimal text; a fraction that is not a decimal is rounded.
+/// Formats an exact number as decimal text. A fraction without a finite decimal expansion is
+/// rounded.
 pub fn decimal(value: &num_rational::BigRational) -> String {
     rules::Decimal::from_rational(value).to_string()
 }
 
-/// A number with what is counted, in the singular or in the plural: `1 conflict`, `2 conflicts`.
+/// Formats a count with its noun, in the singular or in the plural: `1 conflict`, `2 conflicts`.
 pub fn counted<N: Copy + std::fmt::Display + PartialEq + From<u8>>(count: N, noun: &str) -> String {
     let ending = if count == N::from(1) { "" } else { "s" };
     format!("{count} {noun}{ending}")
@@ -229,7 +235,7 @@ mod tests {
     use super::counted;
 
     #[test]
-    fn one_is_singular() {
+    fn a_count_of_one_is_singular() {
         let texts = [0_usize, 1, 2].map(|count| counted(count, "solver call"));
         assert_eq!(texts, ["0 solver calls", "1 solver call", "2 solver calls"]);
     }

@@ -152,7 +152,7 @@ impl From<Encoding> for StepSemantics {
     }
 }
 
-/// What the user asks of the optimizer.
+/// Returns the optimizer's configuration by the options.
 fn configuration(arguments: &Arguments, limits: Limits) -> Config {
     Config::default()
         .with_horizon(arguments.horizon)
@@ -165,7 +165,7 @@ fn configuration(arguments: &Arguments, limits: Limits) -> Config {
 }
 
 impl Arguments {
-    /// Refuses what no parser of options sees.
+    /// Rejects combinations of options that the parser cannot detect.
     fn check(&self) -> Result<(), Failure> {
         let usage = |code: &str, text: String| Failure::usage(Message::error(code, text));
         self.solver.check().map_err(|error| usage("M113", error.to_string()))?;
@@ -181,7 +181,7 @@ impl Arguments {
         Ok(())
     }
 
-    /// The file for the answer. Returns `None` for standard output.
+    /// Returns the file for the answer, or `None` for standard output.
     fn file(&self) -> Option<&Path> {
         output::file_named(self.output.as_ref())
     }
@@ -197,12 +197,12 @@ impl Arguments {
         }
     }
 
-    /// Number of columns for tables. Returns `None` for files, which have no width.
+    /// Returns the number of columns for tables, or `None` for files, which have no width.
     fn columns(&self) -> Option<u16> {
         if self.file().is_some() { None } else { output::columns() }
     }
 
-    /// Whether people read the answer where it is.
+    /// Returns `true` if the answer is text for people on standard output.
     fn is_text(&self, common: &Common) -> bool {
         self.plan_format.is_none() && self.file().is_none() && common.format == Format::Text
     }
@@ -241,15 +241,15 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         })
         .on_stage(|what| progress.set_message(what.to_owned()));
     if let Some(pair) = &arguments.pareto {
-        let found = planner.pareto(two(pair)?);
+        let front = planner.pareto(two(pair)?);
         progress.finish();
-        let mut front = found.map_err(|messages| Failure::planning(messages, &limits))?;
+        let mut front = front.map_err(|messages| Failure::planning(messages, &limits))?;
         front.preparation.read = read;
         return show_front(&front, &mission.name, &positions, (arguments, common));
     }
-    let found = planner.plan();
+    let front = planner.plan();
     progress.finish();
-    let mut planned = found.map_err(|messages| Failure::planning(messages, &limits))?;
+    let mut planned = front.map_err(|messages| Failure::planning(messages, &limits))?;
     planned.preparation.read = read;
     if common.verbose {
         for message in &planned.too_large {
@@ -261,10 +261,10 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
         output::warnings(common, &[Message::warning("M114", text)]);
     }
     finish(&planned, &mission, (arguments, common))?;
-    // The plan is shown by now, however long the rest takes.
+    // The plan is shown before the certificate is written, which may take long.
     Ok(match arguments.certificate.as_deref().map_or(Ok(()), |directory| planned.certify(directory)) {
         Ok(()) => exit(planned.solution.status),
-        // The plan is there, but what was asked for besides is not.
+        // The plan is written, but the requested certificate is not.
         Err(message) => {
             output::warnings(common, [&message]);
             Exit::BadInput
@@ -272,7 +272,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     })
 }
 
-/// The two objectives of a front.
+/// Splits the two objectives of a front.
 fn two(pair: &str) -> Result<[&str; 2], Failure> {
     let parts: Vec<_> = pair.split(',').map(str::trim).collect();
     <[&str; 2]>::try_from(parts).map_err(|parts| {
@@ -296,13 +296,14 @@ fn finish(
             output::note(&beside(planned, arguments, common));
         }
         (Some(text), None) => output::answer(&(drawn + &text)),
-        // There is nothing to write, and readers of plans would stumble over anything else.
+        // Readers of plans expect either a plan or an empty file.
         (None, _) => output::note(&beside(planned, arguments, common)),
     }
     Ok(())
 }
 
-/// Text that is printed if the plan goes to a file: the verdict, and whatever the file's format cannot hold.
+/// Text that is printed if the plan goes to a file: the verdict, and the parts of the answer that
+/// the file's format lacks.
 fn beside(planned: &Planned<'_>, arguments: &Arguments, common: &Common) -> String {
     let verdict = format!("{}\n", planned.solution.verdict());
     match arguments.form(common) {
@@ -313,22 +314,23 @@ fn beside(planned: &Planned<'_>, arguments: &Arguments, common: &Common) -> Stri
     }
 }
 
-/// Text below the verdict.
+/// Returns the text below the verdict.
 fn further(planned: &Planned<'_>, solution: &Solution, (arguments, common): (&Arguments, &Common)) -> String {
     let statistics =
         if common.verbose { statistics_text(solution, &planned.preparation) } else { String::new() };
     let overlaps = solution.plan.as_ref().filter(|_| planned.overlaps());
     let makespan = overlaps.map_or_else(String::new, |plan| format!("makespan {}\n", plan.makespan()));
     let columns = arguments.columns();
-    let others = arguments.alternatives.and(solution.plan.as_ref());
-    let others = others.map(|_| alternatives::text(planned.alternatives.as_ref(), planned, columns));
+    let alternatives_text = arguments.alternatives.and(solution.plan.as_ref());
+    let alternatives_text =
+        alternatives_text.map(|_| alternatives::text(planned.alternatives.as_ref(), planned, columns));
     let blocking = planned.blocking.as_ref().map(|blocking| format!("{blocking}\n"));
     let blocking = blocking.map(|text| text + &missing_text(&planned.missing_values));
     let values = objectives::values_text(planned.objectives(), &planned.values);
-    statistics + &values + &makespan + &others.or(blocking).unwrap_or_default()
+    statistics + &values + &makespan + &alternatives_text.or(blocking).unwrap_or_default()
 }
 
-/// The answer in the form that the user asks for; none if that is a plan, and there is none.
+/// Formats the answer as requested. `None` if the requested plan does not exist.
 fn show(
     planned: &Planned<'_>,
     mission: &Mission,
@@ -344,29 +346,33 @@ fn show(
         }
         PlanFormat::Btcpp => planned.written().map(|plan| btcpp_text(mission, &plan)),
         PlanFormat::Plansys2 => planned.spaced().map(|plan| popf_text(&plan_lines(&plan))),
-        // What `validate` executes has the designs, what the user's own domain has no place for them has not.
+        // Plans for `validate` include the designs; plans for the user's own domain do not, as its
+        // actions have no such parameters.
         PlanFormat::Ipc => planned.solution.plan.as_ref().map(Plan::to_string),
     }
 }
 
-/// Maximum number of missing values that are listed; further ones are only counted.
+/// Maximum number of listed missing values; further ones are only counted.
 const MISSING_SHOWN: usize = 10;
 
-/// The numbers that are missing, a line each.
+/// Lists the missing numbers, one per line.
 fn missing_text(missing: &[MissingValue]) -> String {
-    let line = |own: &MissingValue| {
-        let (function, actions, file) = (&own.function, own.needed_by.join(", "), &own.file);
-        match &own.estimation {
+    let line = |value: &MissingValue| {
+        let (function, actions, file) = (&value.function, value.needed_by.join(", "), &value.file);
+        match &value.estimation {
             Some((design, attribute)) => {
                 format!("    the estimation of {attribute} of {design}, for {actions}, in {file}\n")
             }
             None => format!("    {function}, for {actions}, in {file}\n"),
         }
     };
-    let more = missing.len().saturating_sub(MISSING_SHOWN);
-    let more =
-        if more > 0 { format!("    and {more} more; `--format json` lists all\n") } else { String::new() };
-    let lines: String = missing.iter().take(MISSING_SHOWN).map(line).chain([more]).collect();
+    let omitted = missing.len().saturating_sub(MISSING_SHOWN);
+    let omitted = if omitted > 0 {
+        format!("    and {omitted} more; `--format json` lists all\n")
+    } else {
+        String::new()
+    };
+    let lines: String = missing.iter().take(MISSING_SHOWN).map(line).chain([omitted]).collect();
     if lines.is_empty() {
         lines
     } else {
@@ -399,7 +405,7 @@ fn show_front(
     Ok(exit(front.front.status))
 }
 
-/// How the program ends with a solution of this status.
+/// Returns the exit status for a solution status.
 pub(super) fn exit(status: Status) -> Exit {
     match status {
         Status::Optimal => Exit::Done,

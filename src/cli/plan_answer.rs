@@ -1,4 +1,4 @@
-//! A solution as text.
+//! Formats a solution as text.
 
 use std::fmt::Write as _;
 
@@ -31,7 +31,7 @@ pub(super) fn answer_text(name: &str, solution: &Solution, columns: Option<u16>)
     text
 }
 
-/// Text about the search for an answer, for `--verbose`.
+/// Formats the statistics of the search, for `--verbose`.
 pub(super) fn statistics_text(solution: &Solution, preparation: &Preparation) -> String {
     let statistics = &solution.statistics;
     let families: Vec<_> =

@@ -1,4 +1,4 @@
-//! A plan in the formats of other programs.
+//! Formats a plan for other programs.
 
 use clap::ValueEnum;
 
@@ -20,7 +20,7 @@ pub(super) enum PlanFormat {
     Table,
 }
 
-/// The steps as a table, at most this many columns wide.
+/// Formats the steps as a table, at most `columns` columns wide.
 pub(super) fn steps_text(plan: &Plan, columns: Option<u16>) -> String {
     let rows = plan.steps.iter().enumerate().map(|(index, step)| {
         let configuration: Vec<_> =
@@ -39,7 +39,7 @@ pub(super) fn steps_text(plan: &Plan, columns: Option<u16>) -> String {
     output::table_within(columns, &["step", "start", "duration", "action", "configuration", "cost"], rows)
 }
 
-/// The arguments of a step apart from functions and their designs.
+/// Returns the arguments of a step except for functions and their designs.
 fn route(step: &Step) -> Vec<&str> {
     let configured =
         |argument: &String| step.configuration.iter().any(|(f, design)| f == argument || design == argument);

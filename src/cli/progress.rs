@@ -1,4 +1,5 @@
-//! How far a command is, on standard error: a line that changes on a terminal, and elsewhere a line every few seconds.
+//! Progress of a command on standard error: a changing line on a terminal, otherwise a line every
+//! few seconds.
 
 use std::io::IsTerminal as _;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -11,13 +12,13 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use crate::cli::common::Common;
 use crate::cli::output;
 
-/// What takes less is not worth a line.
-const PATIENCE: Duration = Duration::from_secs(3);
+/// Delay before the first progress line, so that short commands show none.
+const INITIAL_DELAY: Duration = Duration::from_secs(3);
 
-/// From one line to the next.
+/// Time between two lines.
 const INTERVAL: Duration = Duration::from_secs(5);
 
-/// What is shown until it is finished or dropped.
+/// A progress display that ends when it is finished or dropped.
 pub(super) struct Progress {
     bar: ProgressBar,
     message: Arc<Mutex<String>>,
@@ -25,7 +26,7 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// Begins to show what is being done, in a word.
+    /// Starts the display for an activity.
     pub(super) fn new(what: &'static str, common: &Common) -> Self {
         let is_terminal = std::io::stderr().is_terminal();
         let is_shown = is_terminal && !common.quiet;
@@ -43,19 +44,19 @@ impl Progress {
         Self { bar, message, teller }
     }
 
-    /// How far it is.
+    /// Sets the text of the current progress.
     pub(super) fn set_message(&self, text: String) {
         text.clone_into(&mut self.message.lock().unwrap_or_else(PoisonError::into_inner));
         self.bar.set_message(text);
     }
 
-    /// There is nothing more to show.
+    /// Ends the display.
     pub(super) fn finish(self) {
         drop(self);
     }
 }
 
-/// Does something, and shows what as long as it takes.
+/// Runs `work` and shows the activity while it runs.
 pub(super) fn during<T>(what: &'static str, common: &Common, work: impl FnOnce() -> T) -> T {
     let _progress = Progress::new(what, common);
     work()
@@ -66,7 +67,7 @@ impl Drop for Progress {
         self.bar.finish_and_clear();
         if let Some((sender, thread)) = self.teller.take() {
             drop(sender);
-            // It ends at once: its sender is gone.
+            // The thread ends at once, because its channel is closed.
             let _ = thread.join();
         }
     }
@@ -77,7 +78,7 @@ fn tell(what: &'static str, message: Arc<Mutex<String>>) -> (Sender<()>, JoinHan
     let (sender, receiver) = channel();
     let started = Instant::now();
     let thread = std::thread::spawn(move || {
-        let mut wait = PATIENCE;
+        let mut wait = INITIAL_DELAY;
         while receiver.recv_timeout(wait) == Err(RecvTimeoutError::Timeout) {
             let text = message.lock().unwrap_or_else(PoisonError::into_inner).clone();
             output::note(&line(what, started.elapsed(), &text));
@@ -99,7 +100,7 @@ mod tests {
     use super::line;
 
     #[test]
-    fn lines_say_what_is_known() {
+    fn lines_contain_the_current_message() {
         assert_eq!(line("planning", Duration::from_millis(3_100), ""), "planning, 3 s\n");
         assert_eq!(line("planning", Duration::from_secs(8), "cost 4"), "planning, 8 s: cost 4\n");
     }

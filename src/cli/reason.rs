@@ -59,8 +59,9 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let mut knowledge = during("reasoning", common, || read(arguments))?;
     output::warnings(common, knowledge.warnings());
     if !arguments.assert.is_empty() || !arguments.retract.is_empty() {
-        let own = during("reasoning", common, || knowledge.revise(&arguments.assert, &arguments.retract))?;
-        output::warnings(common, &own);
+        let revision =
+            during("reasoning", common, || knowledge.revise(&arguments.assert, &arguments.retract))?;
+        output::warnings(common, &revision);
     }
     for component in &arguments.fail {
         knowledge.fail(component).map_err(Failure::usage)?;

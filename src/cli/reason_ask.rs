@@ -1,5 +1,5 @@
-//! The questions of `metaplan reason`: whether statements follow, why a fact holds or not, and what follows about classes
-//! and properties.
+//! Queries of `metaplan reason`: entailment of statements, derivations of facts, reasons for
+//! missing facts, and inferred classes and properties.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -36,7 +36,7 @@ pub struct Questions {
 }
 
 impl Questions {
-    /// Answers the question, if there is one.
+    /// Answers the query of the arguments, if there is one.
     pub fn answer(
         &self,
         knowledge: &mut Knowledge,
@@ -64,15 +64,16 @@ impl Questions {
     }
 
     fn follows(&self, knowledge: &Knowledge, imports: &Imports) -> Result<(String, String, Exit), Failure> {
-        let known = knowledge.entities().to_vec();
-        let options = ontology::ReadOptions { allow_missing_imports: true, known, ..imports.options() };
+        let entities = knowledge.entities().to_vec();
+        let options =
+            ontology::ReadOptions { allow_missing_imports: true, known: entities, ..imports.options() };
         let conclusions = ontology::read_files(&self.entails, &options)
             .map_err(|errors| errors.iter().map(Message::from_ontology).collect::<Vec<_>>())?;
-        let mut found =
+        let mut entailments =
             entailments(knowledge.engine(), &conclusions).map_err(|error| Message::from_rules(&error))?;
-        found.extend(annotations(knowledge.engine(), knowledge.annotations(), &conclusions));
+        entailments.extend(annotations(knowledge.engine(), knowledge.annotations(), &conclusions));
         let (mut text, mut all) = (String::new(), true);
-        for entailment in &found {
+        for entailment in &entailments {
             match &entailment.answer {
                 Answer::Follows(reason) => {
                     let _ = writeln!(text, "follows: {}", entailment.statement);
@@ -86,15 +87,16 @@ impl Questions {
                 }
             }
         }
-        let count = found.iter().filter(|one| matches!(one.answer, Answer::Follows(_))).count();
-        let verb = if found.len() == 1 { "follows" } else { "follow" };
-        let _ = writeln!(text, "{count} of {} {verb}", output::counted(found.len(), "statement"));
-        let json = output::pretty(&EntailmentAnswer::new(&found));
+        let count =
+            entailments.iter().filter(|entailment| matches!(entailment.answer, Answer::Follows(_))).count();
+        let verb = if entailments.len() == 1 { "follows" } else { "follow" };
+        let _ = writeln!(text, "{count} of {} {verb}", output::counted(entailments.len(), "statement"));
+        let json = output::pretty(&EntailmentAnswer::new(&entailments));
         Ok((text, json, if all { Exit::Done } else { Exit::NotProved }))
     }
 }
 
-/// Answers a question about each assertion; `answer` says whether there is one.
+/// Answers a query about each assertion. `answer` returns `true` if the query has an answer.
 fn reasons(
     knowledge: &mut Knowledge,
     assertions: &[String],
@@ -113,19 +115,19 @@ fn reasons(
 }
 
 fn why(engine: &Engine, fact: &Fact) -> (bool, String) {
-    let shown = fact.display(engine.symbols());
+    let text_of_fact = fact.display(engine.symbols());
     match engine.why(fact) {
         Some(derivation) => (true, derivation.display(engine.symbols()).to_string()),
-        None => (false, format!("{shown} does not hold; `--why-not` says what is missing\n")),
+        None => (false, format!("{text_of_fact} does not hold; `--why-not` says what is missing\n")),
     }
 }
 
 fn why_not(engine: &Engine, fact: &Fact) -> (bool, String) {
-    let shown = fact.display(engine.symbols());
+    let text_of_fact = fact.display(engine.symbols());
     if engine.holds(fact) {
-        return (false, format!("{shown} holds; `--why` says why\n"));
+        return (false, format!("{text_of_fact} holds; `--why` says why\n"));
     }
-    let mut text = format!("{shown} does not hold\n");
+    let mut text = format!("{text_of_fact} does not hold\n");
     let misses = engine.why_not(fact);
     if misses.is_empty() {
         text += "    no rule or axiom could conclude it\n";
@@ -139,7 +141,7 @@ fn why_not(engine: &Engine, fact: &Fact) -> (bool, String) {
     (true, text)
 }
 
-/// The words of an assertion: IRIs in brackets, literals in quotes with what follows them, and names.
+/// Splits an assertion into IRIs in brackets, quoted literals with their suffix, and names.
 fn words(text: &str) -> Vec<&str> {
     let (mut words, mut start, mut inside) = (Vec::new(), None::<usize>, None::<char>);
     for (at, character) in text.char_indices() {
@@ -160,7 +162,7 @@ fn words(text: &str) -> Vec<&str> {
     words
 }
 
-/// The fact that an assertion states.
+/// Parses the fact of an assertion.
 fn read(knowledge: &mut Knowledge, assertion: &str) -> Result<Fact, Message> {
     let words = words(assertion.trim().trim_end_matches(" ."));
     let [subject, predicate, object] = words[..] else {
@@ -184,7 +186,7 @@ fn read(knowledge: &mut Knowledge, assertion: &str) -> Result<Fact, Message> {
     Ok(Fact::new(symbols.name(&predicate), [symbols.name(&subject), object]))
 }
 
-/// All names that facts and rules mention.
+/// Returns all names that facts and rules mention.
 fn names(engine: &Engine) -> BTreeSet<String> {
     let mut symbols: BTreeSet<Symbol> = BTreeSet::new();
     for fact in engine.facts() {
@@ -207,7 +209,8 @@ fn names(engine: &Engine) -> BTreeSet<String> {
     symbols.into_iter().filter_map(text).collect()
 }
 
-/// The IRI of a name: in brackets, in full, or the only one with this local name, whatever its prefix.
+/// Resolves a name to an IRI: in brackets, in full, or the only IRI with this local name, with any
+/// prefix.
 fn name(word: &str, names: &BTreeSet<String>) -> Result<String, Message> {
     if let Some(iri) = word.strip_prefix('<').and_then(|rest| rest.strip_suffix('>')) {
         return Ok(iri.to_owned());
@@ -216,18 +219,21 @@ fn name(word: &str, names: &BTreeSet<String>) -> Result<String, Message> {
         return Ok(word.to_owned());
     }
     let local = word.rsplit(':').next().unwrap_or(word);
-    let found: Vec<&String> = names.iter().filter(|iri| local_name(iri) == local).collect();
-    match found[..] {
+    let matches: Vec<&String> = names.iter().filter(|iri| local_name(iri) == local).collect();
+    match matches[..] {
         [iri] => Ok(iri.clone()),
         [] => Err(Message::error("M134", format!("nothing is called `{word}`; write an IRI as <IRI>"))),
         _ => {
-            let all: Vec<String> = found.iter().map(|iri| format!("<{iri}>")).collect();
-            Err(Message::error("M134", format!("`{word}` may be {}; write one of them", all.join(" or "))))
+            let candidates: Vec<String> = matches.iter().map(|iri| format!("<{iri}>")).collect();
+            Err(Message::error(
+                "M134",
+                format!("`{word}` may be {}; write one of them", candidates.join(" or ")),
+            ))
         }
     }
 }
 
-/// `"text"`, `"text"@en`, `"5"^^xsd:int`, a number, `true` or `false`.
+/// Parses `"text"`, `"text"@en`, `"5"^^xsd:int`, a number, `true` or `false`.
 fn literal(word: &str) -> Option<Literal> {
     const XSD: &str = ontology::vocab::xsd::NS;
     if let Some(rest) = word.strip_prefix('"') {

@@ -1,4 +1,4 @@
-//! `metaplan report`: an answer as a page to look at.
+//! `metaplan report`: an answer as an HTML page.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -98,7 +98,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(exit(status))
 }
 
-/// The page of a journal.
+/// Writes the page of a journal.
 fn journal(arguments: &Arguments, directory: &Path, report: &JournalReport) -> Result<Exit, Failure> {
     let log = log_picture(&directory.display().to_string(), report);
     if let Some(directory) = &arguments.svg {
@@ -108,7 +108,7 @@ fn journal(arguments: &Arguments, directory: &Path, report: &JournalReport) -> R
     Ok(if report.is_sound() { Exit::Done } else { Exit::BadInput })
 }
 
-/// Writes a page where it is wanted, with nothing that is not seen; what is to be said of it goes beside a file.
+/// Writes a page to its destination. The note is printed if the destination is a file.
 fn write(arguments: &Arguments, page: &str, said: &str) -> Result<(), Failure> {
     let page = &*visible(page);
     match output::file_named(arguments.output.as_ref()) {
@@ -121,14 +121,15 @@ fn write(arguments: &Arguments, page: &str, said: &str) -> Result<(), Failure> {
     Ok(())
 }
 
-/// A plan, and what is drawn of it.
+/// A plan, and its pictures.
 struct Answer {
     solution: Solution,
     plan: Plan,
 }
 
 impl Answer {
-    /// Plans for a mission, with a separation for actions that overlap; the plan is one that the validator has executed.
+    /// Plans a mission, with a separation if actions may overlap. The validator has executed the
+    /// plan.
     fn of(
         mission: &Mission,
         positions: &Positions,

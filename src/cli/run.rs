@@ -1,4 +1,4 @@
-//! `metaplan run`: lines of events to lines of adaptations.
+//! `metaplan run`: reads lines of events and writes lines of adaptations.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -87,7 +87,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     ended(drive(common, control, journal, &ready, events, &outlet), &outlet)
 }
 
-/// Opens the journal, if there is to be one, and says in the first line how far it has come.
+/// Opens the journal, if requested, and reports its state in the first line.
 fn journal(
     arguments: &Arguments,
     common: &Common,
@@ -107,7 +107,7 @@ fn journal(
     Ok(Some(journal))
 }
 
-/// Ends what was opened, however the loop has ended.
+/// Closes the outputs after the loop, also after a failure.
 fn ended(result: Result<(), Failure>, outlet: &Outlet) -> Result<Exit, Failure> {
     let closed = outlet.close();
     result?;
@@ -115,7 +115,7 @@ fn ended(result: Result<(), Failure>, outlet: &Outlet) -> Result<Exit, Failure> 
     Ok(Exit::Done)
 }
 
-/// The loop from its first line to its last.
+/// Runs the planning loop from its first line to its last.
 fn drive(
     common: &Common,
     control: Loop,
@@ -134,13 +134,14 @@ fn drive(
     if events.is_file() { session.replay(events) } else { session.live(events) }
 }
 
-/// The loop without a task plan.
+/// Runs the configuration loop, which has no task plan.
 fn keep(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     let knowledge = arguments.situation.knowledge(&arguments.inputs, common)?;
     output::warnings(common, knowledge.warnings());
     let configurator = arguments.wanted.configurator(knowledge)?;
     consistent(Some(configurator.knowledge()))?;
-    let objectives = configurator.objectives().into_iter().map(|own| own.individual.name).collect();
+    let objectives =
+        configurator.objectives().into_iter().map(|objective| objective.individual.name).collect();
     let filters = filters(arguments.adaptation.as_deref(), configurator.knowledge())?;
     let keeper = Keeper::new(configurator, None).with_filters(&filters);
     let events = Lines::open(&arguments.events)?;
@@ -149,13 +150,13 @@ fn keep(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     ended(keep_going(common, keeper, &ready, events, &outlet), &outlet)
 }
 
-/// The filters of a file, or those that count unless said otherwise.
+/// Reads the filters of a file, or returns the default filters.
 fn filters(file: Option<&Path>, knowledge: &Knowledge) -> Result<FilterSettings, Failure> {
     let Some(file) = file else { return Ok(FilterSettings::default()) };
     Ok(Settings::read(file, Some(knowledge))?.filters)
 }
 
-/// As [`drive`], without a task plan.
+/// Runs the configuration loop as [`drive`] runs the planning loop.
 fn keep_going(
     common: &Common,
     mut keeper: Keeper,
@@ -181,30 +182,30 @@ fn keep_going(
     }
 }
 
-/// So long planning may take before a word is said, and from one word to the next.
+/// Time of planning before the first heartbeat, and between two heartbeats.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
-/// Says every second how planning goes, for as long as the program runs.
+/// Reports the progress of planning every second until the program ends.
 fn heartbeat(watch: Watch, line: Arc<AtomicU64>, outlet: Outlet) {
     std::thread::spawn(move || {
-        let mut known: Option<(u64, Instant, Instant)> = None;
+        let mut reported: Option<(u64, Instant, Instant)> = None;
         loop {
             std::thread::sleep(HEARTBEAT / 10);
             let Some(planning) = watch.look() else {
-                known = None;
+                reported = None;
                 continue;
             };
             let now = Instant::now();
-            let (begun, said) = match known {
+            let (begun, said) = match reported {
                 Some((number, begun, said)) if number == planning.number => (begun, said),
                 _ => (now, now),
             };
-            known = Some((planning.number, begun, said));
+            reported = Some((planning.number, begun, said));
             if now - said >= HEARTBEAT {
-                known = Some((planning.number, begun, now));
+                reported = Some((planning.number, begun, now));
                 let line =
                     PlanningLine::new(&planning, (now - begun).as_secs(), line.load(Ordering::Relaxed));
-                // Who does not read any more will be noticed when the answers are written.
+                // A closed pipe is detected when the answers are written.
                 let _ = outlet.say(&output::line(&line));
             }
         }

@@ -1,4 +1,4 @@
-//! Where the loop hears from: lines of a file or of standard input, or those in an MCAP file.
+//! Input of the loop: lines of a file or of standard input, or messages of an MCAP file.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read as _};
@@ -12,13 +12,14 @@ use metaplan::recording::{FIRST_BYTE, Replay};
 use crate::cli::common::Common;
 use crate::cli::output;
 
-/// A line, and the time since the start of the mission, if the source knows it.
+/// A line, and its time since the start of the mission, if the source has times.
 pub(super) struct Line {
     pub(super) text: String,
     pub(super) now: Option<Duration>,
 }
 
-/// Lines without those that are blank. Of a line that is far too long only the beginning is kept, which is not an event.
+/// Reader of non-blank lines. A line that is far too long is truncated, so that it is not a valid
+/// event.
 pub(super) struct Lines {
     name: String,
     source: Source,
@@ -28,13 +29,13 @@ pub(super) struct Lines {
 type Reader = Box<dyn BufRead + Send>;
 
 enum Source {
-    /// Not looked at: standard input may have nothing yet.
+    /// Input that is not opened yet, because standard input may block.
     Fresh(Option<Reader>),
     Text(Reader),
     Recorded(Box<Replay<Reader>>),
 }
 
-/// Opens a file; a pipe is read as it comes, and any other thing that is not a file is refused.
+/// Opens a regular file or a pipe, and rejects anything else.
 fn regular(path: &Path) -> io::Result<File> {
     let kind = std::fs::metadata(path)?.file_type();
     #[cfg(unix)]
@@ -60,12 +61,13 @@ impl Lines {
         Ok(Self { name, source: Source::Fresh(Some(reader)), is_file })
     }
 
-    /// Returns `true` if all lines are there already: each of them is then answered before the next one is read.
+    /// Returns `true` if all lines are available: each line is then answered before the next one is
+    /// read.
     pub(super) fn is_file(&self) -> bool {
         self.is_file
     }
 
-    /// The next line; none at the end.
+    /// Returns the next line, or `None` at the end.
     pub(super) fn next(&mut self, common: &Common) -> Result<Option<Line>, Message> {
         let line = self.look().and_then(|()| match &mut self.source {
             Source::Fresh(_) => Ok(None),
@@ -87,7 +89,7 @@ impl Lines {
         Ok(line)
     }
 
-    /// Looks at the first byte, which no text and every MCAP file begins with.
+    /// Determines the format by the first byte, with which every MCAP file and no text begins.
     fn look(&mut self) -> io::Result<()> {
         let Source::Fresh(reader) = &mut self.source else { return Ok(()) };
         let Some(mut reader) = reader.take() else { return Ok(()) };

@@ -1,4 +1,5 @@
-//! Where what the loop hears and answers goes: its answers to standard output, and both to a recording and to a page, if there are.
+//! Output of the loop: answers to standard output; events and answers to a recording and to a web
+//! page, if requested.
 
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -45,24 +46,24 @@ enum Recorded {
 }
 
 impl Outlets {
-    /// Who draws the plans of a mission, if anybody can look at them.
+    /// Returns the painter of plan pictures, if a page is requested.
     pub(super) fn painter(&self, setup: &Setup) -> Result<Option<Painter>, Errors> {
         let positions = self.serve.as_ref().map(|_| setup.positions()).transpose()?;
         Ok(positions.map(|positions| Painter::new(&setup.mission, positions)))
     }
 }
 
-/// Where it goes; copies lead to the same places.
+/// Destinations of the loop's output. Copies share the destinations.
 #[derive(Debug, Clone)]
 pub(super) struct Outlet {
     recorder: Option<(Recorder, String)>,
-    /// Whether it was said that the recording has failed.
+    /// Set once the failure of the recording has been reported.
     is_told: Arc<AtomicBool>,
     live: Option<Live>,
 }
 
 impl Outlet {
-    /// Opens what is wanted, and says on standard error where the page is.
+    /// Opens the requested destinations, and prints the address of the page to standard error.
     pub(super) fn open(wanted: &Outlets, mission: &str, painter: Option<Painter>) -> Result<Self, Message> {
         let live = match &wanted.serve {
             None => None,
@@ -78,7 +79,8 @@ impl Outlet {
         Ok(Self { recorder, is_told: Arc::default(), live })
     }
 
-    /// A line that is about to be handled, with its number and the time since the start of the mission.
+    /// Publishes a line before it is handled, with its number and the time since the start of the
+    /// mission.
     pub(super) fn heard(&self, line: u64, now: Duration, text: &str) {
         if let Some((recorder, _)) = &self.recorder {
             recorder.event(line, now, text);
@@ -88,7 +90,7 @@ impl Outlet {
         }
     }
 
-    /// Shows how things are when the loop takes over: how designs are, and the plan if it has one already.
+    /// Publishes the initial state of the loop: the designs, and the plan if there is one.
     pub(super) fn begin(&self, control: &Loop) {
         if let Some(live) = &self.live {
             live.known(control.designs());
@@ -98,7 +100,7 @@ impl Outlet {
         }
     }
 
-    /// Shows the plan if these answers have led to another one, or to none.
+    /// Shows the plan if the answers have changed or removed it.
     pub(super) fn plan(&self, beliefs: &Beliefs, answers: &[Answer]) {
         let is_about_plans =
             |answer: &Answer| matches!(answer, Answer::PlanFound { .. } | Answer::PlanNone { .. });
@@ -107,7 +109,7 @@ impl Outlet {
         }
     }
 
-    /// Writes answers, a line each, at once, so that no other thread's line comes in between.
+    /// Writes several lines at once, so that lines of other threads do not interleave.
     pub(super) fn say(&self, lines: &str) -> io::Result<()> {
         let lines = visible_json(lines);
         let mut stdout = io::stdout().lock();
@@ -127,7 +129,7 @@ impl Outlet {
         Ok(())
     }
 
-    /// Writes answers to a line, each with the line's number; there may be more.
+    /// Writes answers to a line, each with the line's number; more may follow.
     pub(super) fn answer_so_far(&self, line: u64, answers: &[impl Serialize]) -> io::Result<()> {
         if answers.is_empty() {
             return Ok(());
@@ -136,7 +138,8 @@ impl Outlet {
         self.say(&lines.collect::<String>())
     }
 
-    /// Writes the answers to a line, each with the line's number, and that it was handled.
+    /// Writes the last answers to a line, each with the line's number, and the acknowledgement of
+    /// the line.
     pub(super) fn answer(&self, line: u64, answers: &[impl Serialize], read: Instant) -> io::Result<()> {
         let mut text = String::new();
         for answer in answers {
@@ -146,7 +149,7 @@ impl Outlet {
         self.say(&text)
     }
 
-    /// Ends what was opened.
+    /// Closes the opened destinations.
     pub(super) fn close(&self) -> Result<(), Message> {
         if let Some(live) = &self.live {
             live.end();
@@ -161,7 +164,7 @@ impl Outlet {
     }
 }
 
-/// Whether nobody reads the answers any more.
+/// Returns `true` if the reader of the answers has closed the pipe.
 pub(super) fn is_over(written: io::Result<()>) -> Result<bool, Message> {
     match written {
         Ok(()) => Ok(false),
@@ -174,7 +177,7 @@ pub(super) fn unwritten(error: &io::Error) -> Message {
     Message::error("M321", format!("the journal cannot be written: {error}"))
 }
 
-/// Begins a recording, which a signal ends as a whole.
+/// Starts a recording, which is completed also when a signal ends the program.
 fn record(path: &Path, events: Recorded, mission: &str) -> Result<(Recorder, String), Message> {
     let form = match events {
         Recorded::Json => Form::Json,
@@ -194,7 +197,7 @@ fn record(path: &Path, events: Recorded, mission: &str) -> Result<(Recorder, Str
         Message::at("M331", &name, None, text)
     })?;
     let copy = recorder.clone();
-    // If the platform refuses a handler, the file can be recovered.
+    // Without a handler, the unfinished file can still be recovered.
     let _ = ctrlc::set_handler(move || {
         let _ = copy.finish();
         std::process::exit(130);

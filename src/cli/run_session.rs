@@ -1,9 +1,10 @@
-//! The loop between its input and its output, in two ways.
+//! The session of the loop between input and output, in two modes.
 //!
-//! Where all input is there already, as in a file, each line is answered completely before the next one is read: the same lines give
-//! the same answers. Where lines come as they happen, from a pipe or a terminal, the loop reacts to all lines that wait before
-//! it deliberates, and plans are looked for on another thread while it goes on reacting. A line that changes the question stops the
-//! search for a plan.
+//! If all input is available, as in a file, each line is answered completely before the next one is
+//! read, so the same lines give the same answers. If lines arrive as they happen, from a pipe or a
+//! terminal, the loop reacts to all waiting lines before it deliberates. Plans are then computed on
+//! another thread while the loop keeps reacting. A line that changes the planning problem cancels
+//! the search.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -19,17 +20,17 @@ use crate::cli::common::{Common, Failure};
 use crate::cli::run_lines::{Line, Lines};
 use crate::cli::run_outlet::{Outlet, is_over, unwritten};
 
-/// Upper limit on the lines that were read and not reacted to.
+/// Maximum number of lines that are read in advance.
 const MAX_WAITING: usize = 1024;
 
-/// After this number of searches in a row that were stopped, the next one runs to its end: otherwise input that changes all the time
-/// would prevent every plan.
+/// Maximum number of consecutive cancelled searches. The next search runs to its end; otherwise
+/// input that changes all the time would prevent every plan.
 const MAX_STOPPED: u32 = 3;
 
-/// Least time between two timers.
+/// Minimum time between two timers.
 const MIN_PAUSE: Duration = Duration::from_millis(1);
 
-/// What the loop waits for.
+/// Inputs of the loop.
 enum Input {
     Line(Line, Instant),
     Thoughts(Thoughts),
@@ -38,36 +39,36 @@ enum Input {
 }
 
 /// A search for plans on another thread.
-struct Thinking {
+struct PlanSearch {
     question: u64,
     stop: Arc<AtomicBool>,
     is_stopped: bool,
 }
 
-/// Whether the loop goes on.
+/// Control flow after an input.
 #[derive(PartialEq, Eq)]
 enum Flow {
     GoesOn,
-    /// Who reads the answers has had enough, and all is well.
+    /// The reader of the answers has closed the pipe, which is not an error.
     Over,
 }
 
-/// A loop with where its answers go.
+/// A loop with its inputs and outputs.
 pub(super) struct Session<'a> {
     common: &'a Common,
     control: Loop,
     journal: Option<Journal>,
     outlet: &'a Outlet,
     clock: SystemClock,
-    /// The time of the last line before this program was started.
+    /// Time of the last line of the journal, before this program started.
     begun: Duration,
-    /// The number of the line that is being handled, for signs of life.
+    /// Number of the current line, for heartbeats.
     line: Arc<AtomicU64>,
-    /// The last line, with when it was read, as long as there may be more answers to it.
+    /// The last line and the time of reading it, while further answers to it are possible.
     open: Option<(u64, Instant)>,
-    thinking: Option<Thinking>,
+    thinking: Option<PlanSearch>,
     stopped: u32,
-    /// Whether a line had a time of its own: then time passes with lines only.
+    /// `true` if a line had a time of its own: then time advances with lines only.
     has_times: bool,
 }
 
@@ -145,7 +146,7 @@ impl<'a> Session<'a> {
                         flow = self.close()?;
                     }
                     let pause = self.pause();
-                    // The sender is kept here, so that there is always one.
+                    // The session keeps a sender, so the channel is never closed.
                     match pause.map_or_else(|| inputs.recv().ok(), |pause| inputs.recv_timeout(pause).ok()) {
                         None if flow == Flow::GoesOn && pause.is_some() => self.elapse()?,
                         input => {
@@ -159,7 +160,7 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// The first decision, or what was begun before the program was started.
+    /// Makes the first decision, or completes the decision that the journal left unfinished.
     fn begin(&mut self, read: Instant) -> Result<Flow, Failure> {
         let answers = match &mut self.journal {
             None => self.control.start(),
@@ -182,7 +183,8 @@ impl<'a> Session<'a> {
         self.answer(number, &answers, read)
     }
 
-    /// Passes a line on to whoever watches; returns its time since the start of the mission.
+    /// Forwards a line to the recording and the page. Returns its time since the start of the
+    /// mission.
     fn heard(&mut self, line: &Line) -> Duration {
         let now = self.begun + line.now.unwrap_or_else(|| self.clock.now());
         let number = self.control.beliefs().lines() + 1;
@@ -191,12 +193,12 @@ impl<'a> Session<'a> {
         now
     }
 
-    /// Reacts to a line; `is_last` says whether none waits behind it.
+    /// Reacts to a line. `is_last` is `true` if no further line is waiting.
     fn line(&mut self, line: &Line, read: Instant, is_last: bool) -> Result<Flow, Failure> {
         if self.close()? == Flow::Over {
             return Ok(Flow::Over);
         }
-        // A recording has its own clock: it is played as a file is.
+        // A recording has its own clock, so its lines are handled like those of a file.
         if line.now.is_some() {
             self.has_times = true;
             return self.recorded(line, read);
@@ -211,7 +213,7 @@ impl<'a> Session<'a> {
         };
         self.open = Some((self.control.beliefs().lines(), read));
         self.stop_thinking();
-        // What is safe has to leave at once; otherwise one decision is written, not two.
+        // Safe effects are written at once; otherwise a single decision is written, not two.
         let is_safe = answers.iter().all(|answer| answer.effect().is_none());
         if is_last
             && is_safe
@@ -227,7 +229,8 @@ impl<'a> Session<'a> {
         self.say(&answers)
     }
 
-    /// Time until something is due without a line; none if nothing is, or if lines have times of their own.
+    /// Returns the time until the next deadline. `None` without a deadline, or if lines have times of
+    /// their own.
     fn pause(&mut self) -> Option<Duration> {
         let due = self.control.due().filter(|_| !self.has_times)?;
         Some(due.saturating_sub(self.begun + self.clock.now()).max(MIN_PAUSE))
@@ -252,8 +255,9 @@ impl<'a> Session<'a> {
         self.say(&answers)
     }
 
-    /// Returns `true` if a line is about an action or effect to come, and nothing is under way that could have to react: whoever has
-    /// written it knows what the loop is going to say, as where a file is piped in.
+    /// Returns `true` if a line is about an action or effect that does not exist yet, and no action
+    /// is running that might require a reaction. The writer of such a line knows the loop's answers
+    /// in advance, as in a file that is piped.
     fn is_early(&self, line: &Line) -> bool {
         let is_idle = self.control.has_agenda() && self.control.beliefs().running().is_none();
         is_idle && self.control.is_ahead(&Observation::parse(&line.text))
@@ -269,7 +273,8 @@ impl<'a> Session<'a> {
         if self.thinking.is_none() {
             return self.deliberate(sender);
         }
-        let place = waiting.iter().position(|own| matches!(own, Input::Thoughts(_)));
+        // The result of the search is handled before the lines that wait for it.
+        let place = waiting.iter().position(|input| matches!(input, Input::Thoughts(_)));
         match place.and_then(|place| waiting.remove(place)).map_or_else(|| inputs.recv(), Ok) {
             Ok(Input::Thoughts(thoughts)) => self.conclude(thoughts),
             Ok(other) => {
@@ -280,9 +285,10 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Stops the search for plans if the question is another one now.
+    /// Cancels the search for plans if the planning problem has changed.
     fn stop_thinking(&mut self) {
         let Some(thinking) = &mut self.thinking else { return };
+        // A search for an unchanged problem stays useful.
         if thinking.question != self.control.question() && !thinking.is_stopped && self.stopped < MAX_STOPPED
         {
             thinking.is_stopped = true;
@@ -290,7 +296,8 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// Deliberates at once if that takes no search, and begins a search on another thread otherwise.
+    /// Deliberates at once if no search is necessary, and otherwise starts a search on another
+    /// thread.
     fn deliberate(&mut self, sender: &SyncSender<Input>) -> Result<Flow, Failure> {
         if let Some(answers) = self.control.deliberate_at_once() {
             self.decided(&answers)?;
@@ -298,18 +305,19 @@ impl<'a> Session<'a> {
         }
         let thinker = self.control.thinker();
         let (question, stop) = (self.control.question(), thinker.stop());
-        self.thinking = Some(Thinking { question, stop, is_stopped: false });
+        self.thinking = Some(PlanSearch { question, stop, is_stopped: false });
         let sender = sender.clone();
         std::thread::spawn(move || {
-            // The other end is gone where nobody reads the answers any more.
+            // The receiver is closed if the run has ended.
             let _ = sender.send(Input::Thoughts(thinker.think()));
         });
         Ok(Flow::GoesOn)
     }
 
-    /// Deliberates with what was found on another thread; otherwise it is looked for anew.
+    /// Deliberates with the result of another thread. A result for an outdated problem is
+    /// discarded, and the search is repeated.
     fn conclude(&mut self, thoughts: Thoughts) -> Result<Flow, Failure> {
-        let was_stopped = self.thinking.take().is_some_and(|own| own.is_stopped);
+        let was_stopped = self.thinking.take().is_some_and(|search| search.is_stopped);
         let is_late = self.stopped >= MAX_STOPPED;
         if let Some(answers) = self.control.deliberate_with(thoughts, is_late) {
             self.stopped = 0;
@@ -342,7 +350,7 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Writes answers to the last line; there may be more.
+    /// Writes answers to the last line; more may follow.
     fn say(&self, answers: &[Answer]) -> Result<Flow, Failure> {
         let number = self.control.beliefs().lines();
         let flow = flow(self.outlet.answer_so_far(number, answers))?;
@@ -350,14 +358,14 @@ impl<'a> Session<'a> {
         Ok(flow)
     }
 
-    /// Writes answers to a line, and that it was handled.
+    /// Writes the last answers to a line, and its acknowledgement.
     fn answer(&self, number: u64, answers: &[Answer], read: Instant) -> Result<Flow, Failure> {
         let flow = flow(self.outlet.answer(number, answers, read))?;
         self.outlet.plan(self.control.beliefs(), answers);
         Ok(flow)
     }
 
-    /// Says that the last line was handled.
+    /// Acknowledges the last line.
     fn close(&mut self) -> Result<Flow, Failure> {
         match self.open.take() {
             None => Ok(Flow::GoesOn),
@@ -366,12 +374,12 @@ impl<'a> Session<'a> {
     }
 }
 
-/// Ends the run where nobody reads its answers any more.
+/// Ends the run if the reader of the answers has closed the pipe.
 fn flow(written: std::io::Result<()>) -> Result<Flow, Failure> {
     Ok(if is_over(written)? { Flow::Over } else { Flow::GoesOn })
 }
 
-/// Adds all inputs that have come.
+/// Receives all waiting inputs.
 fn gather(inputs: &Receiver<Input>, waiting: &mut VecDeque<Input>) {
     while waiting.len() < MAX_WAITING {
         match inputs.try_recv() {
@@ -381,7 +389,7 @@ fn gather(inputs: &Receiver<Input>, waiting: &mut VecDeque<Input>) {
     }
 }
 
-/// Reads lines on a thread of its own.
+/// Reads lines on a separate thread.
 fn read(mut events: Lines, common: Common, sender: SyncSender<Input>) {
     std::thread::spawn(move || {
         loop {

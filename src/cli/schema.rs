@@ -24,9 +24,9 @@ pub fn run(arguments: &Arguments) -> Result<Exit, Failure> {
         return Ok(Exit::Done);
     };
     let Some(schema) = schema(name) else {
-        let known: Vec<&str> = FORMATS.iter().map(|(format, ..)| *format).collect();
-        let meant = did_you_mean(name, known.iter().copied());
-        let text = format!("there is no format `{name}`; there are: {}{meant}", known.join(", "));
+        let names: Vec<&str> = FORMATS.iter().map(|(format, ..)| *format).collect();
+        let suggestion = did_you_mean(name, names.iter().copied());
+        let text = format!("there is no format `{name}`; there are: {}{suggestion}", names.join(", "));
         return Err(Failure::usage(Message::error("M139", text)));
     };
     output::document(&output::pretty(&schema));

@@ -126,7 +126,7 @@ pub fn run(arguments: &Arguments, common: &Common) -> Result<Exit, Failure> {
     Ok(if incomplete.is_some() { Exit::NothingFound } else { Exit::Done })
 }
 
-/// Reads a mission and a scenario for simulation. Fails with all mistakes in the scenario.
+/// Reads a mission and a scenario for simulation, and reports all mistakes in the scenario.
 fn experiment(mission: &Path, scenario: &str, common: &Common) -> Result<Experiment, Failure> {
     let read = || Setup::read(mission)?.experiment(scenario);
     during("reading", common, read).map_err(scenario_failure)
@@ -145,22 +145,22 @@ pub fn check(arguments: &Arguments, directory: &Path, common: &Common) -> Result
     experiment(&directory.join(&arguments.mission), &arguments.scenario, common).map(drop)
 }
 
-/// Missions simulated to their end, by strategy and seed, and a log of the observations and answers of the first
-/// mission of each strategy.
-struct Played {
+/// Results of the simulated missions, by strategy and seed, and a log of the observations and
+/// answers of the first mission of each strategy.
+struct SimulationResults {
     runs: Vec<Run>,
     log: String,
 }
 
-/// Simulates until a limit is reached. Each seed is simulated with all strategies before the next seed, so that
-/// partial results are comparable.
+/// Simulates until a limit is reached. Each seed is simulated with all strategies before the next
+/// seed, so that partial results are comparable.
 fn play(
     experiment: &Experiment,
     strategies: &[Strategy],
     arguments: &Arguments,
     limits: &Limits,
     common: &Common,
-) -> Result<Played, Failure> {
+) -> Result<SimulationResults, Failure> {
     let total = strategies.len() as u64 * u64::from(arguments.runs);
     let progress = Progress::new("simulating", common);
     let (mut runs, mut logs) = (Vec::new(), vec![String::new(); strategies.len()]);
@@ -179,7 +179,7 @@ fn play(
     }
     progress.finish();
     runs.sort_by_key(|(index, run)| (*index, run.seed));
-    Ok(Played { runs: runs.into_iter().map(|(_, run)| run).collect(), log: logs.concat() })
+    Ok(SimulationResults { runs: runs.into_iter().map(|(_, run)| run).collect(), log: logs.concat() })
 }
 
 fn write_log(log: &mut String, strategy: Strategy, observation: &Observation, answers: &[Answer]) {
@@ -232,7 +232,7 @@ fn text(strategies: &[Strategy], runs: &[Run], unit: TimeUnit) -> String {
     output::table(&header, rows) + &failures_text(strategies, runs)
 }
 
-/// Reasons why missions were not accomplished, with a line for each strategy that has such missions.
+/// Lists the reasons of failed missions, one line per strategy that has such missions.
 fn failures_text(strategies: &[Strategy], runs: &[Run]) -> String {
     let mut text = String::new();
     for &strategy in strategies {

@@ -1,4 +1,4 @@
-//! The mission that a command is about, and the situation that it is in.
+//! The mission of a command, and the changes of its situation by options.
 
 use std::path::PathBuf;
 
@@ -68,7 +68,7 @@ impl Imports {
 }
 
 impl Situation {
-    /// A situation of a mission that has a manifest.
+    /// Situation of a mission that has a manifest.
     pub(super) fn of_mission(
         scenario: Option<String>,
         set: Vec<(String, String)>,
@@ -79,14 +79,14 @@ impl Situation {
         Self { knowledge, rules, imports, names, scenario, set, fail }
     }
 
-    /// The same mission as its files have it; none if that is this situation.
+    /// Returns the mission as its files define it. `None` if no option changes it.
     pub(super) fn before(&self) -> Option<Self> {
         let (scenario, set, fail) = (None, Vec::new(), Vec::new());
         let differs = self.scenario.is_some() || !self.set.is_empty() || !self.fail.is_empty();
         differs.then(|| Self { scenario, set, fail, ..self.clone() })
     }
 
-    /// What is different from the mission's files, each in a few words.
+    /// Returns short descriptions of the differences from the mission's files.
     pub(super) fn words(&self) -> Vec<String> {
         let scenario = self.scenario.iter().map(|name| format!("scenario {name}"));
         let fail = self.fail.iter().map(|component| format!("{component} has failed"));
@@ -94,7 +94,7 @@ impl Situation {
         scenario.chain(fail).chain(set).collect()
     }
 
-    /// The knowledge of documents in this situation, without a mission.
+    /// Returns the knowledge of documents in this situation, without a mission.
     pub(super) fn knowledge(&self, documents: &[PathBuf], common: &Common) -> Result<Knowledge, Failure> {
         if !self.knowledge.is_empty() || !self.names.is_empty() || self.scenario.is_some() {
             let text = "with `--configure` the knowledge bases are the arguments, and there is no `--kb`, `--name` or `--scenario`";
@@ -103,12 +103,13 @@ impl Situation {
         during("reading", common, || knowledge(documents, &self.rules, &self.imports, &self.fail, &self.set))
     }
 
-    /// The mission in this situation, from one input (a manifest) or two (domain and problem).
+    /// Reads the mission in this situation, from one input (a manifest) or two (domain and
+    /// problem).
     pub(super) fn mission(&self, inputs: &[PathBuf], common: &Common) -> Result<Mission, Failure> {
         self.setup(inputs, common).map(|setup| setup.mission)
     }
 
-    /// As [`Situation::mission`], with what goes with the mission.
+    /// Returns the mission, as [`Situation::mission`], with the settings of the manifest.
     pub(super) fn setup(&self, inputs: &[PathBuf], common: &Common) -> Result<Setup, Failure> {
         during("reading", common, || self.read(inputs))
     }
@@ -117,9 +118,9 @@ impl Situation {
         let mut setup = match inputs {
             [manifest] => {
                 let imports = &self.imports;
-                let none = self.knowledge.is_empty() && self.rules.is_empty() && self.names.is_empty();
+                let is_empty = self.knowledge.is_empty() && self.rules.is_empty() && self.names.is_empty();
                 let here = imports.catalog.is_empty() && imports.directory.is_empty();
-                if !(none && here && !imports.ignore_missing_imports) {
+                if !(is_empty && here && !imports.ignore_missing_imports) {
                     let text = "`--kb`, `--rules`, `--name` and where imports lie go with DOMAIN and PROBLEM; \
                                 a mission's manifest names its own";
                     return Err(Failure::usage(Message::error("M107", text)));
@@ -183,7 +184,7 @@ pub(super) fn scenario_failure(messages: Errors) -> Failure {
     Failure { exit: if is_usage { Exit::Usage } else { Exit::BadInput }, messages }
 }
 
-/// Reads a knowledge base and reports what is the case.
+/// Reads a knowledge base and asserts the observations of the options.
 pub(super) fn knowledge(
     documents: &[PathBuf],
     rules: &[String],
@@ -200,7 +201,7 @@ pub(super) fn knowledge(
     if wrong.is_empty() { Ok(knowledge) } else { Err(Failure { exit: Exit::Usage, messages: wrong.into() }) }
 }
 
-/// Nothing is planned on knowledge that contradicts itself.
+/// Rejects inconsistent knowledge, because anything follows from it.
 pub(super) fn consistent(knowledge: Option<&Knowledge>) -> Result<(), Failure> {
     planner::consistent(knowledge).map_err(|messages| Failure { exit: Exit::Inconsistent, messages })
 }

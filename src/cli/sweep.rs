@@ -45,10 +45,10 @@ pub struct Arguments {
     measured: bool,
 }
 
-/// Reads the words of a command line; those of `simulate` are returned.
+/// Parses a command line; returns the arguments of `simulate`.
 pub type Read<'a> = dyn Fn(Vec<String>) -> Result<Option<simulate::Arguments>, clap::Error> + 'a;
 
-/// Runs the command; the command lines of the study are read by a function.
+/// Runs the command. `read` parses the command lines of the study.
 pub fn run(arguments: &Arguments, common: &Common, read: &Read<'_>) -> Result<Exit, Failure> {
     output::require_directory(&arguments.output)?;
     let guard = Guard::new(arguments.time_limit, None, common)?;
@@ -85,18 +85,19 @@ fn sweep(arguments: &Arguments, study: &Study, guard: Guard, common: &Common) ->
     }
     progress.finish();
     let lines: Vec<Line> = results.done.values().cloned().collect();
-    let wanted = study.runs(arguments.shard).map(|run| run.number);
-    let exit = say(&SweepAnswer::new(&lines, wanted, &[]).because(messages.clone()), &[], common);
+    let numbers = study.runs(arguments.shard).map(|run| run.number);
+    let exit = say(&SweepAnswer::new(&lines, numbers, &[]).because(messages.clone()), &[], common);
     if common.format != Format::Json {
         output::warnings(common, &messages);
     }
     Ok(exit)
 }
 
-/// Checks whether all commands of a study can be run: their options, and the scenarios that they simulate.
+/// Checks that all commands of a study are valid: their options, and the scenarios that they
+/// simulate.
 ///
 /// # Errors
-/// All mistakes in them, each once.
+/// All mistakes in them, without duplicates.
 fn check(study: &Study, common: &Common, read: &Read<'_>) -> Result<(), Failure> {
     let (mut mistakes, mut simulated): (Vec<Message>, BTreeSet<String>) = (Vec::new(), BTreeSet::new());
     for (path, run) in study.samples() {
@@ -106,7 +107,7 @@ fn check(study: &Study, common: &Common, read: &Read<'_>) -> Result<(), Failure>
             // A file that is generated for the run does not exist yet.
             Err(error) if study.generates() && error.kind() == ErrorKind::ValueValidation => continue,
             Err(error) => {
-                // A mistake in the first run is repeated in the others.
+                // All runs repeat a mistake of the first run, so it is reported once.
                 let text = refusal(&error);
                 if mistakes.iter().all(|mistake: &Message| !mistake.message.starts_with(&text)) {
                     mistakes.push(study.mistake(&path, &text));
@@ -140,11 +141,14 @@ fn merge(arguments: &Arguments, study: &Study, common: &Common) -> Result<Exit, 
     if let Some(answer) = answers().next()
         && answers().all(|answer| answer.pointer(study.rows()).is_none())
     {
-        let known = answer.as_object().into_iter().flatten().map(|(key, _)| format!("/{key}"));
-        let known: Vec<String> = known.collect();
-        let meant = did_you_mean(study.rows(), known.iter().map(String::as_str));
-        let text =
-            format!("no answer has anything at `{}`{meant}; there are: {}", study.rows(), known.join(", "));
+        let keys = answer.as_object().into_iter().flatten().map(|(key, _)| format!("/{key}"));
+        let keys: Vec<String> = keys.collect();
+        let suggestion = did_you_mean(study.rows(), keys.iter().map(String::as_str));
+        let text = format!(
+            "no answer has anything at `{}`{suggestion}; there are: {}",
+            study.rows(),
+            keys.join(", ")
+        );
         return Err(study.mistake(&["rows".into()], &text).into());
     }
     let table = Table::new(&lines, study.rows(), arguments.measured);
@@ -156,7 +160,7 @@ fn merge(arguments: &Arguments, study: &Study, common: &Common) -> Result<Exit, 
     Ok(say(&SweepAnswer::new(&lines, 0..study.len(), &groups), &groups, common))
 }
 
-/// Writes the answer; the status says whether all runs are there.
+/// Writes the answer. The exit status reports missing runs.
 fn say(answer: &SweepAnswer, groups: &[Group], common: &Common) -> Exit {
     if common.format == Format::Json {
         output::json_answer(answer);
@@ -166,16 +170,16 @@ fn say(answer: &SweepAnswer, groups: &[Group], common: &Common) -> Exit {
     if answer.is_complete() { Exit::Done } else { Exit::NotProved }
 }
 
-/// One line for each mean.
+/// Formats the means, one per line.
 fn text(groups: &[Group]) -> String {
     if groups.is_empty() {
         return String::new();
     }
     let rows = groups.iter().flat_map(|group| {
-        let shown =
+        let text_of =
             |value: &serde_json::Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
         let common: Vec<String> =
-            group.common.iter().map(|(column, value)| format!("{column}={}", shown(value))).collect();
+            group.common.iter().map(|(column, value)| format!("{column}={}", text_of(value))).collect();
         let common = common.join(" ");
         group.samples.iter().map(move |(column, sample)| {
             let mean = if sample.count < 2 {

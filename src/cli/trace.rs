@@ -1,4 +1,5 @@
-//! `--trace`: what the program spends its time on, in the format of `chrome://tracing`, which Perfetto opens, too.
+//! `--trace`: a profile of the program in the format of `chrome://tracing`, which Perfetto also
+//! opens.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +8,7 @@ use metaplan::message::Message;
 use tracing_chrome::{ChromeLayerBuilder, FlushGuard};
 use tracing_subscriber::layer::SubscriberExt as _;
 
-/// A trace under way.
+/// A running trace.
 pub(super) struct Trace {
     flush: FlushGuard,
     pending: Pending,
@@ -15,10 +16,10 @@ pub(super) struct Trace {
 }
 
 impl Trace {
-    /// Begins to take notes of spans, until [`Trace::end`].
+    /// Starts to record spans, until [`Trace::end`].
     ///
     /// # Errors
-    /// The file cannot be made.
+    /// The file cannot be created.
     pub(super) fn begin(file: &Path) -> Result<Self, Message> {
         let (writer, pending) = create(file).map_err(|error| unwritten(file, &error))?;
         let (layer, flush) = ChromeLayerBuilder::new().writer(writer).include_args(true).build();
@@ -31,7 +32,7 @@ impl Trace {
     /// Completes the file.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The file cannot be written.
     pub(super) fn end(self) -> Result<(), Message> {
         drop(self.flush);
         self.pending.commit().map_err(|error| unwritten(&self.file, &error))

@@ -1,4 +1,4 @@
-//! The values of options: text to directories, settings, durations and times.
+//! Parsers of option values: directories, settings, durations and times.
 
 use std::path::PathBuf;
 
@@ -19,7 +19,7 @@ pub(super) fn setting(text: &str) -> Result<(String, String), String> {
     Ok((name.trim().to_owned(), value.trim().to_owned()))
 }
 
-/// A name with an exact decimal number.
+/// Parses a name with an exact decimal number.
 pub(super) fn amount(text: &str) -> Result<(String, BigRational), String> {
     let (name, value) = setting(text)?;
     let wrong = || format!("`{value}` is not a decimal number");
@@ -34,7 +34,7 @@ pub(super) fn time(text: &str) -> Result<BigRational, String> {
         .ok_or_else(|| format!("`{text}` is not a time such as 0.001"))
 }
 
-/// An exact number from a decimal of JSON.
+/// Converts a JSON decimal to an exact number.
 pub(super) fn decimal(value: &Value) -> Option<BigRational> {
     let text = value.as_number()?.to_string();
     let (whole, fraction) = text.split_once('.').unwrap_or((&text, ""));

@@ -1,6 +1,6 @@
-//! What the codes of messages of `metaplan-fleet` mean; its package has no reader but this one.
+//! Catalogue of the message codes of `metaplan-fleet`.
 
-/// Codes in their order, each with what it means, what causes it, and what to do.
+/// Codes in order, each with meaning, cause and remedy.
 pub const CODES: &[[&str; 4]] = &[
     [
         "N300",

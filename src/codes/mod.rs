@@ -1,4 +1,5 @@
-//! Every code that a message can have: what it means, what causes it, and what to do. Each crate lists its own; here they are one.
+//! Catalogue of all message codes, with meaning, cause and remedy. It joins the catalogues of the
+//! crates.
 
 mod fleet;
 mod own;
@@ -7,17 +8,17 @@ mod ros;
 /// A code of a message. Codes are stable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Code {
-    /// A letter and three digits.
+    /// Name of the code: a letter and three digits.
     pub code: &'static str,
-    /// What it means, in a sentence.
+    /// Meaning of the code, in a sentence.
     pub meaning: &'static str,
-    /// What causes it.
+    /// Cause of the message.
     pub cause: &'static str,
-    /// What to do.
+    /// Remedy.
     pub remedy: &'static str,
 }
 
-/// All codes, sorted.
+/// Returns all codes, sorted.
 pub fn all() -> Vec<Code> {
     let tables = [
         rules::CODES,
@@ -32,9 +33,9 @@ pub fn all() -> Vec<Code> {
         fleet::CODES,
     ];
     let code = |&[code, meaning, cause, remedy]: &[&'static str; 4]| Code { code, meaning, cause, remedy };
-    let mut all: Vec<Code> = tables.into_iter().flatten().map(code).collect();
-    all.sort_unstable_by_key(|code| code.code);
-    all
+    let mut codes: Vec<Code> = tables.into_iter().flatten().map(code).collect();
+    codes.sort_unstable_by_key(|code| code.code);
+    codes
 }
 
 /// The code of that name, in capitals or not.
@@ -46,7 +47,7 @@ pub fn find(name: &str) -> Option<Code> {
     all().into_iter().find(|code| code.code.eq_ignore_ascii_case(name))
 }
 
-/// Whether a text has the form of a code.
+/// Returns `true` if a text has the form of a code.
 pub fn is_code(text: &str) -> bool {
     let (letter, digits) = text.split_at_checked(1).unwrap_or(("", ""));
     letter.chars().all(|c| c.is_ascii_alphabetic())

@@ -1,6 +1,6 @@
-//! What the codes of messages mean that this crate gives.
+//! Catalogue of the message codes of this crate.
 
-/// Codes in their order, each with what it means, what causes it, and what to do.
+/// Codes in order, each with meaning, cause and remedy.
 pub const CODES: &[[&str; 4]] = &[
     [
         "M104",

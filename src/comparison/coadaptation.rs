@@ -1,4 +1,5 @@
-//! A filled problem to places, arcs, configurations and what they cost: the data of the co-adaptation process.
+//! Extracts the data of the co-adaptation process from a filled problem: places, arcs,
+//! configurations and their costs.
 //!
 //! The PDDL symbols have default names; a manifest's section `[probabilistic]` gives others.
 use std::collections::BTreeMap;
@@ -77,74 +78,74 @@ impl Default for Roles {
     }
 }
 
-/// One way to traverse an arc.
+/// A traversal of an arc with one configuration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Traversal {
-    /// In the mission's time unit.
+    /// Time of the traversal, in the mission's time unit.
     pub time: BigRational,
-    /// In the mission's unit of energy.
+    /// Energy of the traversal, in the mission's unit of energy.
     pub energy: BigRational,
-    /// The probability of getting to the end, collision or not.
+    /// Probability of reaching the end of the arc, with or without a collision.
     pub success: BigRational,
-    /// The probability of a collision on the way, if the end is reached.
+    /// Conditional probability of a collision, given that the end is reached.
     pub hit: BigRational,
 }
 
-/// What a change of configuration takes.
+/// Cost and success probability of a change of configuration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Switch {
-    /// In the mission's time unit.
+    /// Time of the change, in the mission's time unit.
     pub time: BigRational,
-    /// In the mission's unit of energy.
+    /// Energy of the change, in the mission's unit of energy.
     pub energy: BigRational,
-    /// The probability that it works; else the old configuration stays.
+    /// Probability of success; a failed change keeps the old configuration.
     pub success: BigRational,
 }
 
 /// A directed arc.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Arc {
-    /// Where it starts, as a number of a place.
+    /// Number of the place at which the arc starts.
     pub from: usize,
-    /// Where it ends.
+    /// Number of the place at which the arc ends.
     pub to: usize,
-    /// For each configuration how it is traversed, if it can be.
+    /// The traversal with each configuration, if it is possible.
     pub by: Vec<Option<Traversal>>,
 }
 
-/// As many places fit into the number of a state.
-const PLACES: usize = 1 << 16;
-/// As many configurations do.
-const CONFIGURATIONS: usize = 1 << 12;
+/// Maximum number of places in the number of a state.
+const MAX_PLACES: usize = 1 << 16;
+/// Maximum number of configurations in the number of a state.
+const MAX_CONFIGURATIONS: usize = 1 << 12;
 
 /// A configuration: a design of the function that moving requires.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Configuration {
     /// The design's name.
     pub name: String,
-    /// The components that it needs.
+    /// Components that the configuration needs.
     pub components: Vec<String>,
-    /// Whether it is available at the start.
+    /// `true` if the configuration is available at the start.
     pub available: bool,
 }
 
 /// A battery in whole levels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Battery {
-    /// How many levels there are at the start.
+    /// Number of levels at the start.
     pub initial: u32,
-    /// No move may leave less than this.
+    /// Minimum level after each move.
     pub reserve: u32,
-    /// What one level stands for, in the mission's unit of energy.
+    /// Size of a level, in the mission's unit of energy.
     pub unit: u32,
 }
 
 /// A component that may be lost on the way.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Loss {
-    /// Its name.
+    /// Name of the component.
     pub component: String,
-    /// The probability for each move.
+    /// Probability of the loss at each move.
     pub rate: BigRational,
 }
 
@@ -153,21 +154,21 @@ pub struct Loss {
 pub struct Coadaptation {
     /// The names of the places.
     pub places: Vec<String>,
-    /// Where it starts.
+    /// Number of the place at which the mission starts.
     pub start: usize,
-    /// Where it ends.
+    /// Number of the place at which the mission ends.
     pub goal: usize,
     /// The configurations.
     pub configurations: Vec<Configuration>,
-    /// The one at the start.
+    /// The initial configuration.
     pub initial: usize,
     /// The arcs, by start and end.
     pub arcs: Vec<Arc>,
-    /// From each configuration to each other one, where that is possible.
+    /// Changes between each pair of configurations, where possible.
     pub switches: Vec<Vec<Option<Switch>>>,
     /// The battery, if there is one.
     pub battery: Option<Battery>,
-    /// What may be lost.
+    /// The component that may be lost.
     pub loss: Option<Loss>,
 }
 
@@ -205,11 +206,12 @@ impl Coadaptation {
             }
         }
         designs.extend(facts.of(&roles.available).iter().filter_map(|arguments| arguments.first().cloned()));
+        // Start and goal may occur in no arc, so they were added before.
         natural(&mut places);
         natural(&mut designs);
         fits(places.len(), designs.len())?;
-        let place = |name: &str| places.iter().position(|known| known == name).unwrap_or_default();
-        let design = |name: &str| designs.iter().position(|known| known == name).unwrap_or_default();
+        let place = |name: &str| places.iter().position(|place| place == name).unwrap_or_default();
+        let design = |name: &str| designs.iter().position(|design| design == name).unwrap_or_default();
         let view = mission.knowledge().map(crate::knowledge::Knowledge::view);
         let configurations: Vec<_> = designs
             .iter()
@@ -259,30 +261,31 @@ impl Coadaptation {
         .checked()
     }
 
-    /// Whether a problem spells out places and configurations, as [`Coadaptation::new`] reads them; otherwise the states
-    /// of the task serve ([`Tasked`](crate::comparison::Tasked)).
+    /// Returns `true` if the problem declares places and configurations, as [`Coadaptation::new`]
+    /// reads them. Otherwise the states of the task are the places
+    /// ([`Tasked`](crate::comparison::Tasked)).
     pub fn is_spelt_out(problem: &Problem, roles: &Roles) -> bool {
         let facts = Facts::new(problem);
         [&roles.configured, &roles.suits].iter().any(|role| !facts.of(role).is_empty())
     }
 
-    /// The configurations that the loss of the component takes away.
+    /// Returns `true` if the loss of the component makes the configuration unavailable.
     pub fn lost(&self, configuration: usize) -> bool {
         self.loss
             .as_ref()
             .is_some_and(|loss| self.configurations[configuration].components.contains(&loss.component))
     }
 
-    /// The levels of the battery that an amount of energy takes, rounded up.
+    /// Converts energy to battery levels, rounded up.
     pub(super) fn levels(&self, energy: &BigRational) -> u32 {
         let unit = self.battery.map_or(1, |battery| battery.unit);
         (energy / BigRational::from(BigInt::from(unit))).ceil().to_integer().to_u32().unwrap_or(u32::MAX)
     }
 
-    /// The process, if it is one: probabilities from 0 to 1, and nothing less than zero.
+    /// Checks that probabilities are from 0 to 1, and that no number is negative.
     ///
     /// # Errors
-    /// Everything that is not so.
+    /// All numbers out of range.
     pub(super) fn checked(self) -> Result<Self, Errors> {
         let (zero, one) = (BigRational::zero(), BigRational::one());
         let mut problems = Vec::new();
@@ -322,29 +325,29 @@ impl Coadaptation {
         if problems.is_empty() { Ok(self) } else { Err(problems.into()) }
     }
 
-    /// The same without one component, and what needs it.
+    /// Returns the mission without a component and without the configurations that need it.
     #[must_use]
     pub fn without(&self, component: &str) -> Self {
         let mut result = self.clone();
         for configuration in &mut result.configurations {
-            configuration.available &= !configuration.components.iter().any(|known| known == component);
+            configuration.available &= !configuration.components.iter().any(|needed| needed == component);
         }
         result
     }
 }
 
-/// Whether the number of a state has room for so many places and configurations.
+/// Checks that the number of a state can encode `places` and `configurations`.
 pub(super) fn fits(places: usize, configurations: usize) -> Result<(), Errors> {
-    if places <= PLACES && configurations <= CONFIGURATIONS {
+    if places <= MAX_PLACES && configurations <= MAX_CONFIGURATIONS {
         return Ok(());
     }
     let text = format!(
-        "a process has at most {PLACES} places and {CONFIGURATIONS} configurations, not {places} and {configurations}"
+        "a process has at most {MAX_PLACES} places and {MAX_CONFIGURATIONS} configurations, not {places} and {configurations}"
     );
     Err(vec![Message::error("M127", text)].into())
 }
 
-/// Numbers in names count as numbers: `l2` before `l10`.
+/// Sorts names with natural ordering of numbers: `l2` before `l10`.
 fn natural(names: &mut Vec<String>) {
     let key = |name: &String| {
         let digits = name.trim_start_matches(|c: char| !c.is_ascii_digit());
@@ -355,9 +358,9 @@ fn natural(names: &mut Vec<String>) {
 }
 
 pub(super) fn components(view: &View<'_>, design: &str) -> Vec<String> {
-    let found = view.function_designs().into_iter().find(|known| known.individual.name == design);
-    found
-        .map(|found| found.components.iter().map(|component| component.name.clone()).collect())
+    let declared = view.function_designs().into_iter().find(|candidate| candidate.individual.name == design);
+    declared
+        .map(|declared| declared.components.iter().map(|component| component.name.clone()).collect())
         .unwrap_or_default()
 }
 
@@ -389,8 +392,9 @@ impl Facts {
 
     /// The arcs with their traversals.
     fn arcs(&self, roles: &Roles, places: &[String], designs: &[String]) -> Result<Vec<Arc>, Errors> {
-        let index =
-            |names: &[String], name: &str| names.iter().position(|known| known == name).unwrap_or_default();
+        let index = |names: &[String], name: &str| {
+            names.iter().position(|candidate| candidate == name).unwrap_or_default()
+        };
         let (place, design) = (|name: &str| index(places, name), |name: &str| index(designs, name));
         let mut problems = Vec::new();
         let mut arcs: BTreeMap<(usize, usize), Arc> = BTreeMap::new();

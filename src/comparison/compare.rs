@@ -1,5 +1,5 @@
-//! Both approaches in one referee: policies of model checking, and plans with and without re-planning, are played in the
-//! same decision process, and measured exactly there.
+//! Evaluates both approaches in a common process: policies of model checking, and plans with and
+//! without replanning, are measured exactly in the same decision process.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -16,32 +16,32 @@ use crate::comparison::published::{published, shortest_routes};
 use crate::comparison::referee::Referee;
 use crate::comparison::route::best_on_route;
 
-/// Hears of the candidates that have been measured, and of what was taken until then.
+/// Callback for the evaluated candidates and the costs until then.
 pub type Listener<'a> = dyn FnMut(&[Candidate], &Costs) + 'a;
 
-/// How a comparison is made.
+/// Settings of a comparison.
 #[derive(Clone)]
 pub struct Config<'a> {
-    /// What is uncertain in the referee.
+    /// The uncertain parts of the common process.
     pub risk: Risk,
-    /// The time that a failed mission costs; ten times the fastest plan's if not given.
+    /// Time that a failed mission costs; by default ten times the time of the fastest plan.
     pub penalty: Option<f64>,
     /// The priority of the published procedure: time (0), energy (1) or safety (2).
     pub priority: usize,
-    /// More states than this are an error.
+    /// Maximum number of states.
     pub states: usize,
-    /// Tells the greatest memory in megabytes since it was last asked, where that is known.
+    /// Returns the peak memory in megabytes since the last call, if the platform reports it.
     pub memory: &'a dyn Fn() -> Option<u64>,
 }
 
-/// One way to decide, and what comes of it.
+/// A decision rule with its values.
 #[derive(Debug, Clone)]
 pub struct Candidate {
-    /// Which kind it is: `a` to `f`.
+    /// Kind of the candidate: `a` to `f`.
     pub kind: char,
-    /// What it is.
+    /// Name of the candidate.
     pub name: String,
-    /// What comes of it.
+    /// Values of the candidate.
     pub measures: Measures,
 }
 
@@ -51,17 +51,19 @@ pub struct Candidate {
 pub struct Comparison {
     /// The rows.
     pub candidates: Vec<Candidate>,
-    /// The vertices of the front of time and probability of success without collision, where each time is finite.
+    /// Vertices of the front of time and probability of success without collision, where each time
+    /// is finite.
     pub front: Vec<[f64; 2]>,
-    /// Bounds on time and energy that no way to decide gets below, even one that knows beforehand what will be lost.
+    /// Lower bounds on time and energy of every decision rule, including a clairvoyant one.
     pub hindsight: [Hindsight; 2],
     /// The penalty for failed missions.
     pub penalty: f64,
-    /// Why re-planning cannot be worse than the best policy, where that is known without computing it.
+    /// Reason why replanning cannot be worse than the best policy, if that follows without
+    /// computation.
     pub no_price: Option<&'static str>,
-    /// What the loss of the component does, step by step.
+    /// Consequences of losing the component, step by step.
     pub loss: Option<LossReport>,
-    /// What both sides take.
+    /// Computational costs of both approaches.
     pub costs: Costs,
 }
 
@@ -71,34 +73,36 @@ impl Comparison {
         self.candidates.iter().find(|candidate| candidate.kind == kind)?.measures.penalised_time
     }
 
-    /// The penalised time that the plan with re-planning takes above the best policy: the price of determinism.
+    /// Returns the price of determinism: the penalised time of the plan with replanning minus that
+    /// of the best policy.
     pub fn price_of_determinism(&self) -> Option<f64> {
         Some(self.penalised('c')? - self.penalised('a')?)
     }
 
-    /// The penalised time that the plan without re-planning takes above the best policy: the price of the open loop.
+    /// Returns the price of the open loop: the penalised time of the plan without replanning minus
+    /// that of the best policy.
     pub fn price_of_open_loop(&self) -> Option<f64> {
         Some(self.penalised('b')? - self.penalised('a')?)
     }
 
-    /// The penalised time that re-planning saves.
+    /// Returns the penalised time that replanning saves.
     pub fn value_of_replanning(&self) -> Option<f64> {
         Some(self.penalised('b')? - self.penalised('c')?)
     }
 }
 
-/// Compares all candidates. The planner is asked for the plan at the start, and wherever re-planning is needed. What is there
-/// is reported whenever there is more.
+/// Compares all candidates. The planner is called at the start, and whenever replanning is needed.
+/// `report` is called after each new result.
 ///
 /// # Errors
-/// The planner's, or a limit on states.
+/// Errors of the planner, or a limit on states.
 pub fn compare(
     mission: &Coadaptation,
     config: &Config<'_>,
     planner: &mut PlanFinder<'_>,
     report: &mut Listener<'_>,
 ) -> Result<Comparison, NoResult> {
-    // The planner comes first, so that its memory can be told from that of the process.
+    // The planner runs first, so that its memory can be distinguished from that of the process.
     (config.memory)();
     let mut memo = PlanTable { planner, plans: BTreeMap::new(), costs: Costs::default() };
     let first = memo.plan(&Valuation::start(mission, config.risk))?;
@@ -164,7 +168,8 @@ pub fn compare(
     let no_price = referee.no_price();
     let mut comparison =
         Comparison { candidates, front, hindsight, penalty, no_price, loss, costs: memo.costs };
-    // A plan that is best by another metric, or too dear for the rounded battery, has a price all the same.
+    // A plan that minimises another metric, or that exceeds the rounded battery, has a price even
+    // in a deterministic process.
     let price = comparison.price_of_determinism();
     comparison.no_price = no_price.filter(|_| price.is_some_and(|price| price.abs() <= 1e-9 * penalty));
     Ok(comparison)

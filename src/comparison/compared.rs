@@ -1,4 +1,4 @@
-//! A mission beside its process: the SAT planner's plans are what is compared.
+//! Compares a mission's plans with its process.
 
 use std::time::Instant;
 
@@ -13,7 +13,7 @@ use crate::comparison::task::Tasked;
 use crate::message::Errors;
 use crate::mission::{Mission, Planning as _};
 
-/// A mission, and the process that it stands for.
+/// A mission with its process.
 #[derive(Debug, Clone, Copy)]
 pub struct Compared<'m> {
     /// The mission.
@@ -22,15 +22,15 @@ pub struct Compared<'m> {
     pub roles: &'m Roles,
     /// The process.
     pub coadaptation: &'m Coadaptation,
-    /// The same for a task whose problem does not spell out places and configurations.
+    /// The process of a task whose problem does not declare places and configurations.
     pub tasked: Option<&'m Tasked>,
 }
 
 impl Compared<'_> {
-    /// Plans by the SAT planner beside the policies of model checking, in one process.
+    /// Compares plans of the SAT planner with policies of model checking in one process.
     ///
     /// # Errors
-    /// The process is too large, or cannot be solved; or the planner cannot plan.
+    /// The process is too large or cannot be solved, or the planner cannot plan.
     pub fn compare(&self, config: &Config<'_>, report: &mut Listener<'_>) -> Result<Comparison, NoResult> {
         let mut planner = |situation: &Valuation| match self.tasked {
             Some(tasked) => solve(
@@ -43,7 +43,7 @@ impl Compared<'_> {
         compare(self.coadaptation, config, &mut planner, report)
     }
 
-    /// The SAT planner's plan from a situation.
+    /// Computes the SAT planner's plan from a situation.
     fn plan(&self, risk: Risk, situation: Valuation) -> Result<Planned, Errors> {
         let Self { roles, coadaptation, .. } = *self;
         let mut mission = self.mission.clone();
@@ -51,8 +51,8 @@ impl Compared<'_> {
         let configuration = &coadaptation.configurations[situation.configuration].name;
         mission.set(&roles.configured, configuration)?;
         if let Some(battery) = coadaptation.battery.filter(|_| risk.battery) {
-            let left = u64::from(situation.battery) * u64::from(battery.unit);
-            mission.set(&roles.battery, &left.to_string())?;
+            let energy = u64::from(situation.battery) * u64::from(battery.unit);
+            mission.set(&roles.battery, &energy.to_string())?;
         }
         if let Some(loss) = coadaptation.loss.as_ref().filter(|_| situation.lost) {
             mission.fail(&loss.component)?;
@@ -64,7 +64,7 @@ impl Compared<'_> {
     }
 }
 
-/// The plan of a problem, and what it took.
+/// Computes the plan of a problem, and the effort.
 fn solve(
     mission: &Mission,
     problem: impl FnOnce(&Mission) -> Result<Problem, Errors>,
@@ -87,14 +87,19 @@ fn solve(
     })
 }
 
-/// What a step does: between two places, or to the last design that it names.
+/// Converts a step to an action: a move between two places, or a change to the last design that it
+/// names.
 fn action(mission: &Coadaptation, arguments: &[String]) -> Option<Action> {
-    let same = |a: &str, b: &str| a.eq_ignore_ascii_case(b);
-    let place = |name: &String| mission.places.iter().position(|known| same(known, name));
+    let is_equal = |a: &str, b: &str| a.eq_ignore_ascii_case(b);
+    let place = |name: &String| mission.places.iter().position(|place| is_equal(place, name));
     let places: Vec<usize> = arguments.iter().filter_map(place).collect();
     if let [from, to] = places[..] {
         return mission.arcs.iter().position(|arc| (arc.from, arc.to) == (from, to)).map(Action::Move);
     }
     let design = arguments.last()?;
-    mission.configurations.iter().position(|known| same(&known.name, design)).map(Action::Change)
+    mission
+        .configurations
+        .iter()
+        .position(|configuration| is_equal(&configuration.name, design))
+        .map(Action::Change)
 }

@@ -1,4 +1,5 @@
-//! The loss of a component in the middle of a mission: after each move of the nominal run, and with a rate.
+//! Evaluates the loss of a component during a mission: after each move of the nominal run, and at a
+//! rate. The clairvoyant policy gives the lower bounds (hindsight optimization).
 
 use num_traits::ToPrimitive;
 use probabilistic::explore::{Bounds, explore};
@@ -11,19 +12,20 @@ use crate::comparison::planned::{NoResult, PlanTable};
 use crate::comparison::process::{Action, Process, Risk, Valuation};
 use crate::comparison::referee::Referee;
 
-/// What happens when the component is lost after some move of the nominal run.
+/// Consequences of losing the component after some move of the nominal run.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct LossAt {
-    /// After how many moves.
+    /// Number of moves before the loss.
     pub moves: usize,
-    /// The time of the plan if it can be carried on as it is.
+    /// Time of the plan if the loss does not prevent its remaining part.
     pub open_loop: Option<f64>,
-    /// The time with a new plan from there.
+    /// Time with a new plan from that state.
     pub replanned: Option<f64>,
-    /// The time when the process is solved again from there.
+    /// Time with an optimal policy from that state.
     pub solved_again: Option<f64>,
-    /// The time of the policy that reckons with the loss, which may have gone another way from the start.
+    /// Time of the policy that anticipates the loss, which may have taken another route from the
+    /// start.
     pub anticipated: Option<f64>,
 }
 
@@ -35,7 +37,7 @@ pub struct LossReport {
     pub component: String,
     /// The probability of losing it, for each move.
     pub rate: f64,
-    /// For each number of moves.
+    /// The consequences for each number of moves.
     pub steps: Vec<LossAt>,
 }
 
@@ -53,12 +55,13 @@ pub(super) fn report(
     for done in 0..=plan.len() {
         let moved = done == 0 || matches!(plan[done - 1], Action::Move(_));
         if moved {
+            // A component is lost only by moves, so changes of configuration need no entry.
             let lost = Valuation { lost: true, ..at };
             let spent = time_of(mission, &plan[..done]);
-            let rest = &plan[done..];
-            let open_loop = carries_on(mission, at.configuration, rest).then(|| time_of(mission, plan));
+            let remaining = &plan[done..];
+            let open_loop = carries_on(mission, at.configuration, remaining).then(|| time_of(mission, plan));
             let planned = if at.place == mission.goal { Some(Vec::new()) } else { memo.plan(&lost)? };
-            let replanned = planned.map(|rest| spent + time_from(mission, at.configuration, &rest));
+            let replanned = planned.map(|remaining| spent + time_from(mission, at.configuration, &remaining));
             steps.push(LossAt {
                 moves,
                 open_loop,
@@ -79,17 +82,19 @@ pub(super) fn report(
     })
 }
 
-/// Actions after which a run counts as endless.
-const LONGEST: usize = 100_000;
+/// Number of actions after which a run counts as infinite.
+const MAX_ACTIONS: usize = 100_000;
 
-/// The time of a policy when the component is lost after so many moves and nothing else goes wrong.
+/// Returns the time of a policy if the component is lost after `moves` moves and nothing else
+/// fails.
 fn anticipated(referee: &Referee<'_>, policy: &[u32], start: Valuation, moves: usize) -> Option<f64> {
     let mission = referee.mission;
     let (mut at, mut left, mut time) = (start, moves, 0.0);
-    for _ in 0..LONGEST {
+    for _ in 0..MAX_ACTIONS {
         if at.place == mission.goal {
             return Some(time);
         }
+        // The loss happens after the given number of moves.
         at.lost |= left == 0;
         let action = referee.decision(policy, at)?;
         time += time_from(mission, at.configuration, &[action]);
@@ -99,7 +104,7 @@ fn anticipated(referee: &Referee<'_>, policy: &[u32], start: Valuation, moves: u
     None
 }
 
-/// Whether the rest of a plan does without the component.
+/// Returns `true` if the remaining plan does not need the component.
 fn carries_on(mission: &Coadaptation, configuration: usize, rest: &[Action]) -> bool {
     let mut configuration = configuration;
     rest.iter().all(|action| match action {
@@ -116,7 +121,7 @@ fn time_from(mission: &Coadaptation, configuration: usize, plan: &[Action]) -> f
     time_of(&from, plan)
 }
 
-/// The least time to the goal from a situation, when nothing else goes wrong.
+/// Returns the least time to the goal from a situation if nothing else fails.
 fn solved_again(referee: &Referee<'_>, from: Valuation, spent: f64) -> Result<Option<f64>, NoResult> {
     let risk = Risk { collisions: false, failures: false, ..referee.risk };
     let process =
@@ -128,15 +133,15 @@ fn solved_again(referee: &Referee<'_>, from: Valuation, spent: f64) -> Result<Op
     Ok(solution.filter(|s| !s.infinite.contains(0)).map(|s| spent + s.values[0]))
 }
 
-/// Moves after which a loss that has not come is left out.
+/// Number of moves after which a loss that has not happened is neglected.
 const HORIZON: usize = 2000;
 
-/// What is spent on the way.
+/// The quantity that is minimised: time or energy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Spent {
-    /// Time.
+    /// Time is minimised.
     Time,
-    /// Energy.
+    /// Energy is minimised.
     Energy,
 }
 
@@ -152,41 +157,45 @@ impl Spent {
     }
 }
 
-/// Bounds that nobody gets below.
+/// Lower bounds on the value of every policy.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct Hindsight {
-    /// The least that a mission can take which gets to its goal.
+    /// Least value of a mission that reaches its goal.
     pub least: Option<f64>,
-    /// The expected least of who knows beforehand after which move the component is lost; a mission that cannot get to its
-    /// goal then costs the penalty.
+    /// Expected least value for a clairvoyant controller, which knows the move after which the
+    /// component is lost. A mission that then cannot reach its goal costs the penalty.
     pub expected: Option<f64>,
 }
 
-/// What nobody gets below. Collisions, failures and the battery are left out, which can only make it smaller.
+/// Computes the lower bounds. Collisions, failures and the battery are neglected, which can only
+/// decrease the bounds.
 pub fn hindsight(mission: &Coadaptation, risk: Risk, penalty: f64, spent: Spent) -> Hindsight {
     let start = mission.start * mission.configurations.len() + mission.initial;
     let never = relaxed(mission, spent, false, None);
     let least = Some(never[start]).filter(|value| value.is_finite());
     let rate = mission.loss.as_ref().filter(|_| risk.loss).and_then(|loss| loss.rate.to_f64());
     let Some(rate) = rate else { return Hindsight { least, expected: least } };
-    let mut known = relaxed(mission, spent, true, None);
-    // The loss comes with a move at the earliest.
+    let mut bounds = relaxed(mission, spent, true, None);
+    // The first move is the earliest cause of a loss.
     let (mut expected, mut left) = (0.0, 1.0);
     for _ in 0..HORIZON {
-        known = relaxed(mission, spent, false, Some(&known));
-        let value = known[start].min(penalty);
+        bounds = relaxed(mission, spent, false, Some(&bounds));
+        let value = bounds[start].min(penalty);
         expected += left * rate * value;
         left *= 1.0 - rate;
+        // The remaining terms of the sum cannot change the result noticeably.
         if left < 1e-15 || (value - never[start]).abs() < 1e-12 {
             break;
         }
     }
+    // With the remaining probability, the component is not lost in time to matter.
     let expected = expected + left * never[start].min(penalty);
     Hindsight { least, expected: Some(expected).filter(|value| value.is_finite()) }
 }
 
-/// The least that it takes to the goal. What comes after one move is `later`, where that is given.
+/// Returns the least value from each state to the goal. `later` gives the values after one move, if
+/// known.
 fn relaxed(mission: &Coadaptation, spent: Spent, lost: bool, later: Option<&[f64]>) -> Vec<f64> {
     let designs = mission.configurations.len();
     let at = |place: usize, design: usize| place * designs + design;
@@ -195,17 +204,18 @@ fn relaxed(mission: &Coadaptation, spent: Spent, lost: bool, later: Option<&[f64
     for design in 0..designs {
         best[at(mission.goal, design)] = 0.0;
     }
+    // Bellman-Ford: relaxation of arcs and switches until nothing changes.
     loop {
         let mut changed = false;
         for arc in &mission.arcs {
             for (design, traversal) in arc.by.iter().enumerate().filter(|(design, _)| usable(*design)) {
                 let Some(traversal) = traversal else { continue };
-                let rest = match later {
+                let remaining = match later {
                     _ if arc.to == mission.goal => 0.0,
                     Some(later) => later[at(arc.to, design)],
                     None => best[at(arc.to, design)],
                 };
-                let whole = spent.traversal(traversal) + rest;
+                let whole = spent.traversal(traversal) + remaining;
                 let here = &mut best[at(arc.from, design)];
                 if arc.from != mission.goal && whole < *here {
                     *here = whole;

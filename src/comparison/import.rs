@@ -1,7 +1,9 @@
-//! The map of Cámara et al. in its JSON form to a mission: a knowledge base, PDDL with probabilities, a manifest.
+//! Converts a map of Cámara et al. (JSON) to a mission: a knowledge base, PDDL with probabilities,
+//! and a manifest.
 //!
-//! The map's licence does not let it be passed on, so users bring their own copy. What the file does not say (the
-//! robot's configurations, their power, which corridors are dark) comes from options and from the table below.
+//! The map's licence forbids redistribution, so users bring their own copy. Data that the file
+//! lacks (the robot's configurations, their power, the dark corridors) is taken from options and
+//! from the table below.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -9,28 +11,29 @@ use std::fmt::Write as _;
 use super::map::{Coordinates, Map, Measured, object};
 use crate::message::{Errors, Message, did_you_mean};
 
-/// Where the mission starts and ends, and what the file does not say.
+/// Start and goal of the mission, and data that the map lacks.
 #[derive(Debug, Clone)]
 pub struct MapOptions {
     /// The mission's name.
     pub name: String,
-    /// Where it starts, as the map names it.
+    /// The place of the map at which the mission starts.
     pub start: String,
-    /// Where it ends.
+    /// The place of the map at which the mission ends.
     pub goal: String,
     /// The configuration at the start.
     pub configuration: String,
-    /// Pairs of neighbouring places with no light between them.
+    /// Pairs of neighbouring places whose corridor is dark.
     pub dark: Vec<(String, String)>,
-    /// The battery at the start, none for a mission without.
+    /// The battery at the start. `None` for a mission without battery.
     pub battery: Option<u32>,
-    /// Seconds that enabling or disabling one component takes.
+    /// Seconds for enabling or disabling one component.
     pub switch_seconds: u32,
-    /// Whether the probabilities of collisions are imported.
+    /// `true` if the probabilities of collisions are imported.
     pub collisions: bool,
-    /// Whether the probabilities that moves fail are imported.
+    /// `true` if the probabilities of failing moves are imported.
     pub failures: bool,
-    /// Whether each configuration comes at all three speeds, as in the original, or at full speed only.
+    /// `true` if each configuration has all three speeds, as in the original; `false` for full
+    /// speed only.
     pub speeds: bool,
 }
 
@@ -54,22 +57,22 @@ impl Default for MapOptions {
 /// The files of a mission as texts.
 #[derive(Debug, Clone)]
 pub struct Files {
-    /// `NAME.toml`.
+    /// Text of `NAME.toml`.
     pub manifest: String,
-    /// `NAME.ttl`.
+    /// Text of `NAME.ttl`.
     pub knowledge: String,
-    /// `domain.pddl`.
+    /// Text of `domain.pddl`.
     pub domain: String,
-    /// `problem.pddl`.
+    /// Text of `problem.pddl`.
     pub problem: String,
-    /// `positions.csv`.
+    /// Text of `positions.csv`.
     pub positions: String,
-    /// What is not taken over from the map, or taken for granted.
+    /// Warnings about parts of the map that are ignored or assumed.
     pub warnings: Vec<Message>,
 }
 
-/// A configuration of the robot: name, power in milliwatts, whether it works in the dark, whose measurements count for
-/// it, and its components.
+/// A configuration of the robot: name, power in milliwatts, `true` if it works in the dark, the
+/// configuration whose measurements apply, and its components.
 struct Design(&'static str, f64, bool, &'static str, &'static [&'static str]);
 
 const DESIGNS: [Design; 6] = [
@@ -105,8 +108,9 @@ const DESIGNS: [Design; 6] = [
     ),
 ];
 
-/// A speed of the robot: name, metres a second, power in milliwatts beside that of the configuration, and whether bumps do
-/// harm. All measurements of the map count for full speed, which comes first.
+/// A speed of the robot: name, metres per second, power in milliwatts in addition to that of the
+/// configuration, and `true` if collisions do harm. All measurements of the map are for full speed,
+/// the first entry.
 struct Speed(&'static str, f64, f64, bool);
 
 const SPEEDS: [Speed; 3] = [
@@ -115,16 +119,16 @@ const SPEEDS: [Speed; 3] = [
     Speed("safe", 0.24, 4000.0, false),
 ];
 
-/// A legal configuration: a way of localisation at a speed.
+/// A legal configuration: a localisation method at a speed.
 #[derive(Clone, Copy)]
-struct Legal {
+struct LegalConfiguration {
     design: &'static Design,
     speed: &'static Speed,
-    /// Whether the speed is a component like others, because there are several.
+    /// `true` if the speed is a component, because there are several speeds.
     several: bool,
 }
 
-impl Legal {
+impl LegalConfiguration {
     fn all(options: &MapOptions) -> impl Iterator<Item = Self> + use<> {
         let several = options.speeds;
         let speeds = &SPEEDS[..if several { SPEEDS.len() } else { 1 }];
@@ -142,29 +146,29 @@ impl Legal {
     }
 
     fn components(self) -> Vec<String> {
-        let own = self.design.4.iter().map(|name| (*name).to_owned());
-        own.chain(self.several.then(|| format!("{}_speed", self.speed.0))).collect()
+        let components = self.design.4.iter().map(|name| (*name).to_owned());
+        components.chain(self.several.then(|| format!("{}_speed", self.speed.0))).collect()
     }
 
-    /// How much longer it takes than at full speed.
+    /// Ratio of the time to that at full speed.
     fn slowness(self) -> f64 {
         SPEEDS[0].1 / self.speed.1
     }
 
-    /// How much more energy it takes than at full speed.
+    /// Ratio of the energy to that at full speed.
     fn effort(self) -> f64 {
         self.slowness() * (self.design.1 + self.speed.2) / (self.design.1 + SPEEDS[0].2)
     }
 }
 
-/// Metres a second at which energy is computed.
+/// Speed for the computation of energy, in metres per second.
 const SPEED: f64 = 0.68;
-/// Energy of a metre for each milliwatt at that speed, in the map's unit.
+/// Energy per metre and milliwatt at that speed, in the map's unit.
 const ENERGY: f64 = 0.01;
-/// So many places are shown where one is not known.
-const SHOWN: usize = 20;
-/// Levels of the battery that are kept in reserve.
-const RESERVE: u32 = 500;
+/// Maximum number of places that the message about an unknown place lists.
+const MAX_LISTED_PLACES: usize = 20;
+/// Battery levels kept in reserve.
+const RESERVE_LEVELS: u32 = 500;
 
 type Corridor = (String, String);
 
@@ -172,7 +176,7 @@ fn pair(a: &str, b: &str) -> Corridor {
     if a <= b { (a.to_owned(), b.to_owned()) } else { (b.to_owned(), a.to_owned()) }
 }
 
-/// One measurement for each arc and configuration; the last one counts where an arc has several.
+/// Returns one measurement for each arc and configuration. Of several, the last one counts.
 fn measured(
     list: &[Measured<'_>],
     field: &str,
@@ -194,22 +198,22 @@ fn rounded(value: f64, digits: usize) -> f64 {
     format!("{value:.digits$}").parse().unwrap_or(value)
 }
 
-/// Reads a map and writes a mission.
+/// Reads a map and returns the files of a mission.
 ///
 /// # Errors
-/// The file is no such map, or has no such places.
+/// The file is not such a map, or does not have the given places.
 pub fn import_map(file: &str, text: &str, options: &MapOptions) -> Result<Files, Errors> {
     let map = Map::read(file, text)?;
-    let known = map.places();
-    let asked =
+    let places = map.places();
+    let endpoints =
         [&options.start, &options.goal].into_iter().chain(options.dark.iter().flat_map(|(a, b)| [a, b]));
-    let mut problems: Vec<_> = asked
-        .filter(|name| !known.contains(name.as_str()))
+    let mut problems: Vec<_> = endpoints
+        .filter(|name| !places.contains(name.as_str()))
         .map(|name| {
-            let meant = did_you_mean(name, known.iter().copied());
-            let names = known.iter().take(SHOWN).copied().collect::<Vec<_>>().join(", ");
-            let more = if known.len() > SHOWN { ", …" } else { "" };
-            let text = format!("the map has no place `{name}`; it has: {names}{more}{meant}");
+            let suggestion = did_you_mean(name, places.iter().copied());
+            let names = places.iter().take(MAX_LISTED_PLACES).copied().collect::<Vec<_>>().join(", ");
+            let ellipsis = if places.len() > MAX_LISTED_PLACES { ", …" } else { "" };
+            let text = format!("the map has no place `{name}`; it has: {names}{ellipsis}{suggestion}");
             Message::at("M124", file, None, text)
         })
         .collect();
@@ -241,7 +245,7 @@ fn manifest(name: &str) -> String {
     )
 }
 
-/// Where the places lie, in metres.
+/// Returns the coordinates of the places, in metres.
 fn positions(map: &Map<'_>) -> String {
     map.nodes.iter().fold("place,x,y\n".to_owned(), |text, node| {
         text + &format!("{},{},{}\n", object(&node.id.text), node.coords.x, node.coords.y)
@@ -260,12 +264,13 @@ fn knowledge(options: &MapOptions) -> String {
          :f_move a owl:NamedIndividual , t:Function .\n\
          :a_move a owl:NamedIndividual , t:Action ; t:requiresF :f_move .\n\n"
     );
-    let components: BTreeSet<String> = Legal::all(options).flat_map(Legal::components).collect();
+    let components: BTreeSet<String> =
+        LegalConfiguration::all(options).flat_map(LegalConfiguration::components).collect();
     for component in components {
         let _ = writeln!(text, ":c_{component} a owl:NamedIndividual , t:Component .");
     }
     text.push('\n');
-    for legal in Legal::all(options) {
+    for legal in LegalConfiguration::all(options) {
         let components: Vec<_> =
             legal.components().iter().map(|component| format!(":c_{component}")).collect();
         let _ = writeln!(
@@ -313,7 +318,7 @@ const DOMAIN: &str = "; A robot moves along arcs in one of its configurations. W
       (increase (total_time) (switch_time ?old ?new)))))
 ";
 
-/// Without a battery, the lines about it are left out.
+/// Returns the domain. Without a battery, its lines about the battery are omitted.
 fn domain(options: &MapOptions) -> String {
     if options.battery.is_some() {
         return DOMAIN.to_owned();
@@ -336,15 +341,15 @@ fn problem(map: &Map<'_>, options: &MapOptions) -> String {
     let arcs: BTreeSet<Corridor> = map
         .nodes
         .iter()
-        .flat_map(|node| node.neighbours.iter().map(|other| pair(&node.id.text, &other.text)))
+        .flat_map(|node| node.neighbours.iter().map(|neighbour| pair(&node.id.text, &neighbour.text)))
         .collect();
     let length =
         |(a, b): &Corridor| (at[a.as_str()].x - at[b.as_str()].x).hypot(at[a.as_str()].y - at[b.as_str()].y);
     let dark: BTreeSet<Corridor> = options.dark.iter().map(|(a, b)| pair(a, b)).collect();
-    // Where an arc was not measured, the mean speed over all measured ones serves.
+    // For an arc without measurement, the mean speed over all measured arcs is assumed.
     let speed = |source: &str| {
-        let known = times.iter().filter(|(arc, _)| arcs.contains(*arc));
-        let (metres, seconds) = known
+        let measured = times.iter().filter(|(arc, _)| arcs.contains(*arc));
+        let (metres, seconds) = measured
             .filter_map(|(arc, by)| Some((rounded(length(arc), 6), *by.get(source)?)))
             .filter(|(_, seconds)| *seconds > 0.0)
             .fold((0.0, 0.0), |(m, s), (metres, seconds)| (m + metres, s + seconds));
@@ -352,7 +357,7 @@ fn problem(map: &Map<'_>, options: &MapOptions) -> String {
     };
     let mut init = String::new();
     for arc in &arcs {
-        for legal in Legal::all(options) {
+        for legal in LegalConfiguration::all(options) {
             let Design(_, power, sees, source, _) = legal.design;
             if dark.contains(arc) && !sees {
                 continue;
@@ -384,8 +389,8 @@ fn problem(map: &Map<'_>, options: &MapOptions) -> String {
             }
         }
     }
-    for old in Legal::all(options) {
-        for new in Legal::all(options).filter(|new| new.object() != old.object()) {
+    for old in LegalConfiguration::all(options) {
+        for new in LegalConfiguration::all(options).filter(|new| new.object() != old.object()) {
             let (before, after) = (old.components(), new.components());
             let off = before.iter().filter(|component| !after.contains(component)).count();
             let on = after.iter().filter(|component| !before.contains(component)).count();
@@ -397,9 +402,10 @@ fn problem(map: &Map<'_>, options: &MapOptions) -> String {
     places.extend([object(&options.start), object(&options.goal)]);
     places.sort_by_key(|name| (name.len(), name.clone()));
     places.dedup();
-    let designs: Vec<_> = Legal::all(options).map(Legal::object).collect();
-    let battery =
-        options.battery.map(|battery| format!("    (= (battery) {battery}) (= (reserve) {RESERVE})\n"));
+    let designs: Vec<_> = LegalConfiguration::all(options).map(LegalConfiguration::object).collect();
+    let battery = options
+        .battery
+        .map(|battery| format!("    (= (battery) {battery}) (= (reserve) {RESERVE_LEVELS})\n"));
     let battery = battery.unwrap_or_default();
     let initial = format!("fd_{}", object(&options.configuration));
     format!(

@@ -1,7 +1,8 @@
-//! The map of Cámara et al. in its JSON forms, read with the place of everything that may be wrong.
+//! Parses the maps of Cámara et al. (JSON) and records the place of everything that may be faulty.
 //!
-//! A place has `node-id`, `connected-to` and `coords`; in maps of 2017, for Rainbow's first robots, `coord`. Those have no
-//! measurements, and rectangles that the robot should not enter (`unsafe-rects`), which no corridor needs.
+//! A place has `node-id`, `connected-to` and `coords`. Maps of 2017, for Rainbow's first robots,
+//! have `coord` instead, no measurements, and rectangles that the robot should avoid
+//! (`unsafe-rects`), which no corridor crosses.
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Deserializer, de};
@@ -42,7 +43,7 @@ pub(super) struct Coordinates {
     pub(super) y: f64,
 }
 
-/// A string, and where it stands.
+/// A string with its place.
 pub(super) struct Placed<'t> {
     pub(super) text: String,
     raw: &'t str,
@@ -70,8 +71,8 @@ impl<'de: 't, 't> Deserialize<'de> for Measured<'t> {
         let raw = <&'t RawValue>::deserialize(deserializer)?.get();
         let entry: Value = serde_json::from_str(raw).map_err(de::Error::custom)?;
         let end = |name: &str| {
-            let own = entry[name].as_str().map(ToOwned::to_owned);
-            own.ok_or_else(|| {
+            let text = entry[name].as_str().map(ToOwned::to_owned);
+            text.ok_or_else(|| {
                 de::Error::custom(format!("a measurement is of an arc, and needs a place `{name}`"))
             })
         };
@@ -84,7 +85,7 @@ impl<'t> Map<'t> {
     /// Reads a map.
     ///
     /// # Errors
-    /// It is not JSON of that form, or places are there twice, or lead where there is no place.
+    /// The text is not JSON of this form, places occur twice, or arcs lead to unknown places.
     pub(super) fn read(file: &str, text: &'t str) -> Result<Self, Errors> {
         let map: Self = serde_json::from_str(text).map_err(|error| {
             let older = if error.to_string().contains("missing field `coords`") {
@@ -110,40 +111,42 @@ impl<'t> Map<'t> {
     }
 
     fn problems(&self, file: &str, text: &str) -> Vec<Message> {
-        let known = self.places();
+        let places = self.places();
         let mut problems = Vec::new();
         let mut wrong = |raw: &str, sentence: String| {
             problems.push(Message::at("M124", file, Some(place(text, raw)), sentence).with_source(text));
         };
         let mut objects: BTreeMap<String, &str> = BTreeMap::new();
         for node in &self.nodes {
-            let own = node.id.text.as_str();
-            match objects.insert(object(own), own) {
-                Some(other) if other == own => {
-                    wrong(node.id.raw, format!("the place `{own}` is there twice"));
+            let id = node.id.text.as_str();
+            match objects.insert(object(id), id) {
+                Some(other) if other == id => {
+                    wrong(node.id.raw, format!("the place `{id}` is there twice"));
                 }
                 Some(other) => {
                     wrong(
                         node.id.raw,
-                        format!("`{own}` and `{other}` would be one object in PDDL; rename one"),
+                        format!("`{id}` and `{other}` would be one object in PDDL; rename one"),
                     );
                 }
-                None if object(own).chars().next().is_none_or(|first| !first.is_ascii_alphabetic()) => {
-                    let text =
-                        format!("`{own}` cannot name an object of PDDL; it should begin with a letter");
+                None if object(id).chars().next().is_none_or(|first| !first.is_ascii_alphabetic()) => {
+                    let text = format!("`{id}` cannot name an object of PDDL; it should begin with a letter");
                     wrong(node.id.raw, text);
                 }
                 None => {}
             }
             if !(node.coords.x.is_finite() && node.coords.y.is_finite()) {
-                wrong(node.id.raw, format!("the coordinates of `{own}` are not finite"));
+                wrong(node.id.raw, format!("the coordinates of `{id}` are not finite"));
             }
             for next in &node.neighbours {
-                if !known.contains(next.text.as_str()) {
-                    let meant = did_you_mean(&next.text, known.iter().copied());
-                    wrong(next.raw, format!("`{own}` leads to `{}`, which is not a place{meant}", next.text));
-                } else if next.text == own {
-                    wrong(next.raw, format!("`{own}` leads to itself"));
+                if !places.contains(next.text.as_str()) {
+                    let suggestion = did_you_mean(&next.text, places.iter().copied());
+                    wrong(
+                        next.raw,
+                        format!("`{id}` leads to `{}`, which is not a place{suggestion}", next.text),
+                    );
+                } else if next.text == id {
+                    wrong(next.raw, format!("`{id}` leads to itself"));
                 }
             }
         }
@@ -154,7 +157,7 @@ impl<'t> Map<'t> {
         problems
     }
 
-    /// What is not taken over, or taken for granted.
+    /// Warnings about parts of the map that are ignored or assumed.
     pub(super) fn warnings(&self, file: &str) -> Vec<Message> {
         let mut warnings = Vec::new();
         let mut warn = |text: &str| warnings.push(Message::warning("M132", format!("{file}: {text}")));
@@ -171,7 +174,7 @@ impl<'t> Map<'t> {
     }
 }
 
-/// A place or design as an object of PDDL.
+/// Converts the name of a place or design to a PDDL object.
 pub(super) fn object(name: &str) -> String {
     let safe: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     safe.to_ascii_lowercase()

@@ -1,8 +1,9 @@
-//! The approach of Cámara, Schmerl and Garlan (Software Architecture and Task Plan Co-Adaptation for Mobile Service
-//! Robots, SEAMS 2020), beside Metaplan's own.
+//! Compares Metaplan's plans with the approach of Cámara, Schmerl and Garlan (Software Architecture
+//! and Task Plan Co-Adaptation for Mobile Service Robots, SEAMS 2020).
 //!
-//! A mission with routes and configurations becomes a Markov decision process ([`Coadaptation`]); the plan of the SAT
-//! planner and the policies of probabilistic model checking are evaluated in that one process ([`compare`]).
+//! A mission with routes and configurations is converted to a Markov decision process
+//! ([`Coadaptation`]). The plan of the SAT planner and the policies of probabilistic model checking
+//! are evaluated in that process ([`compare`]).
 
 mod coadaptation;
 mod compare;

@@ -1,11 +1,11 @@
-//! Plans on which nothing goes wrong: where they lead, and how long they take.
+//! Executes plans without any failure, and computes their end and their time.
 
 use num_rational::BigRational;
 
 use crate::comparison::coadaptation::Coadaptation;
 use crate::comparison::process::{Action, Risk, Valuation};
 
-/// The time of a plan on which nothing goes wrong.
+/// Returns the time of a plan without failures.
 pub(super) fn time_of(mission: &Coadaptation, plan: &[Action]) -> f64 {
     use probabilistic::Number;
     let (mut configuration, mut time) = (mission.initial, 0.0);
@@ -24,7 +24,7 @@ pub(super) fn time_of(mission: &Coadaptation, plan: &[Action]) -> f64 {
     time
 }
 
-/// The state after an action on which nothing goes wrong.
+/// Returns the state after an action without failures.
 pub(super) fn after(mission: &Coadaptation, at: Valuation, action: Action, risk: Risk) -> Valuation {
     let levels = |energy: &BigRational| if risk.battery { mission.levels(energy) } else { 0 };
     match action {

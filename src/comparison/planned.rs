@@ -1,4 +1,4 @@
-//! Plans by situation, each made once; what they cost to find; and the way to decide that follows them.
+//! Plans cached by situation, their costs of computation, and the decision rule that follows them.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -13,74 +13,75 @@ use crate::comparison::process::{Action, Risk, State, Valuation};
 use crate::comparison::referee::Referee;
 use crate::message::Errors;
 
-/// A plan from a situation, and what it cost to find it.
+/// A plan from a situation, and the effort of computing it.
 #[derive(Debug, Clone, Default)]
 pub struct Planned {
-    /// What to do; none if there is no plan.
+    /// The actions. `None` if there is no plan.
     pub actions: Option<Vec<Action>>,
     /// Variables of the largest formula.
     pub variables: u64,
-    /// Its clauses.
+    /// Number of clauses of the formula.
     pub clauses: u64,
-    /// How long it took.
+    /// Time of planning, by stage.
     pub time: Stages,
 }
 
-/// How long the parts of an answer took.
+/// Times of the stages of an answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Stages {
-    /// To build what is solved: the process, or the ground task and its formulas.
+    /// Time of building the process, or the ground task with its formulas.
     pub build: Duration,
-    /// To solve it.
+    /// Time of solving.
     pub solve: Duration,
-    /// To read out what to do.
+    /// Time of extracting the decisions.
     pub extract: Duration,
 }
 
 impl Stages {
-    /// All of it.
+    /// Returns the sum of the stages.
     pub fn total(&self) -> Duration {
         self.build + self.solve + self.extract
     }
 }
 
-/// Finds plans; asked once for each situation.
+/// Computes plans; called once for each situation.
 pub type PlanFinder<'a> = dyn FnMut(&Valuation) -> Result<Planned, Errors> + 'a;
 
-/// What both sides take.
+/// Computational costs of both approaches.
 #[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub struct Costs {
-    /// Of the process.
+    /// Number of states of the process.
     pub states: usize,
-    /// Of the process.
+    /// Number of transitions of the process.
     pub transitions: usize,
-    /// What the policies of single objectives decide, in all states that they get to.
+    /// Number of decisions of the policies of single objectives, over their reachable states.
     pub decisions: usize,
-    /// The process, for all objectives together.
+    /// Times of the process, for all objectives together.
     pub process: Stages,
-    /// The greatest memory in megabytes until the process was solved, with what the planner has left.
+    /// Peak memory in megabytes until the process was solved, including memory that the planner has
+    /// not released.
     pub process_memory: Option<u64>,
-    /// How many plans were made.
+    /// Number of computed plans.
     pub plans: usize,
-    /// The first one (cold).
+    /// Times of the first plan (cold caches).
     pub first_plan: Stages,
-    /// The greatest memory in megabytes while the first one was made.
+    /// Peak memory in megabytes during the first plan.
     pub plan_memory: Option<u64>,
-    /// The other ones together (warm).
+    /// Total time of the further plans (warm caches).
     pub more_plans: Duration,
-    /// Of the largest formula.
+    /// Number of variables of the largest formula.
     pub variables: u64,
-    /// Of the largest formula.
+    /// Number of clauses of the largest formula.
     pub clauses: u64,
 }
 
-/// Why a comparison has no result.
+/// Reason for a comparison without result.
 #[derive(Debug)]
 pub enum NoResult {
-    /// Of the process.
+    /// The process cannot be built or solved.
     Process(Error),
-    /// Of the planner.
+    /// The planner cannot plan.
     Planner(Errors),
 }
 
@@ -96,7 +97,7 @@ impl From<Errors> for NoResult {
     }
 }
 
-/// Plans by situation, each made once. The collision flag does not matter to a plan.
+/// Cache of plans by situation. Plans do not depend on the collision flag.
 pub(super) struct PlanTable<'a, 'b> {
     pub(super) planner: &'a mut PlanFinder<'b>,
     pub(super) plans: BTreeMap<Valuation, Option<Vec<Action>>>,
@@ -104,7 +105,7 @@ pub(super) struct PlanTable<'a, 'b> {
 }
 
 impl PlanTable<'_, '_> {
-    /// The plan from a situation.
+    /// Returns the plan from a situation.
     pub(super) fn plan(&mut self, situation: &Valuation) -> Result<Option<Vec<Action>>, Errors> {
         let key = Valuation { hit: false, ..*situation };
         if let Some(known) = self.plans.get(&key) {
@@ -123,9 +124,9 @@ impl PlanTable<'_, '_> {
         Ok(planned.actions)
     }
 
-    /// Follows plans, and makes a new one wherever the state is not the one that the last plan expects.
+    /// Follows plans, and replans in every state that the last plan does not expect.
     pub(super) fn play(&mut self, referee: &Referee<'_>) -> Result<Measures, NoResult> {
-        // What the plan in force wants to do in each state that it expects.
+        // Actions of the current plan, for each state that it expects.
         let mut expected: BTreeMap<Valuation, Action> = BTreeMap::new();
         let mut failure = None;
         let unexpected = RefCell::new(BTreeSet::new());
@@ -161,7 +162,7 @@ impl PlanTable<'_, '_> {
     }
 }
 
-/// Notes what a plan does in each state that it expects.
+/// Records the action of a plan in each state that it expects.
 fn follow(
     mission: &Coadaptation,
     mut at: Valuation,

@@ -1,4 +1,4 @@
-//! Something that decides (a policy, a plan, a planner) and the process to what comes of it, exactly.
+//! Evaluates a decision rule (a policy, a plan or a planner) exactly in the process.
 
 use std::cell::RefCell;
 
@@ -10,18 +10,19 @@ use probabilistic::{Direction, Error, Mdp, Number, Problem};
 
 use crate::comparison::process::{Process, State};
 
-/// Decides what to do in a state after so many steps, by the number of the action; none ends the mission.
+/// Decides on an action in a state after a number of steps, by the number of the action. `None`
+/// ends the mission.
 pub type Decide<'a> = dyn FnMut(State, u32) -> Option<u32> + 'a;
 
-/// The process with its decisions made.
-struct Played<'a, 'b, N> {
+/// The process with a fixed decision rule.
+struct FixedProcess<'a, 'b, N> {
     process: &'a Process<N>,
     decide: RefCell<&'a mut Decide<'b>>,
-    /// Whether decisions depend on the number of steps.
+    /// `true` if decisions depend on the number of steps.
     counts: bool,
 }
 
-impl<N: Number> Generator<N> for Played<'_, '_, N> {
+impl<N: Number> Generator<N> for FixedProcess<'_, '_, N> {
     type State = (State, u32);
 
     fn initial(&self) -> (State, u32) {
@@ -37,11 +38,11 @@ impl<N: Number> Generator<N> for Played<'_, '_, N> {
         (state, step): &(State, u32),
         choices: &mut Choices<(State, u32), N>,
     ) -> Result<(), Error> {
-        let mut all = Choices::default();
-        self.process.successors(state, &mut all)?;
+        let mut available = Choices::default();
+        self.process.successors(state, &mut available)?;
         let Some(action) = (self.decide.borrow_mut())(*state, *step) else { return Ok(()) };
-        // What cannot be done ends the mission, too.
-        let Some((transitions, rewards)) = all.find(action) else { return Ok(()) };
+        // An impossible action ends the mission.
+        let Some((transitions, rewards)) = available.find(action) else { return Ok(()) };
         let next = if self.counts { step + 1 } else { 0 };
         for (target, probability) in transitions {
             choices.to((*target, next), probability.clone());
@@ -51,38 +52,38 @@ impl<N: Number> Generator<N> for Played<'_, '_, N> {
     }
 }
 
-/// What comes of a way to decide. Sums are over the whole mission, until the goal or a failure.
+/// Values of a decision rule. Sums are over the whole mission, until the goal or a failure.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Measures {
-    /// The probability of getting to the goal.
+    /// Probability of reaching the goal.
     pub goal: f64,
-    /// The probability of getting there with the battery's reserve untouched.
+    /// Probability of reaching the goal without using the battery's reserve.
     pub goal_with_reserve: f64,
     /// The probability of no collision at all.
     pub no_collision: f64,
     /// The expected number of collisions.
     pub collisions: f64,
-    /// Expected time; none where the mission may go on for ever.
+    /// Expected time. `None` if the mission may never end.
     pub time: Option<f64>,
     /// Expected energy.
     pub energy: Option<f64>,
     /// Expected reconfigurations.
     pub reconfigurations: Option<f64>,
-    /// Expected time of missions that get to the goal; none if there are none.
+    /// Expected time of missions that reach the goal. `None` if no mission does.
     pub time_if_successful: Option<f64>,
-    /// Expected energy of missions that get to the goal.
+    /// Expected energy of missions that reach the goal.
     pub energy_if_successful: Option<f64>,
-    /// Expected time with the penalty for missions that fail.
+    /// Expected time, where a failed mission costs the penalty.
     pub penalised_time: Option<f64>,
-    /// How often a new plan is expected to be needed on the way.
+    /// Expected number of replannings during the mission.
     pub replans: f64,
-    /// States that are visited.
+    /// Number of visited states.
     pub states: usize,
 }
 
-/// Plays a way to decide. The process must have all its rewards. `replans` says, after all decisions are made, in which
-/// states a new plan was needed.
+/// Evaluates a decision rule. The process must have all its rewards. After all decisions are made,
+/// `replans` returns the states in which a new plan was needed.
 ///
 /// # Errors
 /// There are too many states.
@@ -94,7 +95,7 @@ pub fn play<N: Number>(
     replans: &dyn Fn(State) -> bool,
     decide: &mut Decide<'_>,
 ) -> Result<Measures, Error> {
-    let played = Played { process, decide: RefCell::new(decide), counts };
+    let played = FixedProcess { process, decide: RefCell::new(decide), counts };
     let chain = explore(&played, &Bounds::default())?;
     Ok(measure(process, &chain, penalty, reserve, replans))
 }
@@ -113,10 +114,11 @@ fn measure<N: Number>(
         set
     };
     let goal = set(&|state| process.is_goal(state));
-    let kept = set(&|state| process.is_goal(state) && state.situation().battery >= reserve);
+    let above_reserve = set(&|state| process.is_goal(state) && state.situation().battery >= reserve);
     let hit = set(&|state| state.situation().hit);
     let mut end = FixedBitSet::with_capacity(n);
     for state in 0..n {
+        // Exploration marks states without a decision by a deadlock action.
         let stays = chain.mdp.choices(state).all(|c| chain.mdp.action(c) == probabilistic::explore::DEADLOCK);
         end.set(state, stays);
     }
@@ -125,15 +127,19 @@ fn measure<N: Number>(
     };
     let first = |rewards: Option<&[N]>, terminal: &FixedBitSet| {
         let solution = value(&chain.mdp, rewards, terminal)?;
+        // State 0 is the initial state.
         (!solution.infinite.contains(0)).then(|| solution.values[0].to_f64())
     };
     let reached = value(&chain.mdp, None, &goal).map(|solution| solution.values).unwrap_or_default();
     let success = reached.first().map_or(0.0, Number::to_f64);
     let policy: Vec<u32> = (0..n).map(|state| chain.mdp.choices(state).start as u32).collect();
     let if_successful = |reward: usize| {
+        // A conditional expectation needs a condition of positive probability.
         if success <= 0.0 {
             return None;
         }
+        // Conditioning on success reweights each transition by the success probability of its
+        // target.
         let (mdp, origin) = conditioned(&chain.mdp, &policy, &reached, &goal);
         let rewards: Vec<N> = origin.iter().map(|c| chain.rewards[reward][*c as usize].clone()).collect();
         let solution = value(&mdp, Some(&rewards), &goal)?;
@@ -149,7 +155,7 @@ fn measure<N: Number>(
     let time = sum(0);
     Measures {
         goal: success,
-        goal_with_reserve: first(None, &kept).unwrap_or(0.0),
+        goal_with_reserve: first(None, &above_reserve).unwrap_or(0.0),
         no_collision: 1.0 - first(None, &hit).unwrap_or(0.0),
         collisions: sum(2).unwrap_or(f64::NAN),
         time,

@@ -1,7 +1,8 @@
-//! A co-adaptation mission to a Markov decision process, with successors computed natively.
+//! Converts a co-adaptation mission to a Markov decision process whose successors are computed
+//! natively.
 //!
-//! This is the corrected reading of the approach: every route, reconfiguration anywhere, a collision that is not
-//! forgotten, and a move only where the battery stays above the reserve.
+//! This is the corrected interpretation of the approach: every route, reconfiguration anywhere, a
+//! permanent collision flag, and moves only while the battery stays above the reserve.
 
 use fixedbitset::FixedBitSet;
 use num_rational::BigRational;
@@ -14,22 +15,22 @@ use crate::comparison::coadaptation::Coadaptation;
 /// The rewards that the process has, in this order: time, energy, collisions, reconfigurations, moves.
 pub const REWARDS: [&str; 5] = ["time", "energy", "collisions", "reconfigurations", "moves"];
 
-/// What is uncertain.
+/// The uncertain parts of a mission.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[allow(clippy::struct_excessive_bools, reason = "each is a choice of its own")]
 pub struct Risk {
-    /// Collisions, which are remembered.
+    /// `true` if collisions are part of the state.
     pub collisions: bool,
-    /// Moves that fail and end the mission.
+    /// `true` if moves may fail and end the mission.
     pub failures: bool,
-    /// The loss of a component.
+    /// `true` if the component may be lost.
     pub loss: bool,
-    /// Whether the battery is part of the state.
+    /// `true` if the battery is part of the state.
     pub battery: bool,
 }
 
 impl Risk {
-    /// Everything that the mission has.
+    /// All risks that the mission has data for.
     pub fn all(mission: &Coadaptation) -> Self {
         Self {
             collisions: true,
@@ -40,11 +41,11 @@ impl Risk {
     }
 }
 
-/// A state: place, configuration, flags and battery, in one number.
+/// A state: place, configuration, flags and battery, packed into one number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct State(u64);
 
-/// What a state says.
+/// Decoded contents of a state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[allow(missing_docs, reason = "the names say it")]
 pub struct Valuation {
@@ -57,7 +58,7 @@ pub struct Valuation {
 }
 
 impl Valuation {
-    /// Where a mission begins.
+    /// Returns the initial state of a mission.
     pub(super) fn start(mission: &Coadaptation, risk: Risk) -> Self {
         Self {
             place: mission.start,
@@ -71,7 +72,7 @@ impl Valuation {
 }
 
 impl State {
-    /// What it says.
+    /// Decodes the state.
     pub fn situation(self) -> Valuation {
         Valuation {
             place: (self.0 & 0xFFFF) as usize,
@@ -96,9 +97,10 @@ struct Move<N> {
     action: u32,
     to: usize,
     levels: u32,
-    /// Success without and with a collision, and failure; by whether the component is lost then.
+    /// Probabilities of success without a collision, success with a collision, and failure; indexed
+    /// by the loss of the component.
     outcomes: [[N; 3]; 2],
-    /// Those of the process.
+    /// Rewards of the process.
     rewards: Vec<N>,
 }
 
@@ -112,34 +114,34 @@ struct Reconfiguration<N> {
     rewards: Vec<N>,
 }
 
-/// The process of a mission in one kind of number.
+/// The process of a mission, with numbers of type `N`.
 #[derive(Debug, Clone)]
 pub struct Process<N> {
     goal: usize,
     initial: State,
     reserve: u32,
-    /// For each place and configuration.
+    /// Moves for each place and configuration.
     moves: Vec<Vec<Vec<Move<N>>>>,
-    /// For each configuration.
+    /// Reconfigurations for each configuration.
     changes: Vec<Vec<Reconfiguration<N>>>,
-    /// Which configurations the loss takes away.
+    /// For each configuration, `true` if it needs the lost component.
     lost: Vec<bool>,
     risk: Risk,
-    /// How many rewards are computed.
+    /// Number of rewards that are computed.
     rewards: usize,
-    /// Levels of the battery, with none.
+    /// Number of battery levels, including the empty one.
     levels: usize,
 }
 
 impl<N: Number> Process<N> {
-    /// The process with some risks, and with some of the [`REWARDS`].
+    /// Builds the process with the given risks, and with some of the [`REWARDS`].
     pub fn new(mission: &Coadaptation, risk: Risk, rewards: &[&str]) -> Self {
         let number = |value: &BigRational| N::from_rational(value);
-        let wanted: Vec<usize> =
-            rewards.iter().filter_map(|name| REWARDS.iter().position(|known| known == name)).collect();
-        let rewards_of = |all: [N; 5]| wanted.iter().map(|index| all[*index].clone()).collect::<Vec<N>>();
+        let indices: Vec<usize> =
+            rewards.iter().filter_map(|name| REWARDS.iter().position(|reward| reward == name)).collect();
+        let rewards_of = |all: [N; 5]| indices.iter().map(|index| all[*index].clone()).collect::<Vec<N>>();
         let levels = |energy: &BigRational| if risk.battery { mission.levels(energy) } else { 0 };
-        // Complements are exact before they are rounded.
+        // Complements are computed exactly, before numbers are rounded to `N`.
         let (zero, one): (BigRational, BigRational) = (Number::zero(), Number::one());
         let rate = mission.loss.as_ref().filter(|_| risk.loss).map_or(&zero, |loss| &loss.rate);
         let designs = mission.configurations.len();
@@ -197,7 +199,7 @@ impl<N: Number> Process<N> {
             changes,
             lost: (0..designs).map(|design| risk.loss && mission.lost(design)).collect(),
             risk,
-            rewards: wanted.len(),
+            rewards: indices.len(),
             levels: mission
                 .battery
                 .filter(|_| risk.battery)
@@ -205,14 +207,14 @@ impl<N: Number> Process<N> {
         }
     }
 
-    /// The same from another start.
+    /// Returns the process with another initial state.
     #[must_use]
     pub fn starting(mut self, state: State) -> Self {
         self.initial = state;
         self
     }
 
-    /// The states at the goal, by number.
+    /// Returns the set of states at the goal.
     pub fn goals(&self, states: &States<State>) -> FixedBitSet {
         let mut goals = FixedBitSet::with_capacity(states.len());
         for (number, state) in states.iter().enumerate() {
@@ -221,7 +223,7 @@ impl<N: Number> Process<N> {
         goals
     }
 
-    /// Whether a state is at the goal.
+    /// Returns `true` if the state is at the goal.
     pub fn is_goal(&self, state: State) -> bool {
         let situation = state.situation();
         situation.place == self.goal && !situation.failed
@@ -231,26 +233,28 @@ impl<N: Number> Process<N> {
         if !self.risk.battery {
             return Some(0);
         }
-        battery.checked_sub(levels).filter(|left| *left >= self.reserve || levels == 0)
+        // Actions without energy stay possible below the reserve.
+        battery.checked_sub(levels).filter(|remaining| *remaining >= self.reserve || levels == 0)
     }
 }
 
-/// What a choice does, from its action number: a move along an arc, or a change to a configuration.
+/// Meaning of an action number: a move along an arc, or a change to a configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Action {
-    /// Along the arc with this number.
+    /// A move along the arc with this number.
     Move(usize),
-    /// To the configuration with this number.
+    /// A change to the configuration with this number.
     Change(usize),
 }
 
 impl Action {
-    /// From the number that a process has for it.
+    /// Decodes the number that a process assigns to an action.
     pub fn from_number(number: u32) -> Self {
+        // The lowest bit distinguishes changes from moves.
         if number & 1 == 0 { Self::Move(number as usize >> 1) } else { Self::Change(number as usize >> 1) }
     }
 
-    /// The number that a process has for it.
+    /// Returns the number of the action in a process.
     pub fn number(self) -> u32 {
         match self {
             Self::Move(arc) => (arc as u32) << 1,
@@ -270,19 +274,23 @@ impl<N: Number> Generator<N> for Process<N> {
         self.rewards
     }
 
-    /// States between which one gets without moving lie side by side, and what uses little battery close to them.
+    /// Returns the number of state codes. Codes of states that are connected without moves are
+    /// adjacent, and codes of states that differ little in the battery are close.
     fn codes(&self) -> Option<usize> {
         self.levels.checked_mul(self.moves.len())?.checked_mul(8)?.checked_mul(self.lost.len())
     }
 
     fn code(&self, state: &State) -> usize {
         let s = state.situation();
+        // Mixed radix: the most significant digit is the battery, the least significant one the
+        // configuration.
         let flags = usize::from(s.hit) | usize::from(s.failed) << 1 | usize::from(s.lost) << 2;
         ((s.battery as usize * self.moves.len() + s.place) * 8 + flags) * self.lost.len() + s.configuration
     }
 
     fn successors(&self, state: &State, choices: &mut Choices<State, N>) -> Result<(), Error> {
         let s = state.situation();
+        // Goal and failure states are absorbing.
         if s.place == self.goal || s.failed {
             return Ok(());
         }
@@ -301,8 +309,9 @@ impl<N: Number> Generator<N> for Process<N> {
         for step in &self.moves[s.place][s.configuration] {
             let Some(battery) = self.enough(s.battery, step.levels) else { continue };
             let arrived = Valuation { place: step.to, battery, ..s };
-            // Failed missions are over: where the battery and the collisions stood does not matter any more.
+            // A failed mission is over, so its battery and its collisions affect no later choice.
             let failed = Valuation { failed: true, battery, ..s };
+            // The loss happens during the move, so each outcome exists with and without it.
             for (lost, ends) in [s.lost, true].into_iter().zip(&step.outcomes) {
                 let ways = [
                     Valuation { lost, ..arrived },

@@ -1,4 +1,5 @@
-//! A co-adaptation mission to a model in the PRISM language, the same process as [`Process`](crate::comparison::Process) builds.
+//! Converts a co-adaptation mission to a model in the PRISM language.
+//! [`Process`](crate::comparison::Process) builds the same process natively.
 
 use std::collections::BTreeSet;
 
@@ -14,7 +15,8 @@ use probabilistic::prism::identifier;
 use crate::comparison::coadaptation::{Battery, Coadaptation, Traversal};
 use crate::comparison::process::{REWARDS, Risk};
 
-/// The mission as a model: `l` is the place, `c` the configuration, `b` the battery; `hit`, `failed` and `lost` are flags.
+/// Returns the model of a mission: `l` is the place, `c` the configuration, `b` the battery; `hit`,
+/// `failed` and `lost` are flags.
 pub fn program(mission: &Coadaptation, risk: Risk) -> Model {
     let writer = ProcessWriter { mission, risk };
     model(
@@ -120,13 +122,13 @@ impl ProcessWriter<'_> {
         variables
     }
 
-    /// Not at the goal, and nothing has failed.
+    /// Returns the guard of a running mission: not at the goal, and no failure.
     fn running(&self) -> Expr {
         let away = Expr::name("l").op(BinaryOp::NotEqual, Expr::int(self.mission.goal as i64));
         all(std::iter::once(away).chain(self.risk.failures.then(|| not(Expr::name("failed")))))
     }
 
-    /// That there is battery for something, and the battery after it.
+    /// Returns the guard that the battery suffices, and the update of the battery.
     fn spend(&self, energy: &BigRational) -> (Option<Expr>, Assignments) {
         let Some(battery) = self.battery() else { return (None, Vec::new()) };
         let levels = i64::from(self.mission.levels(energy));
@@ -135,6 +137,7 @@ impl ProcessWriter<'_> {
         }
         let enough =
             Expr::name("b").op(BinaryOp::GreaterEqual, Expr::int(levels + i64::from(battery.reserve)));
+        // The guard keeps the reserve, so the battery never becomes negative.
         (Some(enough), vec![assign("b", Expr::name("b").op(BinaryOp::Minus, Expr::int(levels)))])
     }
 
@@ -162,6 +165,7 @@ impl ProcessWriter<'_> {
                     all([self.running(), equals("c", old)].into_iter().chain(self.kept(new)).chain(enough));
                 let mut changed = spent.clone();
                 changed.push(assign("c", Expr::int(new as i64)));
+                // A failed change takes energy and keeps the configuration.
                 let failure = BigRational::one() - &switch.success;
                 let updates = updates([(switch.success.clone(), changed), (failure, spent)]);
                 commands.push(command(self.set(new), guard, updates));
@@ -180,37 +184,37 @@ impl ProcessWriter<'_> {
         commands
     }
 
-    /// How a move can end.
+    /// Returns the outcomes of a move, with their probabilities.
     fn ends(&self, traversal: &Traversal, to: usize, spent: &Assignments) -> Vec<(BigRational, Assignments)> {
-        let one = BigRational::one();
+        let certain = BigRational::one();
         let hit = if self.risk.collisions { traversal.hit.clone() } else { BigRational::zero() };
-        let success = if self.risk.failures { traversal.success.clone() } else { one.clone() };
-        let with = |more: Vec<(&str, Expr)>| {
-            let more = more.into_iter().map(|(name, value)| assign(name, value));
-            more.chain(spent.iter().cloned()).collect::<Assignments>()
+        let success = if self.risk.failures { traversal.success.clone() } else { certain.clone() };
+        let with = |assignments: Vec<(&str, Expr)>| {
+            let assignments = assignments.into_iter().map(|(name, value)| assign(name, value));
+            assignments.chain(spent.iter().cloned()).collect::<Assignments>()
         };
         let there = ("l", Expr::int(to as i64));
         let ends = [
-            (&success * (&one - &hit), with(vec![there.clone()])),
+            (&success * (&certain - &hit), with(vec![there.clone()])),
             (&success * &hit, with(vec![there, ("hit", Expr::bool(true))])),
-            (&one - &success, with(vec![("failed", Expr::bool(true))])),
+            (&certain - &success, with(vec![("failed", Expr::bool(true))])),
         ];
         let Some(loss) = self.mission.loss.as_ref().filter(|_| self.risk.loss) else { return ends.to_vec() };
-        let mut all = Vec::new();
+        let mut outcomes = Vec::new();
         for (probability, assignments) in ends {
             let mut lost = assignments.clone();
             lost.push(assign("lost", Expr::bool(true)));
-            all.push((&probability * (&one - &loss.rate), assignments));
-            all.push((probability * &loss.rate, lost));
+            outcomes.push((&probability * (&certain - &loss.rate), assignments));
+            outcomes.push((probability * &loss.rate, lost));
         }
-        all
+        outcomes
     }
 
     fn rewards(&self) -> Vec<Rewards> {
         let mut time = Vec::new();
         let mut energy = Vec::new();
         let mut collisions = Vec::new();
-        let mut put = |action: &str, guard: Expr, values: [&BigRational; 3]| {
+        let mut add_reward = |action: &str, guard: Expr, values: [&BigRational; 3]| {
             for (list, value) in [&mut time, &mut energy, &mut collisions].into_iter().zip(values) {
                 if !value.is_zero() {
                     list.push(item(action, guard.clone(), number(value)));
@@ -221,7 +225,7 @@ impl ProcessWriter<'_> {
         for new in 0..self.mission.configurations.len() {
             for (old, switches) in self.mission.switches.iter().enumerate() {
                 if let Some(switch) = &switches[new] {
-                    put(&self.set(new), equals("c", old), [&switch.time, &switch.energy, &zero]);
+                    add_reward(&self.set(new), equals("c", old), [&switch.time, &switch.energy, &zero]);
                 }
             }
         }
@@ -230,8 +234,13 @@ impl ProcessWriter<'_> {
                 if let Some(traversal) = traversal {
                     let success =
                         if self.risk.failures { traversal.success.clone() } else { BigRational::one() };
+                    // The expected number of collisions of a move is its probability of one.
                     let hits = if self.risk.collisions { success * &traversal.hit } else { zero.clone() };
-                    put(&self.go(index), equals("c", design), [&traversal.time, &traversal.energy, &hits]);
+                    add_reward(
+                        &self.go(index),
+                        equals("c", design),
+                        [&traversal.time, &traversal.energy, &hits],
+                    );
                 }
             }
         }
@@ -240,8 +249,8 @@ impl ProcessWriter<'_> {
         };
         let sets = once((0..self.mission.configurations.len()).map(|design| self.set(design)).collect());
         let moves = once((0..self.mission.arcs.len()).map(|arc| self.go(arc)).collect());
-        let all = [time, energy, collisions, sets, moves];
-        let named = REWARDS.iter().zip(all);
+        let rewards = [time, energy, collisions, sets, moves];
+        let named = REWARDS.iter().zip(rewards);
         named
             .map(|(name, items)| Rewards { name: (*name).to_owned(), items, place: Place::default() })
             .collect()
@@ -269,7 +278,7 @@ pub(super) fn command(action: String, guard: Expr, updates: Vec<Update>) -> Comm
     Command { action: Some(action), guard, updates, place: Place::default() }
 }
 
-/// The ends that are possible; one that is certain stands without its probability.
+/// Converts outcomes to updates. A certain outcome has no probability.
 pub(super) fn updates(ends: impl IntoIterator<Item = (BigRational, Assignments)>) -> Vec<Update> {
     let possible: Vec<_> = ends.into_iter().filter(|(probability, _)| !probability.is_zero()).collect();
     let certain = possible.len() == 1;

@@ -1,10 +1,12 @@
-//! The published procedure: the five shortest routes, one configuration for the whole way, and a utility.
+//! The published procedure: the five shortest routes, one configuration for the whole route, and a
+//! utility.
 //!
-//! As described by Cámara, Schmerl and Garlan (SEAMS 2020) and done by the public re-implementation: simple paths are
-//! ordered by length and five are kept; for each, model checking finds the configuration that is best by the priority
-//! property, and checks the other properties with it; the route with the best utility wins. Two oddities are kept: the
-//! flag `collided` is overwritten at each move that can collide, so only the last one counts, and an empty battery
-//! does not end a mission.
+//! The description is by Cámara, Schmerl and Garlan (SEAMS 2020), the details by the public
+//! re-implementation. Simple paths are sorted by length and the first five are kept. For each,
+//! model checking determines the best configuration by the priority property, and evaluates the
+//! other properties with it. The route with the best utility wins. Two oddities are preserved: each
+//! move that can collide overwrites the flag `collided`, so only the last of these moves counts,
+//! and an empty battery does not end a mission.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
@@ -13,50 +15,52 @@ use crate::comparison::coadaptation::{Coadaptation, Traversal};
 use crate::comparison::process::Action;
 use probabilistic::Number;
 
-/// How many routes are kept.
+/// Number of routes that are kept.
 pub(super) const ROUTES: usize = 5;
-/// The weight of the priority property, and of each other one.
+/// Weight of the priority property, and of each other property.
 const WEIGHTS: [f64; 2] = [0.6, 0.2];
-/// Partial routes after which the search for routes gives up.
-const SEARCH: usize = 2_000_000;
+/// Maximum number of partial routes in the search for routes.
+const MAX_PARTIAL_ROUTES: usize = 2_000_000;
 
-/// What the procedure decides, and what it believes about it.
+/// Decision of the procedure, with its predicted values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Published {
     /// The route, as numbers of arcs.
     pub route: Vec<usize>,
     /// The configuration for the whole way.
     pub configuration: usize,
-    /// Its utility, from 0 to 1.
+    /// Utility of the decision, from 0 to 1.
     pub utility: f64,
-    /// The time that it expects, in the mission's unit.
+    /// Predicted time, in the mission's unit.
     pub time: f64,
-    /// The energy that it expects to use.
+    /// Predicted energy.
     pub energy: f64,
-    /// The probability that the last risky move does not collide.
+    /// Predicted probability that the last risky move does not collide.
     pub not_collided: f64,
 }
 
 impl Published {
-    /// What the robot then does: one reconfiguration if it is needed, and the route.
+    /// Returns the robot's actions: one reconfiguration if necessary, then the route.
     pub fn actions(&self, mission: &Coadaptation) -> Vec<Action> {
         let change = (self.configuration != mission.initial).then_some(Action::Change(self.configuration));
         change.into_iter().chain(self.route.iter().map(|arc| Action::Move(*arc))).collect()
     }
 }
 
-/// The shortest simple routes in order of their length, which for each arc is the least time that any configuration
-/// takes, at most so many.
+/// Returns at most `wanted` simple routes in ascending length. The length of an arc is its least
+/// time over all configurations.
 pub fn shortest_routes(mission: &Coadaptation, wanted: usize) -> Vec<Vec<usize>> {
     let length = |arc: usize| {
         let by = mission.arcs[arc].by.iter().flatten().map(|traversal| traversal.time.to_f64());
         by.fold(f64::INFINITY, f64::min)
     };
-    // Millionths of the time unit, so that the queue has an order.
+    // The queue needs totally ordered lengths, so they are rounded to millionths of the time unit.
     let scaled = |arc: usize| (length(arc) * 1e6).round() as u64;
-    let rest = to_goal(mission, &scaled);
+    // The exact distance to the goal is the A* heuristic, so routes are completed in ascending
+    // length.
+    let distances = to_goal(mission, &scaled);
     let mut queue =
-        BinaryHeap::from([Reverse((rest[mission.start].unwrap_or(u64::MAX), Vec::<usize>::new()))]);
+        BinaryHeap::from([Reverse((distances[mission.start].unwrap_or(u64::MAX), Vec::<usize>::new()))]);
     let mut leaving = vec![Vec::new(); mission.places.len()];
     for (number, arc) in mission.arcs.iter().enumerate() {
         leaving[arc.from].push(number);
@@ -64,7 +68,7 @@ pub fn shortest_routes(mission: &Coadaptation, wanted: usize) -> Vec<Vec<usize>>
     let (mut found, mut steps) = (Vec::new(), 0);
     while let Some(Reverse((estimate, route))) = queue.pop() {
         steps += 1;
-        if estimate == u64::MAX || steps > SEARCH {
+        if estimate == u64::MAX || steps > MAX_PARTIAL_ROUTES {
             break;
         }
         let at = route.last().map_or(mission.start, |arc| mission.arcs[*arc].to);
@@ -76,23 +80,24 @@ pub fn shortest_routes(mission: &Coadaptation, wanted: usize) -> Vec<Vec<usize>>
             continue;
         }
         let so_far: u64 = route.iter().map(|arc| scaled(*arc)).sum();
-        let seen: BTreeSet<usize> =
+        let visited: BTreeSet<usize> =
             route.iter().map(|arc| mission.arcs[*arc].from).chain(std::iter::once(at)).collect();
         for number in &leaving[at] {
             let arc = &mission.arcs[*number];
-            if !seen.contains(&arc.to)
-                && let Some(rest) = rest[arc.to]
+            // Routes are simple paths.
+            if !visited.contains(&arc.to)
+                && let Some(distance) = distances[arc.to]
             {
                 let mut longer = route.clone();
                 longer.push(*number);
-                queue.push(Reverse((so_far + scaled(*number) + rest, longer)));
+                queue.push(Reverse((so_far + scaled(*number) + distance, longer)));
             }
         }
     }
     found
 }
 
-/// The length of the shortest way from each place to the goal.
+/// Returns the length of the shortest route from each place to the goal.
 fn to_goal(mission: &Coadaptation, length: &dyn Fn(usize) -> u64) -> Vec<Option<u64>> {
     let mut entering = vec![Vec::new(); mission.places.len()];
     for (number, arc) in mission.arcs.iter().enumerate() {
@@ -101,6 +106,7 @@ fn to_goal(mission: &Coadaptation, length: &dyn Fn(usize) -> u64) -> Vec<Option<
     let mut best: Vec<Option<u64>> = vec![None; mission.places.len()];
     let mut queue = BinaryHeap::from([Reverse((0_u64, mission.goal))]);
     while let Some(Reverse((so_far, place))) = queue.pop() {
+        // Dijkstra's algorithm: the first visit has the least distance.
         if best[place].is_some() {
             continue;
         }
@@ -115,7 +121,8 @@ fn to_goal(mission: &Coadaptation, length: &dyn Fn(usize) -> u64) -> Vec<Option<
     best
 }
 
-/// What the published model says of a route with one configuration; none if it cannot drive it.
+/// Returns the published model's values of a route with one configuration. `None` if the
+/// configuration cannot traverse it.
 fn believed(mission: &Coadaptation, route: &[usize], configuration: usize) -> Option<[f64; 3]> {
     let way: Option<Vec<&Traversal>> =
         route.iter().map(|arc| mission.arcs[*arc].by[configuration].as_ref()).collect();
@@ -124,18 +131,20 @@ fn believed(mission: &Coadaptation, route: &[usize], configuration: usize) -> Op
     let begin = switch.map_or([0.0; 2], |switch| [switch.time.to_f64(), switch.energy.to_f64()]);
     let time = way.iter().fold(begin[0], |sum, traversal| sum + traversal.time.to_f64());
     let energy = way.iter().fold(begin[1], |sum, traversal| sum + traversal.energy.to_f64());
+    // The published model overwrites its collision flag, so only the last risky move counts.
     let last_risky = way.iter().rev().map(|traversal| traversal.hit.to_f64()).find(|hit| *hit > 0.0);
     Some([time, energy, 1.0 - last_risky.unwrap_or(0.0)])
 }
 
-/// Runs the procedure with the priority on time (0), energy (1) or safety (2); none if no route can be driven.
+/// Runs the procedure with the priority on time (0), energy (1) or safety (2). `None` if no route
+/// can be traversed.
 pub fn published(mission: &Coadaptation, priority: usize) -> Option<Published> {
     let available = |configuration: &usize| mission.configurations[*configuration].available;
     let mut candidates = Vec::new();
     for route in shortest_routes(mission, ROUTES) {
         let drivable = (0..mission.configurations.len()).filter(available);
         let believed = drivable.filter_map(|c| believed(mission, &route, c).map(|values| (c, values)));
-        // Less time and energy is better, a greater probability is.
+        // Time and energy are minimised; the probability is maximised.
         let key = |values: &[f64; 3]| if priority == 2 { -values[2] } else { values[priority] };
         let best = believed.min_by(|(_, a), (_, b)| key(a).total_cmp(&key(b)));
         candidates.extend(best.map(|(configuration, values)| (route, configuration, values)));

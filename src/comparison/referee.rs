@@ -1,4 +1,4 @@
-//! The referee: the one process in which everything is measured, with what is optimal in it.
+//! The common evaluation process, and its optimal policies.
 
 use fixedbitset::FixedBitSet;
 use num_rational::BigRational;
@@ -12,10 +12,10 @@ use crate::comparison::coadaptation::Coadaptation;
 use crate::comparison::play::{Measures, play};
 use crate::comparison::process::{Action, Process, REWARDS, Risk, State, Valuation};
 
-/// A policy and what it is best at.
+/// A policy, with the name of the objective that it optimises.
 pub type NamedPolicy = (String, Vec<u32>);
 
-/// The process with what is solved in it.
+/// The process with its solutions.
 pub struct Referee<'a> {
     pub mission: &'a Coadaptation,
     pub risk: Risk,
@@ -51,7 +51,7 @@ impl Referee<'_> {
         Problem::new(&self.explored.mdp, direction, rewards, terminal)
     }
 
-    /// The best policies by single objectives; the first one is best by penalised time.
+    /// Returns the optimal policies for single objectives; the first one minimises penalised time.
     pub fn policies(&self) -> Vec<NamedPolicy> {
         let (goal, safe) = (self.goal(), self.safe_goal());
         let mut policies = Vec::new();
@@ -78,12 +78,13 @@ impl Referee<'_> {
         policies
     }
 
-    /// Least expected time, where hopeless states cost the penalty.
+    /// Computes the least expected time, where states without a path to the goal cost the penalty.
     pub fn penalised(&self, goal: &FixedBitSet, reachable: &Solution<f64>) -> Option<Solution<f64>> {
         let n = self.explored.mdp.states();
         let mut terminal = goal.clone();
         let mut worth = vec![0.0; n];
         for (state, worth) in worth.iter_mut().enumerate() {
+            // The mission has failed in such a state, so the penalty is due.
             if reachable.values[state] <= 0.0 {
                 terminal.insert(state);
                 *worth = self.penalty;
@@ -94,7 +95,8 @@ impl Referee<'_> {
         solve(problem, None)
     }
 
-    /// The front of time and probability of success without collision, and policies of its vertices.
+    /// Computes the front of time and probability of success without collision, with policies of
+    /// its vertices.
     pub fn front(&self) -> (Vec<[f64; 2]>, Vec<NamedPolicy>) {
         let objectives = [
             Objective { rewards: Some(self.explored.rewards[0].clone()), target: self.goal() },
@@ -117,7 +119,7 @@ impl Referee<'_> {
         self.mission.battery.filter(|_| self.risk.battery).map_or(0, |battery| battery.reserve)
     }
 
-    /// What a policy does in a situation.
+    /// Returns the action of a policy in a situation.
     pub fn decision(&self, policy: &[u32], situation: Valuation) -> Option<Action> {
         let state = State::from(situation);
         let number = self.explored.states.number(self.process.code(&state), &state)?;
@@ -125,37 +127,44 @@ impl Referee<'_> {
         Some(Action::from_number(self.explored.mdp.action(*choice as usize)))
     }
 
-    /// What a policy does in each state that it gets to.
+    /// Returns the action of a policy in each of its reachable states.
     pub fn decisions(&self, policy: &[u32]) -> Vec<(Valuation, Action)> {
         let mdp = &self.explored.mdp;
-        let mut seen = FixedBitSet::with_capacity(mdp.states());
+        let mut visited = FixedBitSet::with_capacity(mdp.states());
         let (mut queue, mut decisions, mut at) = (vec![0_usize], Vec::new(), 0);
-        seen.insert(0);
+        visited.insert(0);
         while let Some(state) = queue.get(at).copied() {
             at += 1;
             let choice = policy[state];
+            // The mission has ended.
             if choice == NONE || mdp.action(choice as usize) == DEADLOCK {
                 continue;
             }
             let action = Action::from_number(mdp.action(choice as usize));
             decisions.push((self.explored.states[state].situation(), action));
-            queue.extend(mdp.targets(choice as usize).iter().map(|t| *t as usize).filter(|t| !seen.put(*t)));
+            queue.extend(
+                mdp.targets(choice as usize).iter().map(|t| *t as usize).filter(|t| !visited.put(*t)),
+            );
         }
         decisions
     }
 
     pub fn play_policy(&self, policy: &[u32]) -> Result<Measures, Error> {
         let mut decide = |state: State, _: u32| self.decision(policy, state.situation()).map(Action::number);
+        // Values are computed in rationals, although the policy was computed in floating-point
+        // numbers.
         play(&self.exact(), false, self.penalty, self.reserve(), &|_| false, &mut decide)
     }
 
     pub fn play_plan(&self, plan: &[Action]) -> Result<Measures, Error> {
         let mut decide = |_: State, step: u32| plan.get(step as usize).map(|action| action.number());
+        // The action of a plan depends on the number of steps.
         play(&self.exact(), true, self.penalty, self.reserve(), &|_| false, &mut decide)
     }
 
-    /// Where transitions are certain but for the collision flag, which no transition depends on, the fastest plan is an
-    /// optimal policy.
+    /// Returns the reason why determinism has no price: if transitions are deterministic except for
+    /// the collision flag, and no transition depends on that flag, the fastest plan is an optimal
+    /// policy.
     pub fn no_price(&self) -> Option<&'static str> {
         use num_traits::One;
         let certain = |probability: &BigRational| probability.is_one();
@@ -163,9 +172,9 @@ impl Referee<'_> {
         let moves_certain =
             !self.risk.failures || moves.into_iter().all(|traversal| certain(&traversal.success));
         let switches = self.mission.switches.iter().flatten().flatten();
-        let all =
+        let is_deterministic =
             moves_certain && !self.risk.loss && switches.into_iter().all(|switch| certain(&switch.success));
-        all.then_some(
+        is_deterministic.then_some(
             "nothing but the collision flag is uncertain, and neither the time nor any move depends on it",
         )
     }

@@ -1,17 +1,18 @@
-//! A fixed route to the best configurations on it, by dynamic programming over its arcs.
+//! Computes the best configurations for a fixed route by dynamic programming over its arcs.
 
 use num_rational::BigRational;
 
 use crate::comparison::coadaptation::{Coadaptation, Switch, Traversal};
 use crate::comparison::process::Action;
 
-/// The fastest way to drive a route, reconfiguring before any arc; none if it cannot be driven.
+/// Returns the fastest traversal of a route, with reconfigurations before any arc. `None` if the
+/// route cannot be traversed.
 pub fn best_on_route(mission: &Coadaptation, route: &[usize]) -> Option<Vec<Action>> {
     best_by(mission, route, |traversal| traversal.time.clone(), |switch| switch.time.clone())
         .map(|(_, plan)| plan)
 }
 
-/// As [`best_on_route`], by any cost of traversals and switches; with the cost.
+/// Returns the best traversal by any cost of traversals and switches, with its cost.
 fn best_by(
     mission: &Coadaptation,
     route: &[usize],

@@ -1,9 +1,11 @@
-//! A mission to a model of the published setting in the PRISM language, beside the corrected one of [`program`](super::program()).
+//! Exports a mission as a model of the published setting in the PRISM language.
+//! [`program`](super::program()) exports the corrected model.
 //!
-//! As in the models that Cámara, Schmerl and Garlan (SEAMS 2020) generate for each route: one reconfiguration at most, before
-//! the first move; then along one of the routes that were kept. The flag `collided` is overwritten at each move that
-//! can collide, a move never fails, and a battery that is empty ends nothing. Their models are one for each route; here
-//! the route is the first choice, so that one question finds the best of them, and a constant fixes it.
+//! As in the models that Cámara, Schmerl and Garlan (SEAMS 2020) generate for each route, there is
+//! one reconfiguration at most, before the first move; then the robot follows one of the selected
+//! routes. Each move that can collide overwrites the flag `collided`, a move never fails, and an
+//! empty battery has no consequence. The authors generate one model per route. Here the route is
+//! the first choice, so a single query determines the best route, and a constant fixes it.
 
 use num_rational::BigRational;
 use num_traits::{One, Zero};
@@ -19,8 +21,9 @@ use crate::comparison::program::{
 };
 use crate::comparison::published::{ROUTES, shortest_routes};
 
-/// The mission as a model of the published setting: `r` is the route (0 before it is chosen), `p` how many of its arcs are
-/// behind the robot, `c` the configuration, `b` the battery; `rd` says that a reconfiguration was made.
+/// Returns the model of the published setting: `r` is the route (0 before it is chosen), `p` the
+/// number of its arcs behind the robot, `c` the configuration, `b` the battery; `rd` is set after a
+/// reconfiguration.
 pub fn published_program(mission: &Coadaptation) -> Model {
     let routes = shortest_routes(mission, ROUTES);
     let writer = RouteWriter { mission, routes };
@@ -73,7 +76,7 @@ impl RouteWriter<'_> {
         variables
     }
 
-    /// What is left of the battery, at least nothing.
+    /// Updates the battery, with 0 as the lower limit.
     fn spent(&self, energy: &BigRational) -> Vec<(String, Expr, Place)> {
         if self.mission.battery.is_none() {
             return Vec::new();
@@ -82,9 +85,9 @@ impl RouteWriter<'_> {
         if levels == 0 {
             return Vec::new();
         }
-        let left = Expr::name("b").op(BinaryOp::Minus, Expr::int(levels));
-        let left = Expr::new(ExprKind::Call(Function::Max, vec![Expr::int(0), left]));
-        vec![assign("b", left)]
+        let remaining = Expr::name("b").op(BinaryOp::Minus, Expr::int(levels));
+        let remaining = Expr::new(ExprKind::Call(Function::Max, vec![Expr::int(0), remaining]));
+        vec![assign("b", remaining)]
     }
 
     fn commands(&self) -> Vec<probabilistic::prism::ast::Command> {
@@ -92,10 +95,10 @@ impl RouteWriter<'_> {
         let mut commands = Vec::new();
         for route in 1..=self.routes.len() {
             let open = Expr::name("ROUTE").op(BinaryOp::Equal, Expr::int(0));
-            let wanted =
+            let is_requested =
                 open.op(BinaryOp::Or, Expr::name("ROUTE").op(BinaryOp::Equal, Expr::int(route as i64)));
             let chosen = vec![assign("r", Expr::int(route as i64))];
-            let guard = all([equals("r", 0), wanted]);
+            let guard = all([equals("r", 0), is_requested]);
             commands.push(command(
                 name("route", &route.to_string()),
                 guard,
@@ -147,7 +150,7 @@ impl RouteWriter<'_> {
     fn rewards(&self) -> Vec<Rewards> {
         let mission = self.mission;
         let (mut time, mut energy) = (Vec::new(), Vec::new());
-        let mut put = |action: &str, guard: Expr, spent: [&BigRational; 2]| {
+        let mut add_reward = |action: &str, guard: Expr, spent: [&BigRational; 2]| {
             for (list, value) in [&mut time, &mut energy].into_iter().zip(spent) {
                 if !value.is_zero() {
                     list.push(item(action, guard.clone(), number(value)));
@@ -156,14 +159,18 @@ impl RouteWriter<'_> {
         };
         for (new, configuration) in mission.configurations.iter().enumerate() {
             if let Some(switch) = &mission.switches[mission.initial][new] {
-                put(&name("set", &configuration.name), Expr::bool(true), [&switch.time, &switch.energy]);
+                add_reward(
+                    &name("set", &configuration.name),
+                    Expr::bool(true),
+                    [&switch.time, &switch.energy],
+                );
             }
         }
         let arcs: std::collections::BTreeSet<usize> = self.routes.iter().flatten().copied().collect();
         for arc in arcs {
             for (design, traversal) in mission.arcs[arc].by.iter().enumerate() {
                 if let Some(traversal) = traversal {
-                    put(&self.go(arc), equals("c", design), [&traversal.time, &traversal.energy]);
+                    add_reward(&self.go(arc), equals("c", design), [&traversal.time, &traversal.energy]);
                 }
             }
         }

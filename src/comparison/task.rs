@@ -1,9 +1,10 @@
-//! Any mission to a co-adaptation process: places are the states of its ground task, and configurations the designs that
-//! its actions name.
+//! Converts any mission to a co-adaptation process: places are the states of its ground task, and
+//! configurations the designs that its actions name.
 //!
-//! Missions that spell out places and configurations become a process more directly ([`Coadaptation::new`]). For all others
-//! the task is explored: what can be reached by its actions, numbers included. Actions choose their designs freely, so
-//! that reconfiguration takes nothing; what it takes to act is how much the metric grows.
+//! Missions that declare places and configurations are converted more directly
+//! ([`Coadaptation::new`]). For all others the reachable states of the task are enumerated, numbers
+//! included. Actions choose their designs freely, so reconfiguration costs nothing. The cost of an
+//! action is the increase of the metric.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -20,28 +21,28 @@ use crate::comparison::process::{Action, Valuation};
 use crate::message::{Errors, Message};
 use crate::mission::{Mission, Planning as _};
 
-/// States of the task beyond which it does not become a process.
-const STATES: usize = 50_000;
+/// Maximum number of states of a task that is converted to a process.
+const MAX_STATES: usize = 50_000;
 
-/// A mission as a process, with the way back to its actions.
+/// A mission as a process, with the mapping back to its actions.
 #[derive(Debug, Clone)]
 pub struct Tasked {
     /// The process.
     pub coadaptation: Coadaptation,
-    /// For each place one way to get there: the place before it, and the action.
+    /// Predecessor of each place, with the action from there.
     origins: Vec<Option<(usize, Act)>>,
-    /// For each place what the actions do there.
+    /// Effects of the actions at each place: the next place and the configuration.
     moves: Vec<HashMap<Act, (usize, usize)>>,
 }
 
-/// An action with its arguments, as the ground task has it.
+/// An action of the ground task with its arguments.
 type Act = (String, Vec<String>);
 
 impl Tasked {
-    /// Explores the task of a mission, as [`Mission::filled`] has filled its problem.
+    /// Enumerates the states of a mission's task, whose problem [`Mission::filled`] has filled.
     ///
     /// # Errors
-    /// What the planner does not handle, or too many states.
+    /// Constructs that the planner does not support, or too many states.
     pub fn new(mission: &Mission, problem: &Problem, roles: &Roles) -> Result<Self, Errors> {
         let timed = problem.init.iter().any(|element| matches!(element, InitialElement::Timed(..)));
         if timed {
@@ -74,13 +75,14 @@ impl Tasked {
         explorer.finish(parts)
     }
 
-    /// The problem that is left in a situation: the actions that lead to its place have taken place.
+    /// Returns the remaining problem in a situation, after the actions that lead to its place.
     ///
     /// # Errors
     /// The mission with the component lost does not fit its domain.
     pub fn problem(&self, mission: &Mission, situation: &Valuation) -> Result<Problem, Errors> {
         let mut way = Vec::new();
         let mut place = situation.place;
+        // Predecessor links give the actions in reverse order.
         while let Some((before, act)) = &self.origins[place] {
             way.push(act);
             place = *before;
@@ -106,12 +108,14 @@ impl Tasked {
                 )]
             })?;
             done.apply(&mut current.init);
+            // The actions were executed before the loss, so they are applied to the changed
+            // problem, too.
             done.apply(&mut left.init);
         }
         Ok(left)
     }
 
-    /// What the steps of a plan do from a situation.
+    /// Returns the effects of a plan's steps from a situation.
     pub fn actions(&self, situation: &Valuation, steps: &[Step]) -> Option<Vec<Action>> {
         let (mut place, mut configuration) = (situation.place, situation.configuration);
         let mut actions = Vec::new();
@@ -120,6 +124,7 @@ impl Tasked {
                 break;
             }
             let (arc, needed) = *self.moves[place].get(&(step.action.clone(), step.arguments.clone()))?;
+            // The process has explicit reconfigurations, which the plan does not.
             if needed != configuration {
                 actions.push(Action::Change(needed));
                 configuration = needed;
@@ -140,10 +145,10 @@ struct Explorer<'a> {
     places: Vec<TaskState>,
     numbers: HashMap<TaskState, usize>,
     configurations: Vec<String>,
-    /// From a place to another one, by configuration.
+    /// Traversals from one place to another, by configuration.
     arcs: BTreeMap<(usize, usize), BTreeMap<usize, Traversal>>,
     origins: Vec<Option<(usize, Act)>>,
-    /// For each place and action the place after it and the configuration.
+    /// For each place and action, the next place and the configuration.
     moves: Vec<HashMap<Act, (usize, usize)>>,
 }
 
@@ -153,14 +158,15 @@ impl Explorer<'_> {
         self.numbers.insert(start, 0);
         let mut at = 0;
         while at < self.places.len() {
-            if self.places.len() > STATES {
-                let text =
-                    format!("the task has more than {STATES} states, too many for a process of its states");
+            if self.places.len() > MAX_STATES {
+                let text = format!(
+                    "the task has more than {MAX_STATES} states, too many for a process of its states"
+                );
                 return Err(vec![Message::error("M127", text)].into());
             }
             let state = self.places[at].clone();
             self.moves.push(HashMap::new());
-            // Nothing comes after the goal.
+            // Goal states have no successors.
             let transitions =
                 if self.task.reaches_goal(&state) { Some(Vec::new()) } else { self.task.transitions(&state) };
             let transitions = transitions.ok_or_else(|| {
@@ -178,6 +184,7 @@ impl Explorer<'_> {
         let before = self.task.metric(state);
         let after = self.task.metric(&transition.after);
         let time = after.to_rational() - before.to_rational();
+        // States that differ only in the metric are merged.
         let target = transition.after.unpaid();
         let to = self.numbers.get(&target).copied().unwrap_or_else(|| {
             self.numbers.insert(target.clone(), self.places.len());
@@ -185,17 +192,21 @@ impl Explorer<'_> {
             self.origins.push(Some((from, (transition.action.clone(), transition.arguments.clone()))));
             self.places.len() - 1
         });
-        let (designs, others): (Vec<&String>, Vec<&String>) =
+        let (designs, arguments_without_functions): (Vec<&String>, Vec<&String>) =
             transition.arguments.iter().partition(|argument| self.designs.contains(*argument));
         let name = designs.iter().map(|design| design.as_str()).collect::<Vec<_>>().join("+");
+        // Actions without designs have a configuration of their own.
         let name = if name.is_empty() { "none".to_owned() } else { name };
         let configuration =
-            self.configurations.iter().position(|known| *known == name).unwrap_or_else(|| {
-                self.configurations.push(name);
-                self.configurations.len() - 1
-            });
-        let others = others.into_iter().filter(|argument| !self.functions.contains(*argument));
-        let key: Vec<&String> = others.chain(designs).collect();
+            self.configurations.iter().position(|configuration| *configuration == name).unwrap_or_else(
+                || {
+                    self.configurations.push(name);
+                    self.configurations.len() - 1
+                },
+            );
+        let arguments_without_functions =
+            arguments_without_functions.into_iter().filter(|argument| !self.functions.contains(*argument));
+        let key: Vec<&String> = arguments_without_functions.chain(designs).collect();
         let value = |role: &str| self.facts.value(role, &key);
         let traversal = Traversal {
             time,
@@ -204,24 +215,25 @@ impl Explorer<'_> {
             hit: value(&self.roles.hit).unwrap_or_else(BigRational::zero),
         };
         let by = self.arcs.entry((from, to)).or_default();
-        // Of two actions that do the same, the quicker one.
-        if by.get(&configuration).is_none_or(|known| traversal.time < known.time) {
+        // Of two equivalent actions, the faster one is kept.
+        if by.get(&configuration).is_none_or(|slower| traversal.time < slower.time) {
             by.insert(configuration, traversal);
         }
         self.moves[from].insert((transition.action, transition.arguments), (to, configuration));
     }
 
-    /// The objects of the only atom that holds, where that tells all states apart; numbers otherwise.
+    /// Names each place by the objects of the only atom that holds, if these names are unique, and
+    /// by numbers otherwise.
     fn names(&self) -> Vec<String> {
         let strip = |atom: &str| {
             let inner = atom.trim_matches(['(', ')']);
             inner.split_once(' ').map_or(inner, |(_, arguments)| arguments).replace(' ', "_")
         };
-        let one = |state: &TaskState| match self.task.holding(state)[..] {
+        let name_of = |state: &TaskState| match self.task.holding(state)[..] {
             [atom] => Some(strip(atom)),
             _ => None,
         };
-        let single: Option<Vec<String>> = self.places.iter().map(one).collect();
+        let single: Option<Vec<String>> = self.places.iter().map(name_of).collect();
         let told_apart = |names: &Vec<String>| names.iter().collect::<BTreeSet<_>>().len() == names.len();
         single
             .filter(told_apart)
@@ -230,7 +242,7 @@ impl Explorer<'_> {
 
     fn finish(mut self, components: impl Fn(&String) -> Vec<String>) -> Result<Tasked, Errors> {
         let goals: Vec<bool> = self.places.iter().map(|place| self.task.reaches_goal(place)).collect();
-        // All states of the goal become one place, the last one.
+        // All goal states are merged into the last place.
         let goal = self.places.len();
         let mut names = self.names();
         names.push("goal".to_owned());
@@ -244,9 +256,9 @@ impl Explorer<'_> {
             let to = if goals[to] { goal } else { to };
             let row = merged.entry((from, to)).or_insert_with(|| vec![None; designs]);
             for (configuration, traversal) in by {
-                let known = &mut row[configuration];
-                if known.as_ref().is_none_or(|known| traversal.time < known.time) {
-                    *known = Some(traversal);
+                let traversal_slot = &mut row[configuration];
+                if traversal_slot.as_ref().is_none_or(|slower| traversal.time < slower.time) {
+                    *traversal_slot = Some(traversal);
                 }
             }
         }

@@ -1,4 +1,4 @@
-//! Which designs are chosen, and what is said of those that are not.
+//! Chooses designs for the objectives in need, and explains the decision for every other design.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,54 +12,58 @@ use crate::mapek::ruled_out;
 use crate::message::Message;
 use crate::number::decimal;
 
-/// What a design is worth.
+/// Utility of a design.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub enum Worth {
-    /// As MROS has it: what the knowledge base concludes, or else the estimated `performance`, or else 0.001.
+    /// Utility as in MROS: the value that the knowledge base infers, otherwise the estimated
+    /// `performance`, otherwise 0.001.
     #[default]
     Mros,
-    /// The estimation of an attribute type, by local name; the more, the better.
+    /// The estimation of an attribute type, by local name; larger is better.
     Most(String),
-    /// The estimation of an attribute type, by local name; the less, the better.
+    /// The estimation of an attribute type, by local name; smaller is better.
     Least(String),
 }
 
-/// What is wanted of a configuration as a whole.
+/// Requirements on a configuration as a whole.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Wishes {
-    /// What a design is worth.
+    /// Utility of a design.
     pub worth: Worth,
-    /// Attribute types by local name, and what the estimations of all chosen designs may come to in sum, in the type's unit.
+    /// Budgets: attribute types by local name, with the limit on the sum of the chosen designs'
+    /// estimations, in the type's unit.
     pub budgets: Vec<(String, BigRational)>,
     /// Components, by local name, that only one design can use at a time.
     pub exclusive: BTreeSet<String>,
 }
 
-/// What has been chosen for all objectives in need.
+/// Choices for all objectives in need.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Configuration {
-    /// For each objective in need, sorted by name.
+    /// The choice for each objective in need, sorted by name.
     pub choices: Vec<Choice>,
-    /// What the chosen designs are worth in sum.
+    /// Sum of the utilities of the chosen designs.
     pub utility: BigRational,
-    /// Whether it is proved that no choice serves more functions, or as many with more utility; a limit was reached if not.
+    /// `true` if it is proved that no choice serves more functions, or equally many with more
+    /// utility. Otherwise a limit was reached.
     pub optimal: bool,
 }
 
-/// What has been chosen for an objective.
+/// Choice for an objective.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Choice {
     /// The objective, by local name.
     pub objective: String,
-    /// Its function, by local name, if it has one.
+    /// Function of the objective, by local name, if it has one.
     pub function: Option<String>,
-    /// Why it is in need: its statuses, `updatable`, `always improve`, or `ungrounded`.
+    /// Reasons for the need: statuses of the objective, `updatable`, `always improve`, or
+    /// `ungrounded`.
     pub need: Vec<String>,
-    /// The design before, by local name.
+    /// The design before the choice, by local name.
     pub before: Option<String>,
-    /// The design from now on, by local name, if any can be used.
+    /// The chosen design, by local name, if any is usable.
     pub design: Option<String>,
     /// All designs of the function, in the order of preference.
     pub considered: Vec<Considered>,
@@ -69,26 +73,26 @@ pub struct Choice {
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Considered {
-    /// Its local name.
+    /// Local name of the design.
     pub design: String,
-    /// What it is worth; larger is better.
+    /// Utility of the design; larger is better.
     pub utility: BigRational,
-    /// The requirements of the objective that it is estimated to miss, in sentences.
+    /// Requirements of the objective that the design is estimated to miss, as sentences.
     pub missed: Vec<String>,
-    /// What became of it.
+    /// Decision on the design.
     pub verdict: Verdict,
 }
 
-/// What became of a design.
+/// Decision on a design.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Verdict {
-    /// It is chosen.
+    /// The design is chosen.
     Chosen,
-    /// It cannot be used for the objective now: why, in sentences.
+    /// The design is unusable for the objective now; the reasons are sentences.
     RuledOut(Vec<String>),
-    /// It misses more requirements, or as many and is worth no more.
+    /// The design misses more requirements, or equally many without more utility.
     Less,
-    /// It would be better, but not together with what else is chosen: why, in a sentence.
+    /// The design would be better, but conflicts with other choices; the reason is a sentence.
     Together(String),
 }
 
@@ -98,7 +102,7 @@ struct Group {
     candidates: Vec<Offer>,
 }
 
-/// A design as the choice sees it.
+/// A candidate design with its demands, utility and rejections.
 struct Offer {
     design: String,
     utility: BigRational,
@@ -114,16 +118,16 @@ impl Group {
     }
 }
 
-/// The design that provides an objective's function now.
+/// Returns the design that currently provides an objective's function.
 pub(super) fn current(objective: &Objective) -> Option<&str> {
     let designs = objective.groundings.iter().filter_map(|grounding| grounding.design.as_ref());
     designs.map(|design| design.name.as_str()).next()
 }
 
-/// Chooses for the objectives in need; the others keep what they have.
+/// Chooses designs for the objectives in need; the other objectives keep their designs.
 ///
 /// # Errors
-/// A rule runs away.
+/// The rules do not terminate.
 pub(super) fn choose(
     knowledge: &Knowledge,
     wishes: &Wishes,
@@ -139,23 +143,26 @@ pub(super) fn choose(
             needing.push(group);
         } else {
             let current = group.current().map(ToOwned::to_owned);
+            // A fixed group still uses its components and its share of the budgets.
             group.candidates.retain(|offer| Some(&offer.design) == current.as_ref());
             fixed.push(group);
         }
     }
-    let kept: Vec<&Offer> = fixed.iter().filter_map(|group| group.candidates.first()).collect();
-    let left: Vec<BigRational> = wishes
+    let fixed_offers: Vec<&Offer> = fixed.iter().filter_map(|group| group.candidates.first()).collect();
+    let remaining: Vec<BigRational> = wishes
         .budgets
         .iter()
         .enumerate()
         .map(|(budget, (_, most))| {
-            most - kept.iter().map(|offer| &offer.choice.demands[budget]).sum::<BigRational>()
+            most - fixed_offers.iter().map(|offer| &offer.choice.demands[budget]).sum::<BigRational>()
         })
-        // What is in use and stays takes no more than there is.
-        .map(|left| left.max(BigRational::zero()))
+        // Designs that stay in use may exceed the budget already.
+        .map(|remaining| remaining.max(BigRational::zero()))
         .collect();
-    let taken: BTreeSet<usize> = kept.iter().flat_map(|offer| offer.choice.components.clone()).collect();
-    let usable = |offer: &Offer| offer.rejections.is_empty() && offer.choice.components.is_disjoint(&taken);
+    let used_components: BTreeSet<usize> =
+        fixed_offers.iter().flat_map(|offer| offer.choice.components.clone()).collect();
+    let usable =
+        |offer: &Offer| offer.rejections.is_empty() && offer.choice.components.is_disjoint(&used_components);
     let mut positions: Vec<Vec<usize>> = Vec::with_capacity(needing.len());
     let mut functions: Vec<Vec<DesignChoice>> = Vec::with_capacity(needing.len());
     for group in &needing {
@@ -164,15 +171,26 @@ pub(super) fn choose(
         positions.push(at);
         functions.push(choices);
     }
-    let chosen = configure(&functions, &left, limits);
-    let designs: Vec<Option<usize>> =
-        chosen.designs.iter().zip(&positions).map(|(own, at)| own.map(|own| at[own])).collect();
-    let whole = Whole { knowledge, wishes, needing: &needing, designs: &designs, kept: &kept, left: &left };
+    let chosen = configure(&functions, &remaining, limits);
+    let designs: Vec<Option<usize>> = chosen
+        .designs
+        .iter()
+        .zip(&positions)
+        .map(|(chosen_index, at)| chosen_index.map(|chosen_index| at[chosen_index]))
+        .collect();
+    let whole = Whole {
+        knowledge,
+        wishes,
+        needing: &needing,
+        designs: &designs,
+        kept: &fixed_offers,
+        left: &remaining,
+    };
     let choices = (0..needing.len()).map(|at| whole.choice(at)).collect();
     Ok(Configuration { choices, utility: chosen.utility, optimal: chosen.optimal })
 }
 
-/// What the designs of the knowledge base take and are worth.
+/// Computes demands and utilities of the designs in the knowledge base.
 struct Offers<'a> {
     knowledge: &'a Knowledge,
     wishes: &'a Wishes,
@@ -194,11 +212,14 @@ impl<'a> Offers<'a> {
             Worth::Mros => None,
             Worth::Most(attribute) | Worth::Least(attribute) => Some(attribute.as_str()),
         };
-        let found = self.knowledge.runtime().candidates(&objective.individual.iri, attribute);
-        let found = found.map_err(|error| Message::from_ontology(&error))?;
+        let candidates_of_objective =
+            self.knowledge.runtime().candidates(&objective.individual.iri, attribute);
+        let candidates_of_objective =
+            candidates_of_objective.map_err(|error| Message::from_ontology(&error))?;
         let nothing = (Vec::new(), BTreeMap::new());
         let offer = |candidate: ontology::runtime::Candidate| {
             let (components, estimations) = self.designs.get(&candidate.design.iri).unwrap_or(&nothing);
+            // The optimizer maximises, so the sign of a minimised attribute is changed.
             let worth = candidate.utility;
             let utility = if matches!(self.wishes.worth, Worth::Least(_)) { -worth } else { worth };
             let demand =
@@ -215,9 +236,9 @@ impl<'a> Offers<'a> {
             let missed = candidate.missed.iter().map(said).collect();
             Offer { design, utility, rejections: candidate.rejections, missed, choice, components }
         };
-        let mut candidates: Vec<Offer> = found.into_iter().map(offer).collect();
+        let mut candidates: Vec<Offer> = candidates_of_objective.into_iter().map(offer).collect();
         let now = current(&objective).map(ToOwned::to_owned);
-        // Of equals, the one that is in use is the best, and then the first by IRI.
+        // Ties are broken in favour of the design in use, then by IRI.
         candidates.sort_by(|a, b| {
             let in_use = |offer: &Offer| Some(&offer.design) == now.as_ref();
             let by_requirements = a.missed.len().cmp(&b.missed.len());
@@ -227,16 +248,16 @@ impl<'a> Offers<'a> {
     }
 }
 
-/// What has been chosen for all, to say why.
+/// The joint decision, for the reasons of each choice.
 struct Whole<'a> {
     knowledge: &'a Knowledge,
     wishes: &'a Wishes,
     needing: &'a [Group],
-    /// For each group, the position of its design.
+    /// For each group, the position of its chosen design.
     designs: &'a [Option<usize>],
-    /// What is in use and stays.
+    /// Offers in use that stay.
     kept: &'a [&'a Offer],
-    /// What that leaves of the budgets.
+    /// Remaining budgets after the fixed offers.
     left: &'a [BigRational],
 }
 
@@ -268,18 +289,21 @@ impl Whole<'_> {
                 offer.rejections.iter().flat_map(|rejection| self.reasons(&offer.design, rejection));
             return Verdict::RuledOut(reasons.collect());
         }
+        // Candidates are sorted by preference.
         if self.designs[at].is_some_and(|chosen| chosen < position) {
             return Verdict::Less;
         }
         Verdict::Together(self.conflict(at, offer))
     }
 
-    /// Why a design that could be used, and would be worth more, does not go with what else is chosen.
+    /// Reason why a usable design with more utility conflicts with the other choices.
     fn conflict(&self, at: usize, offer: &Offer) -> String {
-        let others = self.needing.iter().zip(self.designs).enumerate().filter(|(other, _)| *other != at);
-        let chosen = others.filter_map(|(_, (group, design))| design.map(|design| &group.candidates[design]));
-        let others: Vec<&Offer> = chosen.collect();
-        for other in self.kept.iter().chain(&others) {
+        let chosen_elsewhere =
+            self.needing.iter().zip(self.designs).enumerate().filter(|(other, _)| *other != at);
+        let chosen = chosen_elsewhere
+            .filter_map(|(_, (group, design))| design.map(|design| &group.candidates[design]));
+        let chosen_elsewhere: Vec<&Offer> = chosen.collect();
+        for other in self.kept.iter().chain(&chosen_elsewhere) {
             if let Some(component) = self
                 .wishes
                 .exclusive
@@ -291,7 +315,7 @@ impl Whole<'_> {
         }
         for (budget, (attribute, most)) in self.wishes.budgets.iter().enumerate() {
             let demand = |offer: &Offer| offer.choice.demands[budget].clone();
-            let sum = others.iter().map(|other| demand(other)).sum::<BigRational>() + demand(offer);
+            let sum = chosen_elsewhere.iter().map(|other| demand(other)).sum::<BigRational>() + demand(offer);
             if sum > self.left[budget] {
                 let whole = sum + self.kept.iter().map(|other| demand(other)).sum::<BigRational>();
                 return format!(
@@ -323,13 +347,13 @@ impl Whole<'_> {
     }
 }
 
-/// A requirement that is missed, in a sentence.
+/// Formats a missed requirement.
 fn said(missed: &Missed) -> String {
     let Missed { attribute, estimation, bound, status } = missed;
     format!("{attribute}: estimated {}, required {}: {status}", decimal(estimation), decimal(bound))
 }
 
-/// Why an objective is in need.
+/// Returns the reasons for an objective's need.
 fn need(objective: &Objective) -> Vec<String> {
     let mut need = objective.statuses.clone();
     if objective.updatable {

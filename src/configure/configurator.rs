@@ -13,24 +13,24 @@ use crate::knowledge::Knowledge;
 use crate::message::{Errors, Message, did_you_mean};
 use crate::number::decimal;
 
-/// What follows from what was heard is to be found in so many steps; see [`rules::Limits`].
+/// Limit on inference steps after a report; see [`rules::Limits`].
 const STEPS: u64 = 100_000_000;
 
-/// An objective to pursue.
+/// An objective.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Goal {
-    /// Its name.
+    /// Name of the objective.
     pub name: String,
     /// The function to provide, by IRI or local name.
     pub function: String,
     /// Attribute types, by IRI or local name, and bounds in their units.
     pub requirements: Vec<(String, BigRational)>,
-    /// Whether to look for a better design also while all is well.
+    /// `true` if a better design is also searched for while the objective is fulfilled.
     pub always_improve: bool,
 }
 
 impl Goal {
-    /// An objective named after its function, without requirements.
+    /// Objective named after its function, without requirements.
     pub fn of(function: &str) -> Self {
         let name = format!("o_{}", ontology::vocab::local_name(function));
         Self { name, function: function.to_owned(), requirements: Vec::new(), always_improve: false }
@@ -42,26 +42,31 @@ impl Goal {
 pub struct Configurator {
     knowledge: Knowledge,
     wishes: Wishes,
-    /// Objectives in need that no design could serve, or for which the robot could not change designs: they stay in need.
+    /// Objectives in need that no design could serve, or for which the robot could not change
+    /// designs; they stay in need.
     pending: BTreeSet<String>,
 }
 
 impl Configurator {
-    /// Takes over a knowledge base.
+    /// Creates a configurator for a knowledge base.
     ///
     /// # Errors
-    /// All attribute types and components of the wishes that are not in the knowledge base, and negative budgets.
+    /// All attribute types and components of the wishes that are not in the knowledge base, and
+    /// negative budgets.
     pub fn new(mut knowledge: Knowledge, wishes: Wishes) -> Result<Self, Errors> {
         knowledge.limit(STEPS);
         let view = knowledge.view();
         let attributes: Vec<String> = view.attribute_types().into_iter().map(|kind| kind.name).collect();
-        let components: Vec<String> = view.components().into_iter().map(|own| own.individual.name).collect();
+        let components: Vec<String> =
+            view.components().into_iter().map(|component| component.individual.name).collect();
         let mut wrong = Vec::new();
         let mut check = |kind: &str, name: &str, known: &[String]| {
-            if !known.iter().any(|own| own == name) {
-                let meant = did_you_mean(name, known.iter().map(String::as_str));
-                let text =
-                    format!("the knowledge base has no {kind} `{name}`; it has: {}{meant}", known.join(", "));
+            if !known.iter().any(|candidate| candidate == name) {
+                let suggestion = did_you_mean(name, known.iter().map(String::as_str));
+                let text = format!(
+                    "the knowledge base has no {kind} `{name}`; it has: {}{suggestion}",
+                    known.join(", ")
+                );
                 wrong.push(Message::error("M140", text));
             }
         };
@@ -81,27 +86,28 @@ impl Configurator {
         }
     }
 
-    /// What is known.
+    /// Returns the knowledge base.
     pub fn knowledge(&self) -> &Knowledge {
         &self.knowledge
     }
 
-    /// What is known, to report what has happened.
+    /// Returns the knowledge base for assertions of reports.
     pub fn knowledge_mut(&mut self) -> &mut Knowledge {
         &mut self.knowledge
     }
 
-    /// What is wanted of a configuration as a whole.
+    /// Returns the requirements on the configuration as a whole.
     pub fn wishes(&self) -> &Wishes {
         &self.wishes
     }
 
-    /// The objectives.
+    /// Returns the objectives.
     pub fn objectives(&self) -> Vec<Objective> {
         self.knowledge.runtime().objectives()
     }
 
-    /// The functions that some design solves, by local name; PLANTA's `fd_unground`, which solves each, does not count.
+    /// Returns the functions that some design solves, by local name, except PLANTA's `fd_unground`,
+    /// which solves each function.
     pub fn functions(&self) -> Vec<String> {
         let view = self.knowledge.view();
         let designs =
@@ -113,10 +119,11 @@ impl Configurator {
         names
     }
 
-    /// Begins to pursue an objective.
+    /// Adds an objective.
     ///
     /// # Errors
-    /// There is no such function or attribute type, or there is an objective of that name.
+    /// The function or an attribute type does not exist, or there is already an objective of that
+    /// name.
     pub fn pursue(&mut self, goal: &Goal) -> Result<(), Message> {
         let bound = |bound: &BigRational| Literal::Decimal(rules::Decimal::from_rational(bound));
         let requirements =
@@ -126,20 +133,20 @@ impl Configurator {
         self.change(|runtime| runtime.add_objective(&new))
     }
 
-    /// Gives an objective up.
+    /// Removes an objective.
     ///
     /// # Errors
-    /// There is no such objective.
+    /// The objective does not exist.
     pub fn give_up(&mut self, objective: &str) -> Result<(), Message> {
         self.change(|runtime| runtime.remove_objective(objective))?;
         self.pending.remove(ontology::vocab::local_name(objective));
         Ok(())
     }
 
-    /// Designs for the objectives in need.
+    /// Chooses designs for the objectives in need.
     ///
     /// # Errors
-    /// A rule runs away.
+    /// The rules do not terminate.
     pub fn choose(&self, limits: &Limits) -> Result<Configuration, Message> {
         let is_in_need = |objective: &Objective| {
             let is_pending = self.pending.contains(&objective.individual.name);
@@ -148,11 +155,12 @@ impl Configurator {
         choose(&self.knowledge, &self.wishes, &is_in_need, limits)
     }
 
-    /// The chosen design serves the objective from now on. Statuses are forgotten, and so are recoveries that made it updatable; that
-    /// a design has failed it is not. An objective that no design can serve keeps the one that it has, and stays in need.
+    /// Grounds the objective by the chosen design. Statuses and recoveries that made the objective
+    /// updatable are retracted; failures of designs are kept. An objective that no design can serve
+    /// keeps its design and stays in need.
     ///
     /// # Errors
-    /// There is no such objective or design, or a rule runs away.
+    /// The objective or the design does not exist, or the rules do not terminate.
     pub fn adopt(&mut self, choice: &Choice) -> Result<(), Message> {
         let objective = choice.objective.as_str();
         let Some(design) = &choice.design else {
@@ -171,7 +179,8 @@ impl Configurator {
         Ok(())
     }
 
-    /// The robot could not change designs for an objective: it is served as before, and stays in need.
+    /// Restores the previous design of an objective after the robot could not change it. The
+    /// objective stays in need.
     ///
     /// # Errors
     /// As [`Configurator::adopt`].

@@ -1,4 +1,5 @@
-//! The loop: what the robot reports goes into the knowledge base, and where objectives are in need, designs are chosen and asked for.
+//! The configuration loop: asserts the robot's reports in the knowledge base, and chooses and
+//! requests designs for objectives in need.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
@@ -16,77 +17,78 @@ use crate::mapek::{
 };
 use crate::message::Message;
 
-/// One line of output, in the format `metaplan-events/1`.
+/// A line of output, in the format `metaplan-events/1`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 #[non_exhaustive]
 pub enum KeeperAnswer {
-    /// As the loop with a plan says it.
+    /// An answer in the form of the planning loop.
     Loop(Answer),
-    /// What becomes of an objective.
+    /// A change in the service of an objective.
     Service(Service),
 }
 
-/// What becomes of an objective.
+/// A change in the service of an objective.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "answer")]
 #[non_exhaustive]
 pub enum Service {
-    /// A function is to get another design.
+    /// A request to change the design of a function.
     #[serde(rename = "reconfigure")]
     Reconfigure {
         /// The objective.
         objective: String,
-        /// Its function.
+        /// Function of the objective.
         function: Option<String>,
-        /// The design before, if there was one.
+        /// The previous design, if there was one.
         from: Option<String>,
-        /// The design from now on; none where the objective was given up.
+        /// The new design. `None` if the objective was removed.
         to: Option<String>,
-        /// Why now, and why the designs that are worth more were not taken: sentences.
+        /// Reasons, as sentences: why the design changes now, and why better designs were not
+        /// chosen.
         because: Vec<String>,
-        /// Whether it is proved that no choice for all objectives in need is better.
+        /// `true` if it is proved that no choice for all objectives in need is better.
         optimal: bool,
-        /// Its number, from 1.
+        /// Number of the effect, from 1.
         effect: u64,
     },
-    /// No design can serve an objective now. It keeps the one that it has, if any.
+    /// No design can serve the objective now. The objective keeps its design, if any.
     #[serde(rename = "unserved")]
     Unserved {
         /// The objective.
         objective: String,
-        /// Its function.
+        /// Function of the objective.
         function: Option<String>,
-        /// Why each of the designs cannot: sentences.
+        /// Reasons, as sentences, why each design is unusable.
         because: Vec<String>,
     },
 }
 
-/// Upper limit on the changes of design that are kept to be undone.
+/// Maximum number of changes of design that can be undone.
 const MAX_CHANGES: usize = 256;
 
-/// A change of design that was asked for, to be undone if it fails, also after its acknowledgement.
+/// A requested change of design. It is undone if it fails, even after its acknowledgement.
 #[derive(Debug, Clone)]
-struct Asked {
+struct PendingChange {
     objective: String,
     from: Option<String>,
     to: String,
 }
 
-/// Keeps the functions of a robot served.
+/// Adaptation loop for the functions of a robot, without a task plan.
 #[derive(Debug, Clone)]
 pub struct Keeper {
     configurator: Configurator,
     limit: Option<Duration>,
-    /// Numbers of lines that were seen.
+    /// Sequence numbers of the received lines.
     numbers: Numbers,
     effects: u64,
-    asked: BTreeMap<u64, Asked>,
+    asked: BTreeMap<u64, PendingChange>,
     available: BTreeSet<String>,
     statuses: BTreeMap<String, Vec<String>>,
     violated: BTreeSet<String>,
     fault: Option<Fault>,
-    /// What was said last of objectives that no design can serve.
+    /// Last reported reasons for each objective that no design can serve.
     unserved: BTreeMap<String, Vec<String>>,
     filters: Filters,
     states: FilterStates,
@@ -95,7 +97,8 @@ pub struct Keeper {
 }
 
 impl Keeper {
-    /// Takes charge; for each choice there is so much time. Every report is believed at once.
+    /// Creates the loop. `limit` is the time limit of each choice. Without filters, every report is
+    /// believed at once.
     pub fn new(configurator: Configurator, limit: Option<Duration>) -> Self {
         let available = available(configurator.knowledge());
         let filters = Filters::new(&FilterSettings::none(), Some(configurator.knowledge()));
@@ -116,7 +119,7 @@ impl Keeper {
         }
     }
 
-    /// The same with filters of what is measured and of what components report.
+    /// Adds filters of measurements and component reports.
     #[must_use]
     pub fn with_filters(self, settings: &FilterSettings) -> Self {
         let filters = Filters::new(settings, Some(self.configurator.knowledge()));
@@ -124,32 +127,36 @@ impl Keeper {
         Self { filters, states, ..self }
     }
 
-    /// Time since the start at which a filter needs a tick, if nothing else is reported.
+    /// Returns the time since the start at which a filter needs a tick, if nothing else is
+    /// reported.
     pub fn due(&self) -> Option<Duration> {
         self.filters.due(&self.states)
     }
 
-    /// What is known, and how the objectives are served.
+    /// Returns the configurator, with the knowledge and the served objectives.
     pub fn configurator(&self) -> &Configurator {
         &self.configurator
     }
 
-    /// The first choice.
+    /// Makes the first choice.
     pub fn start(&mut self) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
         self.adapt(&mut answers);
         answers
     }
 
-    /// Takes a line over at its own time, or else at that of the line before, and says what follows.
+    /// Handles a line at its own time, or at the time of the previous line, and returns the
+    /// answers.
     pub fn handle(&mut self, observation: &Observation) -> Vec<KeeperAnswer> {
         self.handle_at(observation, self.now)
     }
 
-    /// Takes a line over, at a time since the start that never goes back, and says what follows.
+    /// Handles a line and returns the answers. `now` is the time since the start and must not
+    /// decrease.
     pub fn handle_at(&mut self, observation: &Observation, now: Duration) -> Vec<KeeperAnswer> {
         let mut answers = Vec::new();
         self.now = self.now.max(observation.time.unwrap_or(now));
+        // A line that was received before must not have an effect again.
         if let Some(refusal) = observation.sequence.and_then(|seq| self.numbers.refused(seq)) {
             return vec![KeeperAnswer::Loop(refusal)];
         }
@@ -163,6 +170,7 @@ impl Keeper {
                 }
             }
         }
+        // A rejected line may be sent again with the same number.
         if understood && let Some(seq) = observation.sequence {
             self.numbers.insert(seq);
         }
@@ -175,9 +183,10 @@ impl Keeper {
         let knowledge = self.configurator.knowledge_mut();
         match event {
             Event::Measured { attribute, value } => {
-                let mut held = Vec::new();
-                let value = self.filters.sample(&mut self.states, self.now, attribute, value, &mut held);
-                answers.extend(held.into_iter().map(KeeperAnswer::Loop));
+                let mut filter_answers = Vec::new();
+                let value =
+                    self.filters.sample(&mut self.states, self.now, attribute, value, &mut filter_answers);
+                answers.extend(filter_answers.into_iter().map(KeeperAnswer::Loop));
                 if let Some(value) = value {
                     knowledge.take(attribute, RobotReport::measured(&value)).map_err(refused)?;
                 }
@@ -207,7 +216,7 @@ impl Keeper {
         Ok(())
     }
 
-    /// Takes the status of a component over, unless its filter holds it back.
+    /// Asserts the status of a component, unless its filter holds it back.
     fn component(
         &mut self,
         component: &str,
@@ -215,28 +224,28 @@ impl Keeper {
         answers: &mut Vec<KeeperAnswer>,
     ) -> Result<(), Refusal> {
         let knowledge = self.configurator.knowledge_mut();
-        let mut held = Vec::new();
-        let is_believed = knowledge
-            .known_component(component)
-            .is_none_or(|name| self.filters.report(&mut self.states, self.now, &name, status, &mut held));
-        answers.extend(held.into_iter().map(KeeperAnswer::Loop));
+        let mut filter_answers = Vec::new();
+        let is_believed = knowledge.known_component(component).is_none_or(|name| {
+            self.filters.report(&mut self.states, self.now, &name, status, &mut filter_answers)
+        });
+        answers.extend(filter_answers.into_iter().map(KeeperAnswer::Loop));
         if is_believed {
-            let taken = knowledge.take(component, RobotReport::Component(status));
-            taken.map_err(|message| Refusal::new("M306", message.message.clone()))?;
+            let result = knowledge.take(component, RobotReport::Component(status));
+            result.map_err(|message| Refusal::new("M306", message.message.clone()))?;
         }
         Ok(())
     }
 
-    /// Refuses the number of an effect that there was not.
+    /// Rejects the number of an unknown effect.
     fn check_effect(&self, effect: u64) -> Result<(), Refusal> {
         let is_known = (1..=self.effects).contains(&effect);
         is_known.then_some(()).ok_or_else(|| Refusal::new("M305", format!("there was no effect {effect}")))
     }
 
-    /// Takes a change of design back: the design counts as not realisable, so that the next best is chosen. Of a change that is not
-    /// known any more, or has been undone, nothing is left.
+    /// Undoes a change of design: the design counts as not realisable, so that the next best is
+    /// chosen. Does nothing if the change is unknown or was undone before.
     fn undo(&mut self, effect: u64) -> Result<(), Message> {
-        let Some(Asked { objective, from, to }) = self.asked.remove(&effect) else { return Ok(()) };
+        let Some(PendingChange { objective, from, to }) = self.asked.remove(&effect) else { return Ok(()) };
         self.configurator.knowledge_mut().take(&to, RobotReport::Design(false))?;
         // A later change of the same objective has replaced it.
         if self.asked.range(effect..).any(|(_, later)| later.objective == objective) {
@@ -245,11 +254,11 @@ impl Keeper {
         self.configurator.revert(&objective, from.as_deref())
     }
 
-    /// Takes over what filters have held back and what is due.
+    /// Asserts the reports that filters have held back and that are due.
     fn elapse(&mut self, answers: &mut Vec<KeeperAnswer>) {
-        let mut said = Vec::new();
-        let due: Vec<Accepted> = self.filters.elapse(&mut self.states, self.now, &mut said);
-        answers.extend(said.into_iter().map(KeeperAnswer::Loop));
+        let mut filter_answers = Vec::new();
+        let due: Vec<Accepted> = self.filters.elapse(&mut self.states, self.now, &mut filter_answers);
+        answers.extend(filter_answers.into_iter().map(KeeperAnswer::Loop));
         for accepted in due {
             let (name, report) = accepted.report();
             if let Err(message) = self.configurator.knowledge_mut().take(name, report) {
@@ -260,11 +269,12 @@ impl Keeper {
 
     fn give_up(&mut self, name: &str, answers: &mut Vec<KeeperAnswer>) -> Result<(), Refusal> {
         let objectives = self.configurator.objectives();
-        let is_it =
-            |own: &&ontology::runtime::Objective| own.individual.name == name || own.individual.iri == name;
-        let found = objectives.iter().find(is_it);
+        let is_it = |objective: &&ontology::runtime::Objective| {
+            objective.individual.name == name || objective.individual.iri == name
+        };
+        let objective_by_name = objectives.iter().find(is_it);
         self.configurator.give_up(name).map_err(|message| Refusal::new("M306", message.message.clone()))?;
-        if let Some(objective) = found
+        if let Some(objective) = objective_by_name
             && let Some(design) = current(objective)
         {
             self.effects += 1;
@@ -278,19 +288,21 @@ impl Keeper {
                 effect: self.effects,
             }));
         }
+        // A failed change of a removed objective needs no undo.
         self.asked.retain(|_, asked| asked.objective != name);
         self.unserved.remove(name);
         Ok(())
     }
 
-    /// Reports what follows, and chooses for the objectives in need.
+    /// Reports new conclusions, and chooses designs for the objectives in need.
     fn adapt(&mut self, answers: &mut Vec<KeeperAnswer>) {
         self.infer(answers);
         let knowledge = self.configurator.knowledge();
         let doubts = doubts(knowledge, &mut self.fault, &mut self.violated);
         answers.extend(doubts.into_iter().map(KeeperAnswer::Loop));
-        // MROS adapts nothing while there is a contradiction. Here the designs that it rules out are not available, and the others serve.
-        // Where it is not known what follows nothing is available.
+        // MROS adapts nothing while there is a contradiction. Here the designs that the
+        // contradiction rules out are unavailable, and the others serve. If reasoning itself
+        // failed, no design counts as available.
         if self.fault.is_some() {
             return;
         }
@@ -314,6 +326,7 @@ impl Keeper {
         }
         let Some(design) = &choice.design else {
             let because = said(choice);
+            // The same reasons are reported only once.
             if self.unserved.get(&objective) != Some(&because) {
                 self.unserved.insert(objective.clone(), because.clone());
                 answers.push(KeeperAnswer::Service(Service::Unserved { objective, function, because }));
@@ -323,9 +336,13 @@ impl Keeper {
         self.unserved.remove(&objective);
         if choice.before.as_ref() != Some(design) {
             self.effects += 1;
-            let asked =
-                Asked { objective: objective.clone(), from: choice.before.clone(), to: design.clone() };
-            self.asked.insert(self.effects, asked);
+            let change = PendingChange {
+                objective: objective.clone(),
+                from: choice.before.clone(),
+                to: design.clone(),
+            };
+            self.asked.insert(self.effects, change);
+            // The oldest change is the least likely to fail.
             if self.asked.len() > MAX_CHANGES {
                 self.asked.pop_first();
             }
@@ -343,7 +360,7 @@ impl Keeper {
         }
     }
 
-    /// Reports designs and objectives of which something else follows than before.
+    /// Reports the designs and objectives whose conclusions have changed.
     fn infer(&mut self, answers: &mut Vec<KeeperAnswer>) {
         let knowledge = self.configurator.knowledge();
         let (designs, objectives) = changes(knowledge, &mut self.available, &mut self.statuses);
@@ -355,7 +372,7 @@ fn wrong(message: &Message) -> KeeperAnswer {
     KeeperAnswer::Loop(Answer::Error { code: message.code.clone(), message: message.message.clone() })
 }
 
-/// Why an objective is in need, and what speaks against the designs that are worth more than the chosen one.
+/// Reasons why an objective is in need, and why better designs than the chosen one are not used.
 fn said(choice: &Choice) -> Vec<String> {
     let mut because: Vec<String> =
         choice.need.iter().map(|need| format!("{} is {need}", choice.objective)).collect();

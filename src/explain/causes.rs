@@ -1,9 +1,9 @@
 //! Causes that rule a design out, and the smallest sets of alterations that make it available.
 //!
-//! Sets of alterations are tried in ascending order of size, by reasoning in a copy of the knowledge. So each listed
-//! set is known to suffice, and contains no other listed set. These sets are the diagnoses of \[1\]. Each alteration
-//! of such a set removes one cause. The conclusions that remain once all other alterations of the set have come true
-//! are due to that cause.
+//! Sets of alterations are tried in ascending order of size, by reasoning in a copy of the
+//! knowledge. So each listed set is known to suffice, and contains no other listed set. These sets
+//! are the diagnoses of \[1\]. Each alteration of such a set removes one cause. The conclusions
+//! that remain once all other alterations of the set have come true are due to that cause.
 //!
 //! \[1\] R. Reiter: A theory of diagnosis from first principles, Artificial Intelligence 32, 1987.
 
@@ -29,30 +29,31 @@ const MAX_TRIED: usize = 2_000;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Availability {
-    /// Its local name.
+    /// Local name of the design.
     pub design: String,
-    /// The functions that it solves.
+    /// Functions that the design solves.
     pub functions: Vec<String>,
-    /// Whether it is available.
+    /// `true` if the design is available.
     pub available: bool,
-    /// The rules and facts that rule it out, those of all causes.
+    /// Rules and facts that rule the design out, over all causes.
     pub because: Vec<String>,
-    /// Each failed component and each measurement that has a part in that.
+    /// Failed components and measurements that contribute to the availability.
     pub causes: Vec<Cause>,
-    /// If the design is not available: the smallest sets of alterations that make it available. Each set suffices if
-    /// all of its alterations come true, and no proper subset suffices. If the design is available: single
-    /// alterations, each of which makes it unavailable.
+    /// If the design is not available: the smallest sets of alterations that make it available.
+    /// Each set suffices if all of its alterations come true, and no proper subset suffices. If the
+    /// design is available: single alterations, each of which makes it unavailable.
     pub ways: Vec<Vec<Alteration>>,
 }
 
-/// Something that has a part in ruling a design out.
+/// A cause that contributes to ruling a design out.
 #[derive(Debug, Clone)]
 pub struct Cause {
     /// The alteration that removes this cause; other causes may remain.
     pub alteration: Alteration,
-    /// The rules and facts by which the design is ruled out once the other alterations of a smallest set have come true.
+    /// The rules and facts by which the design is ruled out once the other alterations of a
+    /// smallest set have come true.
     pub because: Vec<String>,
-    /// Knowledge in which these other alterations have come true, for further analysis.
+    /// Knowledge after these other alterations, for further analysis.
     pub knowledge: Knowledge,
 }
 
@@ -65,13 +66,15 @@ impl PartialEq for Cause {
 /// The causes that rule a design out.
 #[derive(Debug, Clone)]
 pub struct Causes {
-    /// Empty if the design is available, or if neither a component nor a measurement is a cause.
+    /// The causes. Empty if the design is available, or if neither a component nor a measurement is
+    /// a cause.
     pub causes: Vec<Cause>,
-    /// `true` if the design becomes available only when all causes have gone; `false` if smaller sets of them suffice.
+    /// `true` if the design becomes available only when all causes have gone; `false` if smaller
+    /// sets of them suffice.
     pub are_all_needed: bool,
 }
 
-/// Returns everything that has a part in ruling a design out.
+/// Returns all causes that contribute to ruling a design out.
 pub fn causes(knowledge: &Knowledge, design: &FunctionDesign) -> Causes {
     if design.available {
         return Causes { causes: Vec::new(), are_all_needed: false };
@@ -80,26 +83,26 @@ pub fn causes(knowledge: &Knowledge, design: &FunctionDesign) -> Causes {
     Causes { causes: causes_of(knowledge, design, &ways), are_all_needed: ways.len() == 1 }
 }
 
-/// Causes in the smallest sets of alterations. Once all other alterations of a set have come true, the remaining
-/// conclusions are due to one cause.
+/// Causes in the smallest sets of alterations. Once all other alterations of a set have come true,
+/// the remaining conclusions are due to one cause.
 fn causes_of(knowledge: &Knowledge, design: &FunctionDesign, ways: &[Vec<Alteration>]) -> Vec<Cause> {
     let mut causes: Vec<Cause> = Vec::new();
-    for (way, own) in ways.iter().flat_map(|way| way.iter().map(move |own| (way, own))) {
-        let is_known = causes.iter().any(|cause| cause.alteration == *own);
-        let others = way.iter().filter(|other| *other != own);
-        if let Some(knowledge) = altered(knowledge, others).filter(|_| !is_known) {
+    for (way, alteration) in ways.iter().flat_map(|way| way.iter().map(move |alteration| (way, alteration))) {
+        let is_known = causes.iter().any(|cause| cause.alteration == *alteration);
+        let remaining = way.iter().filter(|other| *other != alteration);
+        if let Some(knowledge) = altered(knowledge, remaining).filter(|_| !is_known) {
             let because = ruled_out(&knowledge, &design.individual.name);
-            causes.push(Cause { alteration: own.clone(), because, knowledge });
+            causes.push(Cause { alteration: alteration.clone(), because, knowledge });
         }
     }
     causes
 }
 
-/// The smallest sets of alterations that make a design available.
+/// Returns the smallest sets of alterations that make a design available.
 fn ways(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Vec<Alteration>> {
     let candidates = candidates(knowledge, design);
     let ways = repairs(knowledge, design, &candidates);
-    // Rules may depend on more than the design itself requires.
+    // Rules may depend on more than the design's own requirements.
     if ways.is_empty() { repairs(knowledge, design, &all_candidates(knowledge, candidates)) } else { ways }
 }
 
@@ -116,11 +119,12 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
     };
     let Some(knowledge) = mission.knowledge() else { return availability };
     if design.available {
-        let loses = |own: &Alteration| {
-            altered(knowledge, [own]).is_some_and(|knowledge| !is_available(&knowledge, design))
+        let loses = |alteration: &Alteration| {
+            altered(knowledge, [alteration]).is_some_and(|knowledge| !is_available(&knowledge, design))
         };
         let candidates = candidates(knowledge, design).into_iter();
-        availability.ways = candidates.filter(loses).map(|own| vec![own]).collect();
+        // For an available design, each alteration alone that makes it unavailable is listed.
+        availability.ways = candidates.filter(loses).map(|alteration| vec![alteration]).collect();
         return availability;
     }
     availability.ways = ways(knowledge, design);
@@ -134,7 +138,8 @@ pub(super) fn availability(mission: &Mission, design: &FunctionDesign) -> Availa
     availability
 }
 
-/// The smallest sets of alterations that make a design available, smaller ones first.
+/// Returns the smallest sets of alterations that make a design available, in ascending order of
+/// size.
 fn repairs(
     knowledge: &Knowledge,
     design: &FunctionDesign,
@@ -143,40 +148,49 @@ fn repairs(
     let suffice = |set: &[&Alteration]| {
         altered(knowledge, set.iter().copied()).is_some_and(|knowledge| is_available(&knowledge, design))
     };
-    let all: Vec<&Alteration> = candidates.iter().collect();
-    let without = |own: &Alteration| all.iter().copied().filter(|other| *other != own).collect::<Vec<_>>();
-    // An alteration that no others can replace is in every set.
-    let (needed, rest): (Vec<&Alteration>, Vec<&Alteration>) = if suffice(&all) {
-        all.iter().copied().partition(|own| !suffice(&without(own)))
-    } else {
-        (Vec::new(), all.clone())
+    let available_changes: Vec<&Alteration> = candidates.iter().collect();
+    let without = |alteration: &Alteration| {
+        available_changes.iter().copied().filter(|other| *other != alteration).collect::<Vec<_>>()
     };
-    let mut found: Vec<Vec<&Alteration>> = Vec::new();
+    // An alteration that no others can replace is in every set.
+    let (needed, rest): (Vec<&Alteration>, Vec<&Alteration>) = if suffice(&available_changes) {
+        available_changes.iter().copied().partition(|alteration| !suffice(&without(alteration)))
+    } else {
+        (Vec::new(), available_changes.clone())
+    };
+    let mut minimal_sets: Vec<Vec<&Alteration>> = Vec::new();
     let subsets = std::iter::once(Vec::new()).chain(subsets(rest.len()));
     for positions in subsets.take(MAX_TRIED) {
-        let is_in = |own: &&Alteration| {
-            needed.contains(own) || positions.iter().any(|position| rest[*position] == *own)
+        let is_in = |alteration: &&Alteration| {
+            needed.contains(alteration) || positions.iter().any(|position| rest[*position] == *alteration)
         };
-        let set: Vec<&Alteration> = all.iter().copied().filter(is_in).collect();
-        let contains = |known: &Vec<&Alteration>| known.iter().all(|own| set.contains(own));
-        // A value cannot be altered in two ways.
-        let is_twice =
-            |(at, own): (usize, &&Alteration)| set[..at].iter().any(|other| other.name == own.name);
-        let is_open = !set.is_empty() && !set.iter().enumerate().any(is_twice) && !found.iter().any(contains);
+        let set: Vec<&Alteration> = available_changes.iter().copied().filter(is_in).collect();
+        // Supersets of a minimal set are not minimal.
+        let contains = |subset: &Vec<&Alteration>| subset.iter().all(|alteration| set.contains(alteration));
+        // A value cannot be altered to two targets at once.
+        let is_twice = |(at, alteration): (usize, &&Alteration)| {
+            set[..at].iter().any(|other| other.name == alteration.name)
+        };
+        let is_open =
+            !set.is_empty() && !set.iter().enumerate().any(is_twice) && !minimal_sets.iter().any(contains);
         if is_open && suffice(&set) {
-            found.push(minimal(set, &suffice));
+            // Availability need not be monotone, so the set is minimised although smaller sets were
+            // tried before.
+            minimal_sets.push(minimal(set, &suffice));
         }
     }
-    if found.is_empty() && suffice(&all) {
-        found.push(minimal(all, &suffice));
+    if minimal_sets.is_empty() && suffice(&available_changes) {
+        minimal_sets.push(minimal(available_changes, &suffice));
     }
-    found.into_iter().map(|set| set.into_iter().cloned().collect()).collect()
+    minimal_sets.into_iter().map(|set| set.into_iter().cloned().collect()).collect()
 }
 
-/// Non-empty subsets of `count` elements, as positions: smaller subsets first, then in lexicographic order.
+/// Returns the non-empty subsets of `count` elements, as positions: smaller subsets first, then in
+/// lexicographic order.
 fn subsets(count: usize) -> impl Iterator<Item = Vec<usize>> {
     (1..=count).flat_map(move |size| {
         std::iter::successors(Some((0..size).collect::<Vec<usize>>()), move |last| {
+            // Rightmost position that can still be advanced.
             let at = (0..size).rev().find(|at| last[*at] < count - size + at)?;
             let mut next = last.clone();
             for (position, element) in next[at..].iter_mut().zip(last[at] + 1..) {
@@ -187,23 +201,24 @@ fn subsets(count: usize) -> impl Iterator<Item = Vec<usize>> {
     })
 }
 
-/// Minimal subset that suffices, found by deletion: none of its proper subsets suffices.
+/// Returns a minimal subset that suffices, by deletion: no proper subset of it suffices.
 fn minimal<'a>(
     mut set: Vec<&'a Alteration>,
     suffice: &dyn Fn(&[&'a Alteration]) -> bool,
 ) -> Vec<&'a Alteration> {
+    // Backwards, so that removals do not shift the remaining positions.
     for position in (0..set.len()).rev() {
-        let mut less = set.clone();
-        less.remove(position);
-        if suffice(&less) {
-            set = less;
+        let mut smaller = set.clone();
+        smaller.remove(position);
+        if suffice(&smaller) {
+            set = smaller;
         }
     }
     set
 }
 
-/// Knowledge in which the alterations have come true. Returns `None` if an alteration fails, for example because the
-/// rules do not terminate.
+/// Returns the knowledge after the alterations. `None` if an alteration fails, for example because
+/// the rules do not terminate.
 fn altered<'a>(
     knowledge: &Knowledge,
     alterations: impl IntoIterator<Item = &'a Alteration>,
@@ -222,10 +237,10 @@ fn altered<'a>(
 
 fn is_available(knowledge: &Knowledge, design: &FunctionDesign) -> bool {
     let designs = knowledge.view().function_designs();
-    designs.iter().any(|own| own.individual == design.individual && own.available)
+    designs.iter().any(|candidate| candidate.individual == design.individual && candidate.available)
 }
 
-/// The best plan once alterations have come true. At a limit, returns the best plan found until then.
+/// Computes the best plan after alterations. At a limit, returns the best plan found until then.
 pub(super) fn in_situation(
     mission: &Mission,
     alterations: &[Alteration],
@@ -243,7 +258,7 @@ pub(super) fn in_situation(
     best(&mission, limits)
 }
 
-/// Each alteration of repairs, with the best plan if it alone comes true.
+/// Returns each alteration of the repairs, with the best plan after this alteration alone.
 pub(super) fn singly(mission: &Mission, repairs: &[Repair], limits: &Limits) -> Result<Vec<Change>, Errors> {
     let mut changes: Vec<Change> = Vec::new();
     for own in repairs.iter().flat_map(|repair| &repair.alterations) {
@@ -260,31 +275,33 @@ pub(super) fn singly(mission: &Mission, repairs: &[Repair], limits: &Limits) -> 
     Ok(changes)
 }
 
-/// Alterations that may change whether a design is available: of its components, and of measurements that it depends
-/// on, to the values at which its requirements and estimations begin or cease to hold.
+/// Alterations that may change whether a design is available: of its components, and of
+/// measurements that it depends on, to the values at which its requirements and estimations begin
+/// or cease to hold.
 fn candidates(knowledge: &Knowledge, design: &FunctionDesign) -> Vec<Alteration> {
-    let is_own = |component: &str| design.components.iter().any(|own| own.iri == component);
-    let mut all = components(knowledge, design.available, &is_own);
+    let is_own = |component: &str| design.components.iter().any(|needed| needed.iri == component);
+    let mut alterations = components(knowledge, design.available, &is_own);
     for (attribute, from) in measured(knowledge) {
         let bounds = design.requirements.iter().filter(|requirement| requirement.attribute == attribute);
         for to in targets(bounds, &from, design.available) {
-            all.push(Alteration { name: attribute.clone(), from: Some(from.clone()), to });
+            alterations.push(Alteration { name: attribute.clone(), from: Some(from.clone()), to });
         }
-        // Some vocabularies compare a measurement with what a design estimates.
+        // Some vocabularies compare a measurement with a design's estimation.
         let is_required = design.requirements.iter().any(|requirement| requirement.attribute == attribute);
         let estimated = design.estimations.get(&attribute).filter(|_| !is_required).cloned();
         for to in estimated.into_iter().flat_map(|bound| around(&bound, &from)) {
-            all.push(Alteration { name: attribute.clone(), from: Some(from.clone()), to });
+            alterations.push(Alteration { name: attribute.clone(), from: Some(from.clone()), to });
         }
     }
-    all
+    alterations
 }
 
-/// Adds alterations of all failed components, and of the measurements that any design depends on, to the candidates.
+/// Adds alterations of all failed components, and of the measurements that any design depends on,
+/// to the candidates.
 fn all_candidates(knowledge: &Knowledge, mut all: Vec<Alteration>) -> Vec<Alteration> {
     let designs = knowledge.view().function_designs();
-    let more = designs.iter().flat_map(|design| candidates(knowledge, design));
-    for own in components(knowledge, false, &|_| true).into_iter().chain(more) {
+    let additional = designs.iter().flat_map(|design| candidates(knowledge, design));
+    for own in components(knowledge, false, &|_| true).into_iter().chain(additional) {
         if own.to != Target::Failed && !all.contains(&own) {
             all.push(own);
         }
@@ -292,18 +309,20 @@ fn all_candidates(knowledge: &Knowledge, mut all: Vec<Alteration>) -> Vec<Altera
     all
 }
 
-/// The components that have failed, to work again; or those that work, to fail.
+/// Returns alterations of components: failed ones are repaired, or working ones fail.
 fn components(knowledge: &Knowledge, working: bool, is_own: &dyn Fn(&str) -> bool) -> Vec<Alteration> {
-    let all = knowledge.view().components().into_iter();
-    let all = all.filter(|component| is_own(&component.individual.iri));
+    let components = knowledge.view().components().into_iter();
+    let components = components.filter(|component| is_own(&component.individual.iri));
     let has_failed = |status: Option<&str>| matches!(status, Some("FALSE" | "ERROR" | "false"));
-    let all = all.filter(|component| has_failed(component.status.as_deref()) != working);
+    let components = components.filter(|component| has_failed(component.status.as_deref()) != working);
     let to = if working { Target::Failed } else { Target::Recovered };
-    all.map(|component| Alteration { name: component.individual.name, from: None, to: to.clone() }).collect()
+    components
+        .map(|component| Alteration { name: component.individual.name, from: None, to: to.clone() })
+        .collect()
 }
 
-/// Values from which on all requirements on an attribute hold or, with `hold` (they hold now), one of them is
-/// violated.
+/// Returns the values at which all requirements on an attribute begin to hold or, with `hold` (they
+/// hold now), one of them becomes violated.
 fn targets<'a>(bounds: impl Iterator<Item = &'a Requirement>, from: &BigRational, hold: bool) -> Vec<Target> {
     let (mut least, mut most): (Vec<&BigRational>, Vec<&BigRational>) = (Vec::new(), Vec::new());
     for requirement in bounds {
@@ -319,7 +338,7 @@ fn targets<'a>(bounds: impl Iterator<Item = &'a Requirement>, from: &BigRational
     least.into_iter().chain(most).collect()
 }
 
-/// Values at a bound and beyond it, seen from a value.
+/// Returns the values at a bound and beyond it, seen from a value.
 fn around(bound: &BigRational, from: &BigRational) -> Vec<Target> {
     let bound = bound.clone();
     match from.cmp(&bound) {

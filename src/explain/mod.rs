@@ -1,10 +1,12 @@
-//! Explanations: why a design is available or not, why it is chosen or not, and which changes lead to another plan.
+//! Explanations: why a design is available or not, why it is chosen or not, and which changes lead
+//! to another plan.
 //!
-//! "Why is it not available?" is answered by reasoning alone: [`availability`]. "Why not this one?" is answered by
-//! planning again with the design as the only one for its functions, as if it were available. The difference of the
-//! metrics is the price of this design. "What would change the plan?" is answered by trying the values at which a
-//! requirement begins or ceases to hold. For values of the problem, such as a battery, bisection is used between a
-//! value with the same plan and one with another.
+//! Availability is explained by reasoning alone: [`availability`]. "Why not this one?" is answered
+//! by planning again with the design as the only one for its functions, as if it were available.
+//! The difference of the metrics is the price of this design. "What would change the plan?" is
+//! answered by trying the values at which a requirement begins or ceases to hold. For values of the
+//! problem, such as a battery, bisection is used between a value with the same plan and one with
+//! another.
 
 mod causes;
 mod parts;
@@ -28,7 +30,7 @@ pub use parts::{Alteration, BestPlan, Change, Repair, Target};
 pub use solve::best;
 pub use thresholds::{SmallestChanges, smallest_changes};
 
-/// All about one design.
+/// Explanation of one design.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct DesignExplanation {
@@ -36,25 +38,25 @@ pub struct DesignExplanation {
     pub availability: Availability,
     /// The best plan for the mission as it is.
     pub best: BestPlan,
-    /// The steps of the best plan that use it, from 1.
+    /// Numbers of the steps of the best plan that use the design, from 1.
     pub used: Vec<usize>,
-    /// The best plan in which no other design solves its functions. If the design is not available, it is planned as
-    /// if it were.
+    /// The best plan in which no other design solves its functions. An unavailable design is
+    /// assumed to be available.
     pub alone: BestPlan,
-    /// The best plan without it.
+    /// The best plan without the design.
     pub without: BestPlan,
-    /// For each of [`Availability::ways`], the best plan once all of it has come true.
+    /// For each of [`Availability::ways`], the best plan after all its alterations.
     pub repairs: Vec<Repair>,
-    /// Single alterations: those of the ways, each with the best plan if it alone comes true.
+    /// Single alterations of the ways, each with the best plan after this alteration alone.
     pub changes: Vec<Change>,
-    /// Whether all of that was found before a limit was reached.
+    /// `true` if no limit was reached.
     pub complete: bool,
 }
 
-/// A design by its local name or IRI.
+/// Finds a design by its local name or IRI.
 ///
 /// # Errors
-/// M112, there is no such design.
+/// M112 if the design does not exist.
 fn find(mission: &Mission, name: &str) -> Result<(FunctionDesign, Vec<FunctionDesign>), Errors> {
     let designs =
         mission.knowledge().map(|knowledge| knowledge.view().function_designs()).unwrap_or_default();
@@ -65,22 +67,22 @@ fn find(mission: &Mission, name: &str) -> Result<(FunctionDesign, Vec<FunctionDe
     if let Some(found) = named.or_else(|| designs.iter().find(is_meant)) {
         return Ok((found.clone(), designs));
     }
-    let known: Vec<&str> = designs.iter().map(|design| design.individual.name.as_str()).collect();
-    let meant = crate::message::did_you_mean(name, known.iter().map(|own| &**own));
-    let text = format!("there is no design `{name}`; there are: {}{meant}", known.join(", "));
+    let names: Vec<&str> = designs.iter().map(|design| design.individual.name.as_str()).collect();
+    let suggestion = crate::message::did_you_mean(name, names.iter().map(|name| &**name));
+    let text = format!("there is no design `{name}`; there are: {}{suggestion}", names.join(", "));
     Err(vec![Message::error("M112", text)].into())
 }
 
 /// Explains by reasoning alone whether one design, by its local name, is available.
 ///
 /// # Errors
-/// There is no such design.
+/// The design does not exist.
 pub fn availability(mission: &Mission, name: &str) -> Result<Availability, Errors> {
     let (found, _) = find(mission, name)?;
     Ok(causes::availability(mission, &found))
 }
 
-/// Explains one design, by its local name. At a limit, what is known by then is the answer.
+/// Explains one design, by its local name. At a limit, returns the partial results.
 ///
 /// ```
 /// use std::path::Path;
@@ -102,8 +104,8 @@ pub fn design(mission: &Mission, name: &str, limits: &Limits) -> Result<DesignEx
 }
 
 impl Availability {
-    /// Adds the results of planning. `hear` is called with a short description of each planning query before that
-    /// starts.
+    /// Adds the results of planning. `hear` is called with a short description of each planning
+    /// query before that starts.
     ///
     /// # Errors
     /// The mission cannot be planned for.
@@ -138,9 +140,9 @@ impl Availability {
         let without = solve(mission, limits, &|other, available| other != name && available)?;
         hear("single changes");
         let changes = causes::singly(mission, &repairs, limits)?;
-        let all = [&best, &alone, &without].into_iter();
-        let all = all.chain(repairs.iter().map(|repair| &repair.then));
-        let complete = all.chain(changes.iter().map(|change| &change.then)).all(|plan| plan.proved);
+        let plans = [&best, &alone, &without].into_iter();
+        let plans = plans.chain(repairs.iter().map(|repair| &repair.then));
+        let complete = plans.chain(changes.iter().map(|change| &change.then)).all(|plan| plan.proved);
         Ok(DesignExplanation { availability: self, best, used, alone, without, repairs, changes, complete })
     }
 }

@@ -8,10 +8,10 @@ use crate::mapek::PlannedStep;
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct BestPlan {
-    /// The metric of the best plan, in its unit. `None` if no plan is known.
+    /// The metric of the best plan, in its unit. `None` without a plan.
     pub cost: Option<BigRational>,
-    /// Whether the cost is proved to be the lowest or, without a cost, whether it is proved that there is no plan. If
-    /// not, a limit was reached.
+    /// `true` if the cost is proved to be the lowest or, without a cost, if it is proved that there
+    /// is no plan. Otherwise a limit was reached.
     pub proved: bool,
     /// The plan.
     pub steps: Vec<PlannedStep>,
@@ -31,9 +31,9 @@ pub struct Alteration {
 /// Alterations that have to come true together.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Repair {
-    /// All of them.
+    /// All alterations of the change.
     pub alterations: Vec<Alteration>,
-    /// The best plan in that situation.
+    /// The best plan after the alterations.
     pub then: BestPlan,
 }
 
@@ -45,32 +45,32 @@ pub struct Change {
     pub alteration: Alteration,
     /// Upper limit on the error of the bound. `None` if the bound is exact.
     pub within: Option<BigRational>,
-    /// Of a change of a design's availability, whether it suffices by itself.
+    /// For a change of a design's availability, `true` if the alteration suffices by itself.
     pub suffices: bool,
-    /// The best plan in that situation.
+    /// The best plan after the change.
     pub then: BestPlan,
 }
 
 /// Value or state after an alteration.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Target {
-    /// At least this.
+    /// A value of at least this bound.
     AtLeast(BigRational),
-    /// At most this.
+    /// A value of at most this bound.
     AtMost(BigRational),
-    /// More than this.
+    /// A value greater than this bound.
     Above(BigRational),
-    /// Less than this.
+    /// A value less than this bound.
     Below(BigRational),
-    /// A component that has failed works again.
+    /// A failed component is repaired.
     Recovered,
-    /// A component that works fails.
+    /// A working component fails.
     Failed,
 }
 
 impl Target {
-    /// A value that meets the target: the bound itself, or, if the bound is strict, a value beyond it by `little()`.
-    /// Returns 0 for components.
+    /// A value that meets the target: the bound itself, or, if the bound is strict, a value beyond
+    /// it by `little()`. Returns 0 for components.
     pub(super) fn example(&self) -> BigRational {
         let little = little();
         match self {

@@ -1,4 +1,4 @@
-//! The best plan for a mission as it is, or with other designs.
+//! Computes the best plan for a mission, optionally with other designs.
 
 use planner::{Config, Limits, Status, optimize};
 
@@ -16,7 +16,8 @@ pub fn best(mission: &Mission, limits: &Limits) -> Result<BestPlan, Errors> {
     solve(mission, limits, &|_, available| available)
 }
 
-/// Computes the best plan with the designs for which `allowed` returns `true`, given the name and whether it is available.
+/// Computes the best plan with the designs for which `allowed` returns `true`, given the name and
+/// whether it is available.
 pub(super) fn solve(
     mission: &Mission,
     limits: &Limits,
@@ -27,7 +28,7 @@ pub(super) fn solve(
     }
     let (mut problem, _) = mission.filled()?;
     let domain = mission.allow(&mut problem, allowed);
-    // Later queries need time, too.
+    // Half of the time is reserved for later queries.
     let limits = &limits.half();
     let task = match ground_with(mission, &domain, &problem, &[], limits) {
         Ok(task) => task,

@@ -11,8 +11,9 @@ use crate::message::Errors;
 use crate::mission::Mission;
 use crate::number;
 
-/// Bisection ends at the value divided by this number; then a number with fewer digits is tried.
-const FINENESS: i64 = 1000;
+/// Bisection ends at an interval of the value divided by this number; then a number with fewer
+/// digits is tried.
+const BISECTION_RESOLUTION: i64 = 1000;
 
 /// The smallest changes that lead to another plan.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,13 +23,13 @@ pub struct SmallestChanges {
     pub best: BestPlan,
     /// The changes.
     pub changes: Vec<Change>,
-    /// Whether these are all: no limit was reached.
+    /// `true` if the list is complete: no limit was reached.
     pub complete: bool,
 }
 
-/// Searches for the smallest changes, upwards and downwards, of each measured attribute and each value of the problem
-/// that lead to another plan. At a limit, returns those found until then. `hear` is called with the name of each
-/// value before it is varied.
+/// Searches for the smallest changes, upwards and downwards, of each measured attribute and each
+/// value of the problem that lead to another plan. At a limit, returns the partial results. `hear`
+/// is called with the name of each value before it is varied.
 ///
 /// # Errors
 /// The mission cannot be planned for.
@@ -39,19 +40,19 @@ pub fn smallest_changes(
 ) -> Result<SmallestChanges, Errors> {
     hear("the best plan");
     let base = best(mission, limits)?;
-    let mut found = SmallestChanges { best: base, changes: Vec::new(), complete: false };
-    if !found.best.proved {
-        return Ok(found);
+    let mut result = SmallestChanges { best: base, changes: Vec::new(), complete: false };
+    if !result.best.proved {
+        return Ok(result);
     }
-    let tried = Tried { mission, base: found.best.clone(), limits };
+    let tried = VariedMission { mission, base: result.best.clone(), limits };
     let attributes = mission.knowledge().map(measured).unwrap_or_default();
     for (attribute, from) in attributes {
         hear(&attribute);
         for upwards in [false, true] {
             match tried.first_threshold(&attribute, &from, upwards)? {
-                Outcome::Found(change) => found.changes.push(*change),
+                Outcome::Found(change) => result.changes.push(*change),
                 Outcome::None => {}
-                Outcome::AtLimit => return Ok(found),
+                Outcome::AtLimit => return Ok(result),
             }
         }
     }
@@ -59,14 +60,14 @@ pub fn smallest_changes(
         hear(&function);
         for upwards in [false, true] {
             match tried.bisected(&function, &from, upwards)? {
-                Outcome::Found(change) => found.changes.push(*change),
+                Outcome::Found(change) => result.changes.push(*change),
                 Outcome::None => {}
-                Outcome::AtLimit => return Ok(found),
+                Outcome::AtLimit => return Ok(result),
             }
         }
     }
-    found.complete = true;
-    Ok(found)
+    result.complete = true;
+    Ok(result)
 }
 
 /// The measured attributes with their values.
@@ -83,27 +84,27 @@ enum Outcome {
 }
 
 /// A mission whose values are varied, and its best plan for comparison.
-struct Tried<'a> {
+struct VariedMission<'a> {
     mission: &'a Mission,
     base: BestPlan,
     limits: &'a Limits,
 }
 
-impl Tried<'_> {
-    /// The best plan with another value. Returns `None` at a limit.
+impl VariedMission<'_> {
+    /// Computes the best plan with another value. Returns `None` at a limit.
     fn with(&self, name: &str, value: &BigRational) -> Result<Option<BestPlan>, Errors> {
         if self.limits.reached() {
             return Ok(None);
         }
-        let mut other = self.mission.clone();
-        if let Some(knowledge) = other.knowledge_mut() {
+        let mut mission = self.mission.clone();
+        if let Some(knowledge) = mission.knowledge_mut() {
             knowledge.interrupt(self.limits.into());
         }
-        match other.set(name, &number::decimal(value)) {
+        match mission.set(name, &number::decimal(value)) {
             Err(_) if self.limits.reached() => return Ok(None),
             outcome => outcome?,
         }
-        Ok(Some(best(&other, self.limits)?).filter(|plan| plan.proved))
+        Ok(Some(best(&mission, self.limits)?).filter(|plan| plan.proved))
     }
 
     /// Returns `true` if a plan differs from the best plan of the mission as it is.
@@ -114,7 +115,8 @@ impl Tried<'_> {
         steps(plan) != steps(&self.base) || plan.cost.is_some() != self.base.cost.is_some()
     }
 
-    /// The nearest value of an attribute at which a requirement begins or ceases to hold, and the plan is another one.
+    /// Returns the nearest value of an attribute at which a requirement begins or ceases to hold
+    /// and the plan changes.
     fn first_threshold(&self, attribute: &str, from: &BigRational, upwards: bool) -> Result<Outcome, Errors> {
         for target in thresholds(self.mission, attribute, from, upwards) {
             let Some(then) = self.with(attribute, &target.example())? else { return Ok(Outcome::AtLimit) };
@@ -125,12 +127,14 @@ impl Tried<'_> {
         Ok(Outcome::None)
     }
 
-    /// Looks for the nearest value of a function, on one side, with another plan.
+    /// Searches for the nearest value of a function, on one side, with another plan.
     fn bisected(&self, function: &str, from: &BigRational, upwards: bool) -> Result<Outcome, Errors> {
+        // Relative steps need a positive start value.
         if *from <= BigRational::default() {
             return Ok(Outcome::None);
         }
         let whole = |value: i64| BigRational::from_integer(value.into());
+        // Exponential search brackets the change before bisection.
         let (mut same, mut other) = (from.clone(), None);
         for percent in [1, 2, 5, 10, 20, 50, 100] {
             let part = from * whole(percent) / whole(100);
@@ -143,7 +147,7 @@ impl Tried<'_> {
             same = value;
         }
         let Some((mut value, mut then)) = other else { return Ok(Outcome::None) };
-        let fine = from / whole(FINENESS);
+        let fine = from / whole(BISECTION_RESOLUTION);
         loop {
             let distance = if upwards { &value - &same } else { &same - &value };
             if distance <= fine {
@@ -160,8 +164,8 @@ impl Tried<'_> {
         self.simplest(function, from, (same, value), then)
     }
 
-    /// The bound between a value with the same plan and one with another. It is the number with the fewest digits if
-    /// the plan changes there.
+    /// Returns the bound between a value with the same plan and one with another: the number with
+    /// the fewest digits if the plan changes there.
     fn simplest(
         &self,
         function: &str,
@@ -175,6 +179,8 @@ impl Tried<'_> {
         let step = if upwards { little() } else { -little() };
         let (before, beyond) = (&bound - &step, &bound + &step);
         let Some(at) = self.with(function, &bound)? else { return Ok(Outcome::AtLimit) };
+        // The plan may change at the bound itself or just beyond it, which decides between a closed
+        // and an open bound.
         if self.is_other(&at) {
             let Some(plan) = self.with(function, &before)? else { return Ok(Outcome::AtLimit) };
             if !self.is_other(&plan) {
@@ -199,7 +205,8 @@ fn change(name: &str, from: &BigRational, to: Target, within: Option<BigRational
     Change { alteration, within, suffices: true, then }
 }
 
-/// A number with the fewest decimals that is at least `low` and at most `high`, which is above 0.
+/// Returns a number with the fewest decimals that is at least `low` and at most `high`, which is
+/// above 0.
 fn shortest_decimal(low: &BigRational, high: &BigRational) -> BigRational {
     let mut unit = BigInt::from(1);
     loop {
@@ -212,7 +219,8 @@ fn shortest_decimal(low: &BigRational, high: &BigRational) -> BigRational {
     }
 }
 
-/// The values of an attribute at which a requirement begins or ceases to hold, the nearest first.
+/// Returns the values of an attribute at which a requirement begins or ceases to hold, the nearest
+/// first.
 fn thresholds(mission: &Mission, attribute: &str, from: &BigRational, upwards: bool) -> Vec<Target> {
     let designs =
         mission.knowledge().map(|knowledge| knowledge.view().function_designs()).unwrap_or_default();
@@ -239,6 +247,7 @@ fn thresholds(mission: &Mission, attribute: &str, from: &BigRational, upwards: b
         if upwards { distance } else { -distance }
     };
     targets.sort_by_key(distance);
+    // Several designs may have the same requirement.
     targets.dedup();
     targets
 }
@@ -250,7 +259,7 @@ mod tests {
     use super::shortest_decimal;
 
     #[test]
-    fn the_shortest_decimal_of_an_interval() {
+    fn the_shortest_decimal_lies_in_the_interval() {
         let number = |value: i64| BigRational::new(value.into(), 1_000_000.into());
         let check =
             |low, high, expected| assert_eq!(shortest_decimal(&number(low), &number(high)), number(expected));

@@ -1,4 +1,4 @@
-//! A directory to the segments and snapshots in it, with all that is wrong with them.
+//! Reads the segments and snapshots of a journal's directory, with all their faults.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
@@ -10,36 +10,37 @@ use serde_json::Value;
 use super::record::{FORMAT, Link, Record, opening};
 use crate::message::Message;
 
-/// A segment, as far as it is sound.
+/// A segment, up to its first fault.
 #[derive(Debug)]
 pub(super) struct Segment {
     pub(super) number: u64,
     pub(super) digest: String,
-    /// What it comes after, and what comes after it.
+    /// Link before the segment, and link after it.
     pub(super) before: Link,
     pub(super) after: Link,
-    /// Without the header.
+    /// Records without the header.
     pub(super) records: Vec<Record>,
-    /// How many bytes are whole records.
+    /// Number of bytes in complete records.
     pub(super) sound: u64,
     pub(super) end: End,
 }
 
-/// How a segment ends.
+/// End of a segment.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum End {
-    /// With a whole record.
+    /// The segment ends with a complete record.
     Whole,
-    /// With a whole record whose line break is missing, or is another character.
+    /// The segment ends with a complete record whose line break is missing, or is another
+    /// character.
     Unbroken,
-    /// With so many bytes of a record that was not written completely.
+    /// The segment ends with this number of bytes of an incomplete record.
     Incomplete(u64),
-    /// Something is wrong with this line, from 1.
+    /// The line with this number, from 1, is damaged.
     Damaged(usize),
 }
 
 impl Segment {
-    /// Whether it says that another one follows.
+    /// Returns `true` if the segment ends with the record that another one follows.
     pub(super) fn is_closed(&self) -> bool {
         self.records.last().is_some_and(|record| record.kind == "end")
     }
@@ -48,15 +49,15 @@ impl Segment {
 /// A snapshot.
 #[derive(Debug)]
 pub(super) struct SnapshotFile {
-    /// After what it was made; the segment with its number begins there.
+    /// Link before the snapshot; the segment with its number begins there.
     pub(super) before: Link,
     pub(super) data: Value,
 }
 
-/// What is in a directory.
+/// Files of a journal.
 #[derive(Debug, Default)]
 pub(super) struct JournalFiles {
-    /// Segments by number, or what is wrong with them as a whole.
+    /// Segments by number, or the fault that makes a segment unreadable.
     pub(super) segments: BTreeMap<u64, Result<Segment, String>>,
     pub(super) snapshots: BTreeMap<u64, Result<SnapshotFile, String>>,
 }
@@ -65,7 +66,7 @@ impl JournalFiles {
     /// Reads a directory.
     ///
     /// # Errors
-    /// It cannot be listed.
+    /// The directory cannot be listed.
     pub(super) fn read(directory: &Path) -> io::Result<Self> {
         let mut contents = Self::default();
         for entry in std::fs::read_dir(directory)? {
@@ -86,23 +87,23 @@ impl JournalFiles {
         Ok(contents)
     }
 
-    /// A sound snapshot with which the segment of its number begins.
+    /// Returns the sound snapshot with which the segment of this number begins.
     pub(super) fn start(&self, number: u64) -> Result<&SnapshotFile, String> {
         let name = name("snapshot", number);
         let missing = || Err(format!("{name} is missing"));
-        let found = self.snapshots.get(&number).map_or_else(missing, |found| match found {
+        let snapshot = self.snapshots.get(&number).map_or_else(missing, |entry| match entry {
             Ok(snapshot) => Ok(snapshot),
             Err(text) => Err(format!("{name} {text}")),
         })?;
         match self.segments.get(&number) {
-            Some(Ok(segment)) if segment.before != found.before => {
+            Some(Ok(segment)) if segment.before != snapshot.before => {
                 Err(format!("{name} is not of the same journal as {}", self::name("journal", number)))
             }
-            _ => Ok(found),
+            _ => Ok(snapshot),
         }
     }
 
-    /// The segments from a number on, which follow each other without a gap, or the first thing that is wrong.
+    /// Returns the contiguous segments from a number on, or the first fault.
     pub(super) fn chain(&self, from: u64) -> Result<Vec<&Segment>, String> {
         let last = self.segments.keys().chain(self.snapshots.keys()).max().copied().unwrap_or(from);
         let mut chain: Vec<&Segment> = Vec::new();
@@ -130,7 +131,8 @@ impl JournalFiles {
     }
 }
 
-/// Whether a segment begins where another one ends, or would end if a crash had not come before its last record.
+/// Returns `true` if a segment begins where another one ends, or would end if a crash had not
+/// prevented its last record.
 pub(super) fn follows(before: &Segment, after: &Segment) -> bool {
     if before.is_closed() {
         return before.end == End::Whole && before.after == after.before;
@@ -138,7 +140,7 @@ pub(super) fn follows(before: &Segment, after: &Segment) -> bool {
     after.records.is_empty() && closing(&before.after, before.number).1 == after.before
 }
 
-/// The last line of a segment that another one follows, and the place after it.
+/// Returns the last line of a segment that has a successor, and the link after it.
 pub(super) fn closing(at: &Link, segment: u64) -> (String, Link) {
     at.line("end", &[Value::from(segment + 1)])
 }
@@ -161,7 +163,7 @@ fn segment(bytes: &[u8], number: u64) -> Result<Segment, String> {
         let whole = line.strip_suffix(b"\n");
         let mut read = segment.after.read(whole.unwrap_or(line));
         if read.is_none() && whole.is_none() {
-            // The line break is another character.
+            // The last character is damaged: it should be a line break.
             read = line.split_last().and_then(|(_, rest)| segment.after.read(rest));
         }
         match (read, whole) {
@@ -182,7 +184,7 @@ fn segment(bytes: &[u8], number: u64) -> Result<Segment, String> {
     Ok(segment)
 }
 
-/// How much of a line without a line break is its record.
+/// Length of the record in a line without line break.
 fn after_length(line: &[u8], at: &Link) -> usize {
     if at.read(line).is_some() { line.len() } else { line.len() - 1 }
 }
@@ -203,12 +205,12 @@ fn check_opening(record: &Record, number: u64) -> Result<(), String> {
     }
 }
 
-/// What is to be said of a segment that an older version has written.
+/// Message about a segment of an older version.
 pub(super) const OLD_FORMAT: &str = "is of the format `metaplan-journal/2` or older, which this version does not read; let the version that \
                                      wrote it bring its mission to an end, or begin the mission anew with a journal in another \
                                      directory";
 
-/// Why a file whose first line is not a header is none of ours.
+/// Reason why a file whose first line is not a header is not a segment.
 fn no_journal(first: &[u8]) -> String {
     let text = String::from_utf8_lossy(first);
     let old = text.contains("metaplan-journal/1");
@@ -232,14 +234,15 @@ pub(super) fn broken(place: &Path, text: &str) -> Message {
     Message::at("M321", &place.display().to_string(), None, format!("the journal cannot be used: {text}"))
 }
 
-/// Reads a file that must be a file: a pipe would never end, and a link leads elsewhere.
+/// Reads a regular file. Pipes and links are rejected, since a pipe may never end, and a link may
+/// lead outside the directory.
 fn read_private(path: &Path) -> io::Result<Vec<u8>> {
     require_file(path)?;
     std::fs::read(path)
 }
 
 /// # Errors
-/// There is something with that name that is not a file.
+/// The name belongs to something that is not a regular file.
 pub(super) fn require_file(path: &Path) -> io::Result<()> {
     match std::fs::symlink_metadata(path) {
         Ok(found) if !found.is_file() => Err(io::Error::other("is not a regular file")),
@@ -248,7 +251,7 @@ pub(super) fn require_file(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Opens a file for its user alone; it is made if there is none.
+/// Opens a file that only its user can access, and creates it if it does not exist.
 pub(super) fn open_private(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
     require_file(path)?;
     #[cfg(unix)]
@@ -262,7 +265,7 @@ pub(super) fn open_private(path: &Path, options: &mut OpenOptions) -> io::Result
     options.open(path)
 }
 
-/// Makes a directory for its user alone, if there is none.
+/// Creates a directory that only its user can access, if it does not exist.
 pub(super) fn make_directory(path: &Path) -> io::Result<()> {
     let mut builder = std::fs::DirBuilder::new();
     builder.recursive(true);

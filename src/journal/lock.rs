@@ -1,4 +1,5 @@
-//! One process at a time has a journal; and how many records it had, so that missing ones are noticed.
+//! Lock of a journal: one process at a time uses it. The file also stores the number of records, so
+//! that missing records are detected.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Read as _, Seek as _, SeekFrom, Write as _};
@@ -10,28 +11,29 @@ use fs4::{FileExt, TryLockError};
 use super::directory::{broken, open_private};
 use crate::message::Message;
 
-/// So often a lock is tried again: a process that was killed may not be gone yet.
-const PATIENCE: u32 = 10;
-/// The time from one try to the next.
-const PAUSE: Duration = Duration::from_millis(20);
-/// Characters of the number of the process, which stands in the first line of the file.
-const OWNER: usize = 10;
-/// Characters of the number of records, which stands in the second.
-const COUNT: usize = 20;
+/// Number of attempts to lock: a killed process may not be gone yet.
+const LOCK_RETRIES: u32 = 10;
+/// Time between two attempts.
+const RETRY_INTERVAL: Duration = Duration::from_millis(20);
+/// Number of characters of the process number, in the first line of the file.
+const OWNER_CHARACTERS: usize = 10;
+/// Number of characters of the record count, in the second line.
+const COUNT_CHARACTERS: usize = 20;
 
-/// A journal that no other process has, for as long as this is kept.
+/// Exclusive access to a journal until the lock is dropped.
 #[derive(Debug)]
 pub(super) struct Lock {
     file: File,
-    /// How many records the journal had when it was last written to, if that is known.
+    /// Number of records after the last write, if known.
     pub(super) records: u64,
 }
 
 impl Lock {
-    /// Takes a journal for this process, and leaves its number there for the message that others get.
+    /// Locks a journal, and stores the number of this process in the file for the messages of other
+    /// processes.
     ///
     /// # Errors
-    /// M322 where another process has it.
+    /// M322 if another process has locked the journal.
     pub(super) fn take(directory: &Path) -> Result<Self, Message> {
         let name = directory.join("lock");
         let failed = |error: &io::Error| broken(&name, &error.to_string());
@@ -39,15 +41,15 @@ impl Lock {
         let file = open_private(&name, options.create(true).truncate(false).read(true).write(true));
         let mut file = file.map_err(|error| failed(&error))?;
         let mut answer = FileExt::try_lock(&file);
-        for _ in 0..PATIENCE {
+        for _ in 0..LOCK_RETRIES {
             if !matches!(answer, Err(TryLockError::WouldBlock)) {
                 break;
             }
-            std::thread::sleep(PAUSE);
+            std::thread::sleep(RETRY_INTERVAL);
             answer = FileExt::try_lock(&file);
         }
         let mut note = String::new();
-        // Where a locked file cannot be read the message does without.
+        // If the locked file cannot be read, the message omits the owner.
         let _ = (&mut file).take(64).read_to_string(&mut note);
         let mut lines = note.lines().map(str::trim);
         let (owner, records) = (lines.next().unwrap_or_default(), lines.next().unwrap_or_default());
@@ -70,10 +72,10 @@ impl Lock {
         }
     }
 
-    /// Notes how many records there are.
+    /// Stores the number of records.
     pub(super) fn note(&mut self, records: u64) -> io::Result<()> {
         let owner = std::process::id();
         self.file.seek(SeekFrom::Start(0))?;
-        self.file.write_all(format!("{owner:>OWNER$}\n{records:>COUNT$}\n").as_bytes())
+        self.file.write_all(format!("{owner:>OWNER_CHARACTERS$}\n{records:>COUNT_CHARACTERS$}\n").as_bytes())
     }
 }

@@ -1,20 +1,24 @@
-//! The journal: every observation and every decision of a loop on disk before anything is done about it.
+//! Write-ahead journal: every observation and every decision of a loop is on disk before its
+//! answers leave the program.
 //!
-//! A directory holds segments `journal-N` and, but for the first, the snapshot `snapshot-N` that each begins from; two
-//! generations are kept. Records are numbered and chained, see `record`. An observation is written before it is
-//! handled, and the decision before any of its answers leaves the program \[1\]. On opening, the loop is brought
-//! back by the newest sound snapshot and by handling the observations since again, with the plans as they were made then;
-//! what it answers must be what is written, explanations apart, or else the journal is refused.
+//! A directory contains segments `journal-N` and, except for the first, the snapshot `snapshot-N`
+//! from which each segment begins; two generations are kept. Records are numbered and chained, see
+//! `record`. An observation is written before it is handled, and the decision before any of its
+//! answers leaves the program \[1\]. Opening restores the loop from the newest sound snapshot and
+//! replays the later observations with the plans of that time. The answers must equal the recorded
+//! ones, except for explanations; otherwise the journal is rejected.
 //!
-//! A crash may leave the last record incomplete. It is cut off, kept in a file beside, and reported. Nothing whole is ever
-//! cut off: whatever else is wrong with what is needed is an error, and whatever is wrong with what is not needed is a
-//! warning.
+//! A crash may leave the last record incomplete. It is cut off, kept in a separate file, and
+//! reported. A complete record is never cut off: any other fault in a needed file is an error, and
+//! a fault in a file that is not needed is a warning.
 //!
-//! A new segment is there before the old one ends with a record that says so, and that before the snapshot. So a
-//! segment that is missing is noticed, and a crash in between is not taken for one.
+//! A new segment is created before the old one ends with a record of its successor, and this record
+//! is written before the snapshot. So a missing segment is detected, and a crash in between is not
+//! mistaken for one.
 //!
-//! One process at a time has the journal: it holds a lock on the file `lock`, which the operating system releases when the
-//! process ends, however it ends. The file says, too, how many records there are, so that missing ones are noticed.
+//! One process at a time uses the journal: it holds a lock on the file `lock`, which the operating
+//! system releases when the process ends. The file also stores the number of records, so that
+//! missing records are detected.
 //!
 //! - \[1\] C. Mohan et al.: ARIES, a transaction recovery method, ACM TODS 17, 1992.
 
@@ -43,25 +47,25 @@ use recover::{Replay, Unfinished, settle, usable};
 
 pub use report::{Entry, JournalReport};
 
-/// When the operating system is made to write to the disk itself. A program that is killed loses nothing either way;
-/// a machine that loses power may lose what was not yet written.
+/// Policy for flushing writes to the disk. A killed program loses nothing with any policy; a
+/// machine that loses power may lose data that was not flushed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Sync {
-    /// After every observation, before its answers leave the program.
+    /// Flushes after every observation, before its answers leave the program.
     Always,
-    /// Before effects leave the program.
+    /// Flushes before effects leave the program.
     #[default]
     Effects,
-    /// When the operating system sees fit.
+    /// The operating system decides when to flush.
     Never,
 }
 
-/// How a journal is kept.
+/// Settings of a journal.
 #[derive(Debug, Clone, Copy)]
 pub struct Policy {
-    /// When the disk is written to.
+    /// Policy for flushing writes to the disk.
     pub sync: Sync,
-    /// After so many observations a snapshot is made, and a new segment begun.
+    /// Number of observations after which a snapshot is written and a new segment begins.
     pub snapshot_every: u64,
 }
 
@@ -79,22 +83,23 @@ pub struct Journal {
     segment: u64,
     file: File,
     link: Link,
-    /// Locked for as long as it is open.
+    /// Lock of the journal while it is open.
     lock: Lock,
-    /// Observations since the snapshot.
+    /// Number of observations since the snapshot.
     observations: u64,
-    /// What was begun and not decided when the program ended.
+    /// Work that was begun and not decided when the program ended.
     unfinished: Option<Unfinished>,
     digest: String,
 }
 
 impl Journal {
-    /// Opens the journal in a directory, which is made if there is none, for a loop that has not begun. The loop is
-    /// then as it was when the last decision was written, or has not begun yet; [`Journal::begin`] has to follow.
+    /// Opens the journal in a directory for a loop that has not begun, and creates the directory if
+    /// it does not exist. The loop is then in its state after the last recorded decision.
+    /// [`Journal::begin`] has to follow.
     ///
     /// # Errors
-    /// The directory cannot be used, or another process uses it; or the journal is damaged or belongs to another
-    /// mission. Nothing has changed then.
+    /// The directory cannot be used, or another process uses it; or the journal is damaged or
+    /// belongs to another mission. The journal is unchanged in these cases.
     pub fn open(directory: &Path, policy: Policy, control: &mut Loop) -> Result<(Self, Recovery), Message> {
         let failed = |error: io::Error| broken(directory, &error.to_string());
         directory::make_directory(directory).map_err(failed)?;
@@ -104,6 +109,7 @@ impl Journal {
         let mut recovery = Recovery::default();
         let directory = directory.to_owned();
         if contents.segments.is_empty() && contents.snapshots.is_empty() {
+            // The lock file proves that the journal had records before.
             if lock.records > 0 {
                 return Err(broken(&directory, &format!("{} is missing", name("journal", 0))));
             }
@@ -122,6 +128,7 @@ impl Journal {
         for (number, line) in anew {
             write_snapshot(&directory, number, &line).map_err(failed)?;
         }
+        // A machine that lost power may have lost records that were not flushed.
         if lock.records > link.next {
             let text = format!(
                 "the last {} records of the journal are missing; send again what follows `seq`",
@@ -134,10 +141,11 @@ impl Journal {
         Ok((journal, recovery))
     }
 
-    /// Brings a loop that has not begun back as [`Journal::open`] does, and changes nothing on disk.
+    /// Restores a loop that has not begun as [`Journal::open`] does, without changing the disk.
     ///
     /// # Errors
-    /// The journal cannot be resumed: it is damaged, or belongs to another mission, or the mission leads to other decisions.
+    /// The journal cannot be resumed: it is damaged, or belongs to another mission, or the mission
+    /// leads to other decisions.
     pub fn rehearse(directory: &Path, control: &mut Loop) -> Result<Recovery, Message> {
         let contents =
             JournalFiles::read(directory).map_err(|error| broken(directory, &error.to_string()))?;
@@ -146,8 +154,9 @@ impl Journal {
         Ok(recovery)
     }
 
-    /// Decides what was begun, which may take as long as a plan takes. The answers have not left the program, or may not
-    /// have: those to what was begun, then effects that were not acknowledged.
+    /// Decides the unfinished work, which may require planning. Returns the answers that may not
+    /// have left the program: first those to the unfinished work, then effects that were not
+    /// acknowledged.
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
@@ -167,7 +176,8 @@ impl Journal {
         self.again(control, answers)
     }
 
-    /// As [`Journal::begin`], without planning: what was begun is reacted to, and remains to be deliberated on.
+    /// Begins as [`Journal::begin`], without planning: the loop reacts to the unfinished work, and the
+    /// deliberation remains.
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
@@ -181,10 +191,11 @@ impl Journal {
         self.again(control, answers)
     }
 
-    /// Answers, and effects that were not acknowledged.
+    /// Returns answers and effects that were not acknowledged, for repeated output.
     fn again(&mut self, control: &Loop, mut answers: Vec<Answer>) -> io::Result<Vec<Answer>> {
         self.file.sync_data()?;
         self.lock.note(self.link.next)?;
+        // Effects of the new answers must not be repeated.
         let fresh: Vec<u64> = answers.iter().filter_map(Answer::effect).map(|effect| effect.number).collect();
         let again = control.repeat().into_iter();
         let is_fresh = |answer: &Answer| answer.effect().is_some_and(|effect| fresh.contains(&effect.number));
@@ -192,8 +203,8 @@ impl Journal {
         Ok(answers)
     }
 
-    /// Writes an observation, lets the loop handle it, and writes what it has decided; the answers may leave the program
-    /// then.
+    /// Writes an observation, handles it by the loop, and writes the decision. The returned answers
+    /// may leave the program.
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
@@ -204,8 +215,8 @@ impl Journal {
         Ok(answers)
     }
 
-    /// Writes an observation, and lets the loop react to it. The answers may leave the program after [`Journal::reacted`], or with those
-    /// of the deliberation after [`Journal::decided`].
+    /// Writes an observation, and lets the loop react to it. The answers may leave the program
+    /// after [`Journal::reacted`], or with those of the deliberation after [`Journal::decided`].
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
@@ -226,7 +237,8 @@ impl Journal {
         self.keep(answers)
     }
 
-    /// Writes the answers of a deliberation, after those of the observation before it if these were not written.
+    /// Writes the answers of a deliberation, after the answers to the previous observation if these
+    /// were not written.
     ///
     /// # Errors
     /// The journal cannot be written; the answers must not leave the program.
@@ -234,15 +246,16 @@ impl Journal {
         let decision = control.decision(answers);
         self.decide(&decision)?;
         self.keep(answers)?;
-        // A snapshot has no place for what is still to be deliberated on.
+        // A snapshot cannot store a pending deliberation.
         if self.observations >= self.policy.snapshot_every && !control.has_agenda() {
             self.checkpoint(control)?;
         }
         Ok(())
     }
 
-    /// Forces answers to the disk as the policy demands.
+    /// Flushes answers to the disk according to the policy.
     fn keep(&mut self, answers: &[Answer]) -> io::Result<()> {
+        // `Effects` is sufficient, because only effects change the world.
         let must = match self.policy.sync {
             Sync::Always => true,
             Sync::Effects => answers.iter().any(|answer| answer.effect().is_some()),
@@ -265,7 +278,8 @@ impl Journal {
         Ok(())
     }
 
-    /// Begins a new segment, ends this one and writes a snapshot, in this order; older generations are removed.
+    /// Begins a new segment, ends the current one and writes a snapshot, in this order. Older
+    /// generations are removed.
     fn checkpoint(&mut self, control: &Loop) -> io::Result<()> {
         let next = self.segment + 1;
         let (end, at) = closing(&self.link, self.segment);
@@ -283,7 +297,7 @@ impl Journal {
                 ["journal", "snapshot"].contains(&kind) && number.parse().is_ok_and(|n: u64| n + 1 < next)
             });
             if is_old {
-                // Nothing rests on it.
+                // No segment depends on the removed file.
                 let _ = std::fs::remove_file(self.directory.join(&name));
             }
         }
@@ -291,18 +305,18 @@ impl Journal {
     }
 }
 
-/// A loop that was brought back, and where in the journal it is.
+/// A restored loop, and its position in the journal.
 struct Resumed<'c> {
-    /// The number of the snapshot, or 0.
+    /// Number of the snapshot, or 0.
     from: u64,
     segments: Vec<&'c Segment>,
     observations: u64,
     unfinished: Option<Unfinished>,
-    /// Snapshots that are missing, by number.
+    /// Missing snapshots, by number, which are written again.
     anew: Vec<(u64, String)>,
 }
 
-/// Brings a loop back by the newest sound snapshot and the observations since.
+/// Restores a loop from the newest sound snapshot and the later observations.
 fn resume<'c>(
     directory: &Path,
     contents: &'c JournalFiles,
@@ -312,6 +326,7 @@ fn resume<'c>(
     let digest = control.digest();
     let (from, segments) =
         usable(contents, &mut recovery.warnings).map_err(|text| broken(directory, &text))?;
+    // Other files or settings would lead to other decisions during the replay.
     if segments.iter().any(|segment| segment.digest != digest) {
         let text = "it belongs to another mission, or the mission's files or settings have changed";
         return Err(broken(directory, text));
@@ -324,6 +339,7 @@ fn resume<'c>(
     let mut replay = Replay { directory, control, recovery, observations: 0, unfinished: None };
     let mut anew = Vec::new();
     for segment in &segments {
+        // A crash between the creation of a segment and its snapshot leaves the snapshot missing.
         if segment.number > from && contents.start(segment.number).is_err() {
             let line = snapshot_line(&segment.before, &digest, segment.number, replay.control);
             anew.push((segment.number, line));
@@ -334,7 +350,7 @@ fn resume<'c>(
     Ok(Resumed { from, segments, observations, unfinished, anew })
 }
 
-/// Makes a segment that holds nothing but its header. It is whole or not there.
+/// Creates a segment with only its header, atomically.
 fn create_segment(directory: &Path, after: &Link, digest: &str, number: u64) -> io::Result<(File, Link)> {
     let (line, link) = header(after, digest, number);
     let mut file = tempfile::NamedTempFile::new_in(directory)?;
@@ -349,12 +365,13 @@ fn snapshot_line(at: &Link, digest: &str, number: u64, control: &Loop) -> String
     record::snapshot(at, digest, number, &control.snapshot().0)
 }
 
-/// Writes a snapshot; one that did not serve is kept beside.
+/// Writes a snapshot. An existing snapshot that was not usable is kept under another name.
 fn write_snapshot(directory: &Path, number: u64, line: &str) -> io::Result<()> {
     let name = path(directory, "snapshot", number);
     let mut file = tempfile::NamedTempFile::new_in(directory)?;
     file.write_all(line.as_bytes())?;
     file.as_file().sync_all()?;
+    // A damaged snapshot may help to find the cause of the damage.
     if name.exists() {
         let mut beside = name.clone().into_os_string();
         beside.push(".damaged");
@@ -369,7 +386,7 @@ fn sync_directory(directory: &Path) -> io::Result<()> {
     File::open(directory)?.sync_all()
 }
 
-/// Where directories cannot be opened, files are as durable as the system makes them.
+/// Does nothing: where directories cannot be opened, the durability of files depends on the system.
 #[cfg(not(unix))]
 fn sync_directory(_: &Path) -> io::Result<()> {
     Ok(())

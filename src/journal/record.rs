@@ -1,19 +1,20 @@
-//! Records of a journal as lines of text, each bound to the one before it.
+//! Records of a journal as lines of text, linked by a hash chain.
 //!
-//! A line is sixteen hexadecimal digits, a space and a JSON array that begins with the record's number. The digits are the
-//! first half of a SHA-256 of the digits of the line before and of the array, so that a line that is changed,
-//! missing, doubled or elsewhere does not fit. This finds damage; it does not keep out who can write to the directory.
+//! A line is sixteen hexadecimal digits, a space and a JSON array that begins with the record's
+//! number. The digits are the first half of a SHA-256 of the digits of the line before and of the
+//! array, so that a line that is changed, missing, doubled or moved does not fit. The chain detects
+//! damage; it does not protect against a writer with access to the directory.
 
 use serde_json::{Value, json};
 use sha2::{Digest as _, Sha256};
 
-/// The version of all that is written.
+/// Version of the file format.
 pub(super) const FORMAT: &str = "metaplan-journal/3";
 
-/// How many digits stand before a record.
+/// Number of hexadecimal digits before a record.
 const DIGITS: usize = 16;
 
-/// A place between two records: the number of the next one, and the digits of the last one.
+/// A position between two records: the number of the next record, and the digits of the last one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Link {
     pub(super) next: u64,
@@ -21,12 +22,12 @@ pub(super) struct Link {
 }
 
 impl Link {
-    /// Before the first record.
+    /// Link before the first record.
     pub(super) fn first() -> Self {
         Self { next: 0, digits: "0".repeat(DIGITS) }
     }
 
-    /// The line of a record that comes here, and the place after it.
+    /// Returns the line of the next record, and the link after it.
     pub(super) fn line(&self, kind: &str, fields: &[Value]) -> (String, Self) {
         let mut array = vec![json!(self.next), json!(kind)];
         array.extend_from_slice(fields);
@@ -35,7 +36,8 @@ impl Link {
         (format!("{digits} {text}\n"), Self { next: self.next + 1, digits })
     }
 
-    /// The record that a line without its line break holds, and the place after it, if it belongs here.
+    /// Parses a line without its line break. Returns the record and the link after it, or `None` if
+    /// the line does not fit here.
     pub(super) fn read(&self, line: &[u8]) -> Option<(Record, Self)> {
         let (record, digits) = parse(line)?;
         let text = line.get(DIGITS + 1..)?;
@@ -49,7 +51,7 @@ impl Link {
 pub(super) struct Record {
     pub(super) number: u64,
     pub(super) kind: String,
-    /// What follows number and kind.
+    /// Fields after number and kind.
     pub(super) fields: Vec<Value>,
 }
 
@@ -67,19 +69,21 @@ impl Record {
     }
 }
 
-/// The first line of a segment, which says after what it comes, and the place after it.
+/// Returns the first line of a segment, which contains the link to its predecessor, and the link
+/// after it.
 pub(super) fn header(after: &Link, digest: &str, segment: u64) -> (String, Link) {
     after.line("segment", &[json!(FORMAT), json!(digest), json!(segment), json!(after.digits)])
 }
 
-/// The only line of the snapshot with which a segment begins that comes after `after`.
+/// Returns the only line of a snapshot that follows `after`.
 pub(super) fn snapshot(after: &Link, digest: &str, segment: u64, data: &Value) -> String {
     after
         .line("snapshot", &[json!(FORMAT), json!(digest), json!(segment), json!(after.digits), data.clone()])
         .0
 }
 
-/// A line that says itself after what it comes: a header or a snapshot. The place before it, and after.
+/// Parses a line that contains its own predecessor: a header or a snapshot. Returns the links
+/// before and after it.
 pub(super) fn opening(line: &[u8], kind: &str) -> Option<(Record, Link, Link)> {
     let (record, _) = parse(line)?;
     let before = Link { next: record.number, digits: record.text(3)?.to_owned() };
@@ -87,7 +91,7 @@ pub(super) fn opening(line: &[u8], kind: &str) -> Option<(Record, Link, Link)> {
     (record.kind == kind).then_some((record, before, after))
 }
 
-/// What a line says, whether or not it belongs there.
+/// Parses a line without checking its link.
 fn parse(line: &[u8]) -> Option<(Record, String)> {
     let (digits, text) = line.split_at_checked(DIGITS)?;
     let digits = std::str::from_utf8(digits).ok()?.to_owned();

@@ -1,5 +1,5 @@
-//! What is in a directory to a loop as it was: which records serve, handling them again, and completing what a crash has
-//! left.
+//! Restores a loop from a journal: selects the usable records, replays them, and completes the
+//! records that a crash has cut off.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, Seek as _, Write as _};
@@ -12,19 +12,19 @@ use super::recovery::Recovery;
 use crate::mapek::{Answer, Loop, Observation};
 use crate::message::Message;
 
-/// What is to be decided first.
+/// Unfinished work that is decided first.
 #[derive(Debug)]
 pub(super) enum Unfinished {
-    /// What was reacted to, or what the loop does before the first observation: it was not deliberated on.
+    /// The loop has reacted to an observation, or is about to begin, and has not deliberated.
     Agenda,
     /// An observation, and its time in microseconds.
     Observation(String, u64),
 }
 
-/// The segments to go on from, and the number of the first: from the newest snapshot that serves.
+/// Returns the segments to replay, and the number of the first: from the newest usable snapshot.
 ///
 /// # Errors
-/// All that is wrong with what is needed.
+/// All faults of the needed files.
 pub(super) fn usable<'a>(
     contents: &'a JournalFiles,
     warnings: &mut Vec<Message>,
@@ -36,7 +36,7 @@ pub(super) fn usable<'a>(
         let start = if from == 0 { Ok(()) } else { contents.start(from).map(|_| ()) };
         match start.and_then(|()| contents.chain(from)) {
             Ok(segments) => {
-                // Older generations are of no use any more; that they are damaged is worth a word.
+                // Older generations are not needed, so their damage is only a warning.
                 let older = (first..from).filter(|&number| number > 0);
                 problems.extend(older.filter_map(|number| contents.start(number).err()));
                 problems.extend(contents.chain(first).err());
@@ -53,7 +53,7 @@ pub(super) fn usable<'a>(
     }
     problems.sort();
     problems.dedup();
-    // What is not damaged need not be restored, and has its own way out.
+    // A journal of an older version is not damaged, and needs another remedy.
     if let Some(old) = problems.iter().find(|text| text.ends_with(OLD_FORMAT)) {
         return Err(format!("{old}; nothing was changed"));
     }
@@ -62,29 +62,35 @@ pub(super) fn usable<'a>(
     Err(format!("{}; {way_out}", problems.join(", ")))
 }
 
-/// Brings a loop to where records end.
+/// Replays records on a loop.
 pub(super) struct Replay<'a> {
     pub(super) directory: &'a Path,
     pub(super) control: &'a mut Loop,
     pub(super) recovery: &'a mut Recovery,
-    /// Observations since the last segment began.
+    /// Number of observations in the last segment.
     pub(super) observations: u64,
     pub(super) unfinished: Option<Unfinished>,
 }
 
 impl Replay<'_> {
-    /// Handles a segment again.
+    /// Replays a segment.
     pub(super) fn segment(&mut self, segment: &Segment) -> Result<(), Message> {
         self.observations = 0;
+        // The end record only links segments.
         let mut records = segment.records.iter().filter(|record| record.kind != "end").peekable();
         while let Some(record) = records.next() {
             let wrong =
                 || broken(self.directory, &format!("record {} is not where it belongs", record.number));
-            if self.unfinished.take().is_some_and(|own| matches!(own, Unfinished::Observation(..))) {
+            // Only the last observation of a journal may lack its answers.
+            if self
+                .unfinished
+                .take()
+                .is_some_and(|unfinished| matches!(unfinished, Unfinished::Observation(..)))
+            {
                 return Err(wrong());
             }
             match record.kind.as_str() {
-                // The decision on what was reacted to before, or the first one.
+                // The decision on an earlier reaction, or the first decision.
                 "decision" if self.control.has_agenda() => {
                     let answers = self.control.deliberate_again(&record.list(1));
                     self.compare(record, &answers)?;
@@ -106,7 +112,8 @@ impl Replay<'_> {
         Ok(())
     }
 
-    /// Handles an observation again, and compares the answers with those in the record that follows it, if there is one.
+    /// Replays an observation, and compares the answers with those in the record that follows it,
+    /// if there is one.
     fn event(&mut self, line: &str, now: u64, next: Option<&Record>) -> Result<(), Message> {
         self.recovery.replayed = self.recovery.replayed.map(|count| count + 1);
         let Some(next) = next else {
@@ -115,6 +122,8 @@ impl Replay<'_> {
         };
         let (observation, now) = (Observation::recorded(line), Duration::from_micros(now));
         let answers = match next.kind.as_str() {
+            // A reaction is replayed without planning; a decision is replayed with the recorded
+            // plans.
             "reaction" => self.control.react(&observation, now),
             _ => self.control.handle_again(&observation, now, &next.list(1)),
         };
@@ -122,7 +131,7 @@ impl Replay<'_> {
         self.compare(next, &answers)
     }
 
-    /// Compares answers with those that were written.
+    /// Compares answers with the recorded ones.
     fn compare(&mut self, written: &Record, answers: &[Answer]) -> Result<(), Message> {
         if self.control.decision(answers).agrees(&written.list(0)) {
             return Ok(());
@@ -133,7 +142,7 @@ impl Replay<'_> {
     }
 }
 
-/// Completes what a crash has left at the end of the last segments, and opens the last one to be written on.
+/// Completes the last segments after a crash, and opens the last one for appending.
 pub(super) fn settle(
     directory: &Path,
     segments: &[&Segment],
@@ -146,6 +155,7 @@ pub(super) fn settle(
         }
         let name = path(directory, "journal", segment.number);
         let mut file = open_private(&name, OpenOptions::new().read(true).write(true))?;
+        // The incomplete record is kept in a separate file before it is cut off.
         if let End::Incomplete(bytes) = segment.end {
             recovery.cut += bytes;
             keep_cut(&name, segment.sound)?;
@@ -155,6 +165,7 @@ pub(super) fn settle(
         if segment.end == End::Unbroken {
             file.write_all(b"\n")?;
         }
+        // A crash may have prevented the record that links to the next segment.
         if !is_last && !segment.is_closed() {
             file.write_all(closing(&segment.after, segment.number).0.as_bytes())?;
         }
@@ -166,17 +177,18 @@ pub(super) fn settle(
     Err(io::Error::other("nothing is in it"))
 }
 
-/// Keeps what is to be cut off a file in another one beside it.
+/// Copies the bytes that will be cut off a file to another file.
 fn keep_cut(name: &Path, sound: u64) -> io::Result<()> {
     let bytes = std::fs::read(name)?;
-    let rest = bytes.get(sound as usize..).unwrap_or_default();
+    let remaining = bytes.get(sound as usize..).unwrap_or_default();
     let mut number = 0;
     loop {
         let mut beside = name.as_os_str().to_owned();
         beside.push(format!(".cut{number}"));
         match open_private(Path::new(&beside), OpenOptions::new().create_new(true).write(true)) {
+            // Earlier crashes may have left such files.
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => number += 1,
-            other => return other.and_then(|mut file| file.write_all(rest)),
+            other => return other.and_then(|mut file| file.write_all(remaining)),
         }
     }
 }

@@ -1,14 +1,14 @@
-//! What was found when a journal was opened.
+//! Result of opening a journal.
 
 use crate::message::Message;
 
-/// What opening a journal has come to.
+/// Result of opening a journal.
 #[derive(Debug, Clone, Default)]
 pub struct Recovery {
-    /// How many observations were handled again; none for a new journal.
+    /// Number of replayed observations. `None` for a new journal.
     pub replayed: Option<u64>,
-    /// How many bytes of an incomplete record were cut off.
+    /// Number of bytes of an incomplete record that were cut off.
     pub cut: u64,
-    /// What is wrong with the journal and has changed nothing.
+    /// Faults of the journal that did not affect the recovery.
     pub warnings: Vec<Message>,
 }

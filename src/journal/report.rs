@@ -1,4 +1,4 @@
-//! What is in a journal, for people and programs; no mission is needed, and nothing is changed.
+//! Reports the contents of a journal without its mission, and without changing it.
 
 use std::path::Path;
 
@@ -8,15 +8,15 @@ use super::directory::{End, JournalFiles, Segment, broken, name};
 use super::recover::usable;
 use crate::message::Message;
 
-/// What is in a journal.
+/// Contents of a journal.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct JournalReport {
-    /// One sentence for each segment and snapshot.
+    /// Descriptions of the segments and snapshots, one sentence each.
     pub parts: Vec<String>,
-    /// What is wrong: an error where the journal cannot be used, a warning otherwise.
+    /// Faults: an error if the journal cannot be used, a warning otherwise.
     pub messages: Vec<Message>,
-    /// All sound records that are there, in their order.
+    /// All sound records in order.
     pub entries: Vec<Entry>,
 }
 
@@ -24,15 +24,15 @@ pub struct JournalReport {
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct Entry {
-    /// Its number.
+    /// Number of the record.
     pub record: u64,
-    /// The number of its segment.
+    /// Number of the record's segment.
     pub segment: u64,
-    /// `event`, `reaction`, `decision` or `end`.
+    /// Kind of the record: `event`, `reaction`, `decision` or `end`.
     pub kind: String,
-    /// Of an event: its time since the start of the mission, in microseconds.
+    /// For an event, the time since the start of the mission, in microseconds.
     pub time: Option<u64>,
-    /// Of an event the line, of a reaction or decision the answers.
+    /// The line of an event, or the answers of a reaction or decision.
     pub content: Value,
 }
 
@@ -40,7 +40,7 @@ impl JournalReport {
     /// Reads the journal in a directory.
     ///
     /// # Errors
-    /// The directory cannot be read, or there is no journal in it.
+    /// The directory cannot be read, or does not contain a journal.
     pub fn read(directory: &Path) -> Result<Self, Message> {
         let contents =
             JournalFiles::read(directory).map_err(|error| broken(directory, &error.to_string()))?;
@@ -80,7 +80,7 @@ impl JournalReport {
         Ok(Self { parts, messages, entries })
     }
 
-    /// Whether the journal can be used.
+    /// Returns `true` if the journal can be used.
     pub fn is_sound(&self) -> bool {
         self.messages.iter().all(|message| message.severity == "warning")
     }

@@ -1,27 +1,28 @@
-//! Where the page is to be found, and who may look at it there.
+//! Address of the web page, and the check of the `Host` header.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, ToSocketAddrs as _};
 
 use crate::message::Message;
 
-/// The port where nothing else is said.
+/// Default port.
 pub const DEFAULT_PORT: u16 = 8420;
 
-/// An address to listen at.
+/// A listening address.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Address(pub(super) SocketAddr);
 
 impl Address {
-    /// Reads `PORT`, `HOST` or `HOST:PORT`; without a host it is the loopback address, which other machines cannot reach, and without a port
-    /// [`DEFAULT_PORT`]. For port 0 the system chooses one.
+    /// Parses `PORT`, `HOST` or `HOST:PORT`. The default host is the loopback address, which other
+    /// machines cannot reach; the default port is [`DEFAULT_PORT`]. For port 0 the system chooses a
+    /// port.
     ///
     /// # Errors
-    /// It is none of these, or there is no such host.
+    /// The text has none of these forms, or the host does not exist.
     pub fn read(text: &str) -> Result<Self, Message> {
         if text.is_empty() {
             return Ok(Self((Ipv4Addr::LOCALHOST, DEFAULT_PORT).into()));
         }
-        // Some systems take a large number for a host.
+        // Some resolvers accept a large number as a host.
         if text.bytes().all(|byte| byte.is_ascii_digit()) {
             let port: u16 = text.parse().map_err(|_| wrong(text, "there is no such port"))?;
             return Ok(Self((Ipv4Addr::LOCALHOST, port).into()));
@@ -29,18 +30,18 @@ impl Address {
         if let Ok(host) = text.trim_start_matches('[').trim_end_matches(']').parse::<IpAddr>() {
             return Ok(Self((host, DEFAULT_PORT).into()));
         }
-        let found = match text.rsplit_once(':') {
+        let resolved = match text.rsplit_once(':') {
             Some(_) => text.to_socket_addrs(),
             None => (text, DEFAULT_PORT).to_socket_addrs(),
         };
-        match found.map(|mut addresses| addresses.next()) {
+        match resolved.map(|mut addresses| addresses.next()) {
             Ok(Some(address)) => Ok(Self(address)),
             Ok(None) => Err(wrong(text, "there is no such host")),
             Err(error) => Err(wrong(text, &error.to_string())),
         }
     }
 
-    /// Whether only this machine can reach it.
+    /// Returns `true` if only this machine can reach the address.
     pub fn is_loopback(self) -> bool {
         self.0.ip().is_loopback()
     }
@@ -53,8 +54,8 @@ fn wrong(text: &str, why: &str) -> Message {
     )
 }
 
-/// Whether a header `Host` names this machine by a loopback address, as a browser writes it that was told to go there. A page of
-/// another site that has its own name lead here says that name.
+/// Returns `true` if a `Host` header names this machine by a loopback address. This prevents DNS
+/// rebinding: a page of another site whose name resolves to this machine sends that name.
 pub(super) fn is_local_host(host: &str) -> bool {
     let without_port = |host: &str| host.rsplit_once(':').map_or(host, |(name, _)| name).to_owned();
     let name = match host.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
@@ -71,9 +72,9 @@ mod tests {
     #[test]
     fn addresses_are_ports_hosts_or_both() {
         let check = |text: &str, expected: Option<(&str, bool)>| {
-            let found = Address::read(text).ok();
-            let found = found.map(|address| (address.0.to_string(), address.is_loopback()));
-            assert_eq!(found, expected.map(|(text, own)| (text.to_owned(), own)), "{text}");
+            let address = Address::read(text).ok();
+            let address = address.map(|address| (address.0.to_string(), address.is_loopback()));
+            assert_eq!(address, expected.map(|(text, own)| (text.to_owned(), own)), "{text}");
         };
         check("", Some(("127.0.0.1:8420", true)));
         check("0", Some(("127.0.0.1:0", true)));
@@ -91,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn hosts_of_this_machine_are_told_from_others() {
+    fn loopback_hosts_are_recognised() {
         let check = |host: &str, expected: bool| assert_eq!(is_local_host(host), expected, "{host}");
         for host in
             ["localhost", "LocalHost:8420", "127.0.0.1", "127.0.0.1:80", "127.9.9.9", "[::1]", "[::1]:80"]

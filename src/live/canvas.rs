@@ -1,4 +1,4 @@
-//! The plan of a run as it is seen: drawn when somebody looks, and not when it is made.
+//! The picture of the current plan, drawn lazily on the first request.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -6,7 +6,7 @@ use crate::mapek::Outlook;
 use crate::report::Painter;
 use crate::visible::visible;
 
-/// The last plan, and its picture once somebody has asked for it.
+/// The last plan, and its picture once requested.
 #[derive(Debug, Default)]
 pub(super) struct Canvas {
     painter: Option<Painter>,
@@ -24,16 +24,17 @@ impl Canvas {
         Self { painter, shown: Mutex::default() }
     }
 
-    /// Takes another plan, or that there is none. Whoever draws holds nobody up meanwhile.
+    /// Replaces the plan, or removes it. A concurrent drawing does not block this call.
     pub(super) fn take(&self, outlook: Option<Outlook>) {
         *self.lock() = Shown { outlook: outlook.map(Arc::new), drawn: None };
     }
 
-    /// The picture of the last plan, with the number that the request of its first step has; nothing where there is no plan.
+    /// Returns the picture of the last plan, with the request number of its first step. Empty
+    /// without a plan.
     pub(super) fn picture(&self) -> Arc<str> {
         let (outlook, drawn) = {
-            let shown = self.lock();
-            (shown.outlook.clone(), shown.drawn.clone())
+            let state = self.lock();
+            (state.outlook.clone(), state.drawn.clone())
         };
         if let Some(drawn) = drawn {
             return drawn;
@@ -42,9 +43,9 @@ impl Canvas {
         let part = painter.part(&outlook);
         let drawn: Arc<str> =
             format!("<div id=\"drawn\" data-first=\"{}\">{}</div>", outlook.first, visible(&part)).into();
-        let mut shown = self.lock();
-        if shown.outlook.as_ref().is_some_and(|own| Arc::ptr_eq(own, &outlook)) {
-            shown.drawn = Some(Arc::clone(&drawn));
+        let mut state = self.lock();
+        if state.outlook.as_ref().is_some_and(|current| Arc::ptr_eq(current, &outlook)) {
+            state.drawn = Some(Arc::clone(&drawn));
         }
         drawn
     }

@@ -1,4 +1,4 @@
-//! What is known of a run, for those who look at it: the last lines, and the last word on each thing.
+//! Broadcast of a run's lines to clients: the last lines, and the current state by key.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
@@ -11,101 +11,103 @@ use serde_json::{Value, json};
 use crate::live::keep::{design_key, keys};
 use crate::mapek::DesignChange;
 
-/// So many lines, with so many bytes together, may wait to be taken; what comes then is left out.
+/// Maximum number of lines in the queue; further lines are dropped and counted.
 const WAITING: usize = 4096;
 const WAITING_BYTES: usize = 16 << 20;
 
-/// So many lines are kept.
-const LINES: usize = 2000;
+/// Maximum number of retained lines.
+const MAX_LINES: usize = 2000;
 
-/// So many bytes of lines are kept, unless a single line has more.
+/// Maximum number of bytes of retained lines, unless a single line has more.
 const BYTES: usize = 4 << 20;
 
-/// On so many things the last word is kept; beyond, the oldest words are forgotten.
-const WORDS: usize = 10_000;
+/// Maximum number of keys with a retained state; the oldest are dropped first.
+const MAX_KEYS: usize = 10_000;
 
-/// So many lines are handed out at once.
-const BATCH: usize = 100;
+/// Maximum number of lines in a batch.
+const MAX_BATCH: usize = 100;
 
-/// What is known, and who waits for more.
+/// The retained lines, and the condition variable for new ones.
 #[derive(Debug, Default)]
 pub(super) struct Hub {
-    known: Mutex<Known>,
+    known: Mutex<RetainedLines>,
     more: Condvar,
 }
 
 #[derive(Debug, Default)]
-struct Known {
+struct RetainedLines {
     lines: VecDeque<Arc<str>>,
     bytes: usize,
-    /// The number of the first of these lines.
+    /// Number of the first retained line.
     first: u64,
-    /// The last word on each thing, with its number.
+    /// Line that defines the current state of each key, with its number.
     words: BTreeMap<String, (u64, Arc<str>)>,
     ended: bool,
 }
 
-/// What there is for somebody who has read up to a line.
+/// News for a client that has read up to a line.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum News {
     /// The next lines.
     Lines(Vec<Arc<str>>),
-    /// Nothing for now.
+    /// No news yet.
     Nothing,
-    /// Lines that were not read are gone.
+    /// Unread lines were dropped.
     Missed,
-    /// There will be no more.
+    /// The run has ended.
     Ended,
 }
 
 impl Hub {
-    /// The state of things, as lines in their order, and the number of the line that follows.
+    /// Returns the current state, as lines in order, and the number of the next line.
     pub(super) fn state(&self) -> (Vec<Arc<str>>, u64) {
-        let known = self.lock();
-        let mut seen = BTreeSet::new();
-        let words = known.words.values().filter(|(number, _)| *number < known.first && seen.insert(*number));
+        let state = self.lock();
+        let mut visited = BTreeSet::new();
+        let words =
+            state.words.values().filter(|(number, _)| *number < state.first && visited.insert(*number));
         let mut words: Vec<_> = words.cloned().collect();
         words.sort_unstable_by_key(|(number, _)| *number);
-        (words.into_iter().map(|(_, line)| line).collect(), known.first)
+        (words.into_iter().map(|(_, line)| line).collect(), state.first)
     }
 
-    /// What follows from a line on; waits for a while if there is nothing yet.
+    /// Returns the lines from a number on, after waiting up to `wait` for the first.
     pub(super) fn news(&self, from: u64, wait: Duration) -> News {
-        let is_waiting = |known: &mut Known| !known.ended && from == known.end();
-        let known = self.more.wait_timeout_while(self.lock(), wait, is_waiting);
-        let (known, _) = known.unwrap_or_else(PoisonError::into_inner);
-        if from < known.first {
+        let is_waiting = |state: &mut RetainedLines| !state.ended && from == state.end();
+        let state = self.more.wait_timeout_while(self.lock(), wait, is_waiting);
+        let (state, _) = state.unwrap_or_else(PoisonError::into_inner);
+        if from < state.first {
             return News::Missed;
         }
-        let skipped = (from - known.first) as usize;
-        let lines: Vec<_> = known.lines.iter().skip(skipped).take(BATCH).cloned().collect();
+        let skipped = (from - state.first) as usize;
+        let lines: Vec<_> = state.lines.iter().skip(skipped).take(MAX_BATCH).cloned().collect();
         match lines.is_empty() {
             false => News::Lines(lines),
-            true if known.ended => News::Ended,
+            true if state.ended => News::Ended,
             true => News::Nothing,
         }
     }
 
-    /// Takes a line, with what it is the last word on.
+    /// Appends a line, and retains it as the current state of `keys`.
     fn take(&self, line: Arc<str>, keys: Vec<String>) {
-        let mut known = self.lock();
-        let number = known.end();
+        let mut state = self.lock();
+        let number = state.end();
         for key in keys {
-            known.words.insert(key, (number, Arc::clone(&line)));
+            state.words.insert(key, (number, Arc::clone(&line)));
         }
-        while known.words.len() > WORDS {
+        while state.words.len() > MAX_KEYS {
             let oldest =
-                known.words.iter().min_by_key(|(_, (number, _))| *number).map(|(key, _)| key.clone());
-            oldest.and_then(|key| known.words.remove(&key));
+                state.words.iter().min_by_key(|(_, (number, _))| *number).map(|(key, _)| key.clone());
+            oldest.and_then(|key| state.words.remove(&key));
         }
-        known.bytes += line.len();
-        known.lines.push_back(line);
-        while known.lines.len() > 1 && (known.lines.len() > LINES || known.bytes > BYTES) {
-            let gone = known.lines.pop_front();
-            known.bytes -= gone.map_or(0, |line| line.len());
-            known.first += 1;
+        state.bytes += line.len();
+        state.lines.push_back(line);
+        // The newest line is always retained, even if it exceeds the limit alone.
+        while state.lines.len() > 1 && (state.lines.len() > MAX_LINES || state.bytes > BYTES) {
+            let removed = state.lines.pop_front();
+            state.bytes -= removed.map_or(0, |line| line.len());
+            state.first += 1;
         }
-        drop(known);
+        drop(state);
         self.more.notify_all();
     }
 
@@ -114,90 +116,91 @@ impl Hub {
         self.more.notify_all();
     }
 
-    fn lock(&self) -> MutexGuard<'_, Known> {
+    fn lock(&self) -> MutexGuard<'_, RetainedLines> {
         self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-impl Known {
-    /// The number of the line that follows.
+impl RetainedLines {
+    /// Returns the number of the next line.
     fn end(&self) -> u64 {
         self.first + self.lines.len() as u64
     }
 }
 
-/// The loop's end of a hub: nothing here ever waits. Copies lead to the same hub.
+/// Sender of the loop's messages to a hub. Sending never blocks. Copies share the hub.
 #[derive(Debug, Clone)]
 pub(super) struct Mouth {
-    said: SyncSender<Option<(f64, Said)>>,
-    behind: Arc<Behind>,
+    said: SyncSender<Option<(f64, Entry)>>,
+    behind: Arc<Backlog>,
     begun: Instant,
 }
 
-/// What was said and is not taken yet.
+/// Size of the queue, and number of dropped lines.
 #[derive(Debug, Default)]
-struct Behind {
+struct Backlog {
     left_out: AtomicU64,
     bytes: AtomicUsize,
 }
 
 #[derive(Debug)]
-enum Said {
+enum Entry {
     Heard(u64, String),
     Answer(String),
-    Known(Vec<DesignChange>),
+    Designs(Vec<DesignChange>),
     Planned { exists: bool, under_way: Option<u64> },
 }
 
-impl Said {
-    /// So much of it is text.
+impl Entry {
+    /// Number of bytes of text.
     fn bytes(&self) -> usize {
         match self {
             Self::Heard(_, text) | Self::Answer(text) => text.len(),
-            Self::Known(_) | Self::Planned { .. } => 0,
+            Self::Designs(_) | Self::Planned { .. } => 0,
         }
     }
 }
 
 impl Mouth {
-    /// A way to speak to a hub, and a thread that listens.
+    /// Starts a receiving thread for a hub, and returns the sender.
     pub(super) fn of(hub: Arc<Hub>) -> Self {
         let (said, received) = sync_channel(WAITING);
-        let behind = Arc::new(Behind::default());
+        let behind = Arc::new(Backlog::default());
         let counted = Arc::clone(&behind);
         std::thread::spawn(move || listen(&hub, &received, &counted));
         Self { said, behind, begun: Instant::now() }
     }
 
-    /// A line that the loop has heard, with its number.
+    /// Sends a line of events, with its number.
     pub(super) fn heard(&self, number: u64, text: &str) {
-        self.say(Said::Heard(number, text.to_owned()));
+        self.say(Entry::Heard(number, text.to_owned()));
     }
 
-    /// An answer, which is an object of the format as JSON.
+    /// Sends an answer, a JSON object of the format.
     pub(super) fn answer(&self, answer: &str) {
-        self.say(Said::Answer(answer.to_owned()));
+        self.say(Entry::Answer(answer.to_owned()));
     }
 
-    /// How designs are.
+    /// Sends the state of designs.
     pub(super) fn known(&self, designs: Vec<DesignChange>) {
-        self.say(Said::Known(designs));
+        self.say(Entry::Designs(designs));
     }
 
-    /// Publishes whether a plan exists now, and the number of the action under way.
+    /// Sends the existence of a plan, and the number of the running action.
     pub(super) fn planned(&self, exists: bool, under_way: Option<u64>) {
-        self.say(Said::Planned { exists, under_way });
+        self.say(Entry::Planned { exists, under_way });
     }
 
-    /// That there will be no more. This waits until what was said before is known.
+    /// Sends the end of the run, and waits until all earlier messages are processed.
     pub(super) fn end(&self) {
         let _ = self.said.send(None);
     }
 
-    fn say(&self, said: Said) {
+    fn say(&self, said: Entry) {
         let at = self.begun.elapsed().as_secs_f64();
         let bytes = said.bytes();
         let waiting = self.behind.bytes.fetch_add(bytes, Ordering::Relaxed);
+        // The loop must not wait for slow clients, so lines beyond the limit are dropped.
         let is_taken = waiting.saturating_add(bytes) <= WAITING_BYTES
             && !matches!(self.said.try_send(Some((at, said))), Err(TrySendError::Full(_)));
         if !is_taken {
@@ -207,29 +210,31 @@ impl Mouth {
     }
 }
 
-fn listen(hub: &Hub, received: &Receiver<Option<(f64, Said)>>, behind: &Behind) {
+fn listen(hub: &Hub, received: &Receiver<Option<(f64, Entry)>>, behind: &Backlog) {
     while let Ok(Some((at, said))) = received.recv() {
         behind.bytes.fetch_sub(said.bytes(), Ordering::Relaxed);
+        // Milliseconds are precise enough for a page.
         let at = (at * 1000.0).round() / 1000.0;
+        // The page shows the number of dropped lines.
         let missing = behind.left_out.swap(0, Ordering::Relaxed);
         if missing > 0 {
             hub.take(json!({"at": at, "left_out": missing}).to_string().into(), Vec::new());
         }
         match said {
-            Said::Heard(number, text) => {
+            Entry::Heard(number, text) => {
                 let line = json!({"at": at, "line": number, "heard": text});
                 hub.take(line.to_string().into(), Vec::new());
             }
-            Said::Known(designs) => {
-                let keys = designs.iter().map(|own| design_key(&own.design)).collect();
+            Entry::Designs(designs) => {
+                let keys = designs.iter().map(|design| design_key(&design.design)).collect();
                 hub.take(json!({"at": at, "known": designs}).to_string().into(), keys);
             }
-            Said::Planned { exists, under_way } => {
+            Entry::Planned { exists, under_way } => {
                 let line = json!({"at": at, "planned": {"exists": exists, "under_way": under_way}});
                 hub.take(line.to_string().into(), vec!["planned".to_owned()]);
             }
-            Said::Answer(answer) => {
-                // An answer is JSON already.
+            Entry::Answer(answer) => {
+                // The answer is valid JSON, so it is embedded unchanged.
                 let line = format!("{{\"at\":{},\"said\":{answer}}}", Value::from(at));
                 hub.take(line.into(), keys(&answer));
             }
@@ -247,18 +252,18 @@ mod tests {
     use super::{Hub, Mouth, News, WAITING_BYTES};
 
     #[test]
-    fn what_waits_is_bounded_by_its_bytes() {
+    fn the_queue_is_bounded_by_its_bytes() {
         let hub = Arc::new(Hub::default());
         let mouth = Mouth::of(Arc::clone(&hub));
         let long = "x".repeat(1 << 20);
-        // Nothing is taken meanwhile.
-        let known = hub.lock();
+        // The lock blocks the receiving thread.
+        let guard = hub.lock();
         for number in 0..100 {
             mouth.heard(number, &long);
         }
         assert!(mouth.behind.bytes.load(Ordering::Relaxed) <= WAITING_BYTES);
         assert!(mouth.behind.left_out.load(Ordering::Relaxed) >= 83);
-        drop(known);
+        drop(guard);
         while mouth.behind.bytes.load(Ordering::Relaxed) > 0 {
             std::thread::sleep(Duration::from_millis(1));
         }
@@ -276,6 +281,6 @@ mod tests {
                 News::Ended => break,
             }
         }
-        assert_eq!(seen, 1, "what comes then is there");
+        assert_eq!(seen, 1, "lines after an overflow are delivered");
     }
 }

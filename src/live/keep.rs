@@ -1,10 +1,10 @@
-//! Which lines say how things are, until another says otherwise.
+//! Determines the lines that describe the current state until a later line replaces them.
 
 use std::borrow::Cow;
 
 use serde::Deserialize;
 
-/// What of an answer says what it is about.
+/// Fields of an answer that identify its subject.
 #[derive(Deserialize)]
 struct About<'a> {
     #[serde(borrow, default)]
@@ -27,26 +27,27 @@ struct Objective {
     objective: String,
 }
 
-/// The word for how a design is.
+/// Key of a design's state.
 pub(super) fn design_key(design: &str) -> String {
     format!("design {design}")
 }
 
-/// What an answer is the last word on, for now.
+/// Returns the keys whose current state an answer defines.
 pub(super) fn keys(answer: &str) -> Vec<String> {
     let Ok(about) = serde_json::from_str::<About>(answer) else { return Vec::new() };
     match about.answer.as_ref() {
         "request_action" | "goal_reached" => vec!["action".to_owned()],
         "suspend_action" | "resume_action" | "cancel_action" => vec!["suspension".to_owned()],
-        // A plan that is found, lost or kept: lines on all three are repeated in their order, since the cost of a kept plan is in the first.
+        // A plan that is found, lost or kept: lines of all three kinds are repeated in their order,
+        // since the cost of a kept plan is in the first.
         kind @ ("plan_found" | "plan_none" | "plan_kept" | "ready" | "contradicted" | "unconcluded") => {
             vec![kind.to_owned()]
         }
         "reconfigure" => about.function.map(|function| format!("function {function}")).into_iter().collect(),
         "inferred" => {
-            let designs = about.designs.iter().map(|own| design_key(&own.design));
+            let designs = about.designs.iter().map(|design| design_key(&design.design));
             designs
-                .chain(about.objectives.into_iter().map(|own| format!("objective {}", own.objective)))
+                .chain(about.objectives.into_iter().map(|change| format!("objective {}", change.objective)))
                 .collect()
         }
         _ => Vec::new(),
@@ -58,7 +59,7 @@ mod tests {
     use super::keys;
 
     #[test]
-    fn answers_are_the_last_word_on_something() {
+    fn answers_have_state_keys() {
         let check = |answer: &str, expected: &[&str]| assert_eq!(keys(answer), expected, "{answer}");
         check(r#"{"answer":"ready"}"#, &["ready"]);
         check(r#"{"answer":"plan_found","cost":1,"steps":[]}"#, &["plan_found"]);

@@ -1,17 +1,21 @@
-//! A run as a page of the Web: what the loop hears and answers, as it comes, over HTTP/1.1 \[1\] and server-sent events \[2\].
+//! Web view of a run: the events and answers of the loop, over HTTP/1.1 \[1\] and server-sent
+//! events \[2\].
 //!
-//! Nothing can be done to the loop from there. [`Live::heard`], [`Live::said`] and [`Live::planned`] never wait: what cannot be taken at once is left out and
-//! counted. A bounded number of lines is kept, with the last of each kind that says how things are, so that who comes later sees
-//! the state of things. Who reads more slowly than lines go is dropped, and so is who does not read; a browser then comes again by itself.
+//! The view cannot influence the loop. [`Live::heard`], [`Live::said`] and [`Live::planned`] never
+//! block: lines that exceed the queue are dropped and counted. A bounded number of lines is
+//! retained, with the last line of each kind that describes the current state, so that later
+//! clients also receive the state. A client that reads too slowly is disconnected; a browser then
+//! reconnects by itself.
 //!
 //! | path | has |
 //! |---|---|
 //! | `/`, `/live.css`, `/live.js` | the page |
 //! | `/plan` | the plan as it was when it was made: timeline, numbers, map |
-//! | `/events` | the lines, from the state of things on |
+//! | `/events` | the current state, then all new lines |
 //!
-//! Whoever can reach a loopback address may look, unless there is a token; pages of other sites may not (their `Host` is another one).
-//! Elsewhere a token is needed, as the password of HTTP's basic authentication with any name, or as a bearer token.
+//! On a loopback address, local clients need no token unless one is set. Pages of other sites are
+//! rejected by their `Host` header. On any other address a token is required, as the password of
+//! HTTP basic authentication with any name, or as a bearer token.
 //!
 //! - \[1\] RFC 9112, HTTP/1.1, 2022.
 //! - \[2\] WHATWG: HTML Living Standard, section 9.2, server-sent events.

@@ -1,16 +1,16 @@
-//! Bytes of a connection to a request: its path and the headers that matter here.
+//! Parses HTTP requests: the path and the relevant headers.
 
 use std::io::{self, Read};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// A head of more bytes is refused.
+/// Maximum number of bytes of a request's head.
 const LONGEST: usize = 16 << 10;
 
-/// So many headers are read.
+/// Maximum number of headers.
 const HEADERS: usize = 64;
 
-/// What is asked for.
+/// A parsed request.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Request {
     pub(super) path: String,
@@ -18,21 +18,21 @@ pub(super) struct Request {
     pub(super) authorization: Option<Vec<u8>>,
 }
 
-/// Why a request is not answered: a status and its words.
+/// Reason for rejecting a request: status code and reason phrase.
 pub(super) type Refused = (u16, &'static str);
 
 impl Request {
-    /// Reads a request that has to be there within a time.
+    /// Reads a request, which has to be complete within `patience`.
     pub(super) fn read(stream: &mut TcpStream, patience: Duration) -> io::Result<Result<Self, Refused>> {
         let begun = Instant::now();
         let mut bytes = Vec::new();
         let mut part = [0; 2048];
         loop {
-            let left = patience.saturating_sub(begun.elapsed());
-            if left.is_zero() {
+            let timeout = patience.saturating_sub(begun.elapsed());
+            if timeout.is_zero() {
                 return Ok(Err((408, "Request Timeout")));
             }
-            stream.set_read_timeout(Some(left))?;
+            stream.set_read_timeout(Some(timeout))?;
             let count = stream.read(&mut part)?;
             if count == 0 {
                 return Err(io::ErrorKind::UnexpectedEof.into());
@@ -47,7 +47,7 @@ impl Request {
         }
     }
 
-    /// The request that some bytes are; none as long as they are not all.
+    /// Parses a request. `None` while it is incomplete.
     fn parse(bytes: &[u8]) -> Option<Result<Self, Refused>> {
         let mut headers = [httparse::EMPTY_HEADER; HEADERS];
         let mut parsed = httparse::Request::new(&mut headers);
@@ -63,9 +63,9 @@ impl Request {
             return Some(Err((405, "Method Not Allowed")));
         }
         let header = |name: &str| {
-            let mut found = parsed.headers.iter().filter(|own| own.name.eq_ignore_ascii_case(name));
-            let first = found.next().map(|own| own.value);
-            if found.next().is_some() { Err((400, "Bad Request")) } else { Ok(first) }
+            let mut values = parsed.headers.iter().filter(|header| header.name.eq_ignore_ascii_case(name));
+            let first = values.next().map(|header| header.value);
+            if values.next().is_some() { Err((400, "Bad Request")) } else { Ok(first) }
         };
         let (host, authorization) = match (header("host"), header("authorization")) {
             (Ok(host), Ok(authorization)) => (host, authorization),
@@ -86,16 +86,16 @@ mod tests {
     use super::Request;
 
     #[test]
-    fn requests_are_read_or_refused() {
+    fn requests_are_parsed_or_rejected() {
         let check = |bytes: &str, expected: Option<Result<(&str, Option<&str>), u16>>| {
-            let found = Request::parse(bytes.as_bytes());
-            let found = found.map(|request| match request {
+            let request = Request::parse(bytes.as_bytes());
+            let request = request.map(|request| match request {
                 Ok(request) => Ok((request.path, request.host)),
                 Err((status, _)) => Err(status),
             });
             let expected =
                 expected.map(|it| it.map(|(path, host)| (path.to_owned(), host.map(ToOwned::to_owned))));
-            assert_eq!(found, expected, "{bytes}");
+            assert_eq!(request, expected, "{bytes}");
         };
         check("GET / HTTP/1.1\r\nHost: a:1\r\n\r\n", Some(Ok(("/", Some("a:1")))));
         check("GET /events?x=1 HTTP/1.1\r\n\r\n", Some(Ok(("/events", None))));
@@ -104,7 +104,7 @@ mod tests {
         check("POST / HTTP/1.1\r\n\r\n", Some(Err(405)));
         check("GET / HTTP/1.1\r\nHost: a\r\nhost: b\r\n\r\n", Some(Err(400)));
         check("\u{0}\u{1}\r\n\r\n", Some(Err(400)));
-        let many = "X: y\r\n".repeat(100);
-        check(&format!("GET / HTTP/1.1\r\n{many}\r\n"), Some(Err(431)));
+        let headers = "X: y\r\n".repeat(100);
+        check(&format!("GET / HTTP/1.1\r\n{headers}\r\n"), Some(Err(431)));
     }
 }

@@ -1,4 +1,4 @@
-//! Connections to answers: the page, and the lines for as long as somebody reads them.
+//! HTTP server: answers connections with the page, or with the event stream.
 
 use std::io::{self, Write as _};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -15,34 +15,34 @@ use crate::mapek::{DesignChange, Outlook};
 use crate::message::Message;
 use crate::report::Painter;
 
-/// So long somebody may take to ask, and to take what was sent.
-const PATIENCE: Duration = Duration::from_secs(5);
+/// Read and write timeout of a connection.
+const CLIENT_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// After so long without a line it is said that all is well.
-const QUIET: Duration = Duration::from_secs(10);
+/// Interval between keep-alive comments on an idle event stream.
+const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(10);
 
-/// So many may look at once.
-const VISITORS: usize = 16;
+/// Maximum number of concurrent connections.
+const MAX_CONNECTIONS: usize = 16;
 
-/// At the end of a run they are given so long to see it.
-const FAREWELL: Duration = Duration::from_millis(500);
+/// Time at the end of a run for clients to receive the last lines.
+const SHUTDOWN_GRACE: Duration = Duration::from_millis(500);
 
 const PAGE: &str = include_str!("page/index.html");
-/// The style of this page, in addition to that of all.
+/// Style sheet of this page, in addition to the common one.
 const STYLE: &str = include_str!("page/live.css");
 const SCRIPT: &str = include_str!("page/live.js");
 
-/// A run that can be looked at; copies are the same one.
+/// Server of a run's page; copies share the run.
 #[derive(Debug, Clone)]
 pub struct Live {
     mouth: Mouth,
     address: SocketAddr,
-    house: Arc<House>,
+    house: Arc<SharedState>,
 }
 
-/// What all connections share.
+/// State shared by all connections.
 #[derive(Debug)]
-struct House {
+struct SharedState {
     hub: Arc<Hub>,
     canvas: Canvas,
     token: Option<Token>,
@@ -50,11 +50,13 @@ struct House {
 }
 
 impl Live {
-    /// Begins to serve. Where other machines can reach, there has to be a token. Without a painter no plan is drawn.
+    /// Starts the server. A token is required unless the address is a loopback address. Without a
+    /// painter no plan is drawn.
     ///
     /// # Errors
-    /// There is none, or nothing can be served there.
+    /// The token is missing, or the address cannot be served.
     pub fn open(address: Address, token: Option<Token>, painter: Option<Painter>) -> Result<Self, Message> {
+        // Other machines on the network could otherwise read the run.
         if !address.is_loopback() && token.is_none() {
             let text = format!("who can reach {} can look at the run: a token is needed there", address.0);
             return Err(Message::error("M332", text));
@@ -67,13 +69,14 @@ impl Live {
         let hub = Arc::new(Hub::default());
         let mouth = Mouth::of(Arc::clone(&hub));
         let canvas = Canvas::new(painter);
-        let house = Arc::new(House { hub, canvas, token, visitors: AtomicUsize::new(0) });
-        let own = Arc::clone(&house);
+        let house = Arc::new(SharedState { hub, canvas, token, visitors: AtomicUsize::new(0) });
+        let accepting = Arc::clone(&house);
         std::thread::spawn(move || {
             for stream in listener.incoming() {
                 match stream {
-                    Ok(stream) => receive(&own, stream),
-                    // As where there are too many open files: others may be closed meanwhile.
+                    Ok(stream) => receive(&accepting, stream),
+                    // The error may be temporary, for example too many open files until other
+                    // connections close.
                     Err(_) => std::thread::sleep(Duration::from_millis(50)),
                 }
             }
@@ -81,60 +84,60 @@ impl Live {
         Ok(Self { mouth, address, house })
     }
 
-    /// Where it is served.
+    /// Returns the address of the server.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// Takes a line that the loop has heard, with its number. This never waits.
+    /// Publishes a line of events, with its number. Never blocks.
     pub fn heard(&self, number: u64, text: &str) {
         self.mouth.heard(number, text);
     }
 
-    /// Takes an answer, which is an object of the format as JSON. This never waits.
+    /// Publishes an answer, a JSON object of the format. Never blocks.
     pub fn said(&self, answer: &str) {
         self.mouth.answer(answer);
     }
 
-    /// Takes how designs are, before anything is answered. This never waits.
+    /// Publishes the initial state of the designs, before the first answer. Never blocks.
     pub fn known(&self, designs: Vec<DesignChange>) {
         self.mouth.known(designs);
     }
 
-    /// Takes another plan, or that there is none any more. This never waits, and nothing is drawn before somebody looks.
+    /// Replaces the plan, or removes it. Never blocks; the plan is drawn on the next request.
     pub fn planned(&self, outlook: Option<Outlook>) {
-        let under_way = outlook.as_ref().filter(|own| own.is_under_way).map(|own| own.first);
+        let under_way = outlook.as_ref().filter(|plan| plan.is_under_way).map(|plan| plan.first);
         let exists = outlook.is_some();
         self.house.canvas.take(outlook);
         self.mouth.planned(exists, under_way);
     }
 
-    /// Ends the run for those who look, who are given a moment to see the end.
+    /// Ends the run for all clients, and waits a moment until they have received the end.
     pub fn end(&self) {
         self.mouth.end();
         let begun = Instant::now();
-        while self.house.visitors.load(Ordering::Acquire) > 0 && begun.elapsed() < FAREWELL {
+        while self.house.visitors.load(Ordering::Acquire) > 0 && begun.elapsed() < SHUTDOWN_GRACE {
             std::thread::sleep(Duration::from_millis(5));
         }
     }
 }
 
-/// A visitor, as long as he is there.
-struct Visit(Arc<House>);
+/// Counts a connection as open until it is dropped.
+struct ConnectionGuard(Arc<SharedState>);
 
-impl Drop for Visit {
+impl Drop for ConnectionGuard {
     fn drop(&mut self) {
         self.0.visitors.fetch_sub(1, Ordering::AcqRel);
     }
 }
 
-/// Gives a connection a thread, if there are not too many.
-fn receive(house: &Arc<House>, mut stream: TcpStream) {
-    let others = house.visitors.fetch_add(1, Ordering::AcqRel);
-    let visit = Visit(Arc::clone(house));
-    let is_full = others >= VISITORS;
+/// Starts a thread for a connection, unless there are too many.
+fn receive(house: &Arc<SharedState>, mut stream: TcpStream) {
+    let connections = house.visitors.fetch_add(1, Ordering::AcqRel);
+    let visit = ConnectionGuard(Arc::clone(house));
+    let is_full = connections >= MAX_CONNECTIONS;
     let answered = std::thread::Builder::new().spawn(move || {
-        // Who has gone away needs no answer.
+        // A write error means that the client has disconnected.
         let _ = if is_full {
             refuse(&mut stream, (503, "Service Unavailable"))
         } else {
@@ -143,14 +146,14 @@ fn receive(house: &Arc<House>, mut stream: TcpStream) {
         let _ = stream.shutdown(Shutdown::Both);
         drop(visit);
     });
-    // Without a thread the connection is closed, and the visit is over.
+    // If no thread could be started, the connection is closed and its guard is dropped.
     drop(answered);
 }
 
 /// Answers one request.
-fn answer(house: &House, stream: &mut TcpStream) -> io::Result<()> {
+fn answer(house: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
     stream.set_nodelay(true)?;
-    let request = match Request::read(stream, PATIENCE)? {
+    let request = match Request::read(stream, CLIENT_TIMEOUT)? {
         Ok(request) => request,
         Err(refused) => return refuse(stream, refused),
     };
@@ -167,17 +170,18 @@ fn answer(house: &House, stream: &mut TcpStream) -> io::Result<()> {
     }
 }
 
-/// Whether a request comes from somebody who may look.
-fn may_look(house: &House, request: &Request) -> Result<(), Refused> {
+/// Checks that a request is authorised.
+fn may_look(house: &SharedState, request: &Request) -> Result<(), Refused> {
     if let Some(token) = &house.token {
         let fits = request.authorization.as_deref().is_some_and(|given| token.fits(given));
         return if fits { Ok(()) } else { Err((401, "Unauthorized")) };
     }
+    // Without a token, the Host header protects against DNS rebinding.
     let is_local = request.host.as_deref().is_some_and(is_local_host);
     if is_local { Ok(()) } else { Err((403, "Forbidden")) }
 }
 
-/// What stands in the head of every answer: nothing is kept, guessed, framed or fetched from elsewhere.
+/// Headers of every response: no caching, no content sniffing, no framing, no foreign resources.
 const COMMON: &str = "Connection: close\r\nCache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n\
     Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src data:; \
     base-uri 'none'; form-action 'none'; frame-ancestors 'none'\r\n";
@@ -191,7 +195,7 @@ fn document(stream: &mut TcpStream, kind: &str, text: &str) -> io::Result<()> {
 }
 
 fn refuse(stream: &mut TcpStream, (status, words): Refused) -> io::Result<()> {
-    let more = match status {
+    let headers = match status {
         401 => "WWW-Authenticate: Basic realm=\"metaplan\", charset=\"UTF-8\"\r\n",
         405 => "Allow: GET\r\n",
         _ => "",
@@ -200,13 +204,13 @@ fn refuse(stream: &mut TcpStream, (status, words): Refused) -> io::Result<()> {
     let length = text.len();
     let kind = "text/plain; charset=utf-8";
     let head = format!(
-        "HTTP/1.1 {status} {words}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\n{more}{COMMON}\r\n"
+        "HTTP/1.1 {status} {words}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\n{headers}{COMMON}\r\n"
     );
     send(stream, &(head + &text))
 }
 
-/// Sends the state of things, and then what comes, until the run ends or somebody does not follow.
-fn events(house: &House, stream: &mut TcpStream) -> io::Result<()> {
+/// Sends the current state and then the new lines, until the run ends or the client is too slow.
+fn events(house: &SharedState, stream: &mut TcpStream) -> io::Result<()> {
     send(
         stream,
         &format!(
@@ -218,12 +222,14 @@ fn events(house: &House, stream: &mut TcpStream) -> io::Result<()> {
         send(stream, &stanzas(batch))?;
     }
     loop {
-        match house.hub.news(next, QUIET) {
+        match house.hub.news(next, KEEPALIVE_INTERVAL) {
             News::Lines(lines) => {
                 send(stream, &stanzas(&lines))?;
                 next += lines.len() as u64;
             }
+            // A comment keeps the connection alive and detects disconnected clients.
             News::Nothing => send(stream, ":\n\n")?,
+            // The browser reconnects and then receives the current state.
             News::Missed => return Ok(()),
             News::Ended => return send(stream, "event: end\ndata: {}\n\n"),
         }
@@ -234,18 +240,19 @@ fn stanzas(lines: &[Arc<str>]) -> String {
     lines.iter().flat_map(|line| ["data: ", line, "\n\n"]).collect()
 }
 
-/// Sends a text to somebody who takes all of it in time.
+/// Writes a text; fails if the client does not read it within the timeout.
 fn send(stream: &mut TcpStream, text: &str) -> io::Result<()> {
     let begun = Instant::now();
-    let mut rest = text.as_bytes();
-    while !rest.is_empty() {
-        let left = PATIENCE.saturating_sub(begun.elapsed());
-        if left.is_zero() {
+    let mut remaining = text.as_bytes();
+    while !remaining.is_empty() {
+        // The timeout applies to the whole text, not to each write.
+        let timeout = CLIENT_TIMEOUT.saturating_sub(begun.elapsed());
+        if timeout.is_zero() {
             return Err(io::ErrorKind::TimedOut.into());
         }
-        stream.set_write_timeout(Some(left))?;
-        match stream.write(rest) {
-            Ok(count) => rest = &rest[count..],
+        stream.set_write_timeout(Some(timeout))?;
+        match stream.write(remaining) {
+            Ok(count) => remaining = &remaining[count..],
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
             Err(error) => return Err(error),
         }

@@ -1,4 +1,4 @@
-//! A secret that is compared and never shown.
+//! Access token, compared in constant time and never printed.
 
 use std::path::Path;
 
@@ -9,13 +9,13 @@ use subtle::ConstantTimeEq as _;
 
 use crate::message::Message;
 
-/// Shorter tokens can be guessed.
+/// Minimum length; shorter tokens can be guessed.
 const SHORTEST: usize = 16;
 
-/// Longer ones are some other file.
+/// Maximum length; a longer text is probably another file.
 const LONGEST: usize = 1024;
 
-/// A token; only its digest is held.
+/// A token, stored as its digest only.
 #[derive(Clone)]
 pub struct Token([u8; 32]);
 
@@ -26,10 +26,10 @@ impl std::fmt::Debug for Token {
 }
 
 impl Token {
-    /// Reads a token from a file: one word of 16 to 1,024 visible characters of ASCII.
+    /// Reads a token from a file: one word of 16 to 1,024 visible ASCII characters.
     ///
     /// # Errors
-    /// The file cannot be read, or has something else. Nothing of it is quoted.
+    /// The file cannot be read, or has other contents. The message never quotes them.
     pub fn read(path: &Path) -> Result<Self, Message> {
         let name = path.display().to_string();
         let wrong = |text: String| Message::at("M332", &name, None, text);
@@ -51,13 +51,14 @@ impl Token {
         Self(Sha256::digest(word).into())
     }
 
-    /// Whether a header `Authorization` has the token. How long that takes does not depend on the token.
+    /// Returns `true` if an `Authorization` header contains the token. The time of the comparison
+    /// does not depend on the token.
     pub(super) fn fits(&self, authorization: &[u8]) -> bool {
         let (scheme, rest) = match authorization.iter().position(|byte| *byte == b' ') {
             None => return false,
             Some(space) => (&authorization[..space], authorization[space..].trim_ascii()),
         };
-        let given = if scheme.eq_ignore_ascii_case(b"bearer") {
+        let candidate = if scheme.eq_ignore_ascii_case(b"bearer") {
             rest.to_vec()
         } else if scheme.eq_ignore_ascii_case(b"basic") {
             let Ok(pair) = STANDARD.decode(rest) else { return false };
@@ -66,7 +67,7 @@ impl Token {
         } else {
             return false;
         };
-        Self::of(&given).0.ct_eq(&self.0).into()
+        Self::of(&candidate).0.ct_eq(&self.0).into()
     }
 }
 
@@ -75,12 +76,12 @@ mod tests {
     use super::Token;
 
     #[test]
-    fn a_token_fits_as_a_password_and_as_a_bearer() {
+    fn tokens_match_as_password_and_as_bearer() {
         let token = Token::of(b"open sesame, now");
         let check = |header: &str, fits: bool| assert_eq!(token.fits(header.as_bytes()), fits, "{header}");
         check("Bearer open sesame, now", true);
         check("bearer  open sesame, now ", true);
-        // The pair `robot:open sesame, now`, by RFC 4648.
+        // Base64 of `robot:open sesame, now`, by RFC 4648.
         check("Basic cm9ib3Q6b3BlbiBzZXNhbWUsIG5vdw==", true);
         check("Basic b3BlbiBzZXNhbWUsIG5vdw==", false);
         check("Bearer open sesame, no", false);

@@ -1,9 +1,10 @@
-//! Why a mission has no plan, as far as it is for designs that are not available: a smallest part of them that suffices.
+//! Explains an unsolvable mission by a minimal set of unavailable designs.
 //!
-//! The facts that designs are available are taken for assumptions. The designs that are not, all together, leave no plan; one
-//! after the other is made available, and stays so if there is still no plan without it. What is left is minimal: with any
-//! one of them there would be a plan. This is the deletion-based search for a minimal unsatisfiable core [1], with the
-//! planner, whose proofs hold for plans of every length, in the place of a SAT solver.
+//! The mission with all unavailable designs has no plan. The designs are made available one by one,
+//! and a design stays available if there is still no plan. The remaining set is minimal: with any
+//! one of its designs there would be a plan. This is the deletion-based search for a minimal
+//! unsatisfiable core [1]. The planner replaces the SAT solver; its proofs hold for plans of every
+//! length.
 //!
 //! [1] J. Marques-Silva, I. Lynce: On improving MUS extraction algorithms, SAT 2011.
 
@@ -16,17 +17,18 @@ use ::mission::Mission;
 
 use crate::mission::planning::ground_with;
 
-/// What keeps an unsolvable mission from having a plan.
+/// Reason for the unsolvability of a mission.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Blocking {
-    /// That these designs are not available, by local name, sorted: as long as none of them is, there is no plan, however many
-    /// others are; and with any one of them there would be one, were all others available, too.
+    /// Minimal set of unavailable designs, sorted by local name. The mission has no plan while all
+    /// of them are unavailable, even if every other design is available. With any one of them, and
+    /// all others, it has a plan.
     Designs(Vec<String>),
-    /// Something else: there would be no plan if every design was available.
+    /// The mission has no plan even if every design is available.
     Other,
 }
 
-/// In a sentence.
+/// Formats the reason as a clause.
 impl fmt::Display for Blocking {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -43,8 +45,8 @@ impl fmt::Display for Blocking {
     }
 }
 
-/// Why there is no plan for a problem that [`Mission::filled`] has made and that is proved to have none. None if the mission has
-/// no knowledge base, or if a limit was reached before the reason was known.
+/// Explains why a problem that [`Mission::filled`] has made, and that is proved unsolvable, has no
+/// plan. `None` if the mission has no knowledge base, or if a limit was reached.
 pub fn blocking(mission: &Mission, problem: &Problem, config: &Config) -> Option<Blocking> {
     let mut config = config.clone();
     config.horizon = None;
@@ -55,11 +57,11 @@ pub fn blocking(mission: &Mission, problem: &Problem, config: &Config) -> Option
     let mut blocking = missing.clone();
     if solvable_with(mission, problem, &missing, config)? {
         for design in &missing {
-            let rest: Vec<String> = blocking.iter().filter(|name| *name != design).cloned().collect();
+            let remaining: Vec<String> = blocking.iter().filter(|name| *name != design).cloned().collect();
             let available: Vec<String> =
-                missing.iter().filter(|name| !rest.contains(name)).cloned().collect();
+                missing.iter().filter(|name| !remaining.contains(name)).cloned().collect();
             if !solvable_with(mission, problem, &available, config)? {
-                blocking = rest;
+                blocking = remaining;
             }
         }
         blocking.sort();
@@ -68,7 +70,8 @@ pub fn blocking(mission: &Mission, problem: &Problem, config: &Config) -> Option
     Some(Blocking::Other)
 }
 
-/// Whether there is a plan with some further designs available; none if a limit was reached.
+/// Returns `true` if there is a plan with `available` as further designs. `None` if a limit was
+/// reached.
 fn solvable_with(
     mission: &Mission,
     problem: &Problem,
@@ -76,10 +79,11 @@ fn solvable_with(
     config: &Config,
 ) -> Option<bool> {
     let mut problem = problem.clone();
-    // Any plan will do.
+    // The metric does not affect solvability.
     problem.metric = None;
-    let domain =
-        mission.allow(&mut problem, &|design, own| own || available.iter().any(|other| other == design));
+    let domain = mission.allow(&mut problem, &|design, is_available| {
+        is_available || available.iter().any(|name| name == design)
+    });
     let task = ground_with(mission, &domain, &problem, &[], &config.limits).ok()?;
     match optimize(&task, config, &mut |_| {}).status {
         Status::Optimal | Status::Feasible => Some(true),

@@ -1,8 +1,10 @@
-//! A plan as a behaviour tree of BehaviorTree.CPP 4: a sequence of actions, with the changes of designs between them.
+//! Exports a plan as a behaviour tree of BehaviorTree.CPP 4: a sequence of actions, with the
+//! changes of designs between them.
 //!
-//! An action is a node with the name of its schema and a port for each parameter. A design is put to work before the first action that
-//! needs it, by a node `ChangeMode` with the ports `service_name` and `mode_name`: the service of `system_modes` for
-//! the function. `TreeNodesModel` declares all of them, as Groot2 wants it.
+//! An action is a node with the name of its schema and a port for each parameter. A node
+//! `ChangeMode` activates a design before the first action that needs it. Its ports are
+//! `service_name`, the `system_modes` service of the function, and `mode_name`. `TreeNodesModel`
+//! declares all nodes, as Groot2 requires.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -12,19 +14,19 @@ use planner::{Plan, Step};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
 
-/// The node that changes the design of a function.
-const CHANGE: &str = "ChangeMode";
-/// Attributes that BehaviorTree.CPP keeps to itself.
+/// Name of the node that changes the design of a function.
+const CHANGE_NODE: &str = "ChangeMode";
+/// Attributes that BehaviorTree.CPP reserves.
 const RESERVED: [&str; 2] = ["name", "ID"];
 
-/// A node: what it is, what this one is called, and its ports with their values.
+/// A node of the tree: its type, its instance name, and the values of its ports.
 struct Node {
     id: String,
     name: String,
     ports: Vec<(String, String)>,
 }
 
-/// The plan, whose arguments are as the domain's file writes them and whose actions follow each other, as XML.
+/// Returns the XML of a sequential plan. Its arguments have the form of the domain's file.
 pub fn btcpp_text(mission: &Mission, plan: &Plan) -> String {
     let mut text = Vec::new();
     // Writing to memory does not fail.
@@ -32,7 +34,7 @@ pub fn btcpp_text(mission: &Mission, plan: &Plan) -> String {
     String::from_utf8(text).unwrap_or_default() + "\n"
 }
 
-/// The nodes in their order.
+/// Returns the nodes of the sequence.
 fn nodes(mission: &Mission, plan: &Plan) -> Vec<Node> {
     let mut nodes = Vec::new();
     let mut at_work: BTreeMap<&str, &str> = BTreeMap::new();
@@ -41,7 +43,11 @@ fn nodes(mission: &Mission, plan: &Plan) -> Vec<Node> {
             if at_work.insert(function, design) != Some(design) {
                 let service = ("service_name".to_owned(), format!("/{function}/change_mode"));
                 let ports = vec![service, ("mode_name".to_owned(), design.clone())];
-                nodes.push(Node { id: CHANGE.to_owned(), name: format!("{function} = {design}"), ports });
+                nodes.push(Node {
+                    id: CHANGE_NODE.to_owned(),
+                    name: format!("{function} = {design}"),
+                    ports,
+                });
             }
         }
         let words: Vec<&str> =
@@ -52,7 +58,7 @@ fn nodes(mission: &Mission, plan: &Plan) -> Vec<Node> {
     nodes
 }
 
-/// The parameters of the schema with the objects of a step.
+/// Returns the parameters of the schema with the objects of a step.
 fn ports(mission: &Mission, step: &Step) -> Vec<(String, String)> {
     let named = |action: &&pddl::ast::Action| {
         action.identifier.name.as_str().eq_ignore_ascii_case(&step.action)
@@ -64,7 +70,7 @@ fn ports(mission: &Mission, step: &Step) -> Vec<(String, String)> {
     names.zip(step.arguments.iter().cloned()).collect()
 }
 
-/// A name for a port: it begins with a letter, and is none that is taken.
+/// Name of a port for a parameter: it begins with a letter and is not reserved.
 fn port(parameter: &str) -> String {
     let is_taken = RESERVED.iter().any(|reserved| reserved.eq_ignore_ascii_case(parameter));
     let begins = parameter.starts_with(|first: char| first.is_ascii_alphabetic());

@@ -1,4 +1,5 @@
-//! Conditions and numeric functions that a manifest names, as text, to what the mission's domain and problem declare.
+//! Parses the conditions and numeric functions of a manifest against the declarations of the
+//! mission's domain and problem.
 
 use pddl::ast::{Atom, Condition, Expression, Term};
 
@@ -9,16 +10,18 @@ use crate::message::{Errors, Message};
 /// A fault in a text, with its place.
 #[derive(Debug, Clone)]
 pub struct Fault {
-    /// Byte offset of the fault. `None` if it is not known.
+    /// Byte offset of the fault, if known.
     pub offset: Option<usize>,
     /// Message about the fault.
     pub message: Message,
 }
 
-/// A condition, such as `(robot_at dock)` or `(< (battery) 20)`. One atom may stand without its parentheses.
+/// Parses a condition, such as `(robot_at dock)` or `(< (battery) 20)`. The parentheses of a single
+/// atom are optional.
 ///
 /// # Errors
-/// It is malformed, or names a predicate, a function or an object that the mission does not have.
+/// The text is malformed, or names a predicate, a function or an object that the mission does not
+/// have.
 pub fn condition(mission: &Mission, text: &str) -> Result<Condition, Vec<Fault>> {
     let is_bare = !text.trim_start().starts_with('(');
     let open = if is_bare { "(" } else { "" };
@@ -40,10 +43,10 @@ pub fn condition(mission: &Mission, text: &str) -> Result<Condition, Vec<Fault>>
         .map_err(|errors| faults(errors, text, before.chars().count()))
 }
 
-/// A numeric function with its arguments, such as `(battery)`; the parentheses may be left out.
+/// Parses a numeric function with its arguments, such as `(battery)`. The parentheses are optional.
 ///
 /// # Errors
-/// It is malformed, or names a function or an object that the mission does not have.
+/// The text is malformed, or names a function or an object that the mission does not have.
 pub fn function(mission: &Mission, text: &str) -> Result<Atom, Vec<Fault>> {
     let mut problem = mission.problem().clone();
     mission.fill(&mut problem);
@@ -56,8 +59,8 @@ pub fn function(mission: &Mission, text: &str) -> Result<Atom, Vec<Fault>> {
     Err(vec![Fault { offset: None, message: Message::error("M135", text) }])
 }
 
-/// Message about the objects in a setting that [`Mission::set`] has accepted: they do not exist, or have other types.
-/// Returns `None` without such a fault.
+/// Returns a message about the objects of a setting that [`Mission::set`] has accepted, if they do
+/// not exist or have other types.
 pub(super) fn setting(mission: &Mission, name: &str, value: &str) -> Option<Message> {
     if mission.knowledge().is_some_and(|knowledge| knowledge.has_attribute(name.trim())) {
         return None;
@@ -71,7 +74,7 @@ pub(super) fn setting(mission: &Mission, name: &str, value: &str) -> Option<Mess
     condition(mission, &text).err()?.into_iter().next().map(|fault| fault.message)
 }
 
-/// A ground atom as the validator writes it: `(distance a b)`.
+/// Formats a ground atom as the validator does: `(distance a b)`.
 pub fn written(atom: &Atom) -> String {
     let words = atom.arguments.iter().map(|term| match term {
         Term::Constant(identifier) | Term::Variable(identifier) => identifier.name.as_str(),
@@ -80,9 +83,11 @@ pub fn written(atom: &Atom) -> String {
     format!("({})", words.join(" "))
 }
 
-/// Faults of a text that was parsed as a line of its own, after a prefix of `before` characters.
+/// Locates the faults of a text that was parsed on a separate line, after a prefix of `before`
+/// characters.
 fn faults(errors: Errors, text: &str, before: usize) -> Vec<Fault> {
-    // Faults in the prefix are not about the text. A fault at a parenthesis that was added has the place of the text's first character.
+    // Faults in the prefix are not about the text. A fault at an added parenthesis gets the place
+    // of the text's first character.
     let is_own =
         |error: &Message| error.line != Some(1) || error.column.is_none_or(|column| column >= before);
     let fault = |error: Message| {

@@ -1,4 +1,4 @@
-//! A plan is shown only once the validator has executed it.
+//! Validates a plan with the independent validator before it is shown.
 
 use ::mission::Mission;
 use ::verify::measure::measure;
@@ -7,30 +7,30 @@ use pddl::ast::{Name, Problem};
 use pddl::validate::{Interrupted, Options, PlanStep, PlanText, Verdict, validate_within};
 use planner::{Limits, Plan};
 
-/// How the validator is to read a plan.
+/// Semantics by which the validator executes a plan.
 #[derive(Debug, Clone)]
 pub struct Reading {
     options: Options,
-    /// Whether a plan without a metric is measured by its time.
+    /// `true` if a plan without a metric is measured by its time.
     timed: bool,
 }
 
-/// Why a plan is not shown.
+/// Reason for not showing a plan.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Unconfirmed {
-    /// The validator refuses it, or measures it otherwise: a fault of the planner.
+    /// The validator rejects the plan or computes another cost: a fault of the planner.
     Refused(String),
     /// A limit was reached before the validator had executed it.
     Interrupted,
 }
 
 impl Reading {
-    /// Actions are executed one after another.
+    /// Semantics of sequential actions.
     pub fn sequential(timed: bool) -> Self {
         Self { options: Options::default(), timed }
     }
 
-    /// Actions overlap; those that interfere lie so far apart.
+    /// Overlapping actions, whose interfering happenings are at least `separation` apart.
     pub fn concurrent(separation: &BigRational) -> Self {
         Self {
             options: Options::default().with_concurrent(true).with_tolerance(separation.clone()),
@@ -38,8 +38,8 @@ impl Reading {
         }
     }
 
-    /// What the validator says a plan with this reading comes to, by the problem's metric. Returns `None` for an invalid plan, and if a
-    /// limit is reached.
+    /// Returns the validator's value of the plan by the problem's metric. `None` for an invalid
+    /// plan, or if a limit is reached.
     pub(super) fn value(
         &self,
         mission: &Mission,
@@ -52,7 +52,7 @@ impl Reading {
     }
 }
 
-/// The verdict of the independent validator on a plan.
+/// Returns the verdict of the independent validator on a plan.
 ///
 /// # Errors
 /// A limit was reached.
@@ -74,11 +74,11 @@ pub(super) fn verdict_of(
     validate_within(mission.domain(), problem, &plan, &reading.options, &|| limits.reached())
 }
 
-/// Has the independent validator execute a plan for a problem that [`Mission::filled`] has made. A plan is often found at the limits: so
-/// the validator has the time of [`Limits::extended`].
+/// Lets the independent validator execute a plan for a problem that [`Mission::filled`] has made.
+/// Plans are often found at the time limit, so the validator has the time of [`Limits::extended`].
 ///
 /// # Errors
-/// The plan is invalid or costs something else, or the time does not suffice.
+/// The plan is invalid, its cost differs, or the time does not suffice.
 pub fn confirm(
     mission: &Mission,
     problem: &Problem,

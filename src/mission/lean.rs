@@ -1,8 +1,10 @@
-//! Plans without actions that they do not need.
+//! Action elimination: removes actions that a plan does not need [1].
 //!
-//! Where the metric counts the time of the last end only, an action that fits in costs nothing, and the planner may leave it in. One after the other,
-//! from the last to the first, actions are left out if the rest is valid and measures the same (H. Nakhost, M. Müller: Action elimination and
-//! plan neighborhood graph search, ICAPS 2010).
+//! If the metric is the makespan, a concurrent action may cost nothing, so the planner may keep
+//! superfluous actions. Each action, from the last to the first, is removed if the plan without it
+//! is valid and has the same cost.
+//!
+//! [1] H. Nakhost, M. Müller: Action elimination and plan neighborhood graph search, ICAPS 2010.
 
 use ::mission::Mission;
 use pddl::ast::Problem;
@@ -10,10 +12,11 @@ use planner::{Limits, Plan};
 
 use crate::mission::confirm::Reading;
 
-/// Each action of a longer plan would be judged in a plan as long: that takes too long.
-const LONGEST: usize = 200;
+/// Maximum number of actions. Each candidate is validated, so the effort grows with the square of
+/// the length.
+const MAX_ACTIONS: usize = 200;
 
-/// The plan without actions that cost nothing and that nothing else in it needs, as far as that is found within the limits.
+/// Removes actions of cost 0 that the plan does not need, as far as the limits permit.
 pub fn lean(
     mission: &Mission,
     problem: &Problem,
@@ -21,15 +24,15 @@ pub fn lean(
     reading: &Reading,
     limits: &Limits,
 ) -> Plan {
-    if plan.steps.len() > LONGEST {
+    if plan.steps.len() > MAX_ACTIONS {
         return plan;
     }
     for index in (0..plan.steps.len()).rev() {
         if plan.steps[index].cost.is_zero() {
-            let mut less = plan.clone();
-            less.steps.remove(index);
-            if reading.value(mission, problem, &less, limits) == Some(plan.cost.to_rational()) {
-                plan = less;
+            let mut shorter = plan.clone();
+            shorter.steps.remove(index);
+            if reading.value(mission, problem, &shorter, limits) == Some(plan.cost.to_rational()) {
+                plan = shorter;
             }
         }
     }
@@ -50,7 +53,8 @@ mod tests {
     const DOMAIN: &str = "(define (domain d) (:requirements :durative-actions) (:predicates (done ?x))
         (:durative-action work :parameters (?x) :duration (= ?duration 4) :effect (at end (done ?x))))";
 
-    /// What is left of work on these objects, side by side, where a and b have to be done.
+    /// Checks which of the simultaneous actions on the objects `work` remain; the goal needs a and
+    /// b.
     fn check(problem: &str, cost: i64, work: &[&str], expected: &[&str]) {
         let (domain, problem) = (Ok(Source::new("d", DOMAIN)), Ok(Source::new("p", problem)));
         let mission = Mission::new("", None, Bindings::default(), domain, problem);
@@ -68,12 +72,12 @@ mod tests {
         let plan = Plan { steps: work.iter().map(step).collect(), cost: number(cost) };
         let reading = Reading::concurrent(&BigRational::new(1.into(), 1000.into()));
         let plan = lean(&mission, mission.problem(), plan, &reading, &Limits::none());
-        let left: Vec<&str> = plan.steps.iter().map(|step| step.arguments[0].as_str()).collect();
-        assert_eq!(left, expected, "{work:?}");
+        let remaining: Vec<&str> = plan.steps.iter().map(|step| step.arguments[0].as_str()).collect();
+        assert_eq!(remaining, expected, "{work:?}");
     }
 
     #[test]
-    fn what_nothing_needs_is_left_out() {
+    fn superfluous_actions_are_removed() {
         let problem = |rest: &str| {
             format!(
                 "(define (problem p) (:domain d) (:objects a b c) (:init) (:goal (and (done a) (done b))) {rest})"
@@ -81,9 +85,9 @@ mod tests {
         };
         check(&problem(""), 4, &["c", "a", "b", "c"], &["a", "b"]);
         check(&problem("(:metric minimize (total-time))"), 4, &["a", "b"], &["a", "b"]);
-        // Somebody may want a longer plan.
+        // A metric that rewards length keeps all useful actions.
         check(&problem("(:metric maximize (total-time))"), 4, &["a", "c", "b"], &["a", "b"]);
-        // What does not measure as it should stays as it is.
+        // A plan with a wrong cost is returned unchanged.
         check(&problem(""), 5, &["a", "b", "c"], &["a", "b", "c"]);
     }
 }

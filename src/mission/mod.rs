@@ -1,6 +1,6 @@
-//! What the robot is and what it has to do, joined by `metaplan-mission`, and planned with.
+//! Planning for missions: grounding, validation and export of plans.
 //!
-//! The only room that sees both OWL and the planner.
+//! The crate `metaplan-mission` joins the knowledge base and the PDDL files. This module adds the planner.
 
 mod blocking;
 mod btcpp;

@@ -1,4 +1,4 @@
-//! A mission to a ground task, and its plans as the domain's file writes them.
+//! Grounds a mission, and converts plans to the action signatures of the domain's file.
 
 use std::borrow::Cow;
 
@@ -14,18 +14,19 @@ use crate::narrow::narrowed;
 
 /// Planning for a mission.
 pub trait Planning {
-    /// Returns the domain and the problem that are grounded for a filled problem. They have the same plans as the mission's own, and are
-    /// smaller if its knowledge base completes its domain.
+    /// Returns the domain and the problem that are grounded for a filled problem. They have the
+    /// same plans as the mission's own, and are smaller if its knowledge base completes its domain.
     fn narrowed<'m>(&'m self, problem: &'m Problem) -> (Cow<'m, Domain>, Cow<'m, Problem>);
 
-    /// Grounds a problem that [`Mission::filled`] has made, to be measured by some objectives in place of its metric
-    /// if there are any.
+    /// Grounds a problem that [`Mission::filled`] has made. Non-empty `objectives` replace its
+    /// metric.
     ///
     /// # Errors
-    /// Everything that the planner does not handle, or that a limit was reached.
+    /// All constructs that the planner does not support, or a limit that was reached.
     fn ground(&self, problem: &Problem, objectives: &[Metric], limits: &Limits) -> Result<Task, Errors>;
 
-    /// As [`Planning::ground`], whatever the size of the numbers: for plans that are searched for in exact rationals.
+    /// Grounds a problem as [`Planning::ground`], with exact rationals, so that numbers of any size
+    /// are accepted.
     ///
     /// # Errors
     /// As [`Planning::ground`].
@@ -36,11 +37,11 @@ pub trait Planning {
         limits: &Limits,
     ) -> Result<ExactTask, Errors>;
 
-    /// Grounds a filled problem for plans whose actions overlap; those that interfere are to lie `separation` apart, in the
-    /// domain's time unit.
+    /// Grounds a filled problem for plans with overlapping actions. Interfering happenings are at
+    /// least `separation` apart, in the domain's time unit.
     ///
     /// # Errors
-    /// Every construct that cannot be planned with, with its place.
+    /// All constructs that the planner does not support, with their places.
     fn ground_concurrent(
         &self,
         problem: &Problem,
@@ -49,8 +50,9 @@ pub trait Planning {
         limits: &Limits,
     ) -> Result<TemporalTask, Errors>;
 
-    /// The plan with the arguments that the domain's file gives its actions: without the designs that the knowledge base has
-    /// added to a plain domain. The configuration of each step has them.
+    /// Returns the plan with the arguments of the domain's file, without the designs that the
+    /// knowledge base has added to a plain domain. The configuration of each step has these
+    /// designs.
     #[must_use]
     fn written(&self, plan: Plan) -> Plan;
 }
@@ -113,9 +115,10 @@ pub(crate) fn ground_with(
         .map_err(|errors| messages(mission, &errors))
 }
 
-/// A planner for filled problems that are like this one; none if the mission is not suited.
+/// Returns a planner for filled problems similar to this one, or `None` if the mission is not
+/// supported.
 pub(crate) fn replanner(mission: &Mission, problem: &Problem, limits: &Limits) -> Option<Replanner> {
-    // Narrowing depends on the facts of a problem, so that each problem has another domain.
+    // Narrowing depends on the facts of a problem, so each problem would need another domain.
     if mission.completed_predicates().is_some() {
         return None;
     }
@@ -135,7 +138,7 @@ fn config(mission: &Mission, objectives: &[Metric], limits: &Limits) -> GroundCo
         .with_limits(limits.clone())
 }
 
-/// Errors of grounding and encoding, with the source lines that they are about.
+/// Converts errors of grounding and encoding to messages with their source lines.
 fn messages(mission: &Mission, errors: &[planner::Error]) -> Errors {
     let (domain, problem) = (mission.domain_source(), mission.problem_source());
     let message = |error: &planner::Error| match error.place() {
@@ -156,9 +159,9 @@ mod tests {
 
     use super::{GroundConfig, Name};
 
-    /// Who only checks links no planner, so that these names stand twice.
+    /// The checker does not link the planner, so the names are defined in both.
     #[test]
-    fn the_defaults_are_those_of_the_planner() {
+    fn default_names_equal_those_of_the_planner() {
         let sorted = |mut names: Vec<Name>| {
             names.sort();
             names

@@ -1,7 +1,9 @@
-//! A plan as PlanSys2 has it: actions with start and duration in seconds, as POPF writes them.
+//! Conversion of plans to PlanSys2's format: actions with start and duration in seconds, as POPF
+//! writes them.
 //!
-//! PlanSys2 orders actions by their times alone. So what follows begins after the end of what it follows, never at the same time, and all
-//! that is done takes time; as in POPF, a thousandth stands for "at once".
+//! PlanSys2 orders actions by their times alone. So an action begins strictly after the end of its
+//! predecessor, and no action has the duration 0. As in POPF, the smallest difference is a
+//! thousandth.
 
 use std::fmt::Write as _;
 
@@ -15,31 +17,32 @@ use crate::mission::confirm::{Reading, verdict_of};
 /// An action of a plan for PlanSys2.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PlanLine {
-    /// When it starts, in the domain's time unit.
+    /// Start of the action, in the domain's time unit.
     pub start: Exact,
-    /// As in `(move leia kitchen bedroom)`.
+    /// The action as a PDDL call: `(move leia kitchen bedroom)`.
     pub action: String,
-    /// How long it takes, in the domain's time unit; not 0.
+    /// Duration of the action, in the domain's time unit; greater than 0.
     pub duration: Exact,
 }
 
-/// The plan with a thousandth between the end of an action and whatever begins then. It is returned as it is if it is no plan then, or if a
-/// limit is reached.
+/// Delays actions so that a thousandth lies between the end of an action and each start that
+/// follows it. Returns the given plan if the delayed plan is invalid, or if a limit is reached.
 #[must_use]
 pub fn spaced(mission: &Mission, problem: &Problem, plan: Plan, reading: &Reading, limits: &Limits) -> Plan {
     let mut later = plan.clone();
     for next in 1..plan.steps.len() {
         let start = plan.steps[next].start.to_rational();
         let after = plan.steps[..next].iter().zip(&later.steps).map(|(before, moved)| {
-            let (own, moved) = (before.start.to_rational(), moved.start.to_rational());
-            // What overlaps keeps its distance.
-            if own.clone() + before.duration.to_rational() <= start {
+            let (start_before, moved) = (before.start.to_rational(), moved.start.to_rational());
+            // Actions that overlap keep the difference of their starts.
+            if start_before.clone() + before.duration.to_rational() <= start {
                 moved + lasting(before) + instant()
-            } else if own == start && before.call() == plan.steps[next].call() {
-                // By its name and its time PlanSys2 knows an action.
+            } else if start_before == start && before.call() == plan.steps[next].call() {
+                // PlanSys2 identifies an action by its call and its start, so equal calls need
+                // different starts.
                 moved + instant()
             } else {
-                moved + &start - own
+                moved + &start - start_before
             }
         });
         later.steps[next].start = after.fold(start.clone(), BigRational::max).into();
@@ -48,7 +51,7 @@ pub fn spaced(mission: &Mission, problem: &Problem, plan: Plan, reading: &Readin
     if verdict.is_ok_and(|verdict| verdict.violation.is_none()) { later } else { plan }
 }
 
-/// The lines of a plan, whose arguments are as the domain's file writes them.
+/// Converts a plan to lines. Its arguments have the form of the domain's file.
 pub fn plan_lines(plan: &Plan) -> Vec<PlanLine> {
     let line = |step: &Step| {
         let (start, duration) = step.times();
@@ -58,17 +61,17 @@ pub fn plan_lines(plan: &Plan) -> Vec<PlanLine> {
     plan.steps.iter().map(line).collect()
 }
 
-/// How long PlanSys2 takes an action to last.
+/// Duration of an action in PlanSys2, in the domain's time unit.
 fn lasting(step: &Step) -> BigRational {
     if step.duration.is_zero() { instant() } else { step.duration.to_rational() }
 }
 
-/// What stands for "at once", and for "as soon as that has ended": a thousandth.
+/// Smallest difference between two times in PlanSys2: a thousandth.
 pub fn instant() -> BigRational {
     BigRational::new(1.into(), 1000.into())
 }
 
-/// The lines as POPF writes them, and as PlanSys2's plugin for POPF reads them.
+/// Formats the lines as POPF does, which PlanSys2's POPF plugin parses.
 pub fn popf_text(lines: &[PlanLine]) -> String {
     let mut text = "Solution Found\n".to_owned();
     for line in lines {
@@ -119,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn what_follows_begins_a_thousandth_later() {
+    fn successors_begin_a_thousandth_later() {
         let sequence = [("long", 0, 5000), ("now", 5000, 0), ("short", 5000, 2000), ("now", 9000, 0)];
         let spaced =
             "0.000: (long)  [5.000]\n5.001: (now)  [0.001]\n5.003: (short)  [2.000]\n9.000: (now)  [0.001]\n";
@@ -132,11 +135,11 @@ mod tests {
         check("", true, &twice, spaced);
     }
 
-    /// Something that holds from 5 to 7 leaves no time.
+    /// A fact that is true only from 5 to 7 fixes the times, so that no gap fits.
     #[test]
-    fn times_that_must_be_stay() {
+    fn plans_without_room_for_gaps_are_unchanged() {
         let steps = [("now", 5000, 0), ("short", 5000, 2000)];
-        let kept = "5.000: (now)  [0.001]\n5.000: (short)  [2.000]\n";
-        check("(at 5 (p)) (at 7 (not (p)))", false, &steps, kept);
+        let expected = "5.000: (now)  [0.001]\n5.000: (short)  [2.000]\n";
+        check("(at 5 (p)) (at 7 (not (p)))", false, &steps, expected);
     }
 }

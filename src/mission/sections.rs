@@ -1,4 +1,4 @@
-//! What a manifest says of a mission: its sections `knowledge`, `planning`, `bindings` and `scenarios`.
+//! The mission's sections of a manifest: `knowledge`, `planning`, `bindings` and `scenarios`.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -39,19 +39,19 @@ fn shipped_rules() -> Vec<String> {
 }
 
 impl KnowledgeSection {
-    /// The files that it names.
+    /// Returns the files of the section.
     pub fn sources(&self, origin: &ManifestPath) -> Sources {
-        let all = |paths: &[PathBuf]| paths.iter().map(|path| origin.path(path)).collect();
+        let resolve = |paths: &[PathBuf]| paths.iter().map(|path| origin.path(path)).collect();
         let rule = |name: &String| match name.as_str() {
             COADAPTATION | TOMASYS => name.clone(),
             path => origin.path(Path::new(path)).display().to_string(),
         };
         Sources {
-            documents: all(&self.files),
+            documents: resolve(&self.files),
             rules: self.rules.iter().map(rule).collect(),
             options: ReadOptions {
-                catalogs: all(&self.catalogs),
-                directories: all(&self.directories),
+                catalogs: resolve(&self.catalogs),
+                directories: resolve(&self.directories),
                 ..ReadOptions::default()
             },
             ..Sources::default()
@@ -111,26 +111,26 @@ impl fmt::Display for TimeUnit {
 pub struct BindingsSection {
     /// PDDL symbol to query, beyond the defaults.
     symbols: BTreeMap<String, Spanned<String>>,
-    /// Individuals to objects, and where that stands.
+    /// Individuals with their objects; the span of an individual is its place in the manifest.
     names: Vec<(Spanned<String>, String)>,
 }
 
 impl BindingsSection {
-    /// The bindings.
+    /// Returns the bindings of the section.
     ///
     /// # Errors
-    /// All queries that are malformed.
+    /// All malformed queries.
     pub fn bindings(&self, origin: &ManifestPath) -> Result<Bindings, Errors> {
         let mut names = Names::default();
         for (individual, object) in &self.names {
             let place = (origin.file().to_owned(), Some(origin.place(individual.span().start)));
             names.add(individual.get_ref(), object, Some(place));
         }
-        let one = |(symbol, query): (&String, &Spanned<String>)| {
-            let own = BTreeMap::from([(symbol.clone(), query.get_ref().clone())]);
-            Bindings::with(&own).err().map(|text| origin.wrong(query.span().start, text))
+        let error_of = |(symbol, query): (&String, &Spanned<String>)| {
+            let binding = BTreeMap::from([(symbol.clone(), query.get_ref().clone())]);
+            Bindings::with(&binding).err().map(|text| origin.wrong(query.span().start, text))
         };
-        let wrong: Vec<Message> = self.symbols.iter().filter_map(one).collect();
+        let wrong: Vec<Message> = self.symbols.iter().filter_map(error_of).collect();
         let symbols = self.symbols.iter().map(|(symbol, query)| (symbol.clone(), query.get_ref().clone()));
         match Bindings::with(&symbols.collect()) {
             Ok(bindings) if wrong.is_empty() => Ok(bindings.naming(names)),
@@ -191,7 +191,7 @@ impl<'de> Visitor<'de> for Section {
     }
 }
 
-/// What a key of the section has.
+/// Value of a key of the section.
 enum Bound {
     Query(String),
     Names(Vec<(Spanned<String>, String)>),
@@ -255,7 +255,8 @@ pub struct Mistake {
 }
 
 impl Mistake {
-    /// Whether it was found by reading PDDL, which presupposes that the mission's own files are right.
+    /// Returns `true` if PDDL analysis found the mistake, which presupposes that the mission's own
+    /// files are correct.
     pub fn is_of_pddl(&self) -> bool {
         self.message.code.starts_with('P')
     }
@@ -270,7 +271,8 @@ impl<S> Scenario<S> {
         Errors::unless_empty(self.mistakes(mission).into_iter().map(|mistake| mistake.message))
     }
 
-    /// Applies the situation as [`Scenario::apply`] does. Returns all settings that do not fit, with their places.
+    /// Applies the situation as [`Scenario::apply`] does. Returns all settings that do not fit,
+    /// with their places.
     pub fn mistakes(&self, mission: &mut Mission) -> Vec<Mistake> {
         let mut mistakes = Vec::new();
         // If the mission's own files are faulty, errors of PDDL may not be caused by the settings.
@@ -296,7 +298,7 @@ impl<S> Scenario<S> {
     }
 }
 
-/// Sets a value; returns what is wrong with it.
+/// Sets a value. Returns the fault of the setting, if any.
 pub fn setting(
     mission: &mut Mission,
     name: &str,

@@ -1,4 +1,4 @@
-//! Plans that somebody else hands in.
+//! Reads plans that other programs have written.
 
 use num_rational::BigRational;
 use num_traits::Num as _;
@@ -28,15 +28,15 @@ pub fn read_plan(source: &Source, mission: &Mission) -> Result<PlanText, Errors>
     PlanText::parse(source).map_err(|diagnostics| Message::from_pddl(&diagnostics, &[source]).into())
 }
 
-/// The line, from 1, where the table of `metaplan plan` begins, if the text has one.
+/// Returns the line, from 1, at which a table of `metaplan plan` begins, if the text has one.
 fn table_heading(text: &str) -> Option<usize> {
     let heading = ["step", "start", "duration", "action"];
     let is_heading = |line: &str| line.split_whitespace().take(heading.len()).eq(heading);
     text.lines().position(is_heading).map(|index| index + 1)
 }
 
-/// The steps of a `metaplan-plan/1` document. Where the knowledge base has given an action of a plain domain its designs, they stand in the
-/// configuration only.
+/// Reads the steps of a `metaplan-plan/1` document. Designs that the knowledge base adds to an
+/// action of a plain domain are in the configuration of the step, not in its arguments.
 fn json_plan(source: &Source, mission: &Mission) -> Result<PlanText, Errors> {
     let bad = |place, text: &str| {
         Message::at("M111", source.name(), place, text.to_owned()).with_source(source.text())
@@ -64,7 +64,7 @@ fn json_plan(source: &Source, mission: &Mission) -> Result<PlanText, Errors> {
     Ok(plan)
 }
 
-/// An exact number from a decimal of JSON.
+/// Converts a JSON decimal to an exact number.
 fn decimal(value: &Value) -> Option<BigRational> {
     let text = value.as_number()?.to_string();
     let (whole, fraction) = text.split_once('.').unwrap_or((&text, ""));

@@ -1,4 +1,5 @@
-//! Derived predicates of a knowledge base as clauses: a head, and a conjunction of atoms and (in)equalities.
+//! Converts derived predicates of a knowledge base to clauses: a head, and a conjunction of atoms
+//! and (in)equalities.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,7 +8,7 @@ use pddl::ast::{Condition, Derived, Name, Term, TypedName};
 /// A ground fact: predicate and arguments.
 pub(super) type Fact = (Name, Vec<Name>);
 
-/// `head(arguments) ← body`; all variables are bound by the clause.
+/// A Horn clause `head(arguments) ← body`, possibly with inequalities; all its variables are local.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Clause {
     pub head: Name,
@@ -20,7 +21,7 @@ pub(super) struct Clause {
 pub(super) enum Literal {
     /// An atom.
     Holds(Name, Vec<Operand>),
-    /// Two terms are equal, or not.
+    /// An equality (`true`) or inequality (`false`) of two terms.
     Equal(bool, Operand, Operand),
 }
 
@@ -40,7 +41,7 @@ impl Literal {
         }
     }
 
-    /// Whether it says that something is of a type.
+    /// Returns `true` if the literal is a type test.
     pub fn is_type(&self) -> bool {
         matches!(self, Self::Holds(name, _) if name.as_str().contains(' '))
     }
@@ -53,18 +54,21 @@ impl Literal {
     }
 }
 
-/// The name of the relation that holds of the objects of a type; no predicate has a blank in its name.
+/// Name of the relation that contains the objects of a type. It contains a blank, so it differs
+/// from all predicates.
 pub(super) fn of_type(r#type: &Name) -> Name {
     Name::new(&format!("type {type}"))
 }
 
-/// The clauses of a derived predicate, without equalities; none if its condition has another form: disjunctions and existential
-/// quantifiers over atoms, equalities and negated equalities, each variable with a name of its own.
+/// Returns the clauses of a derived predicate, without equalities. `None` if its condition has
+/// another form than disjunctions and existential quantifiers over atoms, equalities and negated
+/// equalities, with distinct variable names.
 pub(super) fn clauses(derived: &Derived) -> Option<Vec<Clause>> {
     let head = &derived.head;
     let mut variables: BTreeSet<Name> = BTreeSet::new();
     let typed = typed(&head.parameters, &mut variables)?;
-    let parameters = head.parameters.iter().map(|own| Operand::Variable(own.identifier.name.clone()));
+    let parameters =
+        head.parameters.iter().map(|parameter| Operand::Variable(parameter.identifier.name.clone()));
     let arguments: Vec<Operand> = parameters.collect();
     let name = &head.identifier.name;
     let clause = |body: Vec<Literal>| {
@@ -74,7 +78,7 @@ pub(super) fn clauses(derived: &Derived) -> Option<Vec<Clause>> {
     Some(disjuncts(&derived.condition, &mut variables)?.into_iter().filter_map(clause).collect())
 }
 
-/// That variables are of their types; none if one of them has the name of another.
+/// Returns the type tests of variables. `None` if a variable name occurs twice.
 fn typed(variables: &[TypedName], known: &mut BTreeSet<Name>) -> Option<Vec<Literal>> {
     let mut types = Vec::new();
     for own in variables {
@@ -93,18 +97,22 @@ fn typed(variables: &[TypedName], known: &mut BTreeSet<Name>) -> Option<Vec<Lite
     Some(types)
 }
 
-/// A condition as a disjunction of conjunctions.
+/// Converts a condition to disjunctive normal form.
 fn disjuncts(condition: &Condition, variables: &mut BTreeSet<Name>) -> Option<Vec<Vec<Literal>>> {
     let single = |literal| Some(vec![vec![literal]]);
     match condition {
         Condition::And(parts) => {
-            let mut all = vec![Vec::new()];
+            let mut conjunctions = vec![Vec::new()];
             for part in parts {
                 let part = disjuncts(part, variables)?;
-                let both = |left: &Vec<Literal>, right: &Vec<Literal>| [left.clone(), right.clone()].concat();
-                all = all.iter().flat_map(|left| part.iter().map(move |right| both(left, right))).collect();
+                let concatenated =
+                    |left: &Vec<Literal>, right: &Vec<Literal>| [left.clone(), right.clone()].concat();
+                conjunctions = conjunctions
+                    .iter()
+                    .flat_map(|left| part.iter().map(move |right| concatenated(left, right)))
+                    .collect();
             }
-            Some(all)
+            Some(conjunctions)
         }
         Condition::Or(parts) => {
             let parts: Option<Vec<_>> =
@@ -136,15 +144,16 @@ pub(super) fn operand(term: &Term) -> Operand {
 }
 
 impl Clause {
-    /// Whether all its variables are bound by atoms that are not types: it holds of few things, however many objects there are.
+    /// Returns `true` if atoms other than type tests bind all variables. The extension is then
+    /// small, independent of the number of objects.
     pub fn is_bound(&self) -> bool {
         let atoms = self.body.iter().filter(|part| matches!(part, Literal::Holds(..)) && !part.is_type());
         let bound: BTreeSet<&Operand> = atoms.flat_map(Literal::operands).collect();
-        let all = self.body.iter().flat_map(Literal::operands).chain(&self.arguments);
-        all.into_iter().all(|own| matches!(own, Operand::Constant(_)) || bound.contains(own))
+        let operands = self.body.iter().flat_map(Literal::operands).chain(&self.arguments);
+        operands.into_iter().all(|operand| matches!(operand, Operand::Constant(_)) || bound.contains(operand))
     }
 
-    /// The same without equalities, each atom once; none if its body never holds.
+    /// Eliminates equalities and repeated atoms. `None` if the body is never true.
     fn resolved(mut self) -> Option<Self> {
         while let Some(at) = self.body.iter().position(|part| matches!(part, Literal::Equal(true, ..))) {
             let Literal::Equal(_, left, right) = self.body.remove(at) else { continue };
@@ -156,7 +165,7 @@ impl Clause {
                 _ => return None,
             }
         }
-        let constant = |own: &Operand| matches!(own, Operand::Constant(_));
+        let constant = |operand: &Operand| matches!(operand, Operand::Constant(_));
         for part in &self.body {
             if let Literal::Equal(false, left, right) = part
                 && left == right
@@ -173,30 +182,30 @@ impl Clause {
         Some(self)
     }
 
-    /// Every variable that the map has is replaced.
+    /// Substitutes the variables in the map.
     fn with(self, map: &BTreeMap<Name, Operand>) -> Self {
-        let one = |own: Operand| match &own {
-            Operand::Variable(name) => map.get(name).cloned().unwrap_or(own),
-            Operand::Constant(_) => own,
+        let substitute = |operand: Operand| match &operand {
+            Operand::Variable(name) => map.get(name).cloned().unwrap_or(operand),
+            Operand::Constant(_) => operand,
         };
-        let all = |own: Vec<Operand>| own.into_iter().map(one).collect();
+        let substitute_all = |operands: Vec<Operand>| operands.into_iter().map(substitute).collect();
         let part = |part: Literal| match part {
-            Literal::Holds(name, operands) => Literal::Holds(name, all(operands)),
-            Literal::Equal(same, left, right) => Literal::Equal(same, one(left), one(right)),
+            Literal::Holds(name, operands) => Literal::Holds(name, substitute_all(operands)),
+            Literal::Equal(same, left, right) => Literal::Equal(same, substitute(left), substitute(right)),
         };
         Self {
             head: self.head,
-            arguments: all(self.arguments),
+            arguments: substitute_all(self.arguments),
             body: self.body.into_iter().map(part).collect(),
         }
     }
 
-    /// The clause with a conjunct replaced by the body of a clause that concludes it, whose variables are renamed by `depth`;
-    /// none if the two do not meet.
+    /// Resolves the conjunct at `at` with a clause that concludes it, whose variables are renamed
+    /// by `depth`. `None` if the two do not unify.
     pub fn unfolded(&self, at: usize, by: &Self, depth: usize) -> Option<Self> {
         let Literal::Holds(_, wanted) = &self.body[at] else { return None };
-        let own = by.body.iter().flat_map(Literal::operands).chain(&by.arguments);
-        let names = own.filter_map(|own| match own {
+        let operands = by.body.iter().flat_map(Literal::operands).chain(&by.arguments);
+        let names = operands.filter_map(|operand| match operand {
             Operand::Variable(name) => Some(name.clone()),
             Operand::Constant(_) => None,
         });

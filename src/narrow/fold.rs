@@ -1,8 +1,8 @@
-//! What follows whatever the robot does, decided once: derived predicates to initial facts.
+//! Partial evaluation of derived predicates: those that no action can change become initial facts.
 //!
-//! The clauses of settled predicates (`settle`) have no negated atoms, so that what they hold of is their least fixpoint over the
-//! facts that are stated: the same set in every state. It is computed by naive evaluation, in which each clause asks first for
-//! what restricts most.
+//! The clauses of settled predicates (`settle`) have no negated atoms, so their extension is the
+//! least fixpoint over the stated facts, the same set in every state. It is computed by naive
+//! evaluation, in which each clause matches its most restrictive atoms first.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
@@ -20,8 +20,9 @@ pub(super) struct Folded {
 }
 
 impl Folded {
-    /// Settles what it can of the predicates in `known`, and of predicates whose axioms mention nothing else. Actions and timed
-    /// initial literals change the predicates in `changed`; of these, timed initial literals change those in `timed`.
+    /// Settles predicates in `known`, and predicates whose axioms mention no others, as far as
+    /// possible. Actions and timed initial literals change the predicates in `changed`; of these,
+    /// timed initial literals change those in `timed`.
     pub fn new(
         domain: &Domain,
         (changed, timed): (&BTreeSet<Name>, &BTreeSet<Name>),
@@ -33,23 +34,24 @@ impl Folded {
             .iter()
             .map(|axiom| (&axiom.head.identifier.name, clause::clauses(axiom)))
             .collect();
-        let known = with_small(&axioms, known.clone());
-        let mut all: BTreeMap<Name, Option<Vec<Clause>>> = BTreeMap::new();
+        let vocabulary = with_small(&axioms, known.clone());
+        let mut clauses_by_head: BTreeMap<Name, Option<Vec<Clause>>> = BTreeMap::new();
         for (head, clauses) in axioms {
-            add(&mut all, head, clauses.filter(|_| known.contains(head)));
+            add(&mut clauses_by_head, head, clauses.filter(|_| vocabulary.contains(head)));
         }
-        let (settled, open) = settle(all, changed, guards);
-        let possible = Possible::new(domain, &open, (changed, timed), &|class| known.contains(class));
+        let (settled, open) = settle(clauses_by_head, changed, guards);
+        let possible = Possible::new(domain, &open, (changed, timed), &|class| vocabulary.contains(class));
         Self { settled, possible }
     }
 
-    /// Takes what is settled out of the axioms of a domain.
+    /// Removes the axioms of settled predicates from a domain.
     pub fn shorten(&self, domain: &mut Domain) {
-        domain.derived.retain(|own| !self.settled.contains_key(&own.head.identifier.name));
+        domain.derived.retain(|axiom| !self.settled.contains_key(&axiom.head.identifier.name));
         self.possible.restrict(domain);
     }
 
-    /// What is settled, and what is possible of the rest, given what is stated of which objects.
+    /// Returns the facts of settled predicates and the bounds of the open ones, given the stated
+    /// facts and the types of objects.
     pub fn facts(
         &self,
         stated: &BTreeSet<Fact>,
@@ -58,16 +60,16 @@ impl Folded {
     ) -> BTreeSet<Fact> {
         let settled: Vec<&Clause> = self.settled.values().flatten().collect();
         let mut facts = fixpoint(&settled, stated, objects, is_of);
-        let mut all: BTreeSet<Fact> = stated.union(&facts).cloned().collect();
-        all.extend(self.possible.added(&all));
+        let mut fixed: BTreeSet<Fact> = stated.union(&facts).cloned().collect();
+        fixed.extend(self.possible.added(&fixed));
         let open: Vec<&Clause> = self.possible.clauses().collect();
-        facts.extend(self.possible.bounds(fixpoint(&open, &all, objects, is_of)));
+        facts.extend(self.possible.bounds(fixpoint(&open, &fixed, objects, is_of)));
         facts
     }
 }
 
-/// Adds to `known` the predicates whose axioms mention only predicates in it. Those of other axioms, for example about maps, may hold of
-/// very much.
+/// Adds to `known` the predicates whose axioms mention only predicates in it. Other axioms, for
+/// example about maps, may have very large extensions.
 fn with_small(axioms: &[(&Name, Option<Vec<Clause>>)], mut known: HashSet<Name>) -> HashSet<Name> {
     let is_small = |clauses: &[Clause], known: &HashSet<Name>| {
         let is_known = |part: &Literal| match part {
@@ -83,8 +85,8 @@ fn with_small(axioms: &[(&Name, Option<Vec<Clause>>)], mut known: HashSet<Name>)
             clauses.as_ref().is_some_and(|clauses| is_small(clauses, &known))
         };
         let next = large.iter().copied().find(|head| {
-            let mut own = axioms.iter().filter(|(other, _)| other == head);
-            own.all(|axiom| is_small(&axiom))
+            let mut matching = axioms.iter().filter(|(other, _)| other == head);
+            matching.all(|axiom| is_small(&axiom))
         });
         let Some(next) = next else { return known };
         large.remove(next);
@@ -92,27 +94,28 @@ fn with_small(axioms: &[(&Name, Option<Vec<Clause>>)], mut known: HashSet<Name>)
     }
 }
 
-/// What follows from facts by clauses.
+/// Computes the least fixpoint of clauses over the stated facts.
 fn fixpoint(
     clauses: &[&Clause],
     stated: &BTreeSet<Fact>,
     objects: &BTreeSet<Name>,
     is_of: &dyn Fn(&Name, &Name) -> bool,
 ) -> BTreeSet<Fact> {
-    let mut known = Known { relations: HashMap::new(), objects };
+    let mut relations = Relations { relations: HashMap::new(), objects };
     let parts = clauses.iter().flat_map(|clause| &clause.body);
     let types: BTreeSet<&Name> = parts.filter(|part| part.is_type()).filter_map(Literal::name).collect();
     for relation in types {
         let r#type = Name::new(relation.as_str().split(' ').nth(1).unwrap_or_default());
         for object in objects.iter().filter(|object| is_of(object, &r#type)) {
-            known.insert(relation, vec![object.clone()]);
+            relations.insert(relation, vec![object.clone()]);
         }
     }
     for (predicate, arguments) in stated {
-        known.insert(predicate, arguments.clone());
+        relations.insert(predicate, arguments.clone());
     }
     let mut facts = BTreeSet::new();
-    // The predicates that have grown since a clause was last evaluated; in the first round all of them.
+    // Predicates that have grown in the last round; clauses without any of them are skipped. `None`
+    // in the first round.
     let mut grown: Option<BTreeSet<Name>> = None;
     loop {
         let has_grown = |part: &Literal| {
@@ -121,22 +124,22 @@ fn fixpoint(
         let is_due = |clause: &&Clause| grown.is_none() || clause.body.iter().any(has_grown);
         let mut new = Vec::new();
         for clause in clauses.iter().copied().filter(is_due) {
-            let order = known.order(&clause.body);
-            known.matches(&order, &mut BTreeMap::new(), &mut |found| {
-                known.heads(clause, found, &mut new);
+            let order = relations.order(&clause.body);
+            relations.matches(&order, &mut BTreeMap::new(), &mut |bindings| {
+                relations.heads(clause, bindings, &mut new);
             });
         }
-        let mut more = BTreeSet::new();
+        let mut changed = BTreeSet::new();
         for (head, arguments) in new {
-            if known.insert(&head, arguments.clone()) {
-                more.insert(head.clone());
+            if relations.insert(&head, arguments.clone()) {
+                changed.insert(head.clone());
                 facts.insert((head, arguments));
             }
         }
-        if more.is_empty() {
+        if changed.is_empty() {
             return facts;
         }
-        grown = Some(more);
+        grown = Some(changed);
     }
 }
 
@@ -148,19 +151,19 @@ fn add(all: &mut BTreeMap<Name, Option<Vec<Clause>>>, head: &Name, more: Option<
     }
 }
 
-/// What variables stand for.
-type Found<'k> = BTreeMap<&'k Name, &'k Name>;
+/// Variable bindings.
+type Bindings<'k> = BTreeMap<&'k Name, &'k Name>;
 
 /// The arguments for which a predicate holds, in the order of their discovery and as a set.
 type Rows = (Vec<Vec<Name>>, HashSet<Vec<Name>>);
 
-/// What holds so far.
-struct Known<'o> {
+/// Derived facts, by predicate.
+struct Relations<'o> {
     relations: HashMap<Name, Rows>,
     objects: &'o BTreeSet<Name>,
 }
 
-impl Known<'_> {
+impl Relations<'_> {
     fn insert(&mut self, predicate: &Name, arguments: Vec<Name>) -> bool {
         let (rows, all) = self.relations.entry(predicate.clone()).or_default();
         let is_new = all.insert(arguments.clone());
@@ -174,25 +177,28 @@ impl Known<'_> {
         self.relations.get(predicate).map_or(&[], |(rows, _)| rows)
     }
 
-    /// The conjuncts: those that share variables with others before them first, small relations first; types and inequalities as soon
-    /// as they are tests.
+    /// Orders the conjuncts: atoms that share variables with earlier ones first, small relations
+    /// first; types and inequalities as soon as their variables are bound.
     fn order<'b>(&self, body: &'b [Literal]) -> Vec<&'b Literal> {
+        // Greedy join ordering: each step takes the cheapest remaining conjunct.
         let (mut left, mut order): (Vec<&Literal>, Vec<&Literal>) = (body.iter().collect(), Vec::new());
         let mut bound: BTreeSet<&Name> = BTreeSet::new();
         while !left.is_empty() {
             let cost = |part: &Literal| {
                 let operands = part.operands();
                 let is_free =
-                    |own: &&&Operand| matches!(own, Operand::Variable(name) if !bound.contains(name));
+                    |operand: &&&Operand| matches!(operand, Operand::Variable(name) if !bound.contains(name));
                 let free = operands.iter().filter(is_free).count();
                 let rows = part.name().map_or(0, |name| self.rows(name).len());
                 let is_test = part.name().is_none() || part.is_type();
                 let is_apart = free == operands.len() && !bound.is_empty();
+                // Lexicographic: fully bound conjuncts, no unbound tests, no Cartesian products,
+                // few new variables, and small relations come first.
                 (free > 0, is_test && free > 0, is_apart && free > 0, free, rows)
             };
             let best = (0..left.len()).min_by_key(|&index| cost(left[index])).unwrap_or(0);
             let next = left.remove(best);
-            bound.extend(next.operands().into_iter().filter_map(|own| match own {
+            bound.extend(next.operands().into_iter().filter_map(|operand| match operand {
                 Operand::Variable(name) => Some(name),
                 Operand::Constant(_) => None,
             }));
@@ -201,11 +207,16 @@ impl Known<'_> {
         order
     }
 
-    fn matches<'k>(&'k self, order: &[&'k Literal], found: &mut Found<'k>, each: &mut dyn FnMut(&Found<'k>)) {
+    fn matches<'k>(
+        &'k self,
+        order: &[&'k Literal],
+        found: &mut Bindings<'k>,
+        each: &mut dyn FnMut(&Bindings<'k>),
+    ) {
         let Some((part, rest)) = order.split_first() else { return each(found) };
-        let free = part.operands().into_iter().find(|own| value(own, found).is_none());
+        let free = part.operands().into_iter().find(|operand| value(operand, found).is_none());
         match (part, free) {
-            // No atom binds this variable: it stands for anything.
+            // No atom binds this variable, so it ranges over all objects.
             (Literal::Equal(..), Some(Operand::Variable(name))) => {
                 for object in self.objects {
                     found.insert(name, object);
@@ -220,6 +231,7 @@ impl Known<'_> {
             }
             (Literal::Holds(predicate, operands), _) => {
                 for row in self.rows(predicate) {
+                    // A partial match may have bound some variables before it failed.
                     let before = found.clone();
                     if row.len() == operands.len()
                         && operands.iter().zip(row).all(|(operand, argument)| bind(operand, argument, found))
@@ -232,9 +244,9 @@ impl Known<'_> {
         }
     }
 
-    /// The instances of a head; arguments that the body does not bind stand for anything.
-    fn heads(&self, clause: &Clause, found: &Found<'_>, new: &mut Vec<Fact>) {
-        let mut rows: Vec<(Vec<Name>, Found<'_>)> = vec![(Vec::new(), found.clone())];
+    /// Adds the instances of a head. Arguments that the body does not bind range over all objects.
+    fn heads(&self, clause: &Clause, found: &Bindings<'_>, new: &mut Vec<Fact>) {
+        let mut rows: Vec<(Vec<Name>, Bindings<'_>)> = vec![(Vec::new(), found.clone())];
         for argument in &clause.arguments {
             rows = rows
                 .into_iter()
@@ -243,9 +255,9 @@ impl Known<'_> {
                         (Some(known), _) => vec![(known.clone(), found)],
                         (None, Operand::Variable(name)) => {
                             let with = |object| {
-                                let mut own = found.clone();
-                                own.insert(name, object);
-                                (Name::clone(object), own)
+                                let mut extended = found.clone();
+                                extended.insert(name, object);
+                                (Name::clone(object), extended)
                             };
                             self.objects.iter().map(with).collect()
                         }
@@ -259,14 +271,14 @@ impl Known<'_> {
     }
 }
 
-fn value<'k>(operand: &'k Operand, found: &Found<'k>) -> Option<&'k Name> {
+fn value<'k>(operand: &'k Operand, found: &Bindings<'k>) -> Option<&'k Name> {
     match operand {
         Operand::Variable(name) => found.get(name).copied(),
         Operand::Constant(name) => Some(name),
     }
 }
 
-fn bind<'k>(operand: &'k Operand, argument: &'k Name, found: &mut Found<'k>) -> bool {
+fn bind<'k>(operand: &'k Operand, argument: &'k Name, found: &mut Bindings<'k>) -> bool {
     match operand {
         Operand::Constant(name) => name == argument,
         Operand::Variable(name) => {

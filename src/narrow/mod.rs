@@ -1,11 +1,12 @@
-//! Narrowing: an equivalent and smaller task for the planner.
+//! Narrowing: computes an equivalent and smaller task for the planner.
 //!
-//! A domain in PLANTA's form is completed with hundreds of axioms, and actions change little of what they conclude. Derived predicates
-//! that no action can change become initial facts (`settle`, `fold`). The others get an upper bound, a static predicate
-//! that holds wherever they can hold (`possible`), so that grounding looks at few objects.
+//! A domain in PLANTA's form is completed with hundreds of axioms, and actions change few of their
+//! conclusions. Derived predicates that no action can change become initial facts (`settle`,
+//! `fold`). The others get an upper bound, a static predicate that is true wherever they can be
+//! true (`possible`), so that grounding enumerates few objects.
 //!
-//! The planner alone uses this. What a mission says, exports and certifies is the task before narrowing, with which the checker compares the
-//! ground task.
+//! Only the planner uses narrowing. Messages, exports and certificates are about the task before
+//! narrowing, with which the checker compares the ground task.
 
 mod clause;
 mod fold;
@@ -23,7 +24,8 @@ use clause::Fact;
 use fold::Folded;
 use settle::Guards;
 
-/// A domain and a problem with the same plans as those of a mission, smaller if its knowledge base completes its domain.
+/// Returns a domain and a problem with the same plans as those of a mission. They are smaller if
+/// its knowledge base completes its domain.
 ///
 /// `domain` and `problem` may be variants of the mission's own, with another state or goal.
 pub(crate) fn narrowed<'t>(
@@ -40,8 +42,8 @@ pub(crate) fn narrowed<'t>(
     }
 }
 
-/// Narrows the predicates in `known` and what follows from them. Other predicates are of maps and tasks and may hold of very much, so that
-/// they are left to grounding.
+/// Narrows the predicates in `known` and their consequences. Other predicates are of maps and tasks
+/// and may have large extensions, so grounding handles them.
 fn narrow(domain: &Domain, problem: &Problem, known: &HashSet<Name>) -> (Domain, Problem) {
     let mentioned = Mentioned::by_domain(domain).and_problem(problem);
     let facts: BTreeSet<Fact> = problem
@@ -87,12 +89,12 @@ fn drop_unused(domain: &mut Domain, problem: &Problem) {
     let derived = std::mem::take(&mut domain.derived);
     let mut used = Mentioned::by_domain(domain).and_problem(problem).predicates;
     loop {
-        let mut more = Mentioned::default();
+        let mut mentioned = Mentioned::default();
         for axiom in derived.iter().filter(|axiom| used.contains(&axiom.head.identifier.name)) {
-            more.condition(&axiom.condition);
+            mentioned.condition(&axiom.condition);
         }
         let count = used.len();
-        used.extend(more.predicates);
+        used.extend(mentioned.predicates);
         if used.len() == count {
             break;
         }

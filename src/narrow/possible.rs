@@ -1,10 +1,10 @@
-//! What derived predicates can hold of at most, whatever actions do.
+//! Computes upper bounds on the extensions of derived predicates in all reachable states.
 //!
-//! A predicate that is not settled stays derived. That it can hold of few things only, though its parameters have no types, is
-//! known all the same: nothing else than what actions add can make it hold of more. So for each such predicate there is one more,
-//! `possible-…`, which no action changes and which holds wherever the predicate can; an atom and the conjunction of both are the
-//! same in every state. Who goes through all objects that a variable can stand for, as the checker of certificates does, goes
-//! through few.
+//! An open predicate stays derived. Its parameters have no types, but only facts that actions add
+//! can extend it, which often leaves few candidates. So each such predicate gets a companion,
+//! `possible-…`, which no action changes and which is true wherever the predicate can be true. An
+//! atom is equivalent to its conjunction with the companion in every state. Grounding and the
+//! certificate checker then enumerate few objects for each variable.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -22,14 +22,14 @@ struct Addition {
     arguments: Vec<Argument>,
 }
 
-/// What an argument of it can be: one object, or what some classes hold of.
+/// Possible values of an argument: one object, or the common members of some classes.
 #[derive(Debug, Clone)]
 enum Argument {
     Object(Name),
     Of(Vec<Name>),
 }
 
-/// The predicates that have a bound, and what it is made of.
+/// The bounded predicates, and the data of their bounds.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Possible {
     bounded: BTreeSet<Name>,
@@ -39,8 +39,8 @@ pub(super) struct Possible {
 }
 
 impl Possible {
-    /// Which of the open predicates, with clauses or without, have a bound: those that depend on changed ones of which it is asked
-    /// that their arguments are in classes of the knowledge base.
+    /// Determines the open predicates that have a bound: those that depend only on changed
+    /// predicates whose arguments must be members of classes of the knowledge base.
     pub fn new(
         domain: &Domain,
         open: &BTreeMap<Name, Option<Vec<Clause>>>,
@@ -48,25 +48,26 @@ impl Possible {
         is_class: &dyn Fn(&Name) -> bool,
     ) -> Self {
         let mut free = timed.clone();
-        free.extend(open.iter().filter(|(_, own)| own.is_none()).map(|(name, _)| name.clone()));
-        // What a settled predicate holds of is computed before the bounds; an open one may hold of more things in other states.
+        free.extend(open.iter().filter(|(_, clauses)| clauses.is_none()).map(|(name, _)| name.clone()));
+        // The extensions of settled predicates are computed before the bounds; those of open
+        // predicates may be larger in other states.
         let varying: BTreeSet<Name> = changed.iter().chain(open.keys()).cloned().collect();
-        let mut all = Vec::new();
+        let mut additions_of_actions = Vec::new();
         for action in &domain.actions {
             let Additions { classes, atoms } = additions(action, &varying);
             for (atom, bound) in atoms {
                 let argument = |term: &Term| match term {
-                    Term::Constant(own) => Some(Argument::Object(own.name.clone())),
-                    Term::Variable(own) if bound.contains(&&own.name) => None,
+                    Term::Constant(constant) => Some(Argument::Object(constant.name.clone())),
+                    Term::Variable(variable) if bound.contains(&&variable.name) => None,
                     Term::Variable(_) => {
-                        let own = classes.iter().filter(|(class, of)| is_class(class) && same(of, term));
-                        let own: Vec<Name> = own.map(|(class, _)| class.clone()).collect();
-                        (!own.is_empty()).then_some(Argument::Of(own))
+                        let required = classes.iter().filter(|(class, of)| is_class(class) && same(of, term));
+                        let required: Vec<Name> = required.map(|(class, _)| class.clone()).collect();
+                        (!required.is_empty()).then_some(Argument::Of(required))
                     }
                 };
                 let predicate = atom.predicate.name.clone();
                 match atom.arguments.iter().map(argument).collect() {
-                    Some(arguments) => all.push(Addition { predicate, arguments }),
+                    Some(arguments) => additions_of_actions.push(Addition { predicate, arguments }),
                     None => {
                         free.insert(predicate);
                     }
@@ -76,45 +77,47 @@ impl Possible {
         loop {
             let is_free = |part: &Literal| part.name().is_some_and(|name| free.contains(name));
             let asks = |clauses: &Vec<Clause>| {
-                clauses.iter().any(|own| !own.is_bound() || own.body.iter().any(is_free))
+                clauses.iter().any(|clause| !clause.is_bound() || clause.body.iter().any(is_free))
             };
-            let more =
-                open.iter().filter(|(name, own)| !free.contains(*name) && own.as_ref().is_none_or(asks));
-            let more: Vec<Name> = more.map(|(name, _)| name.clone()).collect();
-            if more.is_empty() {
+            let newly_free = open
+                .iter()
+                .filter(|(name, clauses)| !free.contains(*name) && clauses.as_ref().is_none_or(asks));
+            let newly_free: Vec<Name> = newly_free.map(|(name, _)| name.clone()).collect();
+            if newly_free.is_empty() {
                 break;
             }
-            free.extend(more);
+            free.extend(newly_free);
         }
         let bounded: BTreeSet<Name> = open.keys().filter(|name| !free.contains(*name)).cloned().collect();
         let clauses = bounded.iter().filter_map(|name| open[name].clone()).flatten().collect();
-        Self { bounded, additions: all, clauses }
+        Self { bounded, additions: additions_of_actions, clauses }
     }
 
     pub fn clauses(&self) -> impl Iterator<Item = &Clause> {
         self.clauses.iter()
     }
 
-    /// Facts that actions may add, given the facts that hold in every state: those that are stated, and those of settled predicates.
+    /// Returns the facts that actions may add, given the facts that are true in every state: stated
+    /// facts, and facts of settled predicates.
     pub fn added(&self, fixed: &BTreeSet<Fact>) -> BTreeSet<Fact> {
         let members = |class: &Name| -> BTreeSet<Name> {
-            let own = fixed.iter().filter(|(name, row)| name == class && row.len() == 1);
-            own.map(|(_, row)| row[0].clone()).collect()
+            let unary = fixed.iter().filter(|(name, row)| name == class && row.len() == 1);
+            unary.map(|(_, row)| row[0].clone()).collect()
         };
         let mut facts = BTreeSet::new();
         for addition in &self.additions {
             let mut rows: Vec<Vec<Name>> = vec![Vec::new()];
             for argument in &addition.arguments {
-                let own: BTreeSet<Name> = match argument {
+                let values: BTreeSet<Name> = match argument {
                     Argument::Object(object) => BTreeSet::from([object.clone()]),
                     Argument::Of(classes) => {
-                        let mut all = classes.iter().map(members);
-                        let first = all.next().unwrap_or_default();
-                        all.fold(first, |one, other| one.intersection(&other).cloned().collect())
+                        let mut members_by_class = classes.iter().map(members);
+                        let first = members_by_class.next().unwrap_or_default();
+                        members_by_class.fold(first, |one, other| one.intersection(&other).cloned().collect())
                     }
                 };
                 let longer = |row: &Vec<Name>| -> Vec<Vec<Name>> {
-                    own.iter().map(|object| [row.clone(), vec![object.clone()]].concat()).collect()
+                    values.iter().map(|object| [row.clone(), vec![object.clone()]].concat()).collect()
                 };
                 rows = rows.iter().flat_map(longer).collect();
             }
@@ -123,34 +126,35 @@ impl Possible {
         facts
     }
 
-    /// The bounds of the predicates, from all that can be derived.
+    /// Returns the companion facts of the bounded predicates among the derived facts.
     pub fn bounds(&self, derived: BTreeSet<Fact>) -> impl Iterator<Item = Fact> {
-        let own = derived.into_iter().filter(|(name, _)| self.bounded.contains(name));
-        own.map(|(name, row)| (possible(&name), row))
+        let bounded = derived.into_iter().filter(|(name, _)| self.bounded.contains(name));
+        bounded.map(|(name, row)| (possible(&name), row))
     }
 
-    /// Says in a domain of each atom that has a bound that it is possible.
+    /// Conjoins each atom of a bounded predicate in conditions, and each of their axioms, with the
+    /// companion.
     pub fn restrict(&self, domain: &mut Domain) {
         let declared: Vec<Declaration> = domain
             .predicates
             .iter()
-            .filter(|own| self.bounded.contains(&own.identifier.name))
+            .filter(|atom| self.bounded.contains(&atom.identifier.name))
             .cloned()
             .collect();
-        for own in declared {
-            let untyped = |own: TypedName| TypedName { r#type: TypeExpression::default(), ..own };
-            let identifier = possible(&own.identifier.name).into();
-            let parameters = own.parameters.into_iter().map(untyped).collect();
+        for atom in declared {
+            let untyped = |atom: TypedName| TypedName { r#type: TypeExpression::default(), ..atom };
+            let identifier = possible(&atom.identifier.name).into();
+            let parameters = atom.parameters.into_iter().map(untyped).collect();
             domain.predicates.push(Declaration { identifier, parameters });
         }
         for Derived { head, condition, .. } in &mut domain.derived {
             self.condition(condition);
             if self.bounded.contains(&head.identifier.name) {
                 let arguments =
-                    head.parameters.iter().map(|own| Term::Variable(own.identifier.clone())).collect();
-                let own = Atom { predicate: head.identifier.clone(), arguments, span: head.identifier.span };
+                    head.parameters.iter().map(|atom| Term::Variable(atom.identifier.clone())).collect();
+                let atom = Atom { predicate: head.identifier.clone(), arguments, span: head.identifier.span };
                 let inner = std::mem::replace(condition, Condition::And(Vec::new()));
-                *condition = Condition::And(vec![possible_atom(&own), inner]);
+                *condition = Condition::And(vec![possible_atom(&atom), inner]);
             }
         }
         for action in &mut domain.actions {
@@ -209,7 +213,7 @@ impl Possible {
     }
 }
 
-/// The name of the bound of a predicate.
+/// Name of the companion of a predicate.
 pub(super) fn possible(name: &Name) -> Name {
     Name::new(&format!("possible-{name}"))
 }

@@ -1,12 +1,15 @@
-//! Which derived predicates of a knowledge base no action and no event can change, and the clauses that decide them.
+//! Determines the derived predicates of a knowledge base that no action and no event can change,
+//! and their clauses.
 //!
-//! A predicate is *open* if an action or an event changes it, if it has an axiom that is not a clause, or if a clause for it asks for
-//! an open one. Taken as they stand, the axioms about domains and ranges open nearly everything: what
-//! `(functionGrounding ?f ?fd)` relates is concluded to be a function and a function design. Such a conclusion says nothing new
-//! where each action that adds the fact asks first whether its arguments are stated to be of that class (a *guard*), and where
-//! the initial state keeps to it. So clauses of an open predicate are unfolded \[1\]; those that conclude what they ask for are
-//! dropped, and so are those with a fact that guards the conclusion. If no open atom is left, the predicate is *settled*.
-//! Each step keeps the least fixpoint as it is, in every state that can be reached.
+//! A predicate is *open* if an action or an event changes it, if it has an axiom that is not a
+//! clause, or if one of its clauses has an open atom in the body. Axioms about domains and ranges
+//! make nearly every predicate open: the arguments of `(functionGrounding ?f ?fd)` are concluded to
+//! be a function and a function design. Such a conclusion is redundant if each action that adds the
+//! fact requires its arguments to be stated members of that class (a *guard*), and if the initial
+//! state complies. So clauses of an open predicate are unfolded \[1\]. Clauses whose head occurs in
+//! their body are dropped, and so are those with a fact that guards the conclusion. If no open atom
+//! remains, the predicate is *settled*. Each step preserves the least fixpoint in every reachable
+//! state.
 //!
 //! \[1\] H. Tamaki, T. Sato: Unfold/fold transformation of logic programs, ICLP 1984.
 
@@ -16,30 +19,36 @@ use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Effect, Name, Term}
 
 use super::clause::{Clause, Fact, Literal, Operand};
 
-/// How often a clause is unfolded, and how many clauses of one predicate that may make.
-const DEPTH: usize = 8;
-const CLAUSES: usize = 1000;
+/// Maximum depth of unfolding.
+const MAX_DEPTH: usize = 8;
+/// Maximum number of clauses that are examined while one predicate is unfolded.
+const MAX_CLAUSES: usize = 1000;
 
-/// That arguments of a fact which actions add are stated to be of some classes: predicate, position, class.
+/// Guards: the arguments at a position of facts that actions add are members of a class. A guard is
+/// a predicate, a position and a class.
 pub(super) type Guards = BTreeSet<(Name, usize, Name)>;
 
-/// The classes that all actions of a domain require of the arguments of the facts that they add. A class guards only if the initial
-/// state alone decides what belongs to it, so that `varying` has the predicates that actions or events change, and derived predicates.
+/// Returns the classes that all actions of a domain require of the arguments of the facts that they
+/// add. Only the initial state may decide the members of a guard's class, so `varying` contains the
+/// predicates that actions or events change, and derived predicates.
 pub(super) fn guards(domain: &Domain, varying: &BTreeSet<Name>, timed: &BTreeSet<Name>) -> Guards {
-    let mut found: BTreeMap<(Name, usize), BTreeSet<Name>> = BTreeMap::new();
+    let mut guards: BTreeMap<(Name, usize), BTreeSet<Name>> = BTreeMap::new();
     for action in &domain.actions {
         let Additions { classes, atoms } = additions(action, varying);
         for (atom, bound) in atoms {
             for (position, argument) in atom.arguments.iter().enumerate() {
                 let is_asked = |of: &Term| same(of, argument) && !is_bound(argument, &bound);
-                let own = classes.iter().filter(|(_, of)| is_asked(of)).map(|(class, _)| class.clone());
-                let own: BTreeSet<Name> = own.collect();
+                let required = classes.iter().filter(|(_, of)| is_asked(of)).map(|(class, _)| class.clone());
+                let required: BTreeSet<Name> = required.collect();
                 let key = (atom.predicate.name.clone(), position);
-                found.entry(key).and_modify(|all| all.retain(|class| own.contains(class))).or_insert(own);
+                guards
+                    .entry(key)
+                    .and_modify(|all| all.retain(|class| required.contains(class)))
+                    .or_insert(required);
             }
         }
     }
-    let each = found.into_iter().filter(|((predicate, _), _)| !timed.contains(predicate));
+    let each = guards.into_iter().filter(|((predicate, _), _)| !timed.contains(predicate));
     each.flat_map(|((predicate, position), classes)| {
         classes.into_iter().map(move |class| (predicate.clone(), position, class))
     })
@@ -48,17 +57,18 @@ pub(super) fn guards(domain: &Domain, varying: &BTreeSet<Name>, timed: &BTreeSet
 
 /// The facts that an action adds, and the classes that it requires of objects.
 pub(super) struct Additions<'a> {
-    /// Predicates of one argument, and the argument.
+    /// Classes with the argument that has to be a member.
     pub classes: Vec<(Name, &'a Term)>,
     /// Added atoms, each with the variables that quantifiers within the effect bind.
     pub atoms: Vec<(&'a Atom, Vec<&'a Name>)>,
 }
 
-/// The additions of an action. Predicates in `varying` are no classes.
+/// Returns the additions of an action. Predicates in `varying` do not count as classes.
 pub(super) fn additions<'a>(action: &'a Action, varying: &BTreeSet<Name>) -> Additions<'a> {
     let (conditions, effects): (Vec<&Condition>, Vec<&Effect>) = match &action.body {
         ActionBody::Instantaneous { precondition, effect } => (vec![precondition], vec![effect]),
-        // A condition at the start need not hold when the action adds the fact; classes are never changed.
+        // A condition at the start need not hold when the action adds the fact, but classes never
+        // change.
         ActionBody::Durative { conditions, effects, .. } => {
             (conditions.iter().map(|(_, own)| own).collect(), effects.iter().map(|(_, own)| own).collect())
         }
@@ -70,13 +80,15 @@ pub(super) fn additions<'a>(action: &'a Action, varying: &BTreeSet<Name>) -> Add
     Additions { classes: classes(&conditions, varying), atoms }
 }
 
-/// The unary atoms that a condition requires, without those of `varying` predicates, which may hold of other things in other states.
+/// Returns the unary atoms that a condition requires, except for `varying` predicates, whose
+/// members differ between states.
 fn classes<'c>(asked: &[&'c Condition], varying: &BTreeSet<Name>) -> Vec<(Name, &'c Term)> {
     let (mut parts, mut found) = (asked.to_vec(), Vec::new());
     while let Some(part) = parts.pop() {
         match part {
             Condition::And(more) => parts.extend(more),
             Condition::Atom(atom) if !varying.contains(&atom.predicate.name) => {
+                // Only unary predicates are classes.
                 if let [own] = &atom.arguments[..] {
                     found.push((atom.predicate.name.clone(), own));
                 }
@@ -97,9 +109,10 @@ fn added<'e>(effect: &'e Effect, bound: &[&'e Name], found: &mut Vec<(&'e Atom, 
         }
         Effect::Add(atom) => found.push((atom, bound.to_vec())),
         Effect::ForAll(variables, inner) => {
-            let own = variables.iter().map(|own| &own.identifier.name);
-            added(inner, &bound.iter().copied().chain(own).collect::<Vec<_>>(), found);
+            let quantified = variables.iter().map(|variable| &variable.identifier.name);
+            added(inner, &bound.iter().copied().chain(quantified).collect::<Vec<_>>(), found);
         }
+        // The condition of the effect only restricts the added facts, so ignoring it is safe.
         Effect::When(_, inner) => added(inner, bound, found),
         Effect::Delete(_) | Effect::Assign(..) => {}
     }
@@ -118,10 +131,11 @@ fn is_bound(term: &Term, bound: &[&Name]) -> bool {
     matches!(term, Term::Variable(own) if bound.contains(&&own.name))
 }
 
-/// The clauses of settled predicates, and those of the others.
+/// The clauses of settled predicates, and those of open predicates.
 pub(super) type Parted = (BTreeMap<Name, Vec<Clause>>, BTreeMap<Name, Option<Vec<Clause>>>);
 
-/// The clauses of settled predicates, in which no open predicate occurs.
+/// Unfolds clauses until no further predicate becomes settled. Returns the settled clauses, in
+/// which no open predicate occurs, and the open ones.
 pub(super) fn settle(
     mut all: BTreeMap<Name, Option<Vec<Clause>>>,
     changed: &BTreeSet<Name>,
@@ -130,34 +144,35 @@ pub(super) fn settle(
     loop {
         let open = open(&all, changed);
         let candidates = all.keys().filter(|head| open.contains(*head));
-        let found = candidates.into_iter().find_map(|head| {
+        let resolved = candidates.into_iter().find_map(|head| {
             let clauses = Unfold { all: &all, open: &open, guards, head }.clauses()?;
             Some((head.clone(), clauses))
         });
-        let Some((head, clauses)) = found else {
+        let Some((head, clauses)) = resolved else {
             let (open, settled): (BTreeMap<_, _>, BTreeMap<_, _>) =
                 all.into_iter().partition(|(head, _)| open.contains(head));
             let settled = settled.into_iter().filter_map(|(head, clauses)| Some((head, clauses?)));
             return (settled.collect(), open);
         };
+        // A newly settled predicate may make further predicates settled, so the loop starts again.
         all.insert(head, Some(clauses));
     }
 }
 
-/// The predicates that may change from state to state.
+/// Returns the predicates that may differ between states.
 fn open(all: &BTreeMap<Name, Option<Vec<Clause>>>, changed: &BTreeSet<Name>) -> BTreeSet<Name> {
     let mut open = changed.clone();
     loop {
         let asks = |clauses: &Vec<Clause>| clauses.iter().any(|clause| first_open(clause, &open).is_some());
-        let more: Vec<Name> = all
+        let newly_open: Vec<Name> = all
             .iter()
             .filter(|(head, clauses)| !open.contains(*head) && clauses.as_ref().is_none_or(asks))
             .map(|(head, _)| head.clone())
             .collect();
-        if more.is_empty() {
+        if newly_open.is_empty() {
             return open;
         }
-        open.extend(more);
+        open.extend(newly_open);
     }
 }
 
@@ -165,7 +180,7 @@ fn first_open(clause: &Clause, open: &BTreeSet<Name>) -> Option<usize> {
     clause.body.iter().position(|part| matches!(part, Literal::Holds(name, _) if open.contains(name)))
 }
 
-/// One predicate whose clauses are unfolded.
+/// Unfolding of one predicate's clauses.
 struct Unfold<'a> {
     all: &'a BTreeMap<Name, Option<Vec<Clause>>>,
     open: &'a BTreeSet<Name>,
@@ -174,35 +189,40 @@ struct Unfold<'a> {
 }
 
 impl Unfold<'_> {
-    /// Clauses without open atoms; none if some are left.
+    /// Returns clauses without open atoms, or `None` if open atoms remain.
     fn clauses(&self) -> Option<Vec<Clause>> {
-        let mut left: Vec<(Clause, usize)> =
+        let mut agenda: Vec<(Clause, usize)> =
             self.all[self.head].as_ref()?.iter().map(|clause| (clause.clone(), 0)).collect();
         let (mut done, mut count) = (BTreeSet::new(), 0);
-        while let Some((clause, depth)) = left.pop() {
+        while let Some((clause, depth)) = agenda.pop() {
             count += 1;
-            if count > CLAUSES {
+            // Unfolding may grow exponentially; an unsettled predicate is merely less efficient.
+            if count > MAX_CLAUSES {
                 return None;
             }
             if self.says_nothing(&clause) {
                 continue;
             }
             let Some(at) = first_open(&clause, self.open) else {
+                // A set removes the duplicates that different unfoldings produce.
                 done.insert(clause);
                 continue;
             };
             let Literal::Holds(name, _) = &clause.body[at] else { return None };
-            if depth >= DEPTH || name == self.head {
+            // Recursive clauses cannot be unfolded completely.
+            if depth >= MAX_DEPTH || name == self.head {
                 return None;
             }
-            // What actions change has no clauses, and not all axioms of a domain are clauses.
+            // Predicates that actions change have no clauses, and not all axioms of a domain are
+            // clauses.
             let by = self.all.get(name)?.as_ref()?;
-            left.extend(by.iter().filter_map(|by| Some((clause.unfolded(at, by, depth + 1)?, depth + 1))));
+            agenda.extend(by.iter().filter_map(|by| Some((clause.unfolded(at, by, depth + 1)?, depth + 1))));
         }
         Some(done.into_iter().collect())
     }
 
-    /// Whether a clause asks for what it concludes, or for a fact of which that is stated anyway.
+    /// Returns `true` if the clause is redundant: its body contains its head, or a fact that guards
+    /// its head.
     fn says_nothing(&self, clause: &Clause) -> bool {
         clause.body.iter().any(|part| {
             let Literal::Holds(name, operands) = part else { return false };
@@ -216,7 +236,7 @@ impl Unfold<'_> {
         })
     }
 
-    /// Returns `true` if a clause concludes the predicate of all members of a class.
+    /// Returns `true` if a clause concludes the predicate for all members of a class.
     fn holds_of_all(&self, class: &Name) -> bool {
         let is_inclusion = |clause: &Clause| match (&clause.body[..], &clause.arguments[..]) {
             ([Literal::Holds(name, operands)], [Operand::Variable(_)]) => {
@@ -228,7 +248,7 @@ impl Unfold<'_> {
     }
 }
 
-/// Whether a fact keeps to a guard, where so much is stated.
+/// Returns `true` if a fact complies with a guard, given the stated facts.
 pub(super) fn keeps(
     (predicate, arguments): &Fact,
     (guarded, position, class): &(Name, usize, Name),

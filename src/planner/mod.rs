@@ -1,6 +1,7 @@
-//! Plans for a mission: what is wanted in, plans that the validator has executed out, and nothing printed.
+//! Plans a mission: grounds it, optimizes it, and lets the validator execute each plan. Nothing is
+//! printed.
 //!
-//! This is what `metaplan plan` does between reading its arguments and writing its answer.
+//! `metaplan plan` is this module between the arguments and the output.
 
 mod objectives;
 mod planned;
@@ -30,7 +31,7 @@ pub use ::planner::{
 /// Callback that receives a short description of the work after the best plan is proved.
 type Stage<'a> = dyn FnMut(&str) + 'a;
 
-/// Hears of a better plan or a better bound.
+/// Callback for a better plan or a better bound.
 type Report<'a> = dyn FnMut(&Improvement) -> ControlFlow<()> + 'a;
 
 /// Plans for a mission in its present situation.
@@ -65,10 +66,12 @@ pub struct Planner<'m, 'r> {
 }
 
 impl<'m, 'r> Planner<'m, 'r> {
-    /// Fills the problem with what the mission's knowledge base contributes. There are no limits, and nobody hears of improvements.
+    /// Fills the problem with the contributions of the mission's knowledge base. The planner has no
+    /// limits and reports no improvements by default.
     ///
     /// # Errors
-    /// What the knowledge base contributes does not fit the domain; or M110, the knowledge contradicts itself.
+    /// Contributions of the knowledge base that do not fit the domain; or M110 if the knowledge is
+    /// inconsistent.
     pub fn new(mission: &'m Mission) -> Result<Self, Errors> {
         consistent(mission.knowledge())?;
         let (problem, warnings) = mission.filled()?;
@@ -85,55 +88,61 @@ impl<'m, 'r> Planner<'m, 'r> {
         })
     }
 
-    /// What may be other than meant in the problem as it was filled; [`Mission::warnings`] are those of its files.
+    /// Returns the warnings about the filled problem. [`Mission::warnings`] has the warnings about
+    /// its files.
     pub fn warnings(&self) -> &[Message] {
         &self.warnings
     }
 
-    /// What the optimizer is asked for, with its limits.
+    /// Sets the configuration of the optimizer, including its limits.
     #[must_use]
     pub fn config(mut self, config: Config) -> Self {
         self.config = config;
         self
     }
 
-    /// When to stop with the best plan so far; [`Limits::interrupt`] is a flag that another thread can set.
+    /// Sets the limits. A limit ends planning with the best plan found. [`Limits::interrupt`] is a
+    /// flag that another thread can set.
     #[must_use]
     pub fn limits(mut self, limits: Limits) -> Self {
         self.config.limits = limits;
         self
     }
 
-    /// Gives the best plan so far after this long, counted from now, grounding included.
+    /// Sets a time limit from now, grounding included. At the limit, planning ends with the best
+    /// plan found.
     #[must_use]
     pub fn time_limit(self, time: Duration) -> Self {
         let limits = self.config.limits.clone().with_time(time);
         self.limits(limits)
     }
 
-    /// What plans are measured by, the most important first, in place of the metric of the problem: expressions as in a metric, or
-    /// names of functions.
+    /// Replaces the metric of the problem by objectives, the most important first: expressions as
+    /// in a metric, or names of functions.
     #[must_use]
     pub fn minimize(mut self, objectives: impl IntoIterator<Item = impl Into<String>>) -> Self {
         self.minimize = objectives.into_iter().map(Into::into).collect();
         self
     }
 
-    /// Actions may overlap, as PDDL 2.1 has it; those that interfere lie `separation` apart, in the domain's time unit.
+    /// Allows actions to overlap as in PDDL 2.1. Interfering happenings are at least `separation`
+    /// apart, in the domain's time unit.
     #[must_use]
     pub fn concurrent(mut self, separation: impl Into<Option<BigRational>>) -> Self {
         self.separation = separation.into();
         self
     }
 
-    /// Also up to so many further plans that are as good as the best one. Actions follow one another, and there is one objective.
+    /// Requests up to `most` further plans of the optimal cost. Requires sequential plans and a
+    /// single objective.
     #[must_use]
     pub fn alternatives(mut self, most: impl Into<Option<usize>>) -> Self {
         self.alternatives = most.into();
         self
     }
 
-    /// Hears of every better plan and better bound; planning ends with the best plan so far when it says `Break`.
+    /// Sets the callback for every better plan and better bound. Planning ends with the best plan
+    /// found if it returns `Break`.
     #[must_use]
     pub fn on_improvement(mut self, report: impl FnMut(&Improvement) -> ControlFlow<()> + 'r) -> Self {
         self.report = Box::new(report);
@@ -147,12 +156,13 @@ impl<'m, 'r> Planner<'m, 'r> {
         self
     }
 
-    /// The best plan, executed by the validator.
+    /// Computes the best plan and lets the validator execute it.
     ///
     /// # Errors
-    /// Every construct that the planner does not handle, with its place; what is wrong with an objective; M107, what is wanted does not go
-    /// together; that a limit was reached before the task was ground; or M170, a fault of the planner. A plan that is not proved
-    /// optimal, or none, is not an error: see [`Solution::status`].
+    /// All constructs that the planner does not support, with their places; faults of the
+    /// objectives; M107 if the options exclude each other; a limit that was reached before the task
+    /// was ground; or M170, a fault of the planner. A missing plan, or one that is not proved
+    /// optimal, is not an error: see [`Solution::status`].
     pub fn plan(self) -> Result<Planned<'m>, Errors> {
         let objectives = Objectives::read(self.mission, &self.problem, &self.minimize)?;
         let several = objectives.metrics.len() > 1;
@@ -169,8 +179,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         }
     }
 
-    /// The plans of which no other one is better by one of two objectives and not worse by the other, one for each pair of values; each is
-    /// executed by the validator. What [`Planner::minimize`] was told does not count.
+    /// Computes the Pareto front of two objectives: one plan for each pair of values, executed by
+    /// the validator. Replaces the objectives of [`Planner::minimize`].
     ///
     /// # Errors
     /// As [`Planner::plan`].
@@ -207,6 +217,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         if let Some(plan) = solution.plan.take() {
             let mut problem = self.problem.clone();
             problem.metric = objectives.metrics.first().cloned().or(problem.metric);
+            // The other half of the extended time remains for the validator.
             solution.plan = Some(lean(self.mission, &problem, plan, &reading, &limits.extended().half()));
         }
         let point = valued(solution, &objectives);
@@ -218,6 +229,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         let config = self.config.clone();
         let task = match self.mission.ground(&self.problem, &objectives.metrics, &config.limits) {
             Ok(task) => task,
+            // Rationals of any size are slower, so integers are tried first.
             Err(refused) if is_too_large(&refused) && self.alternatives.is_none() => {
                 return self.exact(objectives, refused);
             }
@@ -226,7 +238,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         let ground = began.elapsed();
         let point = planner::lexicographic(&task, &config, &mut self.hear());
         let reading = Reading::sequential(task.is_timed());
-        let others = match self.alternatives {
+        let alternatives = match self.alternatives {
             Some(most) => {
                 (self.stage)("the plan is proved; other plans that are as good are looked for");
                 self.others(&task, &point.solution, most)?
@@ -234,7 +246,8 @@ impl<'m, 'r> Planner<'m, 'r> {
             None => None,
         };
         let mut planned = self.planned(point, objectives, Ground::Integers(task), reading, ground)?;
-        planned.alternatives = others;
+        planned.alternatives = alternatives;
+        // The explanation needs further planning, which is only useful after a proof.
         if planned.solution.status == Status::Unsolvable {
             planned.blocking = blocking(planned.mission, &planned.problem, &config);
             planned.missing_values = missing_values(planned.mission);
@@ -242,8 +255,9 @@ impl<'m, 'r> Planner<'m, 'r> {
         Ok(planned)
     }
 
-    /// By search alone, in exact rationals.
+    /// Plans by search alone, in exact rationals.
     fn exact(self, objectives: Objectives, refused: Errors) -> Result<Planned<'m>, Errors> {
+        // The search in rationals supports a single objective.
         if objectives.metrics.len() > 1 {
             return Err(refused);
         }
@@ -257,7 +271,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         Ok(planned)
     }
 
-    /// Further plans; each is executed by the validator as the first one is.
+    /// Computes further plans; the validator executes each of them.
     fn others(&self, task: &Task, solution: &Solution, most: usize) -> Result<Option<Alternatives>, Errors> {
         let Some(mut found) = alternatives(task, solution, most, &self.config) else {
             return Ok(None);
@@ -268,6 +282,7 @@ impl<'m, 'r> Planner<'m, 'r> {
             match confirm(self.mission, &self.problem, &found.plans[index], &reading, limits) {
                 Ok(()) => {}
                 Err(Unconfirmed::Interrupted) => {
+                    // Plans that were not validated must not be returned.
                     found.plans.truncate(index);
                     found.complete = false;
                     break;
@@ -279,7 +294,7 @@ impl<'m, 'r> Planner<'m, 'r> {
         Ok(Some(found))
     }
 
-    /// An answer, once the validator has executed its plan.
+    /// Builds the result after the validator has executed the plan.
     fn planned(
         self,
         point: Point,
@@ -311,7 +326,8 @@ impl<'m, 'r> Planner<'m, 'r> {
         })
     }
 
-    /// What the optimizer tells, to who listens; the flag is set when that wants to end.
+    /// Returns a callback that forwards improvements to the listener, and sets the interruption
+    /// flag if the listener returns `Break`.
     fn hear(&mut self) -> impl FnMut(Improvement) {
         let flag = self.config.limits.interrupt();
         let report = &mut self.report;
@@ -335,30 +351,34 @@ impl fmt::Debug for Planner<'_, '_> {
     }
 }
 
-/// Refuses knowledge that contradicts itself: anything follows from it.
+/// Rejects inconsistent knowledge, from which anything follows.
 ///
 /// # Errors
-/// M110, each contradiction.
+/// M110 for each contradiction.
 pub fn consistent(knowledge: Option<&Knowledge>) -> Result<(), Errors> {
     let contradictions = knowledge.map(Knowledge::contradictions).unwrap_or_default();
-    Errors::unless_empty(contradictions.iter().map(|found| {
-        let text = format!("the knowledge is inconsistent: {}: {}", found.violated, found.facts.join(", "));
+    Errors::unless_empty(contradictions.iter().map(|contradiction| {
+        let text = format!(
+            "the knowledge is inconsistent: {}: {}",
+            contradiction.violated,
+            contradiction.facts.join(", ")
+        );
         Message::error("M110", text)
     }))
 }
 
-/// Whether numbers that are too large are all that is wrong with a task.
+/// Returns `true` if numbers that are too large (E304) are the only faults of a task.
 fn is_too_large(messages: &[Message]) -> bool {
     !messages.is_empty() && messages.iter().all(|message| message.code == "E304")
 }
 
-/// A solution by the only objective, if there is one.
+/// Point of a front for the solution of a single objective.
 fn valued(solution: Solution, objectives: &Objectives) -> Point {
     let cost = solution.plan.as_ref().map(|plan| plan.cost.clone());
     Point { values: cost.into_iter().filter(|_| !objectives.metrics.is_empty()).collect(), solution }
 }
 
-/// What does not go together.
+/// Error M107 for options that exclude each other.
 fn apart(text: &str) -> Errors {
     Message::error("M107", text).into()
 }

@@ -1,4 +1,4 @@
-//! What plans are measured by, and that they are.
+//! The objectives of a plan, and the validator's check of their values.
 
 use pddl::ast::{Metric, Problem};
 use planner::{Limits, Point};
@@ -6,17 +6,17 @@ use planner::{Limits, Point};
 use crate::message::{Errors, Message};
 use crate::mission::{Mission, Reading, Unconfirmed, confirm};
 
-/// Objectives in order; none for the problem's metric.
+/// The objectives in order. Empty for the problem's metric.
 #[derive(Debug, Clone)]
 pub(super) struct Objectives {
-    /// As the user has written them.
+    /// The objectives as the user wrote them.
     pub(super) texts: Vec<String>,
     pub(super) metrics: Vec<Metric>,
 }
 
 impl Objectives {
     /// # Errors
-    /// All that is wrong with each of them.
+    /// All faults of each objective.
     pub(super) fn read(mission: &Mission, problem: &Problem, texts: &[String]) -> Result<Self, Errors> {
         let mut metrics = Vec::new();
         let mut messages = Vec::new();
@@ -30,10 +30,11 @@ impl Objectives {
         Ok(Self { texts: texts.to_vec(), metrics })
     }
 
-    /// Has the validator execute the plan, and check its value by every objective.
+    /// Lets the validator execute the plan and check its value by every objective.
     ///
     /// # Errors
-    /// M170, what the validator refuses or measures otherwise; or M130, the time does not suffice.
+    /// M170 if the validator rejects the plan or computes another value; M130 if the time limit is
+    /// reached.
     pub(super) fn confirm(
         &self,
         mission: &Mission,
@@ -56,7 +57,7 @@ impl Objectives {
     }
 }
 
-/// Why a plan that was found is not shown.
+/// Error for a plan that the validator did not confirm.
 pub(super) fn unconfirmed(reason: Unconfirmed) -> Message {
     match reason {
         Unconfirmed::Refused(reason) => fault(&reason),
@@ -67,7 +68,7 @@ pub(super) fn unconfirmed(reason: Unconfirmed) -> Message {
     }
 }
 
-/// A fault of ours.
+/// Message about an internal fault of the planner (M170).
 pub(super) fn fault(reason: &str) -> Message {
     let text = format!("this is a fault of metaplan, not of your input; please report it: {reason}");
     Message::error("M170", text)

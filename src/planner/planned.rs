@@ -1,4 +1,4 @@
-//! Plans that were found, and what can be made of them.
+//! Results of planning a mission, and their conversion to answers, certificates and pictures.
 
 use std::path::Path;
 
@@ -13,35 +13,37 @@ use crate::mission::{Blocking, Mission, Planning as _, Reading, spaced};
 use crate::planner::objectives::Objectives;
 use crate::report::{Positions, Seen, front_sheet, plan_picture};
 
-/// What a mission grounds to.
+/// Ground task of a mission, by the kind of its plans.
 #[derive(Debug)]
 pub(super) enum Ground {
-    /// Steps one after another, in integers.
+    /// Sequential steps, with integers.
     Integers(Task),
-    /// Steps one after another, in rationals of any size.
+    /// Sequential steps, with rationals of any size.
     Exact(ExactTask),
-    /// Steps that overlap.
+    /// Overlapping steps.
     Concurrent,
 }
 
-/// What was found for a mission.
+/// Result of planning a mission.
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct Planned<'m> {
-    /// The plan and what is proved of it. Its actions have all arguments of the mission's domain, those that the knowledge base has added
-    /// to a plain one included; [`Planned::written`] is without them.
+    /// The plan and its proved properties. Actions have all arguments of the mission's domain,
+    /// including those that the knowledge base has added to a plain domain; [`Planned::written`]
+    /// omits these.
     pub solution: Solution,
-    /// What the plan comes to by each objective; empty if there is no plan, or if the problem's own metric counts.
+    /// Value of the plan by each objective. Empty if there is no plan, or if the problem's own
+    /// metric is minimised.
     pub values: Vec<Exact>,
-    /// Further plans that are as good, if they were asked for and the plan is proved optimal.
+    /// Further optimal plans, if requested and if the plan is proved optimal.
     pub alternatives: Option<Alternatives>,
-    /// Which designs keep the mission from having a plan, if it is proved that there is none.
+    /// Unavailable designs that prevent a plan, if the mission is proved unsolvable.
     pub blocking: Option<Blocking>,
-    /// If it is proved that there is no plan: numeric functions without a value that actions need.
+    /// Numeric functions without a value that actions need, if the mission is proved unsolvable.
     pub missing_values: Vec<MissingValue>,
-    /// Why it was planned by search alone, in exact numbers; empty if it was not.
+    /// Reasons for planning by search alone, in exact rationals. Empty if integers suffice.
     pub too_large: Vec<Message>,
-    /// How long things took before the search; that of reading is the caller's to add.
+    /// Times of the stages before the search. The caller adds the time of reading.
     pub preparation: Preparation,
     pub(super) mission: &'m Mission,
     pub(super) problem: Problem,
@@ -55,9 +57,10 @@ pub struct Planned<'m> {
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct PlannedFront<'m> {
-    /// The plans, best by the first objective to best by the second, with all arguments of the mission's domain.
+    /// The plans with all arguments of the mission's domain, from the best by the first objective
+    /// to the best by the second.
     pub front: Front,
-    /// How long things took before the search; that of reading is the caller's to add.
+    /// Times of the stages before the search. The caller adds the time of reading.
     pub preparation: Preparation,
     pub(super) mission: &'m Mission,
     pub(super) problem: Problem,
@@ -65,39 +68,42 @@ pub struct PlannedFront<'m> {
 }
 
 impl Planned<'_> {
-    /// The objectives as they were given, in order; none for the problem's own metric.
+    /// Returns the objectives in order, as the caller wrote them. Empty for the problem's own
+    /// metric.
     pub fn objectives(&self) -> &[String] {
         &self.objectives.texts
     }
 
-    /// The problem as it was planned for: with what the knowledge base contributes.
+    /// Returns the planned problem, including the contributions of the knowledge base.
     pub fn problem(&self) -> &Problem {
         &self.problem
     }
 
-    /// Whether a limit of time or memory has been reached, or an interruption has been requested.
+    /// Returns `true` if a time or memory limit has been reached, or if an interruption has been
+    /// requested.
     pub fn is_at_limit(&self) -> bool {
         self.limits.reached()
     }
 
-    /// Whether actions of the plan may overlap.
+    /// Returns `true` if actions of the plan may overlap.
     pub fn overlaps(&self) -> bool {
         matches!(self.task, Ground::Concurrent)
     }
 
-    /// The plan with the arguments that the domain's file gives its actions.
+    /// Returns the plan with the arguments of the domain's file.
     pub fn written(&self) -> Option<Plan> {
         self.solution.plan.clone().map(|plan| self.mission.written(plan))
     }
 
-    /// The plan with gaps between actions, as PlanSys2 asks for them, and otherwise as [`Planned::written`].
+    /// Returns the plan with the gaps between actions that PlanSys2 needs, in the form of
+    /// [`Planned::written`].
     pub fn spaced(&self) -> Option<Plan> {
         let plan = self.solution.plan.clone()?;
         let limits = self.limits.extended();
         Some(self.mission.written(spaced(self.mission, &self.problem, plan, &self.reading, &limits)))
     }
 
-    /// The answer in the JSON format of `metaplan plan`.
+    /// Returns the answer in the JSON format of `metaplan plan`.
     pub fn answer(&self) -> PlanAnswer {
         let mut solution = self.solution.clone();
         solution.plan = self.written();
@@ -110,7 +116,7 @@ impl Planned<'_> {
             .with_missing_values(&self.missing_values)
     }
 
-    /// Writes all that is needed to check the answer into a directory that does not exist yet; `metaplan verify` checks it.
+    /// Writes a certificate of the answer to a new directory. `metaplan verify` checks it.
     ///
     /// # Errors
     /// The answer has no certificate, actions overlap, or the directory cannot be written.
@@ -132,20 +138,20 @@ impl Planned<'_> {
         certificate::write(directory, &contents, &self.limits)
     }
 
-    /// The plan as a picture.
+    /// Returns a picture of the plan.
     pub fn picture(&self, positions: &Positions) -> picture::Plan {
-        let seen = Seen { mission: self.mission, problem: &self.problem, positions };
-        plan_picture(seen, &self.solution)
+        let context = Seen { mission: self.mission, problem: &self.problem, positions };
+        plan_picture(context, &self.solution)
     }
 }
 
 impl PlannedFront<'_> {
-    /// The objectives as they were given.
+    /// Returns the objectives as the caller wrote them.
     pub fn objectives(&self) -> &[String] {
         &self.objectives
     }
 
-    /// The plans with the arguments that the domain's file gives their actions.
+    /// Returns the plans with the arguments of the domain's file.
     pub fn written(&self) -> Front {
         let mut front = self.front.clone();
         for point in &mut front.points {
@@ -154,14 +160,14 @@ impl PlannedFront<'_> {
         front
     }
 
-    /// The answer in the JSON format of `metaplan plan --pareto`.
+    /// Returns the answer in the JSON format of `metaplan plan --pareto`.
     pub fn answer(&self) -> ParetoAnswer {
         ParetoAnswer::new(&self.mission.name, &self.objectives, &self.written(), &self.preparation)
     }
 
-    /// The front as a page to look at.
+    /// Returns an HTML page about the front.
     pub fn sheet(&self, positions: &Positions) -> picture::Sheet {
-        let seen = Seen { mission: self.mission, problem: &self.problem, positions };
-        front_sheet(seen, &self.objectives, &self.front)
+        let context = Seen { mission: self.mission, problem: &self.problem, positions };
+        front_sheet(context, &self.objectives, &self.front)
     }
 }

@@ -1,6 +1,7 @@
-//! Messages of ROS 2 that recordings have, with their definitions, and what stands for them in bytes (CDR \[1\]).
+//! ROS 2 messages of recordings: their definitions, and their encoding in CDR \[1\].
 //!
-//! - \[1\] OMG: DDS Interoperability Wire Protocol 2.5, 2022, section 10: octets 0 and 1 say the representation.
+//! - \[1\] OMG: DDS Interoperability Wire Protocol 2.5, 2022, section 10: octets 0 and 1 identify
+//!   the representation.
 
 use byteorder::{BigEndian, LittleEndian};
 use serde::de::DeserializeOwned;
@@ -8,16 +9,16 @@ use serde::{Deserialize, Serialize};
 
 use crate::mapek::{Event, Observation};
 
-/// The name of the type of diagnostics.
+/// Type name of diagnostics.
 pub(super) const DIAGNOSTICS: &str = "diagnostic_msgs/msg/DiagnosticArray";
 
-/// The name of the type of a text.
+/// Type name of a text.
 pub(super) const TEXT: &str = "std_msgs/msg/String";
 
 /// The definition of [`Text`].
 pub(super) const TEXT_DEFINITION: &str = "string data\n";
 
-/// The definition of [`DiagnosticArray`] with those of its parts, as `ros2msg` has them.
+/// The definition of [`DiagnosticArray`] and its parts, in the format `ros2msg`.
 pub(super) const DIAGNOSTICS_DEFINITION: &str = "\
 std_msgs/Header header
 DiagnosticStatus[] status
@@ -95,8 +96,9 @@ const OK: u8 = 0;
 const ERROR: u8 = 2;
 
 impl DiagnosticArray {
-    /// What an observation says of attributes and components, in the words of MROS's monitors; none where it says nothing of
-    /// them. The time is in nanoseconds of the system's clock.
+    /// Converts an observation of attributes or components to a message in the form of MROS's
+    /// monitors. `None` for any other observation. The time is in nanoseconds of the system's
+    /// clock.
     pub(super) fn of(observation: &Observation, time: u64) -> Option<Self> {
         let status: Vec<_> = observation.events.iter().flatten().filter_map(DiagnosticStatus::of).collect();
         let stamp = Time {
@@ -123,15 +125,16 @@ impl DiagnosticStatus {
     }
 }
 
-/// A message in plain CDR with the low byte first.
+/// Encodes a message in plain CDR, little-endian.
 pub(super) fn to_cdr(message: &impl Serialize) -> Vec<u8> {
     let mut bytes = vec![0, 1, 0, 0];
-    // Numbers, texts and lists of them always have bytes.
+    // Encoding cannot fail for numbers, texts and lists of them.
     bytes.extend(cdr_encoding::to_vec::<_, LittleEndian>(message).unwrap_or_default());
     bytes
 }
 
-/// The inverse of [`to_cdr`], with either byte first; why not, in words, where the bytes are none of that type.
+/// Decodes CDR with either byte order, the inverse of [`to_cdr`]. Returns a description of the
+/// fault if the bytes do not have the type.
 pub(super) fn from_cdr<M: DeserializeOwned>(bytes: &[u8]) -> Result<M, String> {
     let read = match bytes {
         [0, 0, _, _, content @ ..] => cdr_encoding::from_bytes::<M, BigEndian>(content),

@@ -1,14 +1,19 @@
-//! A run as an MCAP file \[1\], and the lines of events out of one: what Foxglove, `PlotJuggler` and `ros2 bag` read, too.
+//! Recording of runs as MCAP files \[1\], which Foxglove, `PlotJuggler` and `ros2 bag` also read,
+//! and extraction of events from MCAP files.
 //!
 //! | topic | schema | has |
 //! |---|---|---|
-//! | `/diagnostics` | `diagnostic_msgs/msg/DiagnosticArray`, in CDR | what was measured, and how components are, in the words of MROS's monitors |
-//! | `/metaplan/events` | `metaplan.Event` | each line that the loop has heard, as it was, with its number and time |
-//! | `/metaplan/inferences`, `/metaplan/plans`, `/metaplan/effects`, `/metaplan/loop` | `metaplan.Answer` | its answers as they were written, each on the topic of its kind |
+//! | `/diagnostics` | `diagnostic_msgs/msg/DiagnosticArray`, in CDR | measurements and states of
+//! components, in the form of MROS's monitors |
+//! | `/metaplan/events` | `metaplan.Event` | each line of events, unchanged, with its number and
+//! time |
+//! | `/metaplan/inferences`, `/metaplan/plans`, `/metaplan/effects`, `/metaplan/loop` |
+//! `metaplan.Answer` | the written answers, each on the topic of its kind |
 //!
-//! Times are those of the system's clock when the file was begun, and go on from there without ever going back. A chunk is
-//! written to the file as one piece and at most [`INTERVAL`] after its first message, so that a program that is killed leaves a file of
-//! whole chunks, and perhaps a part of one: all readers of MCAP get at what was written before.
+//! Times start with the system's clock when the file is created, and never decrease. A chunk is
+//! written to the file as a whole, at most [`INTERVAL`] after its first message. So a killed
+//! program leaves a file of complete chunks, and perhaps a part of one, and all readers of MCAP can
+//! read the complete chunks.
 //!
 //! - \[1\] Foxglove: MCAP file format specification, <https://mcap.dev/spec>.
 
@@ -24,5 +29,5 @@ pub use replay::{Replay, Replayed};
 pub use schema::answer_schema;
 pub use write::{Form, Recording};
 
-/// With this byte an MCAP file begins, and no line of text.
+/// First byte of an MCAP file, with which no line of text begins.
 pub const FIRST_BYTE: u8 = mcap::MAGIC[0];

@@ -1,4 +1,4 @@
-//! A recording in a thread of its own: who says something does not wait for the disk.
+//! Writes a recording on a separate thread, so that the loop does not wait for the disk.
 
 use std::fs::{File, OpenOptions};
 use std::io;
@@ -10,18 +10,19 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use crate::recording::write::{Form, Recording};
 
-/// So long a message waits at most before it is in the file.
+/// Maximum delay before a message is in the file.
 pub const INTERVAL: Duration = Duration::from_secs(1);
 
-/// So many messages may wait for the disk; who has more to say waits, too.
-const WAITING: usize = 1024;
+/// Capacity of the queue. Senders block while it is full.
+const QUEUE_CAPACITY: usize = 1024;
 
-/// A recording that is written by a thread of its own; copies write to the same file.
+/// A recording that a separate thread writes; copies share the file.
 #[derive(Debug, Clone)]
 pub struct Recorder {
     entries: SyncSender<Entry>,
     thread: Arc<Mutex<Option<JoinHandle<io::Result<()>>>>>,
-    /// The time of the system's clock, in nanoseconds, at a moment.
+    /// Reference for times: the system's clock in nanoseconds, and the monotonic clock at the same
+    /// moment.
     begun: (u64, Instant),
 }
 
@@ -33,40 +34,42 @@ enum Entry {
 }
 
 impl Recorder {
-    /// Begins a file, which must not be there yet: nothing that was recorded is overwritten.
+    /// Creates the file, which must not exist, so that no recording is overwritten.
     ///
     /// # Errors
-    /// It is there, or cannot be written.
+    /// The file exists, or cannot be written.
     pub fn create(path: &Path, mission: &str, form: Form) -> io::Result<Self> {
         let file = OpenOptions::new().write(true).create_new(true).open(path)?;
         let recording = Recording::begin(file, mission, form)?;
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let begun = (u64::try_from(since.as_nanos()).unwrap_or(u64::MAX), Instant::now());
-        let (entries, received) = sync_channel(WAITING);
+        let (entries, received) = sync_channel(QUEUE_CAPACITY);
         let thread = std::thread::spawn(move || write(recording, &received));
         Ok(Self { entries, thread: Arc::new(Mutex::new(Some(thread))), begun })
     }
 
-    /// Takes a line that the loop is about to handle, with its number and the time since the start of the mission.
+    /// Records a line before the loop handles it, with its number and the time since the start of
+    /// the mission.
     pub fn event(&self, line: u64, now: Duration, text: &str) {
         self.send(Entry::Event { time: self.time(), line, now, text: text.to_owned() });
     }
 
-    /// Takes an answer, which is an object of the format as JSON.
+    /// Records an answer, a JSON object of the format.
     pub fn answer(&self, text: &str) {
         self.send(Entry::Answer { time: self.time(), text: text.to_owned() });
     }
 
-    /// Whether something could not be written, so that nothing is recorded any more; [`Recorder::finish`] says why.
+    /// Returns `true` if writing has failed, so that recording has ended; [`Recorder::finish`]
+    /// returns the error.
     pub fn has_failed(&self) -> bool {
         let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner);
         thread.as_ref().is_some_and(JoinHandle::is_finished)
     }
 
-    /// Ends the file with its index. What is said afterwards is not recorded.
+    /// Ends the file with its index. Later messages are not recorded.
     ///
     /// # Errors
-    /// Something could not be written, now or before.
+    /// Writing has failed, now or before.
     pub fn finish(&self) -> io::Result<()> {
         let thread = self.thread.lock().unwrap_or_else(PoisonError::into_inner).take();
         self.send(Entry::End);
@@ -77,7 +80,8 @@ impl Recorder {
         }
     }
 
-    /// Nobody receives any more after an error, which [`Recorder::finish`] tells.
+    /// Sends an entry. After an error the channel is closed; [`Recorder::finish`] returns the
+    /// error.
     fn send(&self, entry: Entry) {
         let _ = self.entries.send(entry);
     }
@@ -88,9 +92,9 @@ impl Recorder {
     }
 }
 
-/// Writes what comes until the end is said, or until nobody can say any more.
+/// Writes entries until the end is requested, or until all senders are dropped.
 fn write(mut recording: Recording<File>, entries: &Receiver<Entry>) -> io::Result<()> {
-    // When what was written last has to be in the file.
+    // Deadline for flushing the last entry to the file.
     let mut due: Option<Instant> = None;
     loop {
         let entry = match due {

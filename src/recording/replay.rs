@@ -1,8 +1,9 @@
-//! An MCAP file to the lines of events in it, in the order in which they stand there.
+//! Extracts the lines of events from an MCAP file, in the order of the file.
 //!
-//! Of a recording of ours these are the lines that the loop has heard, at the times at which it has. Of any other file, as `ros2 bag
-//! record` makes it, they are its diagnostics, at the times since the first of them. A file that was not finished, as a
-//! crash leaves it, is read up to its end.
+//! For a recording of Metaplan these are the lines that the loop received, at their original times.
+//! For any other file, for example of `ros2 bag record`, they are its diagnostics, at times
+//! relative to the first of them. An unfinished file, for example after a crash, is read up to its
+//! end.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::io::{self, Read};
@@ -17,7 +18,7 @@ use crate::recording::schema;
 use crate::recording::unpack::{LARGEST, records};
 use crate::recording::write::EventMessage;
 
-/// A line out of an MCAP file.
+/// A line of an MCAP file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Replayed {
     /// The line.
@@ -33,7 +34,7 @@ pub struct Replay<R> {
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, Kind>,
     lines: VecDeque<Replayed>,
-    /// The time of the first message of diagnostics.
+    /// Time of the first diagnostics message.
     first: Option<u64>,
     state: State,
 }
@@ -44,22 +45,22 @@ impl<R> std::fmt::Debug for Replay<R> {
     }
 }
 
-/// How far a file was read.
+/// State of the reader.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
     Reading,
-    /// To its end.
+    /// The file was read to its end.
     Finished,
-    /// To where it breaks off.
+    /// The file is truncated and was read up to that point.
     Unfinished,
 }
 
-/// What stands on a channel that concerns us.
+/// Contents of a channel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
-    /// What a loop has heard, as JSON.
+    /// Events of a loop, as JSON.
     Events,
-    /// The same as text in CDR.
+    /// Events of a loop, as JSON text in CDR.
     EventTexts,
     /// Diagnostics of ROS 2.
     Diagnostics,
@@ -83,10 +84,10 @@ impl<R: Read> Replay<R> {
         }
     }
 
-    /// The next line; none at the end.
+    /// Returns the next line, or `None` at the end.
     ///
     /// # Errors
-    /// The source cannot be read, it is not an MCAP file, or damaged, or nothing in it is for a loop.
+    /// The source cannot be read, is not an MCAP file, is damaged, or contains nothing for a loop.
     pub fn next_line(&mut self) -> io::Result<Option<Replayed>> {
         loop {
             if let Some(line) = self.lines.pop_front() {
@@ -99,7 +100,8 @@ impl<R: Read> Replay<R> {
         }
     }
 
-    /// Whether the file breaks off, as a crash leaves it; known at its end.
+    /// Returns `true` if the file is truncated, for example by a crash. Known once the end is
+    /// reached.
     pub fn is_unfinished(&self) -> bool {
         self.state == State::Unfinished
     }
@@ -115,6 +117,7 @@ impl<R: Read> Replay<R> {
             Some(Ok(LinearReadEvent::Record { opcode, data })) => {
                 mcap::parse_record(opcode, data).map_err(damaged)?.into_owned()
             }
+            // A crash leaves a file without its end record.
             None | Some(Err(McapError::UnexpectedEof)) => return self.end(State::Unfinished),
             Some(Err(error)) => return Err(damaged(error)),
         };
@@ -129,6 +132,7 @@ impl<R: Read> Replay<R> {
 
     fn end(&mut self, state: State) -> io::Result<()> {
         self.state = state;
+        // A truncated file may end before its channels.
         if self.channels.is_empty() && state == State::Finished {
             let text = format!("there is neither {} nor {} in it", schema::EVENTS, messages::DIAGNOSTICS);
             return Err(io::Error::other(text));
@@ -136,7 +140,7 @@ impl<R: Read> Replay<R> {
         Ok(())
     }
 
-    /// Takes a record that is not a chunk.
+    /// Handles a record that is not a chunk.
     fn take(&mut self, record: Record<'static>) -> io::Result<()> {
         match record {
             Record::Schema { header, .. } => {
@@ -166,7 +170,7 @@ impl<R: Read> Replay<R> {
             );
             io::Error::other(text)
         };
-        let heard = |json: &str| -> io::Result<Replayed> {
+        let replayed = |json: &str| -> io::Result<Replayed> {
             let event: EventMessage =
                 serde_json::from_str(json).map_err(|error| wrong(schema::EVENT, error.to_string()))?;
             let raw = event.event.map(|raw| raw.get().to_owned());
@@ -178,21 +182,23 @@ impl<R: Read> Replay<R> {
         let line = match self.channels.get(&header.channel_id) {
             None => return Ok(()),
             Some(Kind::Events) => {
-                heard(std::str::from_utf8(data).map_err(|error| wrong(schema::EVENT, error.to_string()))?)?
+                replayed(std::str::from_utf8(data).map_err(|error| wrong(schema::EVENT, error.to_string()))?)?
             }
             Some(Kind::EventTexts) => {
-                heard(&from_cdr::<Text>(data).map_err(|why| wrong(messages::TEXT, why))?.data)?
+                replayed(&from_cdr::<Text>(data).map_err(|why| wrong(messages::TEXT, why))?.data)?
             }
-            // What stands there was heard by the same loop.
+            // The events of the recorded loop already contain these diagnostics.
             Some(Kind::Diagnostics) if self.channels.values().any(|kind| *kind != Kind::Diagnostics) => {
                 return Ok(());
             }
             Some(Kind::Diagnostics) => {
                 let array =
                     from_cdr::<DiagnosticArray>(data).map_err(|why| wrong(messages::DIAGNOSTICS, why))?;
+                // A foreign recording has no start of a mission, so its first message defines time
+                // 0.
                 let first = *self.first.get_or_insert(header.log_time);
                 let now = Duration::from_nanos(header.log_time.saturating_sub(first));
-                // Texts and numbers are always data.
+                // Serialisation cannot fail for texts and numbers.
                 Replayed { text: serde_json::to_string(&array).unwrap_or_default(), now }
             }
         };
@@ -201,7 +207,7 @@ impl<R: Read> Replay<R> {
     }
 }
 
-/// What the library says of a file.
+/// Converts an error of the library to an I/O error.
 fn damaged(error: McapError) -> io::Error {
     match error {
         McapError::Io(error) => error,

@@ -1,4 +1,4 @@
-//! The JSON schemas of the topics of a recording, and which answer belongs to which topic.
+//! JSON schemas of a recording's topics, and the assignment of answers to topics.
 
 use schemars::Schema;
 use serde_json::{Value, json};
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 /// The topic of diagnostics.
 pub(super) const DIAGNOSTICS: &str = "/diagnostics";
 
-/// The topic of the lines that were heard.
+/// Topic of the lines of events.
 pub(super) const EVENTS: &str = "/metaplan/events";
 
 /// The name of the schema of [`EVENTS`].
@@ -15,7 +15,7 @@ pub(super) const EVENT: &str = "metaplan.Event";
 /// The name of the schema of the topics of [`ANSWERS`].
 pub(super) const ANSWER: &str = "metaplan.Answer";
 
-/// The topics of answers with the kinds that belong to each; what is not named belongs to the last.
+/// Topics of answers with their kinds. Kinds that are not listed belong to the last topic.
 pub(super) const ANSWERS: [(&str, &[&str]); 4] = [
     ("/metaplan/inferences", &["inferred", "contradicted", "unconcluded", "filtered", "silent"]),
     ("/metaplan/plans", &["plan_requested", "planning", "plan_found", "plan_kept", "plan_none"]),
@@ -33,12 +33,12 @@ pub(super) const ANSWERS: [(&str, &[&str]); 4] = [
     ("/metaplan/loop", &[]),
 ];
 
-/// Where answers of a kind belong: an index of [`ANSWERS`].
+/// Returns the topic of answers of a kind, as an index of [`ANSWERS`].
 pub(super) fn topic(kind: &str) -> usize {
     ANSWERS.iter().position(|(_, kinds)| kinds.contains(&kind)).unwrap_or(ANSWERS.len() - 1)
 }
 
-/// The schema of what was heard.
+/// Returns the schema of events.
 pub(super) fn event() -> Value {
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -68,7 +68,7 @@ pub fn answer_schema() -> Schema {
     Schema::try_from(answer()).unwrap_or_default()
 }
 
-/// The schema of answers, as it is recorded.
+/// Returns the schema of answers, in the recorded form.
 pub(super) fn answer() -> Value {
     let texts = json!({"type": "array", "items": {"type": "string"}});
     let step = json!({

@@ -1,14 +1,14 @@
-//! Chunks of MCAP files to their records, whatever compresses them.
+//! Decompresses the chunks of MCAP files to records.
 
 use std::io::{self, Read as _};
 
 use mcap::read::ChunkReader;
 use mcap::records::{ChunkHeader, Record};
 
-/// Records of more bytes are not read.
+/// Maximum size of a record, in bytes.
 pub(super) const LARGEST: usize = 1 << 28;
 
-/// The records of a chunk.
+/// Returns the records of a chunk.
 pub(super) fn records(header: &ChunkHeader, data: &[u8]) -> io::Result<Vec<Record<'static>>> {
     let size = usize::try_from(header.uncompressed_size).unwrap_or(usize::MAX);
     if size > LARGEST {

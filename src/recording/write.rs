@@ -1,4 +1,4 @@
-//! What a loop hears and answers to an MCAP file.
+//! Writes the events and answers of a loop to an MCAP file.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -15,20 +15,22 @@ use crate::mapek::Observation;
 use crate::recording::messages::{self, DiagnosticArray, Text, to_cdr};
 use crate::recording::schema;
 
-/// The version of recordings.
+/// Version of the format.
 const FORMAT: &str = "metaplan-recording/1";
 
-/// How events and answers are written.
+/// Encoding of events and answers.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Form {
-    /// As JSON with a schema: viewers know the fields.
+    /// JSON with a schema, so that viewers can display the fields.
     #[default]
     Json,
-    /// The same JSON as `std_msgs/msg/String` in CDR. A file with one encoding alone is what `ros2 bag play` needs.
+    /// The JSON text as `std_msgs/msg/String` in CDR. `ros2 bag play` needs files with a single
+    /// encoding.
     Text,
 }
 
-/// An MCAP file that is being written. Each method takes the time in nanoseconds of the system's clock, which must not go back.
+/// An MCAP file that is being written. Each method has a parameter for the time in nanoseconds of
+/// the system's clock, which must not decrease.
 #[derive(Debug)]
 pub struct Recording<W: Write + Seek> {
     writer: Out<W>,
@@ -38,7 +40,7 @@ pub struct Recording<W: Write + Seek> {
     answers: Vec<Topic>,
 }
 
-/// A writer of the library, of which there is nothing to be shown.
+/// Writer of the library, with an opaque `Debug` output.
 struct Out<W: Write + Seek>(Writer<W>);
 
 impl<W: Write + Seek> std::fmt::Debug for Out<W> {
@@ -47,14 +49,14 @@ impl<W: Write + Seek> std::fmt::Debug for Out<W> {
     }
 }
 
-/// A channel, and how many messages it has.
+/// A channel, and its number of messages.
 #[derive(Debug)]
 struct Topic {
     channel: u16,
     messages: u32,
 }
 
-/// A line that was heard, as a message.
+/// Message for a line of events.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct EventMessage<'a> {
     pub(super) line: u64,
@@ -65,7 +67,7 @@ pub(super) struct EventMessage<'a> {
     pub(super) text: Option<Cow<'a, str>>,
 }
 
-/// The kind of an answer.
+/// Fields that determine the kind of an answer.
 #[derive(Deserialize)]
 struct Kind<'a> {
     #[serde(borrow, default)]
@@ -73,16 +75,17 @@ struct Kind<'a> {
 }
 
 impl<W: Write + Seek> Recording<W> {
-    /// Begins a file: all topics are there from the beginning.
+    /// Creates a file, with all topics.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The file cannot be written.
     pub fn begin(sink: W, mission: &str, form: Form) -> io::Result<Self> {
         let options = WriteOptions::new()
             .profile("ros2")
             .library(format!("metaplan {} {}", env!("CARGO_PKG_VERSION"), mcap::LIBRARY_IDENTIFIER))
+            // Without compression, a truncated file can be read up to its last complete chunk.
             .compression(None)
-            // A chunk is written as one piece.
+            // Without seeking, a chunk is written as a whole.
             .disable_seeking(true);
         let mut writer = options.create(sink).map_err(failed)?;
         let metadata = [("format", FORMAT), ("mission", mission), ("version", env!("CARGO_PKG_VERSION"))];
@@ -114,7 +117,7 @@ impl<W: Write + Seek> Recording<W> {
         Ok(Self { writer: Out(writer), form, diagnostics, events, answers })
     }
 
-    /// Writes a line that the loop has heard, with its number and the time since the start of the mission, and what it says of
+    /// Writes a line of events with its number and the time since the start of the mission, and its
     /// attributes and components as diagnostics.
     ///
     /// # Errors
@@ -123,7 +126,7 @@ impl<W: Write + Seek> Recording<W> {
         let event = text.starts_with('{').then(|| serde_json::from_str::<&RawValue>(text).ok()).flatten();
         let nanoseconds = u64::try_from(now.as_nanos()).unwrap_or(u64::MAX);
         let text_ = event.is_none().then_some(Cow::Borrowed(text));
-        // Texts and numbers are always data.
+        // Serialisation cannot fail for texts and numbers.
         let message = serde_json::to_string(&EventMessage { line, nanoseconds, event, text: text_ });
         let bytes = bytes(self.form, message.unwrap_or_default());
         self.writer.message(&mut self.events, time, &bytes)?;
@@ -133,18 +136,19 @@ impl<W: Write + Seek> Recording<W> {
         }
     }
 
-    /// Writes an answer, which is an object of the format as JSON.
+    /// Writes an answer, a JSON object of the format.
     ///
     /// # Errors
     /// The file cannot be written, now or since an error before.
     pub fn answer(&mut self, time: u64, answer: &str) -> io::Result<()> {
         let kind = serde_json::from_str::<Kind>(answer).map(|kind| schema::topic(&kind.answer));
+        // The last topic takes the kinds that no other topic lists.
         let topic = kind.unwrap_or(schema::ANSWERS.len() - 1);
         let bytes = bytes(self.form, answer.to_owned());
         self.writer.message(&mut self.answers[topic], time, &bytes)
     }
 
-    /// Writes all that there is to the sink: the file can be read up to here from now on.
+    /// Flushes all messages to the sink, so that the file is readable up to this point.
     ///
     /// # Errors
     /// The file cannot be written, now or since an error before.
@@ -152,7 +156,7 @@ impl<W: Write + Seek> Recording<W> {
         self.writer.0.flush().map_err(failed)
     }
 
-    /// Ends the file with its index.
+    /// Completes the file with its index.
     ///
     /// # Errors
     /// The file cannot be written, now or since an error before.
@@ -175,7 +179,7 @@ impl<W: Write + Seek> Out<W> {
     }
 }
 
-/// JSON as a form has it.
+/// Encodes JSON in the given form.
 fn bytes(form: Form, json: String) -> Vec<u8> {
     match form {
         Form::Json => json.into_bytes(),
@@ -183,7 +187,7 @@ fn bytes(form: Form, json: String) -> Vec<u8> {
     }
 }
 
-/// What the library says, as an error of writing.
+/// Converts an error of the library to an I/O error.
 fn failed(error: McapError) -> io::Error {
     match error {
         McapError::Io(error) => error,

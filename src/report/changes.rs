@@ -1,4 +1,4 @@
-//! What differs between a mission as its files have it and in a situation, and why that matters.
+//! Differences between a mission as its files define it and in a situation, with their causes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,26 +9,27 @@ use crate::mission::Mission;
 use crate::number::decimal;
 use crate::report::designs::because;
 
-/// What a component's or an attribute's state is called where nobody says any.
-const UNSAID: &str = "not said";
+/// Name of an unknown state of a component or an attribute.
+const UNKNOWN: &str = "not said";
 
 /// The cost of a plan, or the reason for the lack of a plan.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Cost {
     /// The metric, as text.
     Of(String),
-    /// It is proved that there is no plan.
+    /// The mission is proved to have no plan.
     NoPlan,
-    /// No plan was found, within limits.
+    /// No plan was found within the limits.
     NotFound,
 }
 
-/// From causes to effects: what is reported, what the task is, which designs that makes available, and what the plan costs.
+/// Returns the differences from causes to effects: reports, task, availability of designs, and
+/// costs of the plans.
 pub fn changes(before: (&Mission, &Plan), after: (&Mission, &Plan), costs: &[Cost; 2]) -> Vec<Change> {
     let mut changes = Vec::new();
     let mut say = |text: String| changes.push(Change { text, because: Vec::new() });
-    differences(&components(before.0), &components(after.0), UNSAID).into_iter().for_each(&mut say);
-    differences(&measured(before.0), &measured(after.0), UNSAID).into_iter().for_each(&mut say);
+    differences(&components(before.0), &components(after.0), UNKNOWN).into_iter().for_each(&mut say);
+    differences(&measured(before.0), &measured(after.0), UNKNOWN).into_iter().for_each(&mut say);
     task(before.0, after.0).into_iter().for_each(&mut say);
     changes.extend(designs(before.0, after.0));
     changes
@@ -36,7 +37,7 @@ pub fn changes(before: (&Mission, &Plan), after: (&Mission, &Plan), costs: &[Cos
     changes
 }
 
-/// `name: old before, new now` for what differs.
+/// Formats the values that differ: `name: old before, new now`.
 fn differences(
     before: &BTreeMap<String, String>,
     after: &BTreeMap<String, String>,
@@ -53,21 +54,27 @@ fn differences(
 
 fn components(mission: &Mission) -> BTreeMap<String, String> {
     let components = mission.knowledge().map(|knowledge| knowledge.view().components()).unwrap_or_default();
-    let status = components.into_iter().map(|own| {
-        (format!("The status of {}", own.individual.name), own.status.unwrap_or_else(|| UNSAID.to_owned()))
+    let status = components.into_iter().map(|component| {
+        (
+            format!("The status of {}", component.individual.name),
+            component.status.unwrap_or_else(|| UNKNOWN.to_owned()),
+        )
     });
     status.collect()
 }
 
 fn measured(mission: &Mission) -> BTreeMap<String, String> {
     let measured = mission.knowledge().map(|knowledge| knowledge.view().measurements()).unwrap_or_default();
-    let value = measured.into_iter().filter_map(|own| {
-        Some((format!("Measured {} ({})", own.attribute, own.individual.name), decimal(own.value.as_ref()?)))
+    let value = measured.into_iter().filter_map(|measurement| {
+        Some((
+            format!("Measured {} ({})", measurement.attribute, measurement.individual.name),
+            decimal(measurement.value.as_ref()?),
+        ))
     });
     value.collect()
 }
 
-/// What the problem states otherwise than before.
+/// Returns the differences of the problems.
 fn task(before: &Mission, after: &Mission) -> Vec<String> {
     let (old, new) = (stated(before), stated(after));
     let only = |own: &BTreeSet<String>, other: &BTreeSet<String>| {
@@ -103,11 +110,11 @@ fn shown(atom: &Atom) -> String {
     format!("({})", words.join(" "))
 }
 
-/// The designs that are lost or gained, with the reasons.
+/// Returns the designs that are lost or gained, with the reasons.
 fn designs(before: &Mission, after: &Mission) -> Vec<Change> {
     let available = |mission: &Mission| -> BTreeMap<String, bool> {
-        let known = mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
-        known.map(|design| (design.individual.name.clone(), design.available)).collect()
+        let designs = mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
+        designs.map(|design| (design.individual.name.clone(), design.available)).collect()
     };
     let (old, new) = (available(before), available(after));
     let changed = new.iter().filter(|(design, now)| old.get(*design) != Some(now));
@@ -119,7 +126,7 @@ fn designs(before: &Mission, after: &Mission) -> Vec<Change> {
     changes.collect()
 }
 
-/// How the plans differ.
+/// Returns the differences of the plans.
 fn plans(before: &Plan, after: &Plan, costs: &[Cost; 2]) -> Vec<String> {
     let text = match costs {
         [Cost::Of(old), Cost::Of(new)] => return both(before, after, [old, new]),
@@ -158,13 +165,13 @@ fn both(before: &Plan, after: &Plan, [old_cost, new_cost]: [&str; 2]) -> Vec<Str
     texts
 }
 
-/// Sentence with the number of actions that both plans have. An action counts as often as it is in both plans. Its
-/// designs do not matter.
+/// Sentence with the number of actions that both plans have. An action counts as often as it is in
+/// both plans. Its designs do not matter.
 fn kept(before: &Plan, after: &Plan) -> String {
     let mut old: Vec<&str> = before.steps.iter().map(|step| step.label.as_str()).collect();
     let in_both = after.steps.iter().filter(|step| {
-        let found = old.iter().position(|label| *label == step.label);
-        found.map(|position| old.swap_remove(position)).is_some()
+        let position = old.iter().position(|label| *label == step.label);
+        position.map(|position| old.swap_remove(position)).is_some()
     });
     let (kept, new, old) = (in_both.count(), after.steps.len(), before.steps.len());
     let plural = |count: usize| if count == 1 { "1 action".to_owned() } else { format!("{count} actions") };
@@ -191,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn plans_are_compared_in_plain_words() {
+    fn plan_differences_are_sentences() {
         let of = |cost: &str| Cost::Of(cost.to_owned());
         let (there, back) = ("go a b", "go b a");
         check(

@@ -1,4 +1,5 @@
-//! Plans beside probabilistic policies, and ways of control beside the loop, to what is drawn of them.
+//! Converts comparisons with probabilistic policies, and simulations of control strategies, to
+//! pictures.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +9,8 @@ use crate::answers::{MEASURES, Pair, Row};
 use crate::comparison::Comparison;
 use crate::simulate::{Run, Sample, Strategy};
 
-/// What is drawn of comparisons; `rows` are those of the table, added ones among them. How long they took is not drawn.
+/// Returns the picture of comparisons. `rows` are the rows of the table, including added ones.
+/// Computation times are not drawn.
 pub fn comparison_sheet(mission: &str, comparisons: &[(Option<Pair>, Comparison)], rows: &[Row]) -> Sheet {
     let mut parts = Vec::new();
     for (pair, comparison) in comparisons {
@@ -28,11 +30,12 @@ pub fn comparison_sheet(mission: &str, comparisons: &[(Option<Pair>, Comparison)
     }
 }
 
-/// Names for rows or points of these kinds: the kind, with a number where there are several of it: `a1`, `a2`, `b`.
+/// Labels rows or points by their kind, with a number if the kind occurs several times: `a1`, `a2`,
+/// `b`.
 fn labels<'k>(kinds: &[(&'k Option<Pair>, &'k str)]) -> Vec<String> {
-    let mut seen: BTreeMap<&(&Option<Pair>, &str), usize> = BTreeMap::new();
+    let mut counts: BTreeMap<&(&Option<Pair>, &str), usize> = BTreeMap::new();
     let label = |kind| {
-        let number = seen.entry(kind).or_default();
+        let number = counts.entry(kind).or_default();
         *number += 1;
         let is_only = kinds.iter().filter(|other| *other == kind).count() == 1;
         if is_only { kind.1.to_owned() } else { format!("{}{number}", kind.1) }
@@ -40,10 +43,11 @@ fn labels<'k>(kinds: &[(&'k Option<Pair>, &'k str)]) -> Vec<String> {
     kinds.iter().map(label).collect()
 }
 
-/// Time and the probability of a success without collision: the front, and each candidate with a finite time. A point is called as its row in
-/// the table of all measures.
+/// Points for time and the probability of a success without collision: the front, and each
+/// candidate with a finite time. A point has the label of its row in the table.
 fn front(comparison: &Comparison) -> Points {
-    let kinds: Vec<String> = comparison.candidates.iter().map(|own| own.kind.to_string()).collect();
+    let kinds: Vec<String> =
+        comparison.candidates.iter().map(|candidate| candidate.kind.to_string()).collect();
     let kinds: Vec<(&Option<Pair>, &str)> = kinds.iter().map(|kind| (&None, kind.as_str())).collect();
     let points = comparison.candidates.iter().zip(labels(&kinds)).filter_map(|(own, label)| {
         let (time, success) = (own.measures.time?, own.measures.no_collision);
@@ -58,7 +62,7 @@ fn front(comparison: &Comparison) -> Points {
     }
 }
 
-/// What it costs to decide otherwise than the best policy, with the reasons.
+/// Costs of deviating from the best policy, with the reasons.
 fn prices(comparison: &Comparison) -> Vec<Change> {
     let leaf = |text: String| Reason { text, supports: Vec::new() };
     let price = |name: &str, value: Option<f64>, because: Vec<Reason>| Change {
@@ -66,10 +70,10 @@ fn prices(comparison: &Comparison) -> Vec<Change> {
         because,
     };
     let of = |kind: char| {
-        let own = comparison.candidates.iter().find(|own| own.kind == kind);
-        own.map(|own| {
-            let time = own.measures.penalised_time.map_or_else(|| "not finite".to_owned(), shown);
-            leaf(format!("{}: penalised time {time}", own.name))
+        let candidate = comparison.candidates.iter().find(|candidate| candidate.kind == kind);
+        candidate.map(|candidate| {
+            let time = candidate.measures.penalised_time.map_or_else(|| "not finite".to_owned(), shown);
+            leaf(format!("{}: penalised time {time}", candidate.name))
         })
     };
     let penalty = leaf(format!("a mission that fails costs {}", shown(comparison.penalty)));
@@ -90,8 +94,9 @@ fn prices(comparison: &Comparison) -> Vec<Change> {
             leaf(format!("after {moves} moves: {}", times.collect::<Vec<_>>().join(", ")))
         };
         let steps = loss.steps.iter();
-        let steps = steps
-            .map(|own| after(own.moves, [own.open_loop, own.replanned, own.solved_again, own.anticipated]));
+        let steps = steps.map(|loss| {
+            after(loss.moves, [loss.open_loop, loss.replanned, loss.solved_again, loss.anticipated])
+        });
         let text =
             format!("What the loss of {} costs, at a rate of {} for each move", loss.component, loss.rate);
         prices.push(Change { text, because: steps.collect() });
@@ -113,7 +118,8 @@ fn table(rows: &[Row]) -> Part {
     Part::Table("measures".to_owned(), header.collect(), rows.iter().zip(labels(&kinds)).map(line).collect())
 }
 
-/// What is drawn of simulated missions: how costs, reactions and reconfigurations are distributed over the seeds.
+/// Returns the picture of simulated missions: the distributions of costs, reactions and
+/// reconfigurations over the seeds.
 pub fn simulation_sheet(mission: &str, scenario: &str, strategies: &[Strategy], runs: &[Run]) -> Sheet {
     let cost = |run: &Run| run.accomplished.then_some(run.cost);
     let changes = |run: &Run| Some(run.reconfigurations as f64);
@@ -153,8 +159,8 @@ fn accomplished(done: usize, all: usize) -> String {
     }
 }
 
-/// Text for a strategy that has no costs, since none of its missions was accomplished. It is short enough for a
-/// telephone.
+/// Text for a strategy that has no costs, since none of its missions was accomplished. It is short
+/// enough for a telephone.
 fn none_accomplished(missions: usize) -> String {
     format!("0 of {missions} accomplished")
 }
@@ -175,8 +181,8 @@ fn distribution(
             Some((value, format!("{}, seed {}: {}", strategy.name(), run.seed, rounded(value))))
         });
         let values: Vec<(f64, String)> = values.collect();
-        let all: Vec<f64> = values.iter().map(|(value, _)| *value).collect();
-        let mean = Sample::of(&all).map(|sample| {
+        let sample: Vec<f64> = values.iter().map(|(value, _)| *value).collect();
+        let mean = Sample::of(&sample).map(|sample| {
             let half_width = if sample.count > 1 { sample.half_width } else { 0.0 };
             (hundredths(sample.mean), hundredths(half_width))
         });
@@ -202,7 +208,7 @@ fn figures(strategies: &[Strategy], runs: &[Run]) -> Part {
     Part::Table("figures".to_owned(), header, strategies.iter().map(line).collect())
 }
 
-/// A mean, with half the width of its interval where there are several values.
+/// Formats a mean, with half the width of its interval if there are several values.
 fn mean(sample: &Sample) -> String {
     match sample.count {
         1 => rounded(sample.mean),
@@ -210,7 +216,7 @@ fn mean(sample: &Sample) -> String {
     }
 }
 
-/// A simulated figure, which chance makes inexact, with two decimals.
+/// Formats a simulated figure with two decimals, since it is random.
 fn rounded(value: f64) -> String {
     hundredths(value).to_string()
 }
@@ -219,7 +225,7 @@ fn hundredths(value: f64) -> f64 {
     (value * 100.0).round() / 100.0
 }
 
-/// Six decimals at most.
+/// Formats a number with at most six decimals.
 fn shown(value: f64) -> String {
     ((value * 1e6).round() / 1e6).to_string()
 }

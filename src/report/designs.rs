@@ -1,4 +1,4 @@
-//! The designs of a knowledge base, and why each of them can be selected or not.
+//! The designs of a knowledge base, with the reasons for their availability.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -13,7 +13,7 @@ use crate::mapek::{said, unavailable};
 use crate::mission::Mission;
 use crate::number::decimal;
 
-/// All designs, with the steps that use them.
+/// Returns all designs, with the steps that use them.
 pub fn designs(mission: &Mission, steps: &[Step]) -> Vec<Design> {
     let Some(knowledge) = mission.knowledge() else { return Vec::new() };
     let (components, measurements) = (knowledge.view().components(), knowledge.view().measurements());
@@ -30,8 +30,8 @@ fn one(
     let name = design.individual.name.clone();
     let uses = |step: &Step| step.configuration.iter().any(|(_, own)| *own == name);
     let components = design.components.iter().map(|own| {
-        let known = components.iter().find(|component| component.individual == *own);
-        match known.and_then(|component| component.status.as_deref()) {
+        let component = components.iter().find(|component| component.individual == *own);
+        match component.and_then(|component| component.status.as_deref()) {
             Some(status) => format!("{} ({status})", own.name),
             None => own.name.clone(),
         }
@@ -60,14 +60,15 @@ fn required(requirement: &Requirement, measurements: &[Measurement]) -> String {
             let _ = write!(text, " {word} {}", decimal(bound));
         }
     }
-    let measured = measurements.iter().find(|own| own.attribute == requirement.attribute);
+    let measured = measurements.iter().find(|measurement| measurement.attribute == requirement.attribute);
     match measured.and_then(|measured| measured.value.as_ref()) {
         Some(value) => format!("{text} (now {})", decimal(value)),
         None => text,
     }
 }
 
-/// All reasons for the availability of a design: every cause that rules it out, if it is not available.
+/// Returns all reasons for the availability of a design: if it is not available, every cause that
+/// rules it out.
 pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> Vec<Reason> {
     if available {
         let text = "nothing says that it is not realisable, and nothing that it is not available".to_owned();
@@ -88,7 +89,8 @@ pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> V
         format!("{count} causes rule it out:")
     };
     let introduction = (count > 1).then(|| Reason { text: introduction, supports: Vec::new() });
-    // Where neither a component nor a measurement is a cause, what follows from the knowledge as it is.
+    // If neither a component nor a measurement is a cause, the conclusions from the unchanged
+    // knowledge are the reason.
     let states: Vec<&Knowledge> = match count {
         0 => vec![knowledge],
         _ => causes.iter().map(|cause| &cause.knowledge).collect(),
@@ -102,7 +104,7 @@ pub(super) fn because(knowledge: &Knowledge, design: &str, available: bool) -> V
     introduction.into_iter().chain(trees).collect()
 }
 
-/// A derivation as a tree; what was explained already is only named.
+/// Converts a derivation to a tree. A fact that was explained before is only named.
 fn tree(derivation: &Derivation, at: usize, symbols: &Symbols, told: &mut BTreeSet<usize>) -> Reason {
     let step = &derivation.steps[at];
     let fact = said(&step.fact, symbols);

@@ -1,4 +1,4 @@
-//! A front of two objectives to what is drawn of it.
+//! Converts a Pareto front of two objectives to a picture.
 
 use picture::{Part, Points, Sheet};
 use planner::{Front, Status};
@@ -6,7 +6,8 @@ use planner::{Front, Status};
 use crate::report::plan::plan_picture;
 use crate::report::seen::Seen;
 
-/// What is drawn of a front by two objectives with these texts, whose plans have all arguments of the mission's domain.
+/// Returns the picture of a front. `objectives` are the texts of the two objectives. The plans have
+/// all arguments of the mission's domain.
 pub fn front_sheet(seen: Seen<'_>, objectives: &[String], front: &Front) -> Sheet {
     let solved: Vec<_> = front.points.iter().filter(|point| point.solution.plan.is_some()).collect();
     let verdict = match front.status {
@@ -29,7 +30,7 @@ pub fn front_sheet(seen: Seen<'_>, objectives: &[String], front: &Front) -> Shee
     let places: Vec<(f64, f64)> = (0..solved.len()).filter_map(place).collect();
     let mut line = places.clone();
     line.sort_by(|left, right| left.0.total_cmp(&right.0));
-    // Nothing lies between two plans: the line goes by steps.
+    // No plan has values between two points, so the line is a staircase.
     let corners = line.windows(2).flat_map(|pair| [pair[0], (pair[1].0, pair[0].1)]);
     let line: Vec<(f64, f64)> = corners.chain(line.last().copied()).collect();
     let points = (1..).zip(&titles).zip(&places);

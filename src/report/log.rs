@@ -1,11 +1,11 @@
-//! A journal to what is drawn of it.
+//! Converts a journal to a picture.
 
 use picture::{Happening, Kind, Log, Reason};
 use serde_json::Value;
 
 use crate::journal::JournalReport;
 
-/// What is drawn of a journal; `name` is what it is called.
+/// Returns the picture of a journal called `name`.
 pub fn log_picture(name: &str, journal: &JournalReport) -> Log {
     let mut happenings = Vec::new();
     let mut time = 0.0;
@@ -37,7 +37,7 @@ pub fn log_picture(name: &str, journal: &JournalReport) -> Log {
     }
 }
 
-/// An answer of the loop: its kind, a sentence, and what belongs to it.
+/// Converts an answer of the loop to its kind, a sentence, and details.
 fn told(answer: &Value) -> (Kind, String, Vec<Reason>) {
     let word = |field: &str| plain(&answer[field]);
     match answer["answer"].as_str().unwrap_or_default() {
@@ -83,23 +83,26 @@ fn told(answer: &Value) -> (Kind, String, Vec<Reason>) {
     }
 }
 
-/// Designs and objectives that have changed, with the reasons.
+/// Converts changed designs and objectives, with the reasons.
 fn inferred(answer: &Value) -> (Kind, String, Vec<Reason>) {
-    let designs = list(&answer["designs"]).iter().map(|own| {
-        let is = if own["available"] == Value::Bool(true) { "is available" } else { "is not available" };
-        Reason { text: format!("{} {is}", plain(&own["design"])), supports: lines(&own["because"]) }
+    let designs = list(&answer["designs"]).iter().map(|design| {
+        let is = if design["available"] == Value::Bool(true) { "is available" } else { "is not available" };
+        Reason { text: format!("{} {is}", plain(&design["design"])), supports: lines(&design["because"]) }
     });
-    let objectives = list(&answer["objectives"]).iter().map(|own| {
-        let statuses: Vec<String> = list(&own["statuses"]).iter().map(plain).collect();
+    let objectives = list(&answer["objectives"]).iter().map(|objective| {
+        let statuses: Vec<String> = list(&objective["statuses"]).iter().map(plain).collect();
         let statuses = if statuses.is_empty() { "all is well".to_owned() } else { statuses.join(", ") };
-        Reason { text: format!("{}: {statuses}", plain(&own["objective"])), supports: lines(&own["because"]) }
+        Reason {
+            text: format!("{}: {statuses}", plain(&objective["objective"])),
+            supports: lines(&objective["because"]),
+        }
     });
-    let all: Vec<Reason> = designs.chain(objectives).collect();
-    let text: Vec<&str> = all.iter().map(|reason| reason.text.as_str()).collect();
-    (Kind::Inference, text.join("; "), all)
+    let reasons: Vec<Reason> = designs.chain(objectives).collect();
+    let text: Vec<&str> = reasons.iter().map(|reason| reason.text.as_str()).collect();
+    (Kind::Inference, text.join("; "), reasons)
 }
 
-/// An action with its arguments and designs; its name stands in a field.
+/// Formats an action with its arguments and designs; `name` is the field with the action's name.
 fn action(step: &Value, name: &str) -> String {
     let arguments = list(&step["arguments"]).iter().map(plain);
     let words: Vec<String> = std::iter::once(plain(&step[name])).chain(arguments).collect();
@@ -113,10 +116,10 @@ fn list(value: &Value) -> &[Value] {
     value.as_array().map(Vec::as_slice).unwrap_or_default()
 }
 
-/// A list of sentences, or one.
+/// Converts a list of sentences, or a single one.
 fn lines(value: &Value) -> Vec<Reason> {
     match value {
-        Value::Array(all) => all.iter().map(|own| leaf(plain(own))).collect(),
+        Value::Array(all) => all.iter().map(|entry| leaf(plain(entry))).collect(),
         Value::String(text) => vec![leaf(text.clone())],
         _ => Vec::new(),
     }
@@ -126,7 +129,7 @@ fn leaf(text: String) -> Reason {
     Reason { text, supports: Vec::new() }
 }
 
-/// A text as it is, and everything else as JSON.
+/// Returns a string as it is, and any other value as JSON.
 fn plain(value: &Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), ToOwned::to_owned)
 }

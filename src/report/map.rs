@@ -1,8 +1,8 @@
-//! What places a mission has, which of them are neighbours, and which way a plan takes.
+//! Infers the places of a mission, their neighbours, and the route of a plan.
 //!
-//! A domain does not say what a place is. Here something moves if an action deletes `(p … a)` and adds `(p … b)` with parameters `a` and
-//! `b` of one type; the objects of that type are places, and those are neighbours that a fact or a value of the problem
-//! has as its only two places.
+//! PDDL does not mark places. Here something moves if an action deletes `(p … a)` and adds `(p …
+//! b)` with parameters `a` and `b` of one type. The objects of that type are places. Two places are
+//! neighbours if they are the only places of a fact or a value of the problem.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,16 +15,16 @@ use planner::Plan;
 
 use crate::report::seen::Scene;
 
-/// How an action moves something.
+/// Movement by an action.
 struct Movement<'d> {
     action: &'d Name,
     predicate: &'d Name,
-    /// Which parameters say from where and to where.
+    /// Positions of the parameters for origin and destination.
     parameters: (usize, usize),
     r#type: &'d TypeExpression,
 }
 
-/// The map, if there is one; each step of the plan gets its way on it.
+/// Returns the map, if the mission has places, and adds its route to each step of the plan.
 pub(super) fn map(scene: Scene<'_>, plan: &Plan, steps: &mut [Step]) -> Option<Map> {
     let movements: Vec<Movement<'_>> = scene.domain.actions.iter().flat_map(moves).collect();
     let moving = places_of_most(scene, plan, &movements)?;
@@ -53,31 +53,33 @@ pub(super) fn map(scene: Scene<'_>, plan: &Plan, steps: &mut [Step]) -> Option<M
     Some(Map { places: places.iter().map(place).collect(), ways: ways(scene.problem, &number, &predicates) })
 }
 
-/// What moves between the places that a plan uses most.
+/// Movements between the places that a plan uses most.
 struct Moving<'d> {
     movements: Vec<&'d Movement<'d>>,
     places: Vec<Name>,
 }
 
-/// Of several kinds of places, those that the plan has most moves between, and then those that most actions know. Designs are not places.
+/// Selects the kind of places with most moves of the plan, then the one with most actions. Designs
+/// are not places.
 fn places_of_most<'d>(scene: Scene<'_>, plan: &Plan, movements: &'d [Movement<'d>]) -> Option<Moving<'d>> {
     let designs: BTreeSet<Name> = scene.designs.keys().map(|design| Name::new(design)).collect();
     let mut kinds: BTreeMap<Vec<Name>, Vec<&'d Movement<'d>>> = BTreeMap::new();
     for movement in movements {
         let objects = objects(scene.domain, scene.problem, movement.r#type);
+        // A change of designs has the form of a movement.
         if objects.len() > 1 && !objects.iter().any(|object| designs.contains(object)) {
             kinds.entry(objects).or_default().push(movement);
         }
     }
     let uses = |kind: &[&Movement<'_>]| {
-        let own = |name: &str| kind.iter().any(|movement| *movement.action == Name::new(name));
-        plan.steps.iter().filter(|step| own(&step.action)).count()
+        let is_movement = |name: &str| kind.iter().any(|movement| *movement.action == Name::new(name));
+        plan.steps.iter().filter(|step| is_movement(&step.action)).count()
     };
-    let most = kinds.into_iter().max_by_key(|(_, kind)| (uses(kind), kind.len()));
-    most.map(|(places, movements)| Moving { movements, places })
+    let most_used = kinds.into_iter().max_by_key(|(_, kind)| (uses(kind), kind.len()));
+    most_used.map(|(places, movements)| Moving { movements, places })
 }
 
-/// How one action moves something.
+/// Returns the movements by an action.
 fn moves(action: &Action) -> Vec<Movement<'_>> {
     let (mut added, mut deleted) = (Vec::new(), Vec::new());
     let mut parts: Vec<&Effect> = match &action.body {
@@ -94,27 +96,27 @@ fn moves(action: &Action) -> Vec<Movement<'_>> {
     }
     let parameter = |term: Option<&Term>| match term {
         Some(Term::Variable(variable)) => {
-            action.parameters.iter().position(|own| own.identifier.name == variable.name)
+            action.parameters.iter().position(|parameter| parameter.identifier.name == variable.name)
         }
         _ => None,
     };
-    let mut found = Vec::new();
+    let mut movements = Vec::new();
     for (from, to) in deleted.iter().flat_map(|from| added.iter().map(move |to| (*from, *to))) {
         let (Some(left), Some(right)) = (parameter(from.arguments.last()), parameter(to.arguments.last()))
         else {
             continue;
         };
-        let types = [left, right].map(|own| &action.parameters[own].r#type);
+        let types = [left, right].map(|position| &action.parameters[position].r#type);
         if left != right && same_but_last(from, to) && names(types[0]).eq(names(types[1])) {
             let (action, predicate) = (&action.identifier.name, &from.predicate.name);
-            found.push(Movement { action, predicate, parameters: (left, right), r#type: types[1] });
+            movements.push(Movement { action, predicate, parameters: (left, right), r#type: types[1] });
         }
     }
-    found
+    movements
 }
 
 fn names(r#type: &TypeExpression) -> impl Iterator<Item = &Name> {
-    r#type.alternatives.iter().map(|own| &own.name)
+    r#type.alternatives.iter().map(|name| &name.name)
 }
 
 fn same_but_last(left: &Atom, right: &Atom) -> bool {
@@ -133,33 +135,36 @@ fn name_of(term: &Term) -> &Name {
     }
 }
 
-/// The objects of a type, and of types below it; in the order of the files.
+/// Returns the objects of a type and its subtypes, in the order of the files.
 fn objects(domain: &Domain, problem: &Problem, r#type: &TypeExpression) -> Vec<Name> {
     let object = Name::new("object");
     let mut below: BTreeSet<&Name> = names(r#type).collect();
+    // Without a type, PDDL assumes `object`, the supertype of all types.
     let is_everything = below.is_empty() || below.contains(&object);
     loop {
-        let is_below = |own: &&TypedName| names(&own.r#type).any(|above| below.contains(above));
-        let more: Vec<&Name> = domain.types.iter().filter(is_below).map(|own| &own.identifier.name).collect();
+        let is_below = |entry: &&TypedName| names(&entry.r#type).any(|above| below.contains(above));
+        let subtypes: Vec<&Name> =
+            domain.types.iter().filter(is_below).map(|entry| &entry.identifier.name).collect();
         let count = below.len();
-        below.extend(more);
+        below.extend(subtypes);
         if below.len() == count {
             break;
         }
     }
-    let own = |entry: &&TypedName| is_everything || names(&entry.r#type).any(|name| below.contains(name));
-    let all = domain.constants.iter().chain(&problem.objects).filter(own);
-    let mut seen = BTreeSet::new();
-    all.map(|entry| entry.identifier.name.clone()).filter(|name| seen.insert(name.clone())).collect()
+    let has_type =
+        |entry: &&TypedName| is_everything || names(&entry.r#type).any(|name| below.contains(name));
+    let entries = domain.constants.iter().chain(&problem.objects).filter(has_type);
+    let mut visited = BTreeSet::new();
+    entries.map(|entry| entry.identifier.name.clone()).filter(|name| visited.insert(name.clone())).collect()
 }
 
-/// The last arguments of facts with these predicates.
+/// Returns the last arguments of facts with these predicates.
 fn ends<'p>(atoms: impl Iterator<Item = &'p Atom>, predicates: &BTreeSet<&Name>) -> BTreeSet<Name> {
-    let own = atoms.filter(|atom| predicates.contains(&atom.predicate.name));
-    own.filter_map(|atom| atom.arguments.last()).map(|term| name_of(term).clone()).collect()
+    let matching = atoms.filter(|atom| predicates.contains(&atom.predicate.name));
+    matching.filter_map(|atom| atom.arguments.last()).map(|term| name_of(term).clone()).collect()
 }
 
-/// The facts that a goal asks for.
+/// Returns the atoms among the conjuncts of a goal.
 fn goals(goal: &Condition) -> impl Iterator<Item = &Atom> {
     let mut parts = vec![goal];
     std::iter::from_fn(move || {
@@ -173,7 +178,7 @@ fn goals(goal: &Condition) -> impl Iterator<Item = &Atom> {
     })
 }
 
-/// Pairs of neighbours: by facts, or where there is no such fact, by values.
+/// Returns pairs of neighbours: by facts, or without such facts, by values.
 fn ways(problem: &Problem, number: &BTreeMap<&Name, usize>, moving: &BTreeSet<&Name>) -> Vec<(usize, usize)> {
     let (mut facts, mut values) = (BTreeSet::new(), BTreeSet::new());
     for element in &problem.init {
@@ -188,6 +193,7 @@ fn ways(problem: &Problem, number: &BTreeMap<&Name, usize>, moving: &BTreeSet<&N
             && one != other
             && !moving.contains(&atom.predicate.name)
         {
+            // Neighbourhood is symmetric in the picture.
             found.insert((one.min(other), one.max(other)));
         }
     }

@@ -1,6 +1,7 @@
-//! What there is to be seen of an answer: a plan with its configuration, its numbers, its way on the map, and the reasons.
+//! Pictures of answers: a plan with its configuration, its numbers, its route on the map, and the
+//! reasons.
 //!
-//! Pictures are made from what the JSON answers say; how they are drawn is known to `picture` alone.
+//! Pictures are made from the contents of the JSON answers. Only `picture` draws them.
 
 mod changes;
 mod compared;

@@ -1,4 +1,5 @@
-//! The numbers that a plan changes, what its conditions demand of them, and what it costs.
+//! Curves of the numbers that a plan changes, of the limits that its conditions impose, and of its
+//! cost.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +12,8 @@ use planner::Plan;
 use crate::number;
 use crate::report::seen::Scene;
 
-/// One curve for the cost, and one for each number that the plan changes or that something is demanded of.
+/// Returns a curve for the cost, and one for each number that the plan changes or a condition
+/// limits.
 pub(super) fn curves(scene: Scene<'_>, plan: &Plan, steps: &[Step], axis: Axis) -> Vec<Curve> {
     if steps.is_empty() {
         return Vec::new();
@@ -24,16 +26,16 @@ pub(super) fn curves(scene: Scene<'_>, plan: &Plan, steps: &[Step], axis: Axis) 
         line: 0,
     });
     let text = PlanText { steps: text.collect() };
-    // The validator has executed the plan.
+    // The validator has executed the plan before, so its course exists.
     let course = course(scene.domain, scene.problem, &text).unwrap_or_default();
     let points = metric(scene, plan, &course, axis).unwrap_or_else(|| spent(plan, steps, axis));
     let cost = Curve { name: "cost".to_owned(), points, bounds: Vec::new() };
     std::iter::once(cost).chain(numbers(&course, steps, axis)).collect()
 }
 
-/// Values of the problem's metric if the plan ended after each start and end of an action. Returns `None` if a value
-/// is undefined, or if the last value is not the cost of the plan. For example, the cost of the remainder of a
-/// mission does not include earlier costs.
+/// Values of the problem's metric if the plan ended after each start and end of an action. `None`
+/// if a value is undefined, or if the last value is not the cost of the plan. For example, the cost
+/// of the remainder of a mission does not include earlier costs.
 fn metric(scene: Scene<'_>, plan: &Plan, course: &Course, axis: Axis) -> Option<Vec<(f64, f64)>> {
     let first = metric_after(scene.domain, scene.problem, &BigRational::default())?;
     let mut points = vec![(0.0, number::to_f64(&first))];
@@ -44,20 +46,21 @@ fn metric(scene: Scene<'_>, plan: &Plan, course: &Course, axis: Axis) -> Option<
     ((last - cost).abs() <= 1e-6 * cost.abs().max(1.0)).then_some(points)
 }
 
-/// Cost of the plan after each step. If actions overlap, costs that belong to no step are spread evenly over time,
-/// since the makespan is not a sum over steps. Otherwise they are added before the first step.
+/// Cost of the plan after each step. If actions overlap, costs that belong to no step are spread
+/// evenly over time, since the makespan is not a sum over steps. Otherwise they are added before
+/// the first step.
 fn spent(plan: &Plan, steps: &[Step], axis: Axis) -> Vec<(f64, f64)> {
     let costs = plan.steps.iter().map(|step| step.cost.to_f64());
-    let other = plan.cost.to_f64() - costs.clone().sum::<f64>();
+    let remainder = plan.cost.to_f64() - costs.clone().sum::<f64>();
     let overlaps = axis == Axis::Time && steps.windows(2).any(|pair| pair[1].start < pair[0].end);
     let last = steps.iter().map(|step| step.end).fold(0.0, f64::max);
-    let other = |at: f64| if overlaps && last > 0.0 { other * at / last } else { other };
+    let remainder = |at: f64| if overlaps && last > 0.0 { remainder * at / last } else { remainder };
     let mut ends: Vec<(f64, f64)> = steps.iter().map(|step| step.end).zip(costs).collect();
     ends.sort_by(|left, right| left.0.total_cmp(&right.0));
-    let (mut sum, mut points) = (0.0, vec![(0.0, other(0.0))]);
+    let (mut sum, mut points) = (0.0, vec![(0.0, remainder(0.0))]);
     for (end, cost) in ends {
         sum += cost;
-        set(&mut points, end, sum + other(end));
+        set(&mut points, end, sum + remainder(end));
     }
     points
 }
@@ -85,14 +88,15 @@ fn numbers(course: &Course, steps: &[Step], axis: Axis) -> Vec<Curve> {
         }
         let Some(step) = steps.get(moment.step) else { continue };
         for bound in &moment.bounds {
-            let who = format!("step {} ({}) needs", moment.step + 1, step.label);
-            add(&mut curves, bound, (step.start, step.end), &who);
+            let requirement = format!("step {} ({}) needs", moment.step + 1, step.label);
+            add(&mut curves, bound, (step.start, step.end), &requirement);
         }
     }
     let end = steps.iter().map(|step| step.end).fold(0.0, f64::max);
     for bound in &course.goal {
         add(&mut curves, bound, (end, end), "the goal needs");
     }
+    // Constant numbers without limits would only hide the other curves.
     let is_of_interest = |curve: &Curve| curve.points.len() > 1 || !curve.bounds.is_empty();
     curves.into_values().filter(is_of_interest).collect()
 }
@@ -105,7 +109,7 @@ fn add<'c>(curves: &mut BTreeMap<&'c str, Curve>, bound: &'c NumberBound, (from,
     curve.bounds.push(Bound { from, to, value: number::to_f64(&bound.bound), text });
 }
 
-/// Where on the axis something happens.
+/// Position of a moment on the axis.
 fn place(moment: &CourseMoment, axis: Axis) -> f64 {
     match axis {
         Axis::Time => number::to_f64(&moment.time),
@@ -113,7 +117,7 @@ fn place(moment: &CourseMoment, axis: Axis) -> f64 {
     }
 }
 
-/// The name of a function without its parentheses.
+/// Returns the name of a function without its parentheses.
 fn bare(name: &str) -> String {
     name.trim_start_matches('(').trim_end_matches(')').to_owned()
 }

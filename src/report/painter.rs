@@ -1,4 +1,4 @@
-//! What a loop is about to do, as a part of a page.
+//! Draws the remaining plan of a loop as a part of a page.
 
 use num_rational::BigRational;
 use pddl::ast::Condition;
@@ -10,10 +10,10 @@ use crate::report::plan::drawn;
 use crate::report::positions::Positions;
 use crate::report::seen::{Designs, Scene, known_designs};
 
-/// So many steps are drawn at most; what comes later will be drawn when it is near.
-const NEXT: usize = 500;
+/// Maximum number of drawn steps. Later steps are drawn as the plan advances.
+const MAX_STEPS: usize = 500;
 
-/// Draws what a loop is about to do.
+/// Draws the remaining plan of a loop.
 #[derive(Debug, Clone)]
 pub struct Painter {
     designs: Designs,
@@ -21,17 +21,18 @@ pub struct Painter {
 }
 
 impl Painter {
-    /// For a loop that takes charge of a mission.
+    /// Creates the painter for a mission.
     pub fn new(mission: &Mission, positions: Positions) -> Self {
         Self { designs: known_designs(mission), positions }
     }
 
-    /// The plan as HTML: timeline, numbers and map from now on, in the style [`picture::STYLE`].
+    /// Formats the remaining plan as HTML: timeline, numbers and map, in the style
+    /// [`picture::STYLE`].
     pub fn part(&self, outlook: &Outlook) -> String {
-        let later = outlook.steps.len().saturating_sub(NEXT);
+        let later = outlook.steps.len().saturating_sub(MAX_STEPS);
         let mut problem = outlook.problem.clone();
         if later > 0 {
-            // The goal demands nothing of how things are before the end.
+            // A prefix of the plan need not reach the goal.
             problem.goal = Condition::And(Vec::new());
         }
         let scene = Scene {
@@ -42,13 +43,13 @@ impl Painter {
         };
         let mut picture = drawn(scene, &plan(&outlook.steps[..outlook.steps.len() - later]));
         if later > 0 {
-            picture.verdict = format!("The next {NEXT} steps; {later} more follow.");
+            picture.verdict = format!("The next {MAX_STEPS} steps; {later} more follow.");
         }
         picture.part()
     }
 }
 
-/// Steps one after another, from now on.
+/// Sequential plan of the remaining steps.
 fn plan(steps: &[PlannedStep]) -> Plan {
     let mut now = BigRational::default();
     let mut timed = |step: &PlannedStep| {

@@ -1,4 +1,4 @@
-//! A solution to what is drawn of it.
+//! Converts a solution to a picture.
 
 use std::collections::BTreeMap;
 
@@ -11,16 +11,17 @@ use crate::report::map::map;
 use crate::report::numbers::curves;
 use crate::report::seen::{Designs, Scene, Seen, known_designs};
 
-/// What is drawn of a solution, whose steps have all arguments of the mission's domain.
+/// Returns the picture of a solution whose steps have all arguments of the mission's domain.
 pub fn plan_picture(seen: Seen<'_>, solution: &Solution) -> picture::Plan {
-    let known = known_designs(seen.mission);
-    let mut picture = solution.plan.as_ref().map(|plan| drawn(seen.scene(&known), plan)).unwrap_or_default();
+    let functions_of_designs = known_designs(seen.mission);
+    let mut picture =
+        solution.plan.as_ref().map(|plan| drawn(seen.scene(&functions_of_designs), plan)).unwrap_or_default();
     (picture.verdict, picture.search) = (sentence(solution), search(solution));
     picture.designs = designs(seen.mission, &picture.steps);
     picture
 }
 
-/// The steps of a plan, its numbers, and its way on the map.
+/// Returns the picture of a plan: steps, numbers, and route on the map.
 pub(super) fn drawn(scene: Scene<'_>, plan: &Plan) -> picture::Plan {
     let axis = axis(plan);
     let mut steps = steps(scene.designs, plan, axis);
@@ -29,33 +30,35 @@ pub(super) fn drawn(scene: Scene<'_>, plan: &Plan) -> picture::Plan {
     picture::Plan { steps, axis, map, curves, ..picture::Plan::default() }
 }
 
-/// The verdict, the steps and the search of a solution, and nothing else.
+/// Returns a picture with only the verdict, the steps and the search of a solution.
 pub fn timeline_picture(mission: &Mission, solution: &Solution) -> picture::Plan {
     let axis = solution.plan.as_ref().map(axis).unwrap_or_default();
-    let known = known_designs(mission);
-    let steps = solution.plan.as_ref().map(|plan| steps(&known, plan, axis)).unwrap_or_default();
+    let functions_of_designs = known_designs(mission);
+    let steps =
+        solution.plan.as_ref().map(|plan| steps(&functions_of_designs, plan, axis)).unwrap_or_default();
     let (verdict, search) = (sentence(solution), search(solution));
     picture::Plan { verdict, steps, axis, search, ..picture::Plan::default() }
 }
 
-/// The cost, and what proves it.
+/// Formats the cost and its proof.
 fn sentence(solution: &Solution) -> String {
     let cost = solution.plan.as_ref().map(|plan| format!("Cost {}", plan.cost));
     let bound = solution.lower_bound.as_ref().filter(|_| solution.status != Status::Optimal);
     let bound = bound.filter(|_| cost.is_some()).map(|bound| format!(", lower bound {bound}"));
-    let said = solution.verdict();
+    let verdict = solution.verdict();
     if let Some(cost) = cost {
-        return format!("{cost}{}: {said}.", bound.unwrap_or_default());
+        return format!("{cost}{}: {verdict}.", bound.unwrap_or_default());
     }
-    let (first, rest) = said.split_at(said.chars().next().map_or(0, char::len_utf8));
+    let (first, rest) = verdict.split_at(verdict.chars().next().map_or(0, char::len_utf8));
     format!("{}{rest}.", first.to_uppercase())
 }
 
-/// Time, unless actions that take none follow each other.
+/// Returns the time axis, unless actions of duration 0 follow each other.
 fn axis(plan: &Plan) -> Axis {
     let ends = plan.steps.iter().map(|step| step.start.to_rational() + step.duration.to_rational());
     let is_sequence = plan.steps.iter().skip(1).zip(ends).all(|(next, end)| end <= next.start.to_rational());
     let takes_none = plan.steps.iter().any(|step| step.duration.is_zero());
+    // Actions without duration would be invisible on a time axis.
     if is_sequence && takes_none { Axis::Steps } else { Axis::Time }
 }
 
@@ -90,24 +93,25 @@ fn steps(known: &Designs, plan: &Plan, axis: Axis) -> Vec<picture::Step> {
     drawn
 }
 
-/// The configuration of a step; where a domain does not say which function a design is for, the knowledge base does. Of several designs
-/// of one function the last counts.
+/// Returns the configuration of a step. If the domain does not relate a design to a function, the
+/// knowledge base does. Of several designs of one function the last counts.
 fn configuration(step: &Step, known: &Designs) -> Vec<(String, String)> {
     if !step.configuration.is_empty() {
         return step.configuration.clone();
     }
-    let own = step.arguments.iter().filter_map(|name| Some((known.get(name)?.clone(), name.clone())));
-    own.collect::<BTreeMap<String, String>>().into_iter().collect()
+    let of_arguments =
+        step.arguments.iter().filter_map(|name| Some((known.get(name)?.clone(), name.clone())));
+    of_arguments.collect::<BTreeMap<String, String>>().into_iter().collect()
 }
 
-/// The action with its arguments, without functions and designs.
+/// Label of an action: its name and arguments, without functions and designs.
 fn label(step: &Step, configuration: &[(String, String)]) -> String {
     let configured = |word: &&String| configuration.iter().any(|(f, design)| f == *word || design == *word);
     let words = step.arguments.iter().filter(|word| !configured(word)).map(String::as_str);
     std::iter::once(step.action.as_str()).chain(words).collect::<Vec<_>>().join(" ")
 }
 
-/// How the search went; when, differs from run to run, and is not drawn.
+/// Returns the progress of the search. Times are omitted, because they differ between runs.
 fn search(solution: &Solution) -> Vec<picture::Progress> {
     let moments = solution.statistics.history.iter().map(|moment| {
         let cost =

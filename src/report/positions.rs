@@ -1,4 +1,4 @@
-//! Where places lie: the section `report` of a manifest.
+//! Coordinates of places: the section `report` of a manifest.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -31,23 +31,23 @@ enum Written {
     Functions([String; 2]),
 }
 
-/// Where the places of a mission lie.
+/// Coordinates of the places of a mission.
 #[derive(Debug, Clone, Default)]
 pub enum Positions {
-    /// Nobody says it.
+    /// No coordinates are given.
     #[default]
     Unknown,
-    /// Two functions of the problem: to the right and upwards.
+    /// Two functions of the problem: the x and the y coordinate.
     Functions([String; 2]),
-    /// Each place by name, to the right and upwards.
+    /// Coordinates of each place by name: x to the right, y upwards.
     Known(BTreeMap<Name, (f64, f64)>),
 }
 
 impl ReportSection {
-    /// Reads where places lie.
+    /// Reads the coordinates of places.
     ///
     /// # Errors
-    /// The file cannot be read, or has lines that are not positions: all of them.
+    /// The file cannot be read; otherwise all lines that are not coordinates.
     pub fn positions(&self, origin: &ManifestPath) -> Result<Positions, Errors> {
         match &self.positions {
             None => Ok(Positions::Unknown),
@@ -58,21 +58,21 @@ impl ReportSection {
 }
 
 impl Positions {
-    /// The positions of these places; none unless all of them are known.
+    /// Returns the coordinates of the places, or `None` unless all are known.
     pub(super) fn of(&self, problem: &Problem, places: &[Name]) -> Option<BTreeMap<Name, (f64, f64)>> {
-        let known = match self {
+        let coordinates = match self {
             Self::Unknown => return None,
-            Self::Known(known) => known.clone(),
+            Self::Known(coordinates) => coordinates.clone(),
             Self::Functions([x, y]) => {
                 let (x, y) = (values(problem, x), values(problem, y));
                 x.into_iter().filter_map(|(place, x)| Some((place.clone(), (x, *y.get(&place)?)))).collect()
             }
         };
-        places.iter().all(|place| known.contains_key(place)).then_some(known)
+        places.iter().all(|place| coordinates.contains_key(place)).then_some(coordinates)
     }
 }
 
-/// The values of a function of one object.
+/// Returns the values of a unary function by object.
 fn values(problem: &Problem, function: &str) -> BTreeMap<Name, f64> {
     let function = Name::new(function);
     let value = |element: &InitialElement| match element {

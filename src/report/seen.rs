@@ -1,4 +1,4 @@
-//! What a plan is drawn with: the task that it is for, and what else is known.
+//! Context of a plan's picture: the task of the plan, and the coordinates.
 
 use std::collections::BTreeMap;
 
@@ -7,21 +7,21 @@ use pddl::ast::{Domain, Problem};
 use crate::mission::Mission;
 use crate::report::positions::Positions;
 
-/// What a plan is for.
+/// Context of a plan's picture.
 #[derive(Debug, Clone, Copy)]
 pub struct Seen<'a> {
     /// The mission.
     pub mission: &'a Mission,
-    /// Its problem, as [`Mission::filled`] has made it.
+    /// The mission's problem, as [`Mission::filled`] has made it.
     pub problem: &'a Problem,
-    /// Where its places lie.
+    /// Coordinates of the mission's places.
     pub positions: &'a Positions,
 }
 
-/// Designs of a knowledge base, and the first function that each of them solves.
+/// Designs of a knowledge base, with the first function that each of them solves.
 pub(super) type Designs = BTreeMap<String, String>;
 
-/// The task that a plan is for, with what is known beside it.
+/// The task of a plan, with further context.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Scene<'a> {
     pub(super) domain: &'a Domain,
@@ -37,7 +37,7 @@ impl<'a> Seen<'a> {
     }
 }
 
-/// The designs of a mission's knowledge base.
+/// Returns the designs of a mission's knowledge base.
 pub(super) fn known_designs(mission: &Mission) -> Designs {
     let designs = mission.knowledge().into_iter().flat_map(|knowledge| knowledge.catalogue().designs());
     let solved = designs.filter_map(|design| {

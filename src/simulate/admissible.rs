@@ -1,8 +1,10 @@
-//! Designs with which an action can be done now, for ways of control that choose them function by function.
+//! Designs with which an action can be done now, for ways of control that choose them function by
+//! function.
 //!
-//! A design is *admissible* for a function of an action if it is available and all conditions of the action hold now with
-//! this design. They include the bounds of the action in its context (`t:requiresQuality`), and that the battery suffices.
-//! Conditions that mention the design of another function are omitted while that design is not chosen, and are checked once it is.
+//! A design is *admissible* for a function of an action if it is available and all conditions of
+//! the action hold now with this design. They include the bounds of the action in its context
+//! (`t:requiresQuality`), and that the battery suffices. Conditions that mention the design of
+//! another function are omitted while that design is not chosen, and are checked once it is.
 
 use num_rational::BigRational;
 use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Expression, Name, Problem, Term};
@@ -17,8 +19,8 @@ pub(super) struct Admission<'p> {
 }
 
 impl<'p> Admission<'p> {
-    /// Conditions of a step. `done` is the share of the step that is done, if it is under way. Conditions that mention
-    /// the designs of the functions in `undecided` are omitted.
+    /// Collects the conditions of a step. `done` is the completed share of the step, if it is
+    /// running. Conditions that mention the designs of the functions in `undecided` are omitted.
     pub(super) fn new(
         domain: &Domain,
         problem: &'p Problem,
@@ -43,7 +45,7 @@ impl<'p> Admission<'p> {
         Self { domain, problem }
     }
 
-    /// Whether the step can be done as far as its designs are chosen.
+    /// Returns `true` if the step is possible with its designs, as far as they are chosen.
     pub(super) fn admits(&self, step: &PlannedStep) -> bool {
         advance(&self.domain, self.problem, &step.to_plan_step(), false).is_ok()
     }

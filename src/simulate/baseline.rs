@@ -1,20 +1,24 @@
-//! Ways of control to compare with: what is left out of the loop, one idea each.
+//! Baseline strategies for comparison with the adaptation loop. Each lacks one capability of the
+//! loop.
 //!
-//! All know what the loop knows, request actions in the same way, and have the same planner for their tasks. They differ
-//! in when they plan and in who chooses designs:
+//! All strategies receive the same observations as the loop, request actions in the same way, and
+//! use the same planner. They differ in when they plan and in how they choose designs:
 //!
-//! - *none* follows its first plan, and gives up when an action fails;
-//! - *failure* plans again, jointly, when an action has failed, as PLANTA does \[1\];
-//! - *greedy* takes for each function, one after the other, the admissible design with which the action at hand costs least by itself, at
-//!   each request and when a design is lost, as MROS takes the one of greatest utility among those that fulfil the requirements \[2\];
-//!   its task is planned again when an action has failed;
-//! - *random* takes any admissible design instead.
+//! - *none* follows its first plan, and stops when an action fails;
+//! - *failure* plans jointly again when an action has failed, as PLANTA does \[1\];
+//! - *greedy* chooses for each function separately the admissible design with the lowest cost of
+//!   the next action, at each request and when a design is lost. MROS chooses similarly: the design
+//!   of greatest utility among those that fulfil the requirements \[2\]. The task is planned again
+//!   when an action has failed;
+//! - *random* chooses any admissible design instead.
 //!
-//! [`Admission`] defines which designs are admissible. If no design is, the action keeps that of its plan if it is
-//! available, and otherwise gets an available one; the action may become possible later. If the action is not
-//! possible with the chosen designs, but with those of its plan, it gets the designs of its plan.
+//! [`Admission`] defines which designs are admissible. If no design is, the action keeps the design
+//! of its plan if that is available, and otherwise gets an available one; the action may become
+//! possible later. If the action is not possible with the chosen designs, but with those of its
+//! plan, it gets the designs of its plan.
 //!
-//! \[1\] Rezende Silva et al., PLANTA, 2025. \[2\] Bozhinoski et al., MROS, Advanced Robotics 36, 2022.
+//! \[1\] Rezende Silva et al., PLANTA, 2025. \[2\] Bozhinoski et al., MROS, Advanced Robotics 36,
+//! 2022.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::time::Duration;
@@ -27,26 +31,26 @@ use crate::mapek::{Answer, Event, Loop, Observation, PlannedStep};
 use crate::mission::Mission;
 use crate::simulate::admissible::Admission;
 
-/// Who decides.
+/// A control strategy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Strategy {
     /// The adaptation loop.
     Joint,
-    /// The first plan to its end.
+    /// Executes the first plan without any change.
     None,
-    /// For each function any design with which the action can be done.
+    /// Chooses for each function a random design with which the action is possible.
     Random,
-    /// For each function by itself the cheapest design with which the action can be done.
+    /// Chooses for each function separately the cheapest design with which the action is possible.
     Greedy,
-    /// A new joint plan when an action has failed.
+    /// Plans jointly again when an action has failed.
     Failure,
 }
 
 impl Strategy {
-    /// All of them, the loop first.
+    /// All strategies, the loop first.
     pub const ALL: [Self; 5] = [Self::Joint, Self::Failure, Self::Greedy, Self::Random, Self::None];
 
-    /// Its name.
+    /// Returns the name of the strategy.
     pub fn name(self) -> &'static str {
         match self {
             Self::Joint => "joint",
@@ -62,7 +66,7 @@ impl Strategy {
     }
 }
 
-/// A strategy at work. What it knows is kept by a loop that is never asked to decide.
+/// A running strategy. A loop that never deliberates maintains its knowledge.
 #[derive(Debug)]
 pub(super) struct Controller {
     strategy: Strategy,
@@ -70,9 +74,9 @@ pub(super) struct Controller {
     plan: VecDeque<PlannedStep>,
     random: fastrand::Rng,
     gave_up: bool,
-    /// The designs that were available when a plan was last looked for.
+    /// The designs that were available at the last planning.
     planned_with: BTreeSet<String>,
-    /// How many plans were made.
+    /// Number of plans that were computed.
     pub(super) plans: usize,
 }
 
@@ -90,7 +94,7 @@ impl Controller {
         }
     }
 
-    /// Whether it will never request anything any more.
+    /// Returns `true` if the strategy will make no further request.
     pub(super) fn is_done(&self) -> bool {
         self.gave_up
     }
@@ -140,7 +144,7 @@ impl Controller {
         self.plan = self.control.plan_anew().unwrap_or_default().into();
     }
 
-    /// Requests the next action if none is under way.
+    /// Requests the next action if no action is running.
     fn go_on(&mut self, answers: &mut Vec<Answer>) {
         if self.gave_up || self.control.beliefs().running().is_some() {
             return;
@@ -153,17 +157,18 @@ impl Controller {
             && self.planned_with != *self.control.beliefs().available()
             && !self.control.is_goal()
         {
-            // There was no plan; with other designs there may be one.
+            // A plan may exist if the availability of designs changes.
             self.replan();
             if let Some(step) = self.plan.pop_front() {
+                // The recursive call requests the step, and ends because the plan is not empty.
                 self.plan.push_front(step);
                 self.go_on(answers);
             }
         }
     }
 
-    /// The action with the designs that the strategy chooses for the functions in `concerns`. `done` is the share of
-    /// the action that is done, if it is under way.
+    /// Returns the action with the designs that the strategy chooses for the functions in
+    /// `concerns`. `done` is the completed share of the action, if it is running.
     fn choose(
         &mut self,
         step: &PlannedStep,
@@ -178,12 +183,17 @@ impl Controller {
         let functions: Vec<&str> = functions.filter(|function| concerns(function)).collect();
         for (index, function) in functions.iter().enumerate() {
             let designs = self.control.designs_for(function);
+            // Conditions on the later functions are ignored until their designs are chosen.
             let undecided = &functions[index + 1..];
             let admission = Admission::new(mission.domain(), &problem, &chosen, done, undecided);
             let admits = |design: &&String| admission.admits(&chosen.with_design(function, design));
             let admissible: Vec<String> = designs.iter().filter(admits).cloned().collect();
+            // Without an admissible design, the design of the plan has the best chance to become
+            // possible.
             let is_kept = admissible.is_empty()
-                && chosen.design(function).is_some_and(|design| designs.iter().any(|own| own == design));
+                && chosen
+                    .design(function)
+                    .is_some_and(|design| designs.iter().any(|candidate| candidate == design));
             if is_kept {
                 continue;
             }
@@ -199,18 +209,18 @@ impl Controller {
                 chosen = chosen.with_design(function, &design);
             }
         }
-        // Designs that are chosen one after the other may not be possible together. Then those of the plan are used
-        // if they are.
+        // Designs that are chosen one after the other may be impossible together. Then those of the
+        // plan are used if they are possible.
         let whole = Admission::new(mission.domain(), &problem, step, done, &[]);
         if !whole.admits(&chosen) && whole.admits(step) { step.clone() } else { chosen }
     }
 
-    /// Chooses anew where the action under way has lost a design.
+    /// Chooses designs again if the running action has lost a design.
     fn replace_lost(&mut self, answers: &mut Vec<Answer>) {
-        let known = self.control.beliefs();
-        let Some((_, step)) = known.running() else { return };
-        let (step, done) = (step.clone(), known.progress().cloned());
-        let available = known.available().clone();
+        let beliefs = self.control.beliefs();
+        let Some((_, step)) = beliefs.running() else { return };
+        let (step, done) = (step.clone(), beliefs.progress().cloned());
+        let available = beliefs.available().clone();
         let is_lost =
             |function: &str| step.design(function).is_some_and(|design| !available.contains(design));
         if step.configuration.iter().any(|(function, _)| is_lost(function)) {
@@ -220,8 +230,8 @@ impl Controller {
     }
 }
 
-/// The design with which the action costs least by itself, whether or not the action is possible. Of equal designs,
-/// the first.
+/// Returns the design with the lowest cost of the action by itself, whether or not the action is
+/// possible. Ties are broken by order.
 fn cheapest(
     mission: &Mission,
     problem: &Problem,

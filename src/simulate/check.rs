@@ -1,4 +1,4 @@
-//! The section `simulation` of a scenario against the mission that it is for: every name in it, and its numbers.
+//! Checks the section `simulation` of a scenario against its mission: every name and every number.
 
 use pddl::ast::Condition;
 
@@ -15,7 +15,7 @@ pub(super) struct Watched {
     pub(super) events: Vec<Option<Condition>>,
     /// The function that ends the mission, as the validator writes it.
     pub(super) lifeline: Option<String>,
-    /// The condition that the pipeline is found.
+    /// The condition under which the pipeline is found.
     pub(super) found: Option<Condition>,
     /// The function for the length of the pipeline, without parentheses.
     pub(super) length: Option<String>,
@@ -28,7 +28,7 @@ struct Checker<'m> {
 }
 
 impl Simulation {
-    /// All mistakes in the section, for a mission in the scenario's situation.
+    /// Returns all mistakes in the section, for a mission in the scenario's situation.
     pub fn mistakes(&self, mission: &Mission) -> Vec<Mistake> {
         self.watched(mission).1
     }
@@ -173,10 +173,11 @@ impl Checker<'_> {
         let path = |key: &str| -> Vec<Key> { vec!["signals".into(), index.into(), key.into()] };
         let knowledge = self.mission.knowledge();
         if !knowledge.is_some_and(|knowledge| knowledge.has_attribute(&signal.attribute)) {
-            let known = knowledge.map(|knowledge| knowledge.view().attribute_types()).unwrap_or_default();
-            let known = known.iter().map(|attribute| attribute.name.as_str());
-            let meant = did_you_mean(&signal.attribute, known);
-            let text = format!("the knowledge base has no attribute `{}`{meant}", signal.attribute);
+            let attributes =
+                knowledge.map(|knowledge| knowledge.view().attribute_types()).unwrap_or_default();
+            let attributes = attributes.iter().map(|attribute| attribute.name.as_str());
+            let suggestion = did_you_mean(&signal.attribute, attributes);
+            let text = format!("the knowledge base has no attribute `{}`{suggestion}", signal.attribute);
             self.wrong(path("attribute"), text);
         }
         self.positive(path("period"), signal.period);
@@ -207,8 +208,8 @@ impl Checker<'_> {
         }
         let actions = || self.mission.domain().actions.iter().map(|action| action.identifier.name.as_str());
         if !actions().any(|action| action.eq_ignore_ascii_case(&suave.inspect)) {
-            let meant = did_you_mean(&suave.inspect, actions());
-            self.wrong(path("inspect"), format!("the domain has no action `{}`{meant}", suave.inspect));
+            let suggestion = did_you_mean(&suave.inspect, actions());
+            self.wrong(path("inspect"), format!("the domain has no action `{}`{suggestion}", suave.inspect));
         }
         let length = self.function(&path("length"), &suave.length);
         watched.length = length.map(|length| length.trim_matches(['(', ')']).to_owned());

@@ -1,10 +1,11 @@
-//! A mission with a simulated robot: how ways of control fare in the same world.
+//! Simulates missions with a robot model, to compare control strategies in the same world.
 //!
-//! An [`Experiment`] runs one mission to its end, by the goal, by the end of the robot, or by the end of the time. The figures
-//! are those of the mission (accomplished, its metric), those that SUAVE reports \[1\], and how undecided the control was
-//! (reconfigurations, distinct configurations).
+//! An [`Experiment`] runs one mission until the goal is reached, the robot is lost, or the time is
+//! over. The figures are those of the mission (accomplished, its metric), those that SUAVE reports
+//! \[1\], and the stability of the control (reconfigurations, distinct configurations).
 //!
-//! - \[1\] Rezende Silva et al., SUAVE: an exemplar for self-adaptive underwater vehicles, SEAMS 2023.
+//! - \[1\] Rezende Silva et al., SUAVE: an exemplar for self-adaptive underwater vehicles, SEAMS
+//!   2023.
 
 mod admissible;
 mod baseline;
@@ -32,7 +33,7 @@ use baseline::Controller;
 use check::Watched;
 use world::World;
 
-/// A mission with what a simulated robot meets, to be run again and again.
+/// A mission with the environment of a simulated robot. It can be run repeatedly.
 ///
 /// ```
 /// use std::path::Path;
@@ -55,8 +56,9 @@ pub struct Experiment {
 }
 
 impl Experiment {
-    /// A mission in the situation of a scenario, controlled by a loop with the settings `control`. `time_unit` is the
-    /// unit of the domain's times; the clock of the loop is in seconds.
+    /// Prepares a mission in the situation of a scenario, controlled by a loop with the settings
+    /// `control`. `time_unit` is the unit of the domain's times; the clock of the loop is in
+    /// seconds.
     ///
     /// # Errors
     /// All mistakes in the simulation.
@@ -71,7 +73,7 @@ impl Experiment {
         Ok(Self { mission, control, simulation, watched, time_unit })
     }
 
-    /// The mission at its beginning.
+    /// Returns the mission in its initial situation.
     pub fn mission(&self) -> &Mission {
         &self.mission
     }
@@ -81,13 +83,14 @@ impl Experiment {
         numbers::note_doubts(&mut self.mission);
     }
 
-    /// The unit of all times but those of the log.
+    /// Returns the unit of all times except those of the log.
     pub fn time_unit(&self) -> TimeUnit {
         self.time_unit
     }
 
-    /// Runs the mission once. `log` is called with every observation and its answers, with times in seconds. Returns
-    /// `None` if a limit was reached before the end, since a part of a mission is not a result.
+    /// Runs the mission once. `log` is called with every observation and its answers, with times in
+    /// seconds. Returns `None` if a limit was reached before the end, since a part of a mission is
+    /// not a result.
     ///
     /// # Errors
     /// The mission cannot be planned for.
@@ -116,16 +119,16 @@ impl Experiment {
     }
 }
 
-/// A world, who controls it, and what is noted of both.
+/// A world, its controller, and the records of both.
 struct Stage {
     world: World,
     controller: Controller,
-    /// The seconds in a unit of the domain's time.
+    /// Number of seconds in a unit of the domain's time.
     second: f64,
     time_budget: f64,
     configuration: BTreeMap<String, String>,
     configurations: BTreeSet<BTreeMap<String, String>>,
-    /// Since when the action under way cannot go on, with nothing done about it.
+    /// Time since which the running action has stalled without a reaction.
     upset: Option<f64>,
     run: Run,
 }
@@ -138,7 +141,7 @@ impl Stage {
         log: &mut dyn FnMut(&Observation, &[Answer]),
     ) -> Result<Option<Ending>, Message> {
         let mut queue: VecDeque<Event> = self.world.first_look()?.into();
-        // What is seen at first is known before the first plan.
+        // The first observations are known before the first plan.
         let early: Vec<Event> = queue.drain(..).collect();
         let answers = self.controller.start();
         let begun = Observation::from(Event::Tick);
@@ -147,7 +150,7 @@ impl Stage {
         queue.extend(early);
         loop {
             while let Some(event) = queue.pop_front() {
-                // A plan that a limit cut short would lead to a different mission.
+                // A plan that a limit has cut short would falsify the result.
                 if limits.reached() {
                     return Ok(None);
                 }
@@ -168,7 +171,7 @@ impl Stage {
         }
     }
 
-    /// Reason why the mission is over. Returns `None` if it continues.
+    /// Returns the reason for the end of the mission, or `None` if it continues.
     fn ending(&self) -> Option<Ending> {
         if self.world.reached() {
             Some(Ending::Goal)
@@ -194,14 +197,14 @@ impl Stage {
         }
     }
 
-    /// Notes when the action under way has come to a stand.
+    /// Records the time at which the running action stalls.
     fn look(&mut self) {
         if self.upset.is_none() && !self.world.goes_on() {
             self.upset = Some(self.world.time);
         }
     }
 
-    /// Carries out what was decided.
+    /// Executes the controller's decisions.
     fn take(&mut self, answers: &[Answer], queue: &mut VecDeque<Event>) {
         for effect in answers.iter().filter_map(Answer::effect) {
             if let Command::Reconfigure { function, from, to } = &effect.command {

@@ -1,4 +1,4 @@
-//! The figures of one simulated mission, also in the columns of SUAVE.
+//! The figures of one simulated mission, including the columns of SUAVE.
 
 use std::fmt;
 
@@ -9,7 +9,7 @@ use crate::simulate::baseline::Strategy;
 pub const SUAVE_COLUMNS: [&str; 4] =
     ["pipeline found", "time searching pipeline (s)", "distance inspected (m)", "mean reaction time (s)"];
 
-/// Reason why a simulated mission is over.
+/// Reason for the end of a simulated mission.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ending {
     /// The goal was reached.
@@ -34,42 +34,43 @@ impl fmt::Display for Ending {
     }
 }
 
-/// What a simulated mission has come to. Times are in the domain's time unit.
+/// Result of a simulated mission. Times are in the domain's time unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
-    /// Who decided.
+    /// The control strategy.
     pub strategy: Strategy,
-    /// What all that is random was drawn from.
+    /// Seed of everything random.
     pub seed: u64,
-    /// Whether the goal was reached.
+    /// `true` if the goal was reached.
     pub accomplished: bool,
-    /// Whether the robot came to its end.
+    /// `true` if the robot was lost.
     pub lost: bool,
-    /// Reason why the mission is over.
+    /// Reason for the end of the mission.
     pub ending: Ending,
-    /// The unit of its times.
+    /// Unit of the times.
     pub time_unit: TimeUnit,
     /// The mission's metric at the end.
     pub cost: f64,
-    /// How long it took.
+    /// Duration of the mission.
     pub time: f64,
-    /// How many actions succeeded.
+    /// Number of actions that succeeded.
     pub actions: usize,
-    /// How many actions failed.
+    /// Number of actions that failed.
     pub failed: usize,
-    /// How many actions were cancelled.
+    /// Number of actions that were cancelled.
     pub cancelled: usize,
-    /// How many plans were looked for.
+    /// Number of planning queries.
     pub plans: usize,
-    /// How often a function got another design.
+    /// Number of changes of a function's design.
     pub reconfigurations: usize,
-    /// How many different configurations actions were requested with.
+    /// Number of distinct configurations in the requests of actions.
     pub distinct: usize,
-    /// For each time that the action under way could not go on, how long until something was done about it.
+    /// Reaction times: for each time that the running action stalled, the time until the controller
+    /// acted.
     pub reactions: Vec<f64>,
-    /// When the pipeline was found.
+    /// Time at which the pipeline was found.
     pub found: Option<f64>,
-    /// How much of it was inspected; none where the mission does not inspect.
+    /// Inspected length of the pipeline. `None` if the mission does not inspect.
     pub distance: Option<f64>,
 }
 
@@ -98,15 +99,16 @@ impl Default for Run {
 }
 
 impl Run {
-    /// The mean time from a disturbance to what was done about it; none where there was no such event, which is not the
-    /// same as a reaction at once.
+    /// Returns the mean reaction time. `None` without any event, which differs from a reaction at
+    /// once.
     pub fn mean_reaction(&self) -> Option<f64> {
         let count = self.reactions.len();
         (count > 0).then(|| self.reactions.iter().sum::<f64>() / count as f64)
     }
 
-    /// The values of [`SUAVE_COLUMNS`]; empty where the mission has none, and `no event` where there was nothing to react
-    /// to. The search time of a pipeline that was not found is the mission's, as SUAVE has it.
+    /// Returns the values of [`SUAVE_COLUMNS`]. Empty if the mission does not have them, and `no
+    /// event` if no reaction was needed. As in SUAVE, the search time of a pipeline that was not
+    /// found is the duration of the mission.
     pub fn suave(&self) -> [String; 4] {
         let Some(distance) = self.distance else {
             return [String::new(), String::new(), String::new(), self.reaction()];
@@ -127,7 +129,7 @@ impl Run {
         short(time * self.time_unit.seconds())
     }
 
-    /// Whether this is the better outcome: a mission that is accomplished before one that is not, then the lower cost.
+    /// Returns `true` if this outcome is better: accomplished missions first, then the lower cost.
     pub fn is_better_than(&self, other: &Self) -> bool {
         match (self.accomplished, other.accomplished) {
             (true, true) => self.cost < other.cost - 1e-6,
@@ -136,7 +138,7 @@ impl Run {
     }
 }
 
-/// A number with at most three decimals.
+/// Formats a number with at most three decimals.
 pub(super) fn short(value: f64) -> String {
     let text = format!("{value:.3}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()

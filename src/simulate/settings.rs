@@ -1,4 +1,4 @@
-//! What a simulated robot meets: the section `simulation` of a scenario.
+//! The section `simulation` of a scenario: the environment of a simulated robot.
 
 use std::collections::BTreeMap;
 
@@ -103,8 +103,8 @@ pub struct Suave {
 }
 
 impl Simulation {
-    /// A world in which nothing happens but what is asked for: reports come every `step`, the mission is given up after `time_budget`, and
-    /// an action that cannot go on fails after `patience`.
+    /// Settings of a world without disturbances. Observations are reported every `step`, the
+    /// mission ends after `time_budget`, and an action that has stalled for `patience` fails.
     pub fn new(step: f64, time_budget: f64, patience: f64) -> Self {
         Self {
             step,

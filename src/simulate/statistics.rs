@@ -4,16 +4,17 @@
 //!
 //! - \[1\] Student: The probable error of a mean, Biometrika 6, 1908.
 
-/// A sample in three numbers.
+/// Statistics of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
-    /// How many values.
+    /// Number of values.
     pub count: usize,
-    /// Their mean.
+    /// Mean of the values.
     pub mean: f64,
-    /// Their standard deviation, from one degree of freedom less than values; 0 for fewer than two.
+    /// Standard deviation, with one degree of freedom less than values; 0 for fewer than two.
     pub deviation: f64,
-    /// Half the width of the 95 percent confidence interval of the mean; 0 for fewer than two values.
+    /// Half the width of the 95 percent confidence interval of the mean; 0 for fewer than two
+    /// values.
     pub half_width: f64,
 }
 
@@ -24,7 +25,7 @@ const QUANTILES: [f64; 30] = [
 ];
 
 impl Sample {
-    /// The sample of some values; none without any.
+    /// Computes the statistics of a sample. `None` if it is empty.
     pub fn of(values: &[f64]) -> Option<Self> {
         let count = values.len();
         if count == 0 {
@@ -37,7 +38,7 @@ impl Sample {
         let freedom = count - 1;
         let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
         let deviation = (squares / freedom as f64).sqrt();
-        // For more than 30 degrees of freedom, Cornish and Fisher's expansion to its third term.
+        // Above 30 degrees of freedom, the Cornish-Fisher expansion to its third term is accurate.
         let (z, n) = (1.959_964_f64, freedom as f64);
         let quantile = QUANTILES.get(freedom - 1).copied().unwrap_or_else(|| {
             let second = (z.powi(3) + z) / (4.0 * n);
@@ -60,13 +61,13 @@ mod tests {
     }
 
     #[test]
-    fn samples_by_hand() {
+    fn statistics_match_manual_results() {
         check(&[5.0], 5.0, 0.0, 0.0);
         check(&[1.0, 3.0], 2.0, 1.414, 12.706);
         check(&[2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0], 5.0, 2.138, 1.788);
         assert_eq!(Sample::of(&[]), None);
         // 41 values, 40 degrees of freedom: 2.021.
-        let many: Vec<f64> = (0..41).map(f64::from).collect();
-        check(&many, 20.0, 11.979, 3.781);
+        let values: Vec<f64> = (0..41).map(f64::from).collect();
+        check(&values, 20.0, 11.979, 3.781);
     }
 }

@@ -1,9 +1,9 @@
-//! A simulated robot: what is true, as it changes with time, disturbances and the action under way.
+//! The simulated robot: its state, which changes by time, disturbances and the running action.
 //!
-//! What an action needs, takes and does is what the mission's own domain says, with a seeded share more or less time. An
-//! action whose designs are not available, or whose conditions do not hold for what is left of it, stands still, and
-//! fails when its patience is over. Everything random is drawn from the seed alone, so that all ways of control meet the
-//! same world.
+//! Conditions, durations and effects of actions follow the mission's own domain, with a seeded
+//! deviation of the duration. An action stalls if its designs are not available, or if its
+//! conditions do not hold for the remaining part, and fails when it has stalled for its `patience`.
+//! The seed alone determines everything random, so all strategies face the same world.
 
 use std::cell::OnceCell;
 
@@ -19,51 +19,51 @@ use crate::number;
 use crate::simulate::check::Watched;
 use crate::simulate::settings::{Disturbance, Simulation};
 
-/// Times and shares are rounded to this part of a unit.
+/// Times and shares are rounded to multiples of 1 / `GRAIN`.
 const GRAIN: f64 = 1e6;
 
-/// The action under way.
+/// The running action.
 #[derive(Debug, Clone)]
 struct Job {
     action: u64,
     step: PlannedStep,
-    /// From 0 to 1.
+    /// Completed share of the action, from 0 to 1.
     progress: f64,
-    /// How long it has stood still.
+    /// Time for which the action has stalled.
     waited: f64,
-    /// Whether it was asked to.
+    /// `true` if the controller has suspended the action.
     suspended: bool,
 }
 
-/// A failure or recovery that is to come.
+/// A scheduled failure or recovery.
 #[derive(Debug, Clone)]
-struct Upset {
+struct ComponentChange {
     time: f64,
     component: String,
     status: Status,
 }
 
-/// The true state of robot and surroundings.
+/// The true state of the robot and its environment.
 #[derive(Debug, Clone)]
 pub struct World {
     truth: Mission,
-    /// Its problem with what the knowledge base contributes, once that is asked for.
+    /// The problem with the contributions of the knowledge base, filled on first use.
     filled: OnceCell<Problem>,
     settings: Simulation,
     watched: Watched,
     seed: u64,
-    /// Since the start of the mission, in the domain's time unit.
+    /// Time since the start of the mission, in the domain's time unit.
     pub time: f64,
     job: Option<Job>,
     phases: Vec<f64>,
-    upsets: Vec<Upset>,
-    /// When each disturbance takes place, once that is known; infinite once it has.
+    upsets: Vec<ComponentChange>,
+    /// Time of each disturbance, once determined; infinite after the disturbance has happened.
     times: Vec<Option<f64>>,
-    /// Whether the robot has come to its end.
+    /// `true` if the robot is lost.
     pub lost: bool,
-    /// How much of the action that inspects is done, at most so far.
+    /// Greatest completed share of the inspection until now.
     pub inspected: f64,
-    /// When the pipeline was found.
+    /// Time at which the pipeline was found.
     pub found: Option<f64>,
 }
 
@@ -77,7 +77,7 @@ fn rounded(value: f64) -> f64 {
 }
 
 impl World {
-    /// A robot at the beginning of its mission.
+    /// Creates the world at the beginning of a mission.
     pub fn new(truth: Mission, settings: Simulation, watched: Watched, seed: u64) -> Self {
         let mut random = fastrand::Rng::with_seed(seed);
         let phases =
@@ -86,21 +86,23 @@ impl World {
         for failure in &settings.failures {
             let mut time = 0.0;
             loop {
+                // Inverse transform sampling of an exponential distribution.
                 time += -(1.0 - random.f64()).ln() * failure.mean_time;
                 if time > settings.time_budget {
                     break;
                 }
                 let component = failure.component.clone();
-                upsets.push(Upset {
+                upsets.push(ComponentChange {
                     time: rounded(time),
                     component: component.clone(),
                     status: Status::Failed,
                 });
                 let Some(recovery) = failure.recovery else { break };
                 time += recovery;
-                upsets.push(Upset { time: rounded(time), component, status: Status::Recovered });
+                upsets.push(ComponentChange { time: rounded(time), component, status: Status::Recovered });
             }
         }
+        // Failures of different components are generated one component after the other.
         upsets.sort_by(|left, right| left.time.total_cmp(&right.time));
         let times = settings
             .events
@@ -132,13 +134,13 @@ impl World {
         })
     }
 
-    /// The truth, to change it.
+    /// Returns the true state for modification.
     fn change(&mut self) -> &mut Mission {
         self.filled.take();
         &mut self.truth
     }
 
-    /// Does as the controller says; what that leads to at once.
+    /// Executes an effect of the controller. Returns the immediate events.
     pub fn obey(&mut self, effect: &Effect) -> Vec<Event> {
         match &effect.command {
             Command::Request { step } => {
@@ -165,12 +167,12 @@ impl World {
         }
     }
 
-    /// Whether the action under way can go on; there need not be one.
+    /// Returns `true` if the running action can proceed, or if no action is running.
     pub fn goes_on(&self) -> bool {
         self.job.as_ref().is_none_or(|job| self.left(job).is_some())
     }
 
-    /// How long what is left of an action takes, if it can go on.
+    /// Returns the time that the remaining part of an action takes, if it can proceed.
     fn left(&self, job: &Job) -> Option<f64> {
         if job.suspended {
             return None;
@@ -180,7 +182,8 @@ impl World {
         Some(number::to_f64(&advance.duration) * self.slowness(&job.step))
     }
 
-    /// How much longer than expected an action takes here, whatever its designs.
+    /// Factor by which an action takes longer than expected in this world, independent of its
+    /// designs.
     fn slowness(&self, step: &PlannedStep) -> f64 {
         let mut text = step.action.clone();
         for word in step.context().into_iter().flatten() {
@@ -192,16 +195,16 @@ impl World {
         1.0 + self.settings.noise * (2.0 * fastrand::Rng::with_seed(seed).f64() - 1.0)
     }
 
-    /// Lets time pass, at most one step, and reports.
+    /// Advances time by at most one step, and reports events.
     ///
     /// # Errors
     /// A disturbance or a signal that does not fit the mission.
     pub fn pass(&mut self) -> Result<Vec<Event>, Message> {
         let mut events = Vec::new();
-        let left = self.job.as_ref().and_then(|job| self.left(job));
-        let step = left.map_or(self.settings.step, |left| left.min(self.settings.step));
+        let remaining = self.job.as_ref().and_then(|job| self.left(job));
+        let step = remaining.map_or(self.settings.step, |remaining| remaining.min(self.settings.step));
         self.time = rounded(self.time + step);
-        self.work(step, left, &mut events);
+        self.work(step, remaining, &mut events);
         self.disturb(&mut events)?;
         self.swing(&mut events)?;
         events.push(Event::Tick);
@@ -210,6 +213,7 @@ impl World {
 
     fn work(&mut self, step: f64, left: Option<f64>, events: &mut Vec<Event>) {
         let Some(mut job) = self.job.take() else { return };
+        // The action has stalled.
         let Some(left) = left else {
             job.waited += step;
             if job.waited >= self.settings.patience {
@@ -221,6 +225,7 @@ impl World {
             return;
         };
         job.waited = 0.0;
+        // The last step ends exactly with the action.
         let whole = step >= left;
         let share = if whole { 1.0 - job.progress } else { (1.0 - job.progress) * step / left };
         job.progress = rounded(job.progress + share);
@@ -242,7 +247,7 @@ impl World {
         self.look();
     }
 
-    /// What a share of an action changes, and at its end all else that it changes.
+    /// Applies the changes of a share of an action and, if `whole`, all its effects at the end.
     fn use_up(&mut self, step: &PlannedStep, share: f64, whole: bool, events: &mut Vec<Event>) {
         let Ok(mut advance) = advance(self.truth.domain(), self.filled(), &step.to_plan_step(), true) else {
             return;
@@ -262,7 +267,7 @@ impl World {
         self.change().set_init(init);
         for change in &advance.values {
             let lifeline = self.watched.lifeline.as_ref();
-            let is_lifeline = lifeline.is_some_and(|own| own.eq_ignore_ascii_case(&change.text));
+            let is_lifeline = lifeline.is_some_and(|lifeline| lifeline.eq_ignore_ascii_case(&change.text));
             self.lost |= is_lifeline && change.after <= BigRational::default();
             let name = change.text.trim_matches(['(', ')']).to_owned();
             if !whole {
@@ -271,7 +276,8 @@ impl World {
         }
     }
 
-    /// Records when the pipeline is found, and schedules events whose conditions hold for the first time.
+    /// Records the time at which the pipeline is found, and schedules events whose conditions hold
+    /// for the first time.
     fn look(&mut self) {
         if self.found.is_none() && self.watched.found.as_ref().is_some_and(|found| self.holds(found)) {
             self.found = Some(self.time);
@@ -279,6 +285,8 @@ impl World {
         for (index, event) in self.settings.events.iter().enumerate() {
             let condition = self.watched.events[index].as_ref().filter(|_| self.times[index].is_none());
             if condition.is_some_and(|condition| self.holds(condition)) {
+                // A separate generator for each event keeps the delays independent of the order of
+                // the events.
                 let seed = self.seed.wrapping_add(index as u64 + 1);
                 let delay = fastrand::Rng::with_seed(seed).f64() * event.within;
                 self.times[index] = Some(rounded(self.time + delay));
@@ -286,7 +294,7 @@ impl World {
         }
     }
 
-    /// Whether a condition holds now.
+    /// Returns `true` if a condition holds in the current state.
     fn holds(&self, condition: &Condition) -> bool {
         let goal = condition.clone();
         is_valid(self.truth.domain(), &Problem { goal, constraints: Vec::new(), ..self.filled().clone() })
@@ -297,6 +305,7 @@ impl World {
             .filter(|&index| self.times[index].is_some_and(|time| time <= self.time))
             .collect();
         for index in due {
+            // Each disturbance happens once.
             self.times[index] = Some(f64::INFINITY);
             let Disturbance { fail, recover, set, .. } = self.settings.events[index].clone();
             for (components, status) in [(fail, Status::Failed), (recover, Status::Recovered)] {
@@ -324,7 +333,7 @@ impl World {
         Ok(())
     }
 
-    /// What the signals are at the beginning.
+    /// Returns the initial values of the signals.
     ///
     /// # Errors
     /// As [`World::pass`].
@@ -341,6 +350,7 @@ impl World {
         for (signal, phase) in self.settings.signals.iter().zip(&self.phases) {
             let turn = std::f64::consts::TAU * (self.time / signal.period + phase);
             let value = signal.mean + signal.amplitude * turn.sin();
+            // Two decimals keep the exact numbers small.
             let value = exact((value * 100.0).round() / 100.0);
             if let Some(knowledge) = self.truth.knowledge_mut() {
                 knowledge.observe(&signal.attribute, &value)?;
@@ -350,25 +360,26 @@ impl World {
         Ok(())
     }
 
-    /// Whether the goal holds.
+    /// Returns `true` if the goal holds.
     pub fn reached(&self) -> bool {
         is_valid(self.truth.domain(), self.filled())
     }
 
-    /// The mission's metric so far; the time without one.
+    /// Returns the value of the mission's metric until now, or the time if it has no metric.
     pub fn cost(&self) -> f64 {
         let metric = metric_after(self.truth.domain(), self.filled(), &exact(self.time));
         metric.map_or(self.time, |metric| number::to_f64(&metric))
     }
 
-    /// How much was inspected, in the unit of the length; none where the mission does not inspect.
+    /// Returns the inspected length, in the unit of the length. `None` if the mission does not
+    /// inspect.
     pub fn distance(&self) -> Option<f64> {
         let length = self.truth.value(self.watched.length.as_ref()?)?;
         Some(number::to_f64(&length) * self.inspected)
     }
 }
 
-/// Whether the empty plan solves a problem.
+/// Returns `true` if the empty plan solves the problem.
 fn is_valid(domain: &Domain, problem: &Problem) -> bool {
     validate(domain, problem, &PlanText::default(), &Options::default()).valid
 }

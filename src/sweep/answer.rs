@@ -1,4 +1,5 @@
-//! What `metaplan sweep` answers. It stands here, and not among the other answers, since studies read missions, which know of answers.
+//! JSON answer of `metaplan sweep`. It is not in `answers`, because studies depend on missions,
+//! which depend on `answers`.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -69,14 +70,14 @@ impl GroupPart {
 }
 
 impl SweepAnswer {
-    /// Runs that are done, of those with the given numbers.
-    pub fn new(lines: &[Line], wanted: impl Iterator<Item = usize>, groups: &[Group]) -> Self {
+    /// Answer about the runs with the requested numbers.
+    pub fn new(lines: &[Line], requested: impl Iterator<Item = usize>, groups: &[Group]) -> Self {
         let done: std::collections::BTreeSet<usize> = lines.iter().map(|line| line.run).collect();
-        let wanted: Vec<usize> = wanted.collect();
-        let missing = wanted.iter().filter(|run| !done.contains(run)).copied();
+        let requested: Vec<usize> = requested.collect();
+        let missing = requested.iter().filter(|run| !done.contains(run)).copied();
         Self {
             format: FORMAT,
-            runs: wanted.len(),
+            runs: requested.len(),
             done: lines.len(),
             failed: lines.iter().filter(|line| line.answer.is_null()).count(),
             timed_out: lines.iter().filter(|line| line.timed_out).count(),
@@ -86,18 +87,18 @@ impl SweepAnswer {
         }
     }
 
-    /// With why it was ended before all runs were done.
+    /// Adds the reasons for ending before all runs were done.
     #[must_use]
     pub fn because(self, messages: Vec<Message>) -> Self {
         Self { messages, ..self }
     }
 
-    /// Whether all runs are done, each with an answer.
+    /// Returns `true` if all runs are done, each with an answer.
     pub fn is_complete(&self) -> bool {
         self.done == self.runs && self.failed == 0
     }
 
-    /// A sentence.
+    /// Formats the answer as a sentence.
     pub fn sentence(&self) -> String {
         let done = format!("{} of {} runs done", self.done, self.runs);
         match (self.failed, self.timed_out) {

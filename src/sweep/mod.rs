@@ -1,8 +1,10 @@
-//! Studies: one command again and again, with every combination of what is varied; in shards, on any number of machines.
+//! Parameter studies: one command with every combination of varied values, in shards, on any number
+//! of machines.
 //!
-//! A [`Study`] is the product of its variations. Its runs are numbered, and a [`Shard`] is every N-th of them. Each run is a process of
-//! its own, so that one that fails takes nothing with it, and leaves one line in the shard's file. A line is whole or it is not there: who
-//! goes on after a kill does again what has none. [`Table`] puts the lines of all shards together.
+//! A [`Study`] is the product of its variations. Its runs are numbered, and a [`Shard`] is every
+//! N-th of them. Each run is a separate process, so a failed run affects no other, and writes one
+//! line to the shard's file. A resumed study repeats the runs without a complete line. [`Table`]
+//! joins the lines of all shards.
 
 mod answer;
 mod process;

@@ -1,4 +1,4 @@
-//! A run as a process.
+//! Executes a run as a process.
 
 use std::io::Read;
 use std::path::Path;
@@ -12,17 +12,17 @@ use super::results::Line;
 use super::study::{Planned, Study};
 use crate::message::Message;
 
-/// So often it is looked whether a process has ended.
-const LOOK: Duration = Duration::from_millis(5);
+/// Polling interval for the end of a process.
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
-/// So many characters of standard error are kept.
-const KEPT: usize = 2000;
+/// Number of characters of standard error that are kept.
+const MAX_MESSAGE_CHARACTERS: usize = 2000;
 
-/// Performs a run with a program, and waits for its end. Returns `None` if a limit is reached first; the run is ended
-/// then.
+/// Executes a run with a program, and waits for its end. Returns `None` if a limit is reached
+/// first; the run is killed in this case.
 ///
 /// # Errors
-/// The program, or the one that generates files, cannot be run.
+/// The program, or the generator of its files, cannot be executed.
 pub fn perform(
     program: &Path,
     study: &Study,
@@ -49,8 +49,8 @@ pub fn perform(
         }
     }
     let mut command = Command::new(program);
-    // This program handles Ctrl-C and ends the run. An interrupted run would give a partial answer, which the study
-    // does not want.
+    // This program handles Ctrl-C and ends the run. An interrupted run would give a partial answer,
+    // which would falsify the study.
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     let mut child = command
@@ -68,7 +68,7 @@ pub fn perform(
     let Some((status, timed_out)) = ended else { return Ok(None) };
     let answer: Value = serde_json::from_str(&out).unwrap_or_default();
     let message = if answer.is_null() {
-        let from = errors.char_indices().rev().nth(KEPT - 1).map_or(0, |(at, _)| at);
+        let from = errors.char_indices().rev().nth(MAX_MESSAGE_CHARACTERS - 1).map_or(0, |(at, _)| at);
         errors[from..].trim_end().to_owned()
     } else {
         String::new()
@@ -77,20 +77,21 @@ pub fn perform(
     Ok(Some(Line { run: run.number, vary: run.vary.clone(), status, timed_out, seconds, answer, message }))
 }
 
-/// Reads to the end in a thread of its own: who waits for two pipes in turns may wait for ever.
+/// Reads a pipe to its end on a separate thread: reading two pipes alternately on one thread may
+/// deadlock.
 fn reader(pipe: Option<impl Read + Send + 'static>) -> std::thread::JoinHandle<String> {
     std::thread::spawn(move || {
         let mut bytes = Vec::new();
         if let Some(mut pipe) = pipe {
-            // What was read until an error counts.
+            // The part that was read before an error counts.
             let _ = pipe.read_to_end(&mut bytes);
         }
         String::from_utf8_lossy(&bytes).into_owned()
     })
 }
 
-/// Waits for the end of a process. At its own time limit, the process is ended, and that is its result. At another
-/// limit, it is ended, and `None` is returned.
+/// Waits for the end of a process. Its own time limit ends the process, which is its result. Any
+/// other limit ends it, and `None` is returned.
 fn wait(
     child: &mut Child,
     limit: Option<Duration>,
@@ -107,6 +108,6 @@ fn wait(
             child.wait()?;
             return Ok(is_late.then_some((None, true)));
         }
-        std::thread::sleep(LOOK);
+        std::thread::sleep(POLL_INTERVAL);
     }
 }

@@ -1,4 +1,4 @@
-//! The lines that runs leave.
+//! Result files of a study (JSON Lines).
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
@@ -12,59 +12,59 @@ use serde_json::{Map, Value};
 use super::study::{Shard, Study};
 use crate::message::{Errors, Message};
 
-/// The version of the files.
+/// Version of the file format.
 pub(super) const FORMAT: &str = "metaplan-sweep/1";
 
-/// Why a file is not one of a study.
-const OTHER: &str = "it belongs to another study, or the study or its files have changed";
+/// Reason for rejecting the file of another study.
+const OTHER_STUDY: &str = "it belongs to another study, or the study or its files have changed";
 
 /// The first line of a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Header {
     format: String,
-    /// The study's checksum.
+    /// Checksum of the study.
     study: String,
-    /// How many runs the study has.
+    /// Number of runs of the study.
     runs: usize,
     shard: String,
 }
 
-/// A run that has ended.
+/// Result of a finished run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Line {
-    /// Its number in the study, from 0.
+    /// Number of the run in the study, from 0.
     pub run: usize,
-    /// What is varied, with its values.
+    /// Varied keys with their values.
     pub vary: Map<String, Value>,
-    /// Its exit status; none where it was ended by the time limit or by a signal.
+    /// Exit status. `None` if the time limit or a signal ended the run.
     pub status: Option<i32>,
-    /// Whether the time limit has ended it.
+    /// `true` if the time limit ended the run.
     pub timed_out: bool,
-    /// How long it took.
+    /// Duration of the run, in seconds.
     pub seconds: f64,
-    /// What it has answered; null where that is not JSON.
+    /// JSON answer of the run; null if the output is not JSON.
     pub answer: Value,
-    /// The end of what it said on standard error, where there is no answer.
+    /// End of the standard error output, if there is no answer.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub message: String,
 }
 
-/// The file of a shard, which no other process writes.
+/// The file of a shard, locked against other processes.
 #[derive(Debug)]
 pub struct Results {
     file: File,
-    /// Where the file is.
+    /// Path of the file.
     pub path: PathBuf,
-    /// The runs that are done.
+    /// Results of finished runs, by number.
     pub done: BTreeMap<usize, Line>,
 }
 
 impl Results {
-    /// Opens the file of a shard in a directory, which is made if there is none.
+    /// Opens the file of a shard in a directory, which is created if it does not exist.
     ///
     /// # Errors
-    /// There is one already and it is not to be resumed, another process writes it, it belongs to another study, or it is damaged
-    /// elsewhere than at its end.
+    /// The file exists and is not to be resumed, another process writes it, it belongs to another
+    /// study, or it is damaged before its last line.
     pub fn open(directory: &Path, study: &Study, shard: Shard, resume: bool) -> Result<Self, Message> {
         let path = directory.join(format!("shard-{:04}-of-{:04}.jsonl", shard.index, shard.of));
         let failed = |error: io::Error| wrong(&path, &error.to_string());
@@ -96,11 +96,11 @@ impl Results {
             }
             let (found, lines) = parse(&path, &text[..whole])?;
             if found != header {
-                return Err(wrong(&path, OTHER));
+                return Err(wrong(&path, OTHER_STUDY));
             }
             done = lines.into_iter().map(|line| (line.run, line)).collect();
         }
-        // What a kill has left of a line is cut off; its run is done again.
+        // An incomplete last line, left by a killed process, is cut off; its run is repeated.
         file.set_len(whole as u64).map_err(failed)?;
         file.seek(SeekFrom::End(0)).map_err(failed)?;
         let mut results = Self { file, path, done };
@@ -110,7 +110,7 @@ impl Results {
         Ok(results)
     }
 
-    /// Adds the line of a run; it is on the disk then.
+    /// Appends the line of a run and flushes it to the disk.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -145,10 +145,11 @@ fn parse(path: &Path, text: &str) -> Result<(Header, Vec<Line>), Message> {
     Ok((header, parsed.collect::<Result<_, _>>()?))
 }
 
-/// The lines of all shards in a directory, each run once, in their order.
+/// Reads the lines of all shards in a directory, sorted by run, without duplicates.
 ///
 /// # Errors
-/// A file cannot be read or is of another study, or two have done the same run with different answers; all that is wrong.
+/// All faults: files that cannot be read or belong to another study, and runs with differing
+/// answers.
 pub fn read_lines(directory: &Path, study: &Study) -> Result<Vec<Line>, Errors> {
     let failed = |error: io::Error| Errors::from(wrong(directory, &error.to_string()));
     let mut files = Vec::new();
@@ -173,12 +174,12 @@ pub fn read_lines(directory: &Path, study: &Study) -> Result<Vec<Line>, Errors> 
             Err(message) => mistakes.push(message),
             Ok((header, lines)) => {
                 if header.study != study.digest {
-                    mistakes.push(wrong(path, OTHER));
+                    mistakes.push(wrong(path, OTHER_STUDY));
                     continue;
                 }
                 for line in lines {
-                    let known = all.entry(line.run).or_insert_with(|| line.clone());
-                    if essence(&known.answer) != essence(&line.answer) {
+                    let first_line = all.entry(line.run).or_insert_with(|| line.clone());
+                    if essence(&first_line.answer) != essence(&line.answer) {
                         mistakes.push(wrong(path, &format!("run {} has another answer elsewhere", line.run)));
                     }
                 }
@@ -191,19 +192,20 @@ pub fn read_lines(directory: &Path, study: &Study) -> Result<Vec<Line>, Errors> 
     if mistakes.is_empty() { Ok(all.into_values().collect()) } else { Err(mistakes.into()) }
 }
 
-/// An answer without what differs from one run of the same to the next: times, memory and the course of a search.
+/// Returns an answer without the fields that differ between repeated runs: times, memory and the
+/// course of a search.
 pub(super) fn essence(answer: &Value) -> Value {
     match answer {
         Value::Object(fields) => {
-            let kept = fields.iter().filter(|(name, _)| !is_measured(name));
-            Value::Object(kept.map(|(name, value)| (name.clone(), essence(value))).collect())
+            let reproducible = fields.iter().filter(|(name, _)| !is_measured(name));
+            Value::Object(reproducible.map(|(name, value)| (name.clone(), essence(value))).collect())
         }
         Value::Array(values) => values.iter().map(essence).collect(),
         other => other.clone(),
     }
 }
 
-/// Whether a field is measured on a machine.
+/// Returns `true` if a field is measured on a machine.
 fn is_measured(name: &str) -> bool {
     ["statistics", "costs", "milliseconds", "seconds", "elapsed"].contains(&name)
 }

@@ -1,4 +1,4 @@
-//! A study's file to its runs.
+//! Reads the file of a study, and enumerates its runs.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
@@ -15,7 +15,7 @@ use crate::manifest::{self, Key, ManifestPath, Part};
 use crate::message::{Errors, Message, did_you_mean};
 use crate::setup::Setup;
 
-/// More runs than that are a mistake.
+/// Maximum number of runs; more are considered a mistake.
 const MOST_RUNS: usize = 10_000_000;
 
 /// What is run, and what is varied.
@@ -118,13 +118,13 @@ pub fn schema() -> Schema {
     schema_for!(Sections)
 }
 
-/// A study: a file, and the runs that it comes to.
+/// A study: its file and its runs.
 #[derive(Debug, Clone)]
 pub struct Study {
     sections: Sections,
-    /// Where processes run: relative paths are relative to the study's file.
+    /// Working directory of the processes: relative paths are relative to the study's file.
     pub directory: PathBuf,
-    /// A checksum of the file, of files that its command names, and of the program's version.
+    /// Checksum of the file, of the files that its command names, and of the program's version.
     pub digest: String,
     /// Keys with their values, the last one varies fastest.
     keys: Vec<(String, Vec<Value>)>,
@@ -134,18 +134,18 @@ pub struct Study {
 /// One run of a study.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Planned {
-    /// From 0.
+    /// Number of the run, from 0.
     pub number: usize,
-    /// What is varied, with its values.
+    /// Varied keys with their values.
     pub vary: Map<String, Value>,
 }
 
-/// Which runs are a process's: each N-th one, from the I-th on.
+/// A shard: each N-th run, from the I-th on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
-    /// From 1 to `of`.
+    /// Index of the shard, from 1 to `of`.
     pub index: usize,
-    /// How many shards there are.
+    /// Number of shards.
     pub of: usize,
 }
 
@@ -178,7 +178,8 @@ impl Study {
     /// Reads a study's file.
     ///
     /// # Errors
-    /// It cannot be read, is not a study, varies what cannot be varied, or its pairs have no places.
+    /// The file cannot be read or is not a study, varies a key that cannot be varied, or its pairs
+    /// have no places.
     pub fn read(file: &Path) -> Result<Self, Errors> {
         let (sections, place): (Sections, ManifestPath) = manifest::read(file)?;
         let wrong_at = |path: &[Key], part: Part, text: String| {
@@ -220,30 +221,30 @@ impl Study {
                 Err(errors) => mistakes.extend(errors),
             }
         }
-        let known: BTreeSet<&str> = keys.iter().map(|(key, _)| key.as_str()).collect();
+        let names: BTreeSet<&str> = keys.iter().map(|(key, _)| key.as_str()).collect();
         if sections.pairs.is_some() && sections.vary.contains_key("pair") {
             mistakes.push(wrong(
                 &["pairs".into()],
                 "`vary.pair` and `pairs` are two lists for one key".to_owned(),
             ));
         }
-        let generated = sections.generate.iter().flat_map(|own| &own.run).enumerate();
+        let generated = sections.generate.iter().flat_map(|generate| &generate.run).enumerate();
         let generated =
             generated.map(|(index, word)| (vec!["generate".into(), "run".into(), index.into()], word));
         let command = sections.command.iter().enumerate();
         for (path, word) in
             command.map(|(index, word)| (vec![Key::from("command"), index.into()], word)).chain(generated)
         {
-            for name in placeholders(word).filter(|name| *name != "dir" && !known.contains(name)) {
-                let meant = did_you_mean(name, known.iter().copied());
-                let text = format!("`{{{name}}}` stands for a key that is not varied{meant}");
+            for name in placeholders(word).filter(|name| *name != "dir" && !names.contains(name)) {
+                let suggestion = did_you_mean(name, names.iter().copied());
+                let text = format!("`{{{name}}}` stands for a key that is not varied{suggestion}");
                 mistakes.push(wrong(&path, text));
             }
         }
         for (index, name) in sections.repetitions.iter().enumerate() {
-            if sections.repetitions != seeds() && !known.contains(name.as_str()) {
-                let meant = did_you_mean(name, known.iter().copied());
-                let text = format!("`{name}` is not a key that is varied, so nothing repeats it{meant}");
+            if sections.repetitions != seeds() && !names.contains(name.as_str()) {
+                let suggestion = did_you_mean(name, names.iter().copied());
+                let text = format!("`{name}` is not a key that is varied, so nothing repeats it{suggestion}");
                 mistakes.push(wrong(&["repetitions".into(), index.into()], text));
             }
         }
@@ -262,14 +263,15 @@ impl Study {
         Ok(Self { sections, directory, digest, keys, origin: place })
     }
 
-    /// A mistake in the study's file, at the end of a path.
+    /// Message about a mistake in the study's file, at the end of a path.
     pub fn mistake(&self, path: &[Key], text: &str) -> Message {
         let place = self.origin.place_of(path, Part::Value);
         self.origin.quote([Message::at("M150", self.origin.file(), place, text)]).swap_remove(0)
     }
 
-    /// The first run, and for each value of each key a run that differs from the first one in this value only, with
-    /// the path to that value. Ranges of numbers and pairs contribute their last value only.
+    /// The first run, and for each value of each key a run that differs from the first one in this
+    /// value only, with the path to that value. Ranges of numbers and pairs contribute their last
+    /// value only.
     pub fn samples(&self) -> Vec<(Vec<Key>, Planned)> {
         if self.is_empty() {
             return Vec::new();
@@ -286,62 +288,65 @@ impl Study {
         samples
     }
 
-    /// Whether a program writes files for each run, so that they are not there before.
+    /// Returns `true` if a program generates files for each run, so that they do not exist in
+    /// advance.
     pub fn generates(&self) -> bool {
         self.sections.generate.is_some()
     }
 
-    /// How many runs it has.
+    /// Returns the number of runs.
     pub fn len(&self) -> usize {
         self.keys.iter().map(|(_, values)| values.len()).product()
     }
 
-    /// Whether it has none.
+    /// Returns `true` if the study has no runs.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The runs of a shard, in their order.
+    /// Returns the runs of a shard, in order.
     pub fn runs(&self, shard: Shard) -> impl Iterator<Item = Planned> + '_ {
         (shard.index - 1..self.len()).step_by(shard.of).map(|number| self.planned(number))
     }
 
     fn planned(&self, number: usize) -> Planned {
-        let mut rest = number;
+        let mut remaining = number;
         let mut vary = Vec::new();
         for (key, values) in self.keys.iter().rev() {
-            vary.push((key.clone(), values[rest % values.len()].clone()));
-            rest /= values.len();
+            // The number of a run is a mixed-radix number whose digits select the values.
+            vary.push((key.clone(), values[remaining % values.len()].clone()));
+            remaining /= values.len();
         }
         Planned { number, vary: vary.into_iter().rev().collect() }
     }
 
-    /// Where the rows of an answer are.
+    /// Returns the JSON pointer to the rows of an answer.
     pub fn rows(&self) -> &str {
         &self.sections.rows
     }
 
-    /// What the study is about.
+    /// Returns the description of the study.
     pub fn description(&self) -> &str {
         &self.sections.description
     }
 
-    /// Keys, in their order, and which of them are repetitions.
+    /// Returns the keys in order, each with `true` if it is a repetition.
     pub fn keys(&self) -> Vec<(String, bool)> {
         let is_repetition = |key: &String| self.sections.repetitions.contains(key);
         self.keys.iter().map(|(key, _)| (key.clone(), is_repetition(key))).collect()
     }
 
-    /// The seconds after which a run is ended.
+    /// Returns the time limit of a run, in seconds.
     pub fn time_limit(&self) -> Option<f64> {
         self.sections.time_limit
     }
 
-    /// The words of a run's command, after the program's name.
+    /// Returns the arguments of a run's command, after the program's name.
     pub fn words(&self, run: &Planned, directory: &Path) -> Vec<String> {
         let mut words: Vec<String> =
             self.sections.command.iter().map(|word| filled(word, &run.vary, directory)).collect();
-        let generator = self.sections.generate.iter().flat_map(|own| &own.run);
+        let generator = self.sections.generate.iter().flat_map(|generate| &generate.run);
+        // Keys without a placeholder become options of the command.
         let named: BTreeSet<&str> =
             self.sections.command.iter().chain(generator).flat_map(|word| placeholders(word)).collect();
         for (key, value) in run.vary.iter().filter(|(key, _)| !named.contains(key.as_str())) {
@@ -361,14 +366,14 @@ impl Study {
         words
     }
 
-    /// The words of the program that writes a run's files, if there is one.
+    /// Returns the command line of the program that writes a run's files, if there is one.
     pub fn generator(&self, run: &Planned, directory: &Path) -> Option<Vec<String>> {
         let generate = self.sections.generate.as_ref()?;
         Some(generate.run.iter().map(|word| filled(word, &run.vary, directory)).collect())
     }
 }
 
-/// The names in braces.
+/// Returns the names in braces.
 fn placeholders(word: &str) -> impl Iterator<Item = &str> {
     word.split('{').skip(1).filter_map(|rest| rest.split_once('}').map(|(name, _)| name))
 }
@@ -419,22 +424,25 @@ fn places(mission: &Path, most: Option<usize>) -> Result<Vec<Value>, Errors> {
     let Setup { mission, roles, .. } = Setup::read(mission)?;
     let (problem, _) = mission.filled()?;
     let places = Coadaptation::new(&mission, &problem, &roles)?.places;
-    let all: Vec<String> = places
+    let pairs: Vec<String> = places
         .iter()
         .flat_map(|start| {
             places.iter().filter(move |goal| *goal != start).map(move |goal| format!("{start},{goal}"))
         })
         .collect();
-    let wanted = most.unwrap_or(all.len()).clamp(1, all.len().max(1)).min(all.len());
-    Ok((0..wanted).map(|number| json!(all[number * all.len() / wanted])).collect())
+    let count = most.unwrap_or(pairs.len()).clamp(1, pairs.len().max(1)).min(pairs.len());
+    // A limited number of pairs is spread evenly over all pairs.
+    Ok((0..count).map(|number| json!(pairs[number * pairs.len() / count])).collect())
 }
 
 fn digest(sections: &Sections, keys: &[(String, Vec<Value>)], directory: &Path) -> String {
     let mut hash = Sha256::new();
     let mut part = |bytes: &[u8]| {
+        // The length separates the parts, so that different studies cannot have the same input.
         hash.update((bytes.len() as u64).to_le_bytes());
         hash.update(bytes);
     };
+    // Another version may give other answers, so its results must not be mixed with these.
     part(env!("CARGO_PKG_VERSION").as_bytes());
     part(format!("{:?} {:?} {:?}", sections.command, sections.time_limit, sections.generate).as_bytes());
     part(json!(keys).to_string().as_bytes());
@@ -464,19 +472,19 @@ mod tests {
     fn runs_are_the_product_and_shards_divide_it() {
         let study = study(TEXT).expect("a study");
         assert_eq!(study.len(), 12);
-        let all: Vec<Planned> = study.runs(Shard::default()).collect();
-        assert_eq!(all.len(), 12);
+        let runs: Vec<Planned> = study.runs(Shard::default()).collect();
+        assert_eq!(runs.len(), 12);
         let mut divided: Vec<Planned> =
             (1..=5).flat_map(|index| study.runs(Shard { index, of: 5 }).collect::<Vec<_>>()).collect();
         divided.sort_by_key(|run| run.number);
-        assert_eq!(divided, all);
-        let words = |number: usize| study.words(&all[number], Path::new("d")).join(" ");
+        assert_eq!(divided, runs);
+        let words = |number: usize| study.words(&runs[number], Path::new("d")).join(" ");
         assert_eq!(words(0), "plan m-1.toml --set=x=1 --stay-close --format json --quiet");
         assert_eq!(words(11), "plan m-5.toml --fail=a --fail=b --set=x=1 --format json --quiet");
     }
 
     #[test]
-    fn what_is_wrong_is_told_all_at_once() {
+    fn all_mistakes_are_reported_together() {
         let text =
             "command = []\nrows = 'x'\ntime_limit = 0\n[vary]\na = []\nb = {from = 1, to = 2, step = 0}\n";
         let errors = study(text).expect_err("it is wrong");

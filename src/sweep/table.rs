@@ -1,4 +1,4 @@
-//! The lines of a study as a table, and means over its repetitions.
+//! Table of a study's lines, and means over its repetitions.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,57 +7,58 @@ use serde_json::{Map, Value};
 use super::results::{Line, essence};
 use crate::simulate::Sample;
 
-/// The column of exit statuses, over which there is no mean.
+/// Column of exit statuses, which have no mean.
 const STATUS: &str = "status";
 
-/// What stands in a cell; nothing where a row has no such value.
+/// Contents of a cell. `None` if the row has no such value.
 pub type Cell = Option<Value>;
 
-/// A row: of one run, one object of its answer.
+/// A row: an object in the answer of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
-    /// The number of its run.
+    /// Number of the run.
     pub run: usize,
-    /// By column.
+    /// Cells in the order of the columns.
     pub cells: Vec<Cell>,
 }
 
-/// All rows, with columns that all of them have.
+/// All rows, with the union of their columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table {
-    /// Keys that are varied, and then what answers have; sorted.
+    /// Column names, sorted: first the varied keys, then the fields of answers.
     pub columns: Vec<String>,
-    /// How many of the columns are keys.
+    /// Number of columns that are varied keys.
     pub keys: usize,
-    /// By run, and then as in the answer.
+    /// Rows by run, in the order of the answer.
     pub rows: Vec<Row>,
 }
 
-/// Columns with the values that rows have in common there.
+/// Columns with the common values of rows.
 type Common = Vec<(String, Value)>;
 
-/// Rows that are the same but for repetitions.
+/// Rows that differ only in repetitions.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Group {
-    /// What they have in common: keys and words, with their columns.
+    /// Common values of the group: keys and words, with their columns.
     pub common: Common,
-    /// How many rows.
+    /// Number of rows.
     pub count: usize,
-    /// Samples of the columns that have numbers.
+    /// Statistics of the numeric columns.
     pub samples: Vec<(String, Sample)>,
 }
 
 impl Table {
-    /// The rows that stand at a JSON pointer in each answer; with what is measured on a machine only if that is wanted.
+    /// Collects the rows at a JSON pointer in each answer. `measured` includes the fields that are
+    /// measured on a machine.
     pub fn new(lines: &[Line], rows: &str, measured: bool) -> Self {
-        let mut found: Vec<(&Line, Map<String, Value>)> = Vec::new();
+        let mut rows_of_lines: Vec<(&Line, Map<String, Value>)> = Vec::new();
         for line in lines {
             let answer = if measured { line.answer.clone() } else { essence(&line.answer) };
-            let mut own = Map::new();
-            own.insert(STATUS.to_owned(), line.status.map_or(Value::Null, Into::into));
-            own.insert("timed_out".to_owned(), line.timed_out.into());
+            let mut fields = Map::new();
+            fields.insert(STATUS.to_owned(), line.status.map_or(Value::Null, Into::into));
+            fields.insert("timed_out".to_owned(), line.timed_out.into());
             if measured {
-                own.insert("seconds".to_owned(), line.seconds.into());
+                fields.insert("seconds".to_owned(), line.seconds.into());
             }
             let parts = match answer.pointer(rows) {
                 Some(Value::Array(parts)) => parts.clone(),
@@ -65,18 +66,19 @@ impl Table {
                 None => vec![Value::Null],
             };
             for part in parts {
-                let mut cells = own.clone();
+                let mut cells = fields.clone();
                 flatten("", &part, &mut cells);
-                found.push((line, cells));
+                rows_of_lines.push((line, cells));
             }
         }
-        let keys: BTreeSet<String> = found.iter().flat_map(|(line, _)| line.vary.keys().cloned()).collect();
-        let columns: BTreeSet<String> = found
+        let keys: BTreeSet<String> =
+            rows_of_lines.iter().flat_map(|(line, _)| line.vary.keys().cloned()).collect();
+        let columns: BTreeSet<String> = rows_of_lines
             .iter()
             .flat_map(|(_, cells)| cells.keys().cloned())
             .filter(|column| !keys.contains(column))
             .collect();
-        let rows = found.into_iter().map(|(line, cells)| {
+        let rows = rows_of_lines.into_iter().map(|(line, cells)| {
             let keys = keys.iter().map(|key| line.vary.get(key).cloned().map(joined));
             let cells =
                 columns.iter().map(|column| cells.get(column).cloned().filter(|value| !value.is_null()));
@@ -86,7 +88,7 @@ impl Table {
         Self { keys: keys.len(), columns: keys.iter().chain(&columns).cloned().collect(), rows }
     }
 
-    /// It as CSV: one line a row, all of them with the same columns; what is missing is empty.
+    /// Formats the table as CSV: one line per row, with all columns; missing values are empty.
     pub fn to_csv(&self) -> String {
         let mut writer = csv::Writer::from_writer(Vec::new());
         let text = |value: &Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
@@ -100,27 +102,27 @@ impl Table {
         String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default()
     }
 
-    /// Rows in groups: those that have the same values of keys, but for repetitions, and the same words. Of truth values the mean is the
-    /// share of those that are true.
+    /// Groups the rows that have the same words and the same values of keys except for
+    /// `repetitions`. The mean of truth values is the share of true ones.
     pub fn groups(&self, repetitions: &[String]) -> Vec<Group> {
         let is_number = |column: usize| {
             self.rows.iter().filter_map(|row| row.cells[column].as_ref()).all(|value| figure(value).is_some())
         };
         let counts: Vec<bool> =
-            (0..self.columns.len()).map(|own| own >= self.keys && is_number(own)).collect();
+            (0..self.columns.len()).map(|column| column >= self.keys && is_number(column)).collect();
         let is_status = |column: usize| self.columns[column] == STATUS;
         let is_common = |column: usize| {
             !counts[column] && !is_status(column) && !repetitions.contains(&self.columns[column])
         };
         let mut groups: Vec<(Common, Vec<&Row>)> = Vec::new();
-        let mut known: BTreeMap<String, usize> = BTreeMap::new();
+        let mut positions: BTreeMap<String, usize> = BTreeMap::new();
         for row in &self.rows {
             let common: Common = (0..self.columns.len())
                 .filter(|column| is_common(*column))
                 .map(|column| (self.columns[column].clone(), row.cells[column].clone().unwrap_or_default()))
                 .collect();
             let name = common.iter().map(|(_, value)| value.clone()).collect::<Value>().to_string();
-            let place = *known.entry(name).or_insert_with(|| {
+            let place = *positions.entry(name).or_insert_with(|| {
                 groups.push((common, Vec::new()));
                 groups.len() - 1
             });
@@ -139,12 +141,12 @@ impl Table {
     }
 }
 
-/// A number, or a truth value as one.
+/// Returns a number, or a truth value as 0 or 1.
 fn figure(value: &Value) -> Option<f64> {
     value.as_bool().map(|truth| f64::from(u8::from(truth))).or_else(|| value.as_f64())
 }
 
-/// An option that is given several times, as one value of a table.
+/// Joins the values of a repeated option to one cell.
 fn joined(value: Value) -> Value {
     match value {
         Value::Array(values) => {
@@ -158,7 +160,7 @@ fn joined(value: Value) -> Value {
     }
 }
 
-/// The values of an object by their paths; lists have no place in a table.
+/// Flattens an object to cells by path; lists are omitted.
 fn flatten(path: &str, value: &Value, cells: &mut Map<String, Value>) {
     match value {
         Value::Object(fields) => {
@@ -199,7 +201,8 @@ mod tests {
         assert_eq!(groups.iter().map(|group| group.count).collect::<Vec<_>>(), [2, 1]);
         let costs = &groups[0].samples.iter().find(|(column, _)| column == "x.cost").expect("costs").1;
         assert_eq!((costs.count, costs.mean), (2, 3.0));
-        // Student's quantile for one degree of freedom, times the deviation over the root of two.
+        // Quantile of Student's distribution for one degree of freedom, times the deviation over
+        // the square root of two.
         assert!((costs.half_width - 12.706).abs() < 1e-9);
         assert!(Table::new(&lines, "", true).columns.contains(&"seconds".to_owned()));
         let parts = Table::new(&[line(0, 1, "a", json!({"l": [{"v": 1}, {"v": 2}]}))], "/l", false);

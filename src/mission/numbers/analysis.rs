@@ -1,11 +1,12 @@
-//! Analysis of the numeric functions of a mission that lack a value, and of durations below 0.
+//! Analysis of missing values of numeric functions, and of durations below 0.
 //!
-//! For each numeric function that an action needs, the analysis enumerates the objects for which the action is
-//! possible according to the facts that no action changes (three-valued evaluation of its conditions, as in
-//! grounding). A mission may omit numbers for what can never happen. So a missing value causes a warning only in
-//! these cases: the function has no parameters of the action as arguments; three quarters of the objects have a
-//! value; or such a fact is about the same objects, and either two thirds of the objects have a value or the object
-//! is a design. For example, `(lit_aisle a b)` is about the objects of `(distance a b)`.
+//! For each numeric function that an action needs, the analysis enumerates the objects for which
+//! the action is possible according to the facts that no action changes (three-valued evaluation of
+//! its conditions, as in grounding). A mission may omit numbers for impossible cases. So a missing
+//! value causes a warning only in these cases: the function has no parameters of the action as
+//! arguments; three quarters of the objects have a value; or such a fact is about the same objects,
+//! and either two thirds of the objects have a value or the object is a design. For example,
+//! `(lit_aisle a b)` is about the objects of `(distance a b)`.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
@@ -29,28 +30,30 @@ use crate::message::Message;
 use crate::mission::conditions::written;
 use crate::number;
 
-/// Number of conditions that are evaluated before the remaining ones stay unchecked.
+/// Maximum number of evaluated conditions; the remaining ones are not checked.
 const BUDGET: usize = 50_000;
 
-/// A numeric function with its arguments that has no value, though actions need it.
+/// A numeric function without a value that actions need, with its arguments.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct MissingValue {
-    /// The function with its arguments, as the domain writes it: `(distance a b)`; of a design, `(ATTRIBUTE DESIGN)`.
+    /// The function with its arguments, as the domain writes it: `(distance a b)`; for a design,
+    /// `(ATTRIBUTE DESIGN)`.
     pub function: String,
-    /// The actions that need it.
+    /// Actions that need the value.
     pub needed_by: Vec<String>,
     /// The design whose estimation is missing, and the attribute, if the number is an estimation.
     pub estimation: Option<(String, String)>,
-    /// The file that should have it.
+    /// The file in which the value is missing.
     pub file: String,
     pub(super) symbol: String,
-    /// Whether the function has no value for any arguments.
+    /// `true` if the function has no value for any arguments.
     pub(super) is_silent: bool,
-    /// Whether the value is probably not omitted on purpose.
+    /// `true` if the value is probably missing by mistake.
     pub(super) is_likely: bool,
 }
 
-/// Functions without a value, each with whether that is probably a mistake, and with the actions that need it.
+/// Functions without a value: `true` if that is probably a mistake, and the actions that need the
+/// value.
 type Needed = BTreeMap<(Name, Vec<Name>), (bool, BTreeSet<String>)>;
 
 /// A duration that is negative.
@@ -58,7 +61,7 @@ type Needed = BTreeMap<(Name, Vec<Name>), (bool, BTreeSet<String>)>;
 pub(super) struct NegativeDuration {
     pub(super) action: String,
     pub(super) duration: String,
-    /// The values below 0 that it comes from, in words.
+    /// The negative values that cause the negative duration, formatted.
     pub(super) causes: Vec<String>,
     pub(super) design: Option<String>,
 }
@@ -97,8 +100,8 @@ impl<'m> Numbers<'m> {
                     facts.entry(atom.predicate.name.clone()).or_default().insert(constants(atom));
                 }
                 InitialElement::Value(atom, value, _) => {
-                    let own = values.entry(atom.predicate.name.clone()).or_default();
-                    own.insert(constants(atom), value.clone());
+                    let values_of_function = values.entry(atom.predicate.name.clone()).or_default();
+                    values_of_function.insert(constants(atom), value.clone());
                 }
                 InitialElement::Timed(_, atom, ..) => drop(dynamic.insert(atom.predicate.name.clone())),
                 InitialElement::NegatedFact(_) => {}
@@ -172,7 +175,7 @@ impl<'m> Numbers<'m> {
         }
     }
 
-    /// The attribute that a function of a design is the estimation of.
+    /// Returns the attribute whose estimation a function of a design is.
     fn attribute(&self, function: &Name) -> String {
         let mut bound = self.mission.bindings().written().iter();
         let bound = bound.find(|(symbol, _)| Name::new(symbol) == *function);
@@ -189,7 +192,8 @@ impl<'m> Numbers<'m> {
             let function = &atom.predicate.name;
             let is_own =
                 function.as_str().eq_ignore_ascii_case("total-cost") || !checked.insert(written(atom));
-            // A function that an action assigns may lack a value before, unless actions increase or decrease it.
+            // A function that an action assigns may lack a value before, unless actions increase or
+            // decrease it.
             let is_stock = || self.domain.actions.iter().any(|action| grows(action, function));
             if is_own || (self.assigned.contains(function) && !is_stock()) {
                 continue;
@@ -199,10 +203,11 @@ impl<'m> Numbers<'m> {
             let (mut without, mut count) = (Vec::new(), 0_usize);
             self.each(&variables, &conditions, &mut Vec::new(), &mut |binding| {
                 let arguments = grounded(atom, binding);
-                // From a place to itself there is no distance.
+                // A function such as the distance has no value for two equal arguments.
                 let is_apart = arguments.iter().collect::<HashSet<_>>().len() == arguments.len();
                 count += usize::from(is_apart);
-                if is_apart && !self.values.get(function).is_some_and(|own| own.contains_key(&arguments)) {
+                if is_apart && !self.values.get(function).is_some_and(|entry| entry.contains_key(&arguments))
+                {
                     let is_linked =
                         conditions.iter().any(|condition| self.is_linked(condition, &names, binding));
                     without.push((arguments, is_linked));
@@ -212,9 +217,9 @@ impl<'m> Numbers<'m> {
             for (arguments, is_linked) in without {
                 let is_design = arguments.len() == 1 && self.designs.contains(arguments[0].as_str());
                 let is_likely = names.is_empty() || is_few || is_linked && (is_third || is_design);
-                let own = missing.entry((function.clone(), arguments)).or_insert((false, BTreeSet::new()));
-                own.0 |= is_likely;
-                own.1.insert(action.identifier.name.to_string());
+                let entry = missing.entry((function.clone(), arguments)).or_insert((false, BTreeSet::new()));
+                entry.0 |= is_likely;
+                entry.1.insert(action.identifier.name.to_string());
             }
         }
     }
@@ -230,9 +235,9 @@ impl<'m> Numbers<'m> {
             in_expression(&constraint.expression, &mut fluents);
             let mut variables: Vec<(&Name, &TypeExpression)> = Vec::new();
             if !fluents.iter().all(|atom| {
-                let own = variables_of(atom, action);
-                let is_known = own.is_some() && !self.changed.contains(&atom.predicate.name);
-                for variable in own.into_iter().flatten() {
+                let parameters = variables_of(atom, action);
+                let is_known = parameters.is_some() && !self.changed.contains(&atom.predicate.name);
+                for variable in parameters.into_iter().flatten() {
                     if !variables.iter().any(|(name, _)| *name == variable.0) {
                         variables.push(variable);
                     }
@@ -248,8 +253,11 @@ impl<'m> Numbers<'m> {
                 let mut causes: Vec<String> = Vec::new();
                 for atom in &fluents {
                     let arguments = grounded(atom, binding);
-                    let own = self.values.get(&atom.predicate.name).and_then(|own| own.get(&arguments));
-                    let Some(value) = own.filter(|value| **value < BigRational::zero()) else { continue };
+                    let input =
+                        self.values.get(&atom.predicate.name).and_then(|values| values.get(&arguments));
+                    let Some(value) = input.filter(|value| **value < BigRational::zero()) else {
+                        continue;
+                    };
                     let of = self.described(&atom.predicate.name, &arguments, BTreeSet::new());
                     let name = match of.estimation {
                         Some((of, attribute)) => {
@@ -260,9 +268,9 @@ impl<'m> Numbers<'m> {
                     };
                     causes.push(format!("{name} is {}", number::decimal(value)));
                 }
-                // One is enough for each cause.
-                let is_told = |own: &NegativeDuration| {
-                    own.action == action.identifier.name.as_str() && own.causes == causes
+                // A single message per cause suffices.
+                let is_told = |reported: &NegativeDuration| {
+                    reported.action == action.identifier.name.as_str() && reported.causes == causes
                 };
                 if !negative.iter().any(is_told) {
                     negative.insert(NegativeDuration {
@@ -286,14 +294,14 @@ impl<'m> Numbers<'m> {
     ) {
         let Some((variable, r#type)) = variables.get(binding.len()) else { return visit(binding) };
         let objects = self.domain.constants.iter().chain(&self.problem.objects);
-        let mut seen = HashSet::new();
+        let mut visited = HashSet::new();
         for object in objects.filter(|object| self.types.fits(&object.r#type, r#type)) {
-            let left = self.budget.get();
-            if left == 0 {
+            let budget = self.budget.get();
+            if budget == 0 {
                 return;
             }
-            self.budget.set(left - 1);
-            if !seen.insert(&object.identifier.name) {
+            self.budget.set(budget - 1);
+            if !visited.insert(&object.identifier.name) {
                 continue;
             }
             binding.push((variable, object.identifier.name.clone()));
@@ -304,8 +312,8 @@ impl<'m> Numbers<'m> {
         }
     }
 
-    /// Truth of a condition in every state. Returns `None` if it depends on actions or on variables that are not
-    /// bound, or if it contains comparisons or quantifiers that decide it.
+    /// Truth of a condition in every state. Returns `None` if it depends on actions or on variables
+    /// that are not bound, or if it contains comparisons or quantifiers that decide it.
     fn truth(&self, condition: &Condition, binding: &Binding<'_>) -> Option<bool> {
         match condition {
             Condition::And(parts) => parts
@@ -335,14 +343,14 @@ impl<'m> Numbers<'m> {
             Condition::Atom(atom) => {
                 let arguments =
                     known(atom, binding).filter(|_| !self.dynamic.contains(&atom.predicate.name))?;
-                Some(self.facts.get(&atom.predicate.name).is_some_and(|own| own.contains(&arguments)))
+                Some(self.facts.get(&atom.predicate.name).is_some_and(|facts| facts.contains(&arguments)))
             }
             Condition::Equal(left, right, _) => Some(object(left, binding)? == object(right, binding)?),
             Condition::Compare(..) | Condition::Exists(..) | Condition::ForAll(..) => None,
         }
     }
 
-    /// Whether a fact that no action changes and by which the action is possible is about all these variables.
+    /// Returns `true` if a static fact among the preconditions mentions all these variables.
     fn is_linked(&self, condition: &Condition, variables: &[&Name], binding: &Binding<'_>) -> bool {
         match condition {
             Condition::And(parts) | Condition::Or(parts) => {

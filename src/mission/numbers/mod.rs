@@ -1,5 +1,5 @@
-//! Numbers that a mission lacks, or that cannot be intended. They prevent actions and designs from ever being used,
-//! although no file is malformed.
+//! Detects missing and unintended numbers. They make actions and designs unusable although no file
+//! is malformed.
 
 mod analysis;
 mod syntax;
@@ -14,8 +14,8 @@ pub use analysis::MissingValue;
 use crate::message::Message;
 use analysis::Numbers;
 
-/// Adds warnings about probable mistakes to a mission, once its situation is complete: [`Mission::doubts`], and for
-/// missions with a knowledge base [`doubts`].
+/// Adds warnings about probable mistakes to a mission, once its situation is complete:
+/// [`Mission::doubts`], and for missions with a knowledge base [`doubts`].
 pub fn note_doubts(mission: &mut Mission) {
     mission.note_doubts();
     if mission.knowledge().is_some() {
@@ -24,44 +24,47 @@ pub fn note_doubts(mission: &mut Mission) {
     }
 }
 
-/// Warnings about numbers that are missing and about durations below 0.
+/// Returns warnings about missing numbers and about negative durations.
 pub fn doubts(mission: &Mission) -> Vec<Message> {
     let numbers = Numbers::new(mission);
     let (missing, negative) = numbers.check();
-    // Functions without any value have a warning of their own (M206).
+    // Functions without any value have a separate warning (M206).
     let missing: Vec<MissingValue> =
-        missing.into_iter().filter(|own| !own.is_silent && own.is_likely).collect();
-    let estimations = missing.iter().filter_map(|own| Some((own, own.estimation.as_ref()?)));
-    let mut doubts: Vec<Message> =
-        estimations.map(|(own, (design, attribute))| numbers.no_estimation(own, design, attribute)).collect();
+        missing.into_iter().filter(|value| !value.is_silent && value.is_likely).collect();
+    let estimations = missing.iter().filter_map(|value| Some((value, value.estimation.as_ref()?)));
+    let mut doubts: Vec<Message> = estimations
+        .map(|(value, (design, attribute))| numbers.no_estimation(value, design, attribute))
+        .collect();
     let mut values: BTreeMap<&str, Vec<&MissingValue>> = BTreeMap::new();
-    for own in missing.iter().filter(|own| own.estimation.is_none()) {
-        values.entry(&own.symbol).or_default().push(own);
+    for value in missing.iter().filter(|value| value.estimation.is_none()) {
+        values.entry(&value.symbol).or_default().push(value);
     }
     doubts.extend(values.values().map(|missing| numbers.no_value(missing)));
-    doubts.extend(negative.iter().map(|own| numbers.negative(own)));
+    doubts.extend(negative.iter().map(|duration| numbers.negative(duration)));
     doubts
 }
 
-/// Numeric functions without a value that actions need: those that are probably omitted by mistake, and all of them
-/// if no omission seems to be one.
+/// Returns the numeric functions without a value that actions need: the probable mistakes, or all
+/// of them if none is a probable mistake.
 pub fn missing_values(mission: &Mission) -> Vec<MissingValue> {
-    let all = Numbers::new(mission).check().0;
-    let is_told = |own: &MissingValue| own.is_likely || own.is_silent;
-    let is_any = all.iter().any(is_told);
-    all.into_iter().filter(|own| !is_any || is_told(own)).collect()
+    let values = Numbers::new(mission).check().0;
+    let is_told = |value: &MissingValue| value.is_likely || value.is_silent;
+    let is_any = values.iter().any(is_told);
+    values.into_iter().filter(|value| !is_any || is_told(value)).collect()
 }
 
-/// Reasons why a design can never be used although it may be available, as sentences.
+/// Returns the reasons why a design can never be used although it may be available, as sentences.
 pub fn against(mission: &Mission, design: &str) -> Vec<String> {
     let (missing, negative) = Numbers::new(mission).check();
-    let missing = missing.iter().filter_map(|own| {
-        let (of, attribute) = own.estimation.as_ref()?;
-        (of == design)
-            .then(|| format!("it has no estimation of {attribute}, which {} needs", own.needed_by.join(", ")))
+    let missing = missing.iter().filter_map(|value| {
+        let (of, attribute) = value.estimation.as_ref()?;
+        (of == design).then(|| {
+            format!("it has no estimation of {attribute}, which {} needs", value.needed_by.join(", "))
+        })
     });
-    let negative = negative.iter().filter(|own| own.design.as_deref() == Some(design));
-    let negative =
-        negative.map(|own| format!("with it {} would take {}, less than no time", own.action, own.duration));
+    let negative = negative.iter().filter(|duration| duration.design.as_deref() == Some(design));
+    let negative = negative.map(|duration| {
+        format!("with it {} would take {}, less than no time", duration.action, duration.duration)
+    });
     missing.chain(negative).collect()
 }

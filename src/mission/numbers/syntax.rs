@@ -1,10 +1,10 @@
-//! Numeric functions that actions, conditions and effects need.
+//! Collects the numeric functions that actions, conditions and effects need.
 
 use pddl::ast::{
     Action, ActionBody, Assignment, Atom, Condition, Effect, Expression, Name, Term, TypeExpression,
 };
 
-/// Variables with the objects that they are bound to.
+/// Bindings of variables to objects.
 pub(super) type Binding<'a> = Vec<(&'a Name, Name)>;
 
 pub(super) fn constants(atom: &Atom) -> Vec<Name> {
@@ -17,7 +17,7 @@ pub(super) fn name_of(term: &Term) -> &Name {
     }
 }
 
-/// The object that a term denotes. Returns `None` if its variable is not bound.
+/// Returns the object that a term denotes, or `None` if its variable is not bound.
 pub(super) fn object<'a>(term: &'a Term, binding: &'a Binding<'_>) -> Option<&'a Name> {
     match term {
         Term::Constant(constant) => Some(&constant.name),
@@ -27,7 +27,7 @@ pub(super) fn object<'a>(term: &'a Term, binding: &'a Binding<'_>) -> Option<&'a
     }
 }
 
-/// The arguments of an atom. Returns `None` unless all of its variables are bound.
+/// Returns the arguments of an atom, or `None` unless all of its variables are bound.
 pub(super) fn known(atom: &Atom, binding: &Binding<'_>) -> Option<Vec<Name>> {
     atom.arguments.iter().map(|term| object(term, binding).cloned()).collect()
 }
@@ -37,7 +37,8 @@ pub(super) fn grounded(atom: &Atom, binding: &Binding<'_>) -> Vec<Name> {
     known(atom, binding).unwrap_or_default()
 }
 
-/// The distinct parameters of an action that an atom mentions. Returns `None` if the atom mentions another variable.
+/// Returns the distinct parameters of an action that an atom mentions, or `None` if the atom
+/// mentions another variable.
 pub(super) fn variables_of<'a>(
     atom: &Atom,
     action: &'a Action,
@@ -45,7 +46,8 @@ pub(super) fn variables_of<'a>(
     let mut variables: Vec<(&Name, &TypeExpression)> = Vec::new();
     for term in &atom.arguments {
         let Term::Variable(variable) = term else { continue };
-        let parameter = action.parameters.iter().find(|own| own.identifier.name == variable.name)?;
+        let parameter =
+            action.parameters.iter().find(|parameter| parameter.identifier.name == variable.name)?;
         if !variables.iter().any(|(name, _)| **name == variable.name) {
             variables.push((&parameter.identifier.name, &parameter.r#type));
         }
@@ -69,7 +71,7 @@ pub(super) fn effects(body: &ActionBody) -> Vec<&Effect> {
     }
 }
 
-/// Visits all parts of an effect that are not composed of others.
+/// Visits all parts of an effect that are not composed of other effects.
 pub(super) fn walk<'a>(effect: &'a Effect, visit: &mut dyn FnMut(&'a Effect)) {
     match effect {
         Effect::And(parts) => parts.iter().for_each(|part| walk(part, visit)),
@@ -78,36 +80,36 @@ pub(super) fn walk<'a>(effect: &'a Effect, visit: &mut dyn FnMut(&'a Effect)) {
     }
 }
 
-/// Whether an action adds to a function, or takes from it.
+/// Returns `true` if the action increases or decreases the function.
 pub(super) fn grows(action: &Action, function: &Name) -> bool {
-    let mut found = false;
+    let mut is_changed = false;
     for effect in effects(&action.body) {
         walk(effect, &mut |effect| {
-            found |= matches!(effect, Effect::Assign(kind, target, ..)
+            is_changed |= matches!(effect, Effect::Assign(kind, target, ..)
                 if *kind != Assignment::Assign && target.predicate.name == *function);
         });
     }
-    found
+    is_changed
 }
 
-/// The functions without whose values an action is never possible.
+/// Returns the functions whose values an action always needs.
 pub(super) fn needed(action: &Action) -> Vec<&Atom> {
-    let mut needed = Vec::new();
+    let mut functions = Vec::new();
     if let ActionBody::Durative { duration, .. } = &action.body {
         for constraint in duration {
-            in_expression(&constraint.expression, &mut needed);
+            in_expression(&constraint.expression, &mut functions);
         }
     }
     for condition in conditions(&action.body) {
-        in_condition(condition, &mut needed);
+        in_condition(condition, &mut functions);
     }
     for effect in effects(&action.body) {
-        in_effect(effect, &mut needed);
+        in_effect(effect, &mut functions);
     }
-    needed
+    functions
 }
 
-/// Comparisons that have to hold.
+/// Collects functions in comparisons that must be true.
 pub(super) fn in_condition<'a>(condition: &'a Condition, needed: &mut Vec<&'a Atom>) {
     match condition {
         Condition::And(parts) => parts.iter().for_each(|part| in_condition(part, needed)),
@@ -119,7 +121,7 @@ pub(super) fn in_condition<'a>(condition: &'a Condition, needed: &mut Vec<&'a At
     }
 }
 
-/// Effects that always take place.
+/// Collects functions in unconditional effects.
 pub(super) fn in_effect<'a>(effect: &'a Effect, needed: &mut Vec<&'a Atom>) {
     match effect {
         Effect::And(parts) => parts.iter().for_each(|part| in_effect(part, needed)),

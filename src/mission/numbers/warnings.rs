@@ -1,4 +1,5 @@
-//! Warnings about missing numbers and negative durations, with the file and the place where they can be corrected.
+//! Warnings about missing numbers and negative durations, with the file and the place where they
+//! can be corrected.
 
 use std::collections::BTreeSet;
 
@@ -11,11 +12,11 @@ use crate::message::{Message, did_you_mean};
 /// Maximum number of functions without a value that a warning names; further ones are only counted.
 const NAMED: usize = 3;
 
-/// The warnings.
+/// Messages about missing and negative numbers.
 impl Numbers<'_> {
     pub(super) fn no_estimation(&self, own: &MissingValue, design: &str, attribute: &str) -> Message {
         let individual = self.design(design);
-        let estimated = individual.iter().flat_map(|known| known.estimations.keys().map(String::as_str));
+        let estimated = individual.iter().flat_map(|design| design.estimations.keys().map(String::as_str));
         let text = format!(
             "the design `{design}` has no estimation of `{attribute}`, which {} needs, so it can never be used there{}",
             quoted(&own.needed_by),
@@ -26,14 +27,14 @@ impl Numbers<'_> {
 
     pub(super) fn no_value(&self, missing: &[&MissingValue]) -> Message {
         let names: Vec<String> =
-            missing.iter().take(NAMED).map(|own| format!("`{}`", own.function)).collect();
-        let more = missing.len().saturating_sub(NAMED);
-        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        let actions: BTreeSet<&String> = missing.iter().flat_map(|own| &own.needed_by).collect();
+            missing.iter().take(NAMED).map(|value| format!("`{}`", value.function)).collect();
+        let omitted = missing.len().saturating_sub(NAMED);
+        let omitted = if omitted > 0 { format!(" and {omitted} more") } else { String::new() };
+        let actions: BTreeSet<&String> = missing.iter().flat_map(|value| &value.needed_by).collect();
         let actions: Vec<String> = actions.into_iter().cloned().collect();
         let have = if missing.len() == 1 { "has" } else { "have" };
         let text = format!(
-            "{}{more} {have} no value, so {} can never be done where it is needed",
+            "{}{omitted} {have} no value, so {} can never be done where it is needed",
             names.join(", "),
             quoted(&actions)
         );
