@@ -13,7 +13,8 @@ use task::task::number::TaskNumber;
 use task::task::quantity::Linear;
 use task::task::{Condition, Fact, Task};
 
-/// What is asked of something: more of it (or its truth), less of it (or its falsity).
+/// Directions in which a quantity (or a fact) is needed: `up` for more (or true), `down` for less
+/// (or false).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Polarity {
     pub up: bool,
@@ -33,7 +34,7 @@ impl Polarity {
     }
 }
 
-/// What is asked of each numeric variable, and of each derived variable as far as it depends on them.
+/// Fixpoint computation of the polarity of each numeric variable and each derived variable.
 struct PolarityAnalysis<'a, N> {
     task: &'a Task<N>,
     numbers: Vec<Polarity>,
@@ -41,18 +42,18 @@ struct PolarityAnalysis<'a, N> {
     changed: bool,
 }
 
-/// What is asked of each numeric variable of a task.
+/// Polarity of each numeric variable of a task.
 pub fn directions<N: TaskNumber>(task: &Task<N>) -> Vec<Polarity> {
     let numbers = vec![Polarity::default(); task.initial.numbers.len()];
     let facts = vec![Polarity::default(); task.variables.len()];
-    let mut asking = PolarityAnalysis { task, numbers, facts, changed: true };
+    let mut analysis = PolarityAnalysis { task, numbers, facts, changed: true };
     if task.initial.numbers.is_empty() {
-        return asking.numbers;
+        return analysis.numbers;
     }
-    while std::mem::take(&mut asking.changed) {
-        asking.spread();
+    while std::mem::take(&mut analysis.changed) {
+        analysis.spread();
     }
-    asking.numbers
+    analysis.numbers
 }
 
 impl<N: TaskNumber> PolarityAnalysis<'_, N> {
@@ -61,6 +62,7 @@ impl<N: TaskNumber> PolarityAnalysis<'_, N> {
         self.condition(&task.goal, UP);
         for operator in &task.operators {
             self.condition(&operator.condition, UP);
+            // An effect may fire or not, so its condition is needed in both directions.
             for literal in operator.conditional.iter().flat_map(|effect| &effect.condition) {
                 self.fact(literal.fact, BOTH);
             }
@@ -88,27 +90,28 @@ impl<N: TaskNumber> PolarityAnalysis<'_, N> {
         }
     }
 
-    /// The truth of a derived variable is its value 0.
+    /// Adds a polarity to the variable of a fact. A derived variable is true if its value is 0.
     fn fact(&mut self, fact: Fact, asked: Polarity) {
         let asked = if fact.value == 0 { asked } else { asked.flipped() };
-        let known = &mut self.facts[fact.variable.index()];
-        let next = known.with(asked);
-        self.changed |= next != *known;
-        *known = next;
+        let polarity = &mut self.facts[fact.variable.index()];
+        let next = polarity.with(asked);
+        self.changed |= next != *polarity;
+        *polarity = next;
     }
 
     fn linear(&mut self, linear: &Linear<N>, asked: Polarity) {
         for (variable, factor) in &linear.coefficients {
+            // A negative coefficient swaps the directions.
             let asked = if *factor >= N::zero() { asked } else { asked.flipped() };
-            let known = &mut self.numbers[variable.index()];
-            let next = known.with(asked);
-            self.changed |= next != *known;
-            *known = next;
+            let polarity = &mut self.numbers[variable.index()];
+            let next = polarity.with(asked);
+            self.changed |= next != *polarity;
+            *polarity = next;
         }
     }
 }
 
-/// Whether more of any numeric variable can only help.
+/// Returns `true` if a higher value of any numeric variable never hurts.
 pub fn is_monotone<N: TaskNumber>(task: &Task<N>) -> bool {
     directions(task).iter().all(|asked| !asked.down)
 }
