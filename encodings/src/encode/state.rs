@@ -14,7 +14,7 @@ use crate::encode::conditional::FiredEffects;
 use crate::encode::formula::{Family, Formula};
 use crate::sat::Lit;
 
-/// Every variable has exactly one value before the step.
+/// Adds clauses that give every variable exactly one value before the step.
 pub(super) fn domain(builder: &mut Builder<'_>, step: usize) {
     for variable in 0..builder.task.variables.len() {
         let falsum = !Formula::truth();
@@ -27,7 +27,8 @@ pub(super) fn domain(builder: &mut Builder<'_>, step: usize) {
     }
 }
 
-/// A value that holds after the step held before it, or an operator at the step has brought it.
+/// Adds frame axioms: a value that holds after the step held before it, or an operator at the step
+/// sets it.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "steps are fewer than the horizon, whose formula is in memory"

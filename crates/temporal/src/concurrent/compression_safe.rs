@@ -15,7 +15,7 @@ use task::task::Task;
 use crate::concurrent::action_invariants::{Index, MAX_PAIR_CHECKS};
 use crate::concurrent::happening::{Happening, Instance};
 
-/// For each instance whether its end can come right after its start.
+/// Per instance: whether its end can directly follow its start.
 pub(super) fn compression_safe_actions(
     task: &Task,
     happenings: &[Happening],
@@ -23,10 +23,10 @@ pub(super) fn compression_safe_actions(
     limits: &Limits,
 ) -> Result<Vec<bool>, Interrupted> {
     let index = Index::new(task, happenings, instances);
-    let mut left = MAX_PAIR_CHECKS;
+    let mut work_left = MAX_PAIR_CHECKS;
     limits
         .watch(instances)
-        .map(|instance| instance.map(|own| index.is_compressible(own, &mut left)))
+        .map(|instance| instance.map(|instance_data| index.is_compressible(instance_data, &mut work_left)))
         .collect()
 }
 
@@ -36,15 +36,15 @@ impl Index<'_> {
         if !own.joint.is_empty() || end.writes.iter().any(|id| self.joint.binary_search(id).is_ok()) {
             return false;
         }
-        // Of what may overlap with itself, other runs can lie in between as well.
+        // Other runs of an instance that can overlap itself may start or end in between.
         let alone = own.under_way.is_none();
         let Some(invariant) = self.invariant(own, alone, left) else { return false };
         let waiting = end.accesses.marks.iter().filter_map(|key| self.waiting.get(key));
         let marking = end.accesses.after.iter().filter_map(|(key, _)| self.marking.get(key));
         let interfering = waiting.chain(marking).flatten();
         for other in interfering {
-            let Some(rest) = left.checked_sub(1) else { return false };
-            *left = rest;
+            let Some(work_left) = left.checked_sub(1) else { return false };
+            *left = work_left;
             let is_own = alone && [own.start, own.end].contains(other);
             if !is_own && !self.excludes(&invariant, own, *other) {
                 return false;
