@@ -33,12 +33,12 @@ fn certified(seed: u64) -> (Certificate, Option<BigRational>) {
     (certificate.unwrap_or_else(|| panic!("seed {seed}: no certificate")), cost)
 }
 
-/// Claims that are false: that plans cost more than they do, or that there are none.
+/// False claims: a higher least cost, and unsolvability.
 fn false_claims(cost: &BigRational) -> [Option<BigRational>; 2] {
     [Some(cost + BigRational::from_integer(1.into())), None]
 }
 
-/// What the comparison of a written task with the files of a mission says.
+/// Result of the grounding check of a written task against the files of a mission.
 fn compared((domain, problem): &(Domain, Problem), task: &str) -> Faithful {
     match witness(domain, problem, task, &|| false) {
         Ok(witness) => faithful(domain, problem, task, &witness, &|| false),
@@ -111,7 +111,7 @@ fn withstands(seed: u64, mutants: usize) {
         }
         let mut mutant = written.clone();
         mutate(&mut mutant, &mut random);
-        // It may still stand for the files, but then it proves nothing that is false of them.
+        // A mutant that passes the grounding check must not prove a false claim.
         let written = mutant.to_string();
         let stands = matches!(compared(&files, &written), Faithful::Yes { .. });
         for claim in cost.iter().flat_map(false_claims).chain([cost.clone()]) {
@@ -129,7 +129,7 @@ fn changed_arguments_prove_nothing_that_is_false() {
     (200..230).for_each(|seed| withstands(seed, 40));
 }
 
-/// What can be read in two ways proves nothing: a number that an operator changes twice, a number with two factors, a design that
+/// Ambiguous tasks prove nothing: a number that an operator changes twice, a number with two factors, a design that
 /// is not there.
 #[test]
 fn tasks_that_can_be_read_in_two_ways_are_refused() {
@@ -200,7 +200,7 @@ fn what_changes_nothing_needs_no_operator() {
     assert!(matches!(found, Faithful::Yes { instances: 8, idle: 4, .. }), "{found:?}");
 }
 
-/// What the SMT solver answers to the verification conditions of a claim.
+/// Answers of the SMT solver to the verification conditions of a claim.
 fn answers(solver: &str, certificate: &Certificate, claim: Option<&BigRational>) -> Vec<String> {
     let conditions = verification_conditions(&certificate.task, &certificate.argument, claim);
     let conditions = conditions.expect("documents").expect("no derived variables");

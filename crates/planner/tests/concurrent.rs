@@ -39,7 +39,7 @@ pub fn written(plan: &Plan) -> String {
     text
 }
 
-/// What the validator says a plan costs; else why it is not valid.
+/// Metric of a plan by the validator, or the reason why the plan is invalid.
 pub fn metric(
     domain: &Domain,
     problem: &Problem,
@@ -56,7 +56,7 @@ pub fn metric(
     }
 }
 
-/// The metric and the lines of the plan; none if it is proved that there is no plan.
+/// Checks the metric and the lines of the plan; `None` means a proof that there is no plan.
 pub fn check(
     name: &str,
     domain: &str,
@@ -360,7 +360,7 @@ fn agree(seed: u64) -> bool {
     let separation = rational(1, 1);
     let ground = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation)
         .unwrap_or_else(|errors| panic!("{errors:?}"));
-    // Numbers can grow for ever.
+    // Numbers can grow without bound.
     let limits = Limits::none().with_time(std::time::Duration::from_secs(2));
     let solution = optimize_concurrent(&ground, &limits, &mut |_| {});
     let context = || format!("seed {seed}\n{}\n{}", task.domain, task.problem);

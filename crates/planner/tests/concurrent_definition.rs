@@ -12,7 +12,7 @@ use pddl::{Source, read};
 
 const NONE: &str = "none";
 
-/// What is proved of a task with a separation of a thousandth: the least metric, or that there is no plan.
+/// Proved result of a task with a separation of a thousandth: the least metric, or that there is no plan.
 fn proved(domain: &str, problem: &str) -> String {
     let read = read(&Source::new("domain", domain), &Source::new("problem", problem));
     let (domain, problem, _) = read.unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
@@ -51,7 +51,7 @@ fn durative(name: &str, duration: &str, condition: &str, effect: &str) -> String
     )
 }
 
-/// What is proved of actions over the atoms `p`, `q`, `r`, `g` and the number `x` (2).
+/// Checks the proved result for actions over the atoms `p`, `q`, `r`, `g` and the number `x` (2).
 fn check(actions: &[String], init: &str, goal: &str, expected: &str) {
     let domain =
         format!("(define (domain d) (:predicates (p) (q) (r) (g)) (:functions (x))\n{})", actions.concat());
@@ -173,7 +173,7 @@ fn one_number_is_assigned_the_same_value_twice() {
     check(&[assigns("a", "g"), assigns("b", "p")], "", "(g) (p)", "3.001");
 }
 
-/// The value that the start of `a` sets and its end requires is left in between and taken again.
+/// The value that the start of `a` sets and its end requires may change in between and be restored.
 #[test]
 fn a_value_is_left_during_an_action_and_taken_again() {
     let domain = "(define (domain f2) (:requirements :durative-actions) (:predicates (i) (x) (y) (g) (h))

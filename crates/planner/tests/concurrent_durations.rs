@@ -45,7 +45,7 @@ pub fn written(plan: &Plan) -> String {
     text
 }
 
-/// What the validator says a plan costs; else why it is not valid.
+/// Metric of a plan by the validator, or the reason why the plan is invalid.
 pub fn metric(
     domain: &Domain,
     problem: &Problem,
@@ -128,7 +128,7 @@ fn as_much_is_charged_as_is_needed() {
 
 #[test]
 fn what_is_spent_at_the_start_is_paid_for() {
-    // Twice as long as it takes, so much fuel; the tank has 9.
+    // The fuel consumption is twice the duration; the tank has 9.
     let burn = durative(
         "burn",
         "(and (>= ?duration 2) (<= ?duration 8))",
@@ -245,7 +245,7 @@ fn more_than_a_number_is_a_little_more() {
     assert_eq!(solve(&domain, &problem, &rational(1, 1000), &limits).status, Status::Unknown);
 }
 
-/// What is shorter than the separation the planner does not look at, and claims nothing of.
+/// The planner does not search durations below the separation, and claims nothing about such plans.
 #[test]
 fn no_action_is_shorter_than_the_separation() {
     for (bounds, status) in [
@@ -402,7 +402,7 @@ fn brute_force(durations: &[Vec<i128>; 3], domain: &Domain, problem: &Problem) -
     best
 }
 
-/// Whether a task is decided; then no plan of brute force is better than the one that is found, or there is none.
+/// Compares a solution with brute force. Returns `true` if the planner decided the task.
 fn agree(seed: u64) -> bool {
     let (domain, problem, durations) = sample(&mut Random(seed));
     let (read_domain, read_problem) = parse(&domain, &problem);

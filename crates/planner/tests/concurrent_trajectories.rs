@@ -111,7 +111,7 @@ fn what_has_to_follow_in_time_is_judged_by_the_times_of_the_plan() {
     let time = "(:metric minimize (total-time))";
     let both = ["0: (raise) [3]", "0: (light) [2]"];
     check(&soon("3"), "(p)", time, (Status::Feasible, Some("3"), &both));
-    // It is put off until nothing has to follow.
+    // It is delayed until no further action has to follow.
     let late = ["0: (raise) [3]", "3.5: (light) [2]"];
     check(&soon("1"), "(p)", time, (Status::Feasible, Some("5.5"), &late));
     let weighed = "(:metric minimize (+ (total-time) (* 2 (is-violated w))))";

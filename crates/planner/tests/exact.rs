@@ -30,7 +30,7 @@ fn number(decimal: &str) -> BigRational {
     BigRational::new(digits, BigInt::from(10).pow(fraction.len() as u32))
 }
 
-/// What the validator says a plan costs; none if it is not valid.
+/// Cost of a plan by the validator. Returns `None` if the plan is invalid.
 fn metric(domain: &Domain, problem: &Problem, plan: &Plan) -> Option<BigRational> {
     let steps = plan.steps.iter().map(|step| PlanStep {
         action: Name::new(&step.action),
@@ -64,11 +64,11 @@ fn too_large(domain: &Domain, problem: &Problem) -> bool {
     }
 }
 
-/// How many actions a random plan has at most.
+/// Maximum number of actions of a random plan.
 const STEPS: usize = 4;
 const NUMBERS: [&str; 2] = ["x", "y"];
 
-/// What becomes of a number.
+/// Effect on a number.
 #[derive(Debug, Clone)]
 enum Change {
     ScaleUp(String),
@@ -283,7 +283,7 @@ impl Model {
         (domain, problem)
     }
 
-    /// For each number of actions the least cost of a plan with so many.
+    /// Least cost of a plan, by number of actions.
     fn oracle(&self) -> Vec<Option<BigRational>> {
         let mut layer: HashMap<Moment, BigRational> = HashMap::new();
         let [x, y] = &self.initial;

@@ -38,7 +38,7 @@ fn large(times: usize) -> BigRational {
     BigRational::from_integer(LARGE.parse::<BigInt>().expect("a number") * BigInt::from(times))
 }
 
-/// A robot in a corridor of so many places, to whose end it has to go; each move costs as much as `cost` says.
+/// A robot that has to go to the end of a corridor with `places` places; each move has the cost effect `cost`.
 fn corridor(places: usize, cost: &str, metric: &str) -> Task {
     let domain = format!(
         "(define (domain d) (:requirements :typing :numeric-fluents) (:types place)
@@ -144,7 +144,7 @@ fn an_objective_whose_sum_does_not_fit_is_shown_and_not_proved() {
 
 #[test]
 fn the_least_number_of_the_type_is_too_large_as_well() {
-    // From 2^112 to 2^124, which is the most that a number may come to, and then to -2^127.
+    // From 2^112 to 2^124, the greatest admitted number, and then to -2^127.
     let domain =
         "(define (domain d) (:requirements :numeric-fluents) (:predicates (a) (b) (c)) (:functions (x))
         (:action grow :parameters () :precondition (a) :effect (and (not (a)) (b) (scale-up (x) 4096)))

@@ -15,7 +15,7 @@ use pddl::{Source, read};
 use testing::missions::Mission;
 use testing::random::Random;
 
-/// The certificate of a mission and its least cost; none if there is no plan.
+/// Certificate of a mission and its least cost. Returns `None` if there is no plan.
 fn certified(seed: u64) -> Option<(Certificate, BigRational)> {
     let mission = Mission::random(seed);
     let cost = BigRational::from_integer(mission.oracle()?.into());
@@ -71,7 +71,7 @@ fn refutation(
     Ok((steps, files.map(|file| file.text())))
 }
 
-/// What is said of formula, proof and steps.
+/// Verdicts on formula, proof and steps.
 fn verdicts(
     certificate: &Certificate,
     claim: &BigRational,

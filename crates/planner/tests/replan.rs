@@ -1,4 +1,4 @@
-//! The live planner against planning anew: the same plan, for random changes of state and availability.
+//! The replanner against planning from scratch: the same plan, for random changes of state and availability.
 
 #![allow(clippy::format_collect)]
 #![expect(clippy::print_stdout, reason = "times are what one of these tests is for")]
@@ -36,7 +36,7 @@ fn words(atom: &Atom) -> Vec<String> {
     std::iter::once(atom.predicate.name.to_string()).chain(atom.arguments.iter().map(term)).collect()
 }
 
-/// What can change in a mission: names of its fact of place, of its places and designs, and the battery's capacity.
+/// Changeable parts of a mission: names of its position predicate, places and designs, and the battery's capacity.
 struct Changes {
     at: &'static str,
     places: Vec<String>,
@@ -126,7 +126,7 @@ fn live_with(
     };
     let mut told = Vec::new();
     let found = replanner.plan_aloud(&query, &mut |progress| told.push(progress));
-    // What is told on the way is true in the end.
+    // Progress reports must agree with the final result.
     if let ReplanOutcome::Optimal { metric, .. } = &found {
         for progress in told {
             let dearest = progress.metric.as_ref();
@@ -160,7 +160,7 @@ fn compare(expected: &Solution, found: &ReplanOutcome, context: &dyn Fn() -> Str
     }
 }
 
-/// So many changes of a mission, one after the other, each answered in both ways; how often it had to be ground anew.
+/// Applies changes to a mission one by one, each answered in both ways. Returns how often it had to be ground again.
 fn check(seed: u64, changes: usize) -> usize {
     let mission = Mission::random(seed);
     let (domain, mut problem) = parse(&mission.domain(), &mission.problem());
@@ -178,7 +178,7 @@ fn check(seed: u64, changes: usize) -> usize {
         }
         let context = || format!("seed {seed}, change {number}: {mission:?}: {:?}", problem.init);
         compare(&from_scratch(&domain, &problem), &found, &context);
-        // A plan that is known is none the worse.
+        // A known plan must not change the result.
         let again = live_with(&mut replanner, &domain, &problem, old.as_ref());
         assert_eq!(again, found, "{}", context());
         if let ReplanOutcome::Optimal { steps, .. } = &found {
@@ -321,7 +321,7 @@ fn the_old_plan_serves_when_time_is_up() {
     );
 }
 
-/// What blocks a mission is minimal: alone it leaves no plan, and without any part of it there is one.
+/// Checks that the blocking set is minimal: alone it makes the mission unsolvable, and no proper part does.
 fn check_blocking(seed: u64) -> bool {
     let mission = Mission::random(seed);
     let (domain, mut problem) = parse(&mission.domain(), &mission.problem());
@@ -400,7 +400,7 @@ fn generated(waypoints: usize, designs: usize, functions: usize) -> Option<(Doma
     command.output().ok()?.status.success().then(|| parse(&read("domain"), &read("problem")))
 }
 
-/// What the thread has used of the processor so far, in milliseconds.
+/// CPU time of the thread in milliseconds.
 fn used() -> f64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux tells");
     text.split(' ').next().and_then(|first| first.parse::<f64>().ok()).expect("nanoseconds") / 1e6

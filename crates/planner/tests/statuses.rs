@@ -1,4 +1,4 @@
-//! What is claimed of tasks at the edges: nothing to do, nothing that helps, free cycles, metrics without a best value.
+//! Statuses of edge cases: empty plans, unsolvable tasks, cycles without cost, metrics without an optimum.
 
 use metaplan_planner::{
     Backend, Config, GroundConfig, MetricUnbounded, Proof, Status, StepSemantics, ground, optimize,

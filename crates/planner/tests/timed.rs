@@ -16,7 +16,7 @@ fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// The cheapest plan; none if it is proved that there is none. `Engine::Sat` is the SAT solver alone.
+/// Cheapest plan. Returns `None` if it is proved that no plan exists. `Engine::Sat` is the SAT solver alone.
 fn plan(domain: &Domain, problem: &Problem, engine: Engine) -> Option<Plan> {
     let task =
         ground(domain, problem, &GroundConfig::default()).unwrap_or_else(|errors| panic!("{errors:?}"));
@@ -43,7 +43,7 @@ fn written(plan: &Plan) -> String {
     text
 }
 
-/// What the validator says a plan costs; none if it is not valid.
+/// Metric of a plan by the validator. Returns `None` if the plan is invalid.
 fn metric(domain: &Domain, problem: &Problem, text: &str) -> Option<String> {
     let plan =
         PlanText::parse(&Source::new("plan", text)).unwrap_or_else(|errors| panic!("{errors:?}\n{text}"));

@@ -1,4 +1,4 @@
-//! The validator beside that of the unified planning framework: the same verdict on cheapest plans of generated missions
+//! The validator compared with that of the unified planning framework: the same verdict on cheapest plans of generated missions
 //! and on plans that were changed in one place.
 //!
 //! Needs a Python with the framework (`python3 -m venv peers; peers/bin/pip install unified-planning`), named by

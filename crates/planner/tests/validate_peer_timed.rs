@@ -1,4 +1,4 @@
-//! The validator beside that of the unified planning framework for plans with times: on the real files that the
+//! The validator compared with that of the unified planning framework for plans with times: on the real files that the
 //! framework can read, with cheapest plans and with plans that were changed in one place.
 //!
 //! The framework knows neither the mutex rule of PDDL 2.1 nor, where an action has no effect at its start, what holds

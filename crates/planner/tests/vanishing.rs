@@ -7,7 +7,7 @@ use metaplan_planner::{Config, GroundConfig, Status, ground, optimize};
 use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, read};
 
-/// What is expected: the metric and a plan that has it, no plan, or a refusal with a code.
+/// Expected result: the metric and a plan with this metric, no plan, or a rejection with a code.
 enum Expected {
     Optimal(&'static str, &'static str),
     Unsolvable,
@@ -42,7 +42,7 @@ fn check(name: &str, domain: &str, problem: &str, expected: &Expected) {
     }
 }
 
-/// An action of duration 2 with these start effects beside `(q)`, and one of duration 100 that also reaches the goal.
+/// An action of duration 2 with these start effects in addition to `(q)`, and one of duration 100 that also reaches the goal.
 fn conditional(effects: &str) -> String {
     format!(
         "(define (domain d) (:requirements :durative-actions :fluents :conditional-effects) (:predicates (p) (q) (r)) (:functions (f) (g) (h))

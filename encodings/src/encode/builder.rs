@@ -16,7 +16,7 @@ use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::variables::Variables;
 use crate::sat::Lit;
 
-/// A task with its limits, its formula so far, and the variables of the formula.
+/// A task with its limits, its unfinished formula, and the variables of the formula.
 pub(super) struct Builder<'a> {
     pub(super) task: &'a Task,
     pub(super) limits: &'a Limits,

@@ -338,9 +338,9 @@ impl Sum<'_, '_> {
             }
             let active = self.builder.variables.busy[*step as usize];
             let mut arithmetic = Arithmetic { formula: &mut self.builder.formula, family: Family::Cost };
-            let more = arithmetic.choose(&possible, active);
+            let increment = arithmetic.choose(&possible, active);
             // Neither summand exceeds the gap, so the sum fits; then the limit is enforced again.
-            spent = arithmetic.add(&spent, &more, width);
+            spent = arithmetic.add(&spent, &increment, width);
             arithmetic.at_most(&spent, gap);
         }
         spent

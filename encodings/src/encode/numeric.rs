@@ -201,11 +201,11 @@ impl Transition<'_, '_> {
 
     fn add_source(&mut self, base: Bits, premises: &[(Vec<Lit>, Int)], active: Lit, width: usize) -> Bits {
         let mut arithmetic = Arithmetic { formula: &mut self.builder.formula, family: Family::Numeric };
-        let more = arithmetic.choose(premises, active);
-        if more.iter().all(|bit| *bit == !Formula::truth()) {
+        let summand = arithmetic.choose(premises, active);
+        if summand.iter().all(|bit| *bit == !Formula::truth()) {
             return base;
         }
-        arithmetic.add(&base, &more, width)
+        arithmetic.add(&base, &summand, width)
     }
 
     /// Adds the numeric conditions of the operators at a step.

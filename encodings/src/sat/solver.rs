@@ -64,7 +64,7 @@ pub enum Answer {
 pub trait Solver {
     /// Adds a clause; its variables need no declaration.
     fn add_clause(&mut self, clause: &[Lit]);
-    /// Decides the clauses added so far together with the assumptions, which hold for this call only.
+    /// Decides all added clauses together with the assumptions, which hold for this call only.
     fn solve(&mut self, assumptions: &[Lit]) -> Answer;
     /// Failed assumptions of the last call, if its answer was `Unsatisfiable`: a subset of the
     /// assumptions that is inconsistent with the clauses, unordered and not necessarily minimal.

@@ -61,14 +61,14 @@ mod tests {
             let mut solver = Backend::default().start(&Limits::none(), u64::MAX);
             let mut variables = size;
             for count in 1..size as usize {
-                let more = totalizer.more_than(count, &mut variables, |clause| solver.add_clause(clause));
-                let more = more.expect("more can be true");
+                let exceeds = totalizer.more_than(count, &mut variables, |clause| solver.add_clause(clause));
+                let exceeds = exceeds.expect("the count can be exceeded");
                 for bits in 0..1_u32 << size {
                     let assigned = |at: u32| {
                         if bits >> at & 1 == 1 { literals[at as usize] } else { !literals[at as usize] }
                     };
                     let mut assumptions: Vec<Lit> = (0..size).map(assigned).collect();
-                    assumptions.push(!more);
+                    assumptions.push(!exceeds);
                     let satisfiable = solver.solve(&assumptions) == Answer::Satisfiable;
                     assert_eq!(satisfiable, bits.count_ones() as usize <= count, "{bits:b}, {count}");
                 }

@@ -195,7 +195,7 @@ enum Part {
 /// Streaming parser of Varisat's proof format that detects learnt clauses.
 struct Steps {
     part: Part,
-    /// Partially read number, and number of its bytes read so far.
+    /// Partially read number, and number of its bytes already read.
     number: u128,
     bytes: u32,
 }

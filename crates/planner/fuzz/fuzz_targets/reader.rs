@@ -9,7 +9,7 @@ use pddl::{
 };
 use pddl::validate::PlanText;
 
-/// What a tree says, without the places of its parts.
+/// Debug text of a tree, without source positions.
 fn bare(tree: &impl std::fmt::Debug) -> String {
     let text = format!("{tree:?}");
     let mut parts = text.split("Span { start: ");

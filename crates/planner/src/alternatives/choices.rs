@@ -41,8 +41,8 @@ pub(super) struct Choice {
 impl Choice {
     /// All choices of a plan.
     pub(super) fn all(plan: &[GroundStep]) -> Vec<Self> {
-        let choices = plan.iter().enumerate().flat_map(|(step, own)| {
-            let slots = (0..dense(own.choice.len())).map(Some);
+        let choices = plan.iter().enumerate().flat_map(|(step, content)| {
+            let slots = (0..dense(content.choice.len())).map(Some);
             std::iter::once(None).chain(slots).map(move |slot| Self { step, slot })
         });
         choices.collect()
@@ -51,12 +51,12 @@ impl Choice {
 
 /// Returns `true` if both steps have the same operator, or, with a slot, if `other` also uses the design that `one`
 /// has in that slot.
-pub(super) fn shares(task: &Task, one: &GroundStep, other: &GroundStep, slot: Option<u32>) -> bool {
+pub(super) fn shares(task: &Task, first: &GroundStep, second: &GroundStep, slot: Option<u32>) -> bool {
     match slot {
-        None => other.operator == one.operator,
+        None => second.operator == first.operator,
         Some(slot) => {
-            let own = design(task, one, slot as usize);
-            (0..other.choice.len()).any(|position| design(task, other, position) == own)
+            let first_design = design(task, first, slot as usize);
+            (0..second.choice.len()).any(|position| design(task, second, position) == first_design)
         }
     }
 }

@@ -27,7 +27,7 @@ pub(super) fn by_formula(
     context: Context<'_>,
     bounds: &Bounds,
     first: &GroundPlan,
-    most: usize,
+    max_plans: usize,
     config: &Config,
 ) -> Option<Alternatives> {
     let task = context.task;
@@ -55,22 +55,22 @@ pub(super) fn by_formula(
     let mut run = Run { task, encoding, solver };
     let plan =
         |steps: &[GroundStep]| decode(context, &GroundPlan { steps: steps.to_vec(), cost: first.cost });
-    let mut found = vec![first.steps.clone()];
+    let mut sequences = vec![first.steps.clone()];
     // Plans that differ only in waits are one plan for the reader.
     let mut plans = vec![plan(&first.steps)];
     let mut exhausted = false;
     // Literal that excludes the known plans while it is assumed.
-    let others = run.encoding.formula.fresh(VariableMeaning::Others);
-    while plans.len() <= most && !exhausted {
-        if let Some(known) = found.last() {
-            run.exclude(known, others);
+    let exclusion = run.encoding.formula.fresh(VariableMeaning::Others);
+    while plans.len() <= max_plans && !exhausted {
+        if let Some(last_plan) = sequences.last() {
+            run.exclude(last_plan, exclusion);
         }
-        match run.solve(&[others]) {
-            (Answer::Satisfiable, Some(other)) => {
-                let shown = plan(&other);
-                found.push(other);
-                if !plans.contains(&shown) {
-                    plans.push(shown);
+        match run.solve(&[exclusion]) {
+            (Answer::Satisfiable, Some(steps)) => {
+                let decoded = plan(&steps);
+                sequences.push(steps);
+                if !plans.contains(&decoded) {
+                    plans.push(decoded);
                 }
             }
             (Answer::Unsatisfiable, _) => exhausted = true,
@@ -79,7 +79,7 @@ pub(super) fn by_formula(
     }
     // Where there are waits, one action is several operators, at one place or another.
     let has_waits = task.operators.iter().any(|operator| operator.wait.is_some());
-    let choices = if complete && !has_waits { run.forced(&first.steps, &found) } else { None };
+    let choices = if complete && !has_waits { run.forced(&first.steps, &sequences) } else { None };
     let forced = choices.map(|choices| forced(task, &first.steps, &choices));
     plans.remove(0);
     Some(Alternatives { plans, complete: complete && exhausted, forced })
@@ -119,12 +119,12 @@ impl Run<'_> {
             choices.retain(|choice| self.shares(first, plan, *choice));
         }
         while !choices.is_empty() {
-            let other = self.encoding.formula.fresh(VariableMeaning::Others);
+            let selector = self.encoding.formula.fresh(VariableMeaning::Others);
             let differs =
                 choices.iter().map(|choice| !self.encoding.choice(first, (choice.step, choice.slot)));
-            let clause: Vec<_> = differs.chain([!other]).collect();
+            let clause: Vec<_> = differs.chain([!selector]).collect();
             self.solver.add_clause(&clause);
-            match self.solve(&[other]) {
+            match self.solve(&[selector]) {
                 (Answer::Satisfiable, Some(plan)) => {
                     choices.retain(|choice| self.shares(first, &plan, *choice));
                 }

@@ -66,14 +66,14 @@ impl List {
     /// Lists the plans of a graph, and returns whether there may be others.
     fn new(context: Context<'_>, first: &GroundPlan, most: usize, graph: &Graph) -> (Self, End) {
         let mut list = Self { plans: Vec::new(), most };
-        let own = decode(context, first);
+        let first_plan = decode(context, first);
         let end = Paths::new(graph).each(&mut |steps| {
             // If a label represents several states, some paths need more of a resource than is available.
             if !graph.is_exact && replay(context.task, &steps).is_none_or(|(_, cost)| cost != first.cost) {
                 return true;
             }
             let plan = decode(context, &GroundPlan { steps, cost: first.cost });
-            let is_new = plan != own && !list.plans.contains(&plan);
+            let is_new = plan != first_plan && !list.plans.contains(&plan);
             if is_new && list.is_full() {
                 return false;
             }
@@ -94,7 +94,7 @@ fn shared(task: &Task, first: &[GroundStep], graph: &Graph) -> Vec<Choice> {
     let mut choices = Choice::all(first);
     choices.retain(|choice| {
         layers[choice.step].as_ref().is_some_and(|steps| {
-            steps.iter().all(|other| shares(task, &first[choice.step], other, choice.slot))
+            steps.iter().all(|step| shares(task, &first[choice.step], step, choice.slot))
         })
     });
     choices

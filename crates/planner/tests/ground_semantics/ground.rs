@@ -1,4 +1,4 @@
-//! The ground task beside the interpreter: from state to state, the same actions can be executed, the same atoms hold,
+//! The ground task against the interpreter: from state to state, the same actions can be executed, the same atoms hold,
 //! the goal is reached in the same states, and the metric is the same.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -9,7 +9,7 @@ use pddl::ast::{Domain, Problem};
 use crate::ground_semantics::interpret::{State, choices};
 use crate::ground_semantics::model::{Action, Expression, Number, OBJECTS, Sign, Task, fact_text};
 
-/// How many pairs of states are compared.
+/// Number of pairs of states that are compared.
 const LIMIT: usize = 60;
 
 /// States with numbers beyond are not followed: exact integers end somewhere.
@@ -33,7 +33,7 @@ fn rewards_time(task: &Task) -> bool {
     if *maximize { sum > zero } else { sum < zero }
 }
 
-/// How long an action takes: what the only equation says, and otherwise the only bound that the metric makes it take.
+/// Duration of an action: the value of its only equation, or else the only bound that is optimal for the metric.
 fn duration(task: &Task, action: &Action, scope: &[usize], state: &State) -> Option<Number> {
     let bounds = action.duration.as_ref()?;
     let among = |signs: &[Sign]| {
@@ -79,7 +79,7 @@ fn is_small(state: &State) -> bool {
 struct Pair {
     lifted: State,
     ground: TaskState,
-    /// How many actions led here; nothing where some of them are not in the ground task, so that their costs are unknown.
+    /// Number of actions from the initial state. `None` if some of them are not in the ground task, so that their costs are unknown.
     steps: Option<usize>,
 }
 

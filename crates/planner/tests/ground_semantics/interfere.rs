@@ -1,11 +1,11 @@
-//! When two happenings interfere: one writes what the other reads, or both write the same in ways that do not go together.
+//! Interference of happenings: one writes an atom or number that the other reads, or both write it and do not commute.
 
 use std::collections::BTreeSet;
 
 use crate::ground_semantics::interpret::{Change, Changes, objects, with};
 use crate::ground_semantics::model::{Atom, DERIVED, Effect, Expression, Formula, PREDICATES, Task, UPPER};
 
-/// What a happening reads and writes.
+/// Read and write sets of a happening.
 #[derive(Debug, Default)]
 pub struct Touch {
     facts: BTreeSet<Atom>,
@@ -16,7 +16,7 @@ pub struct Touch {
     functions: BTreeSet<usize>,
     pub added: BTreeSet<Atom>,
     pub deleted: BTreeSet<Atom>,
-    /// How each number changes: assigned, added to, or scaled.
+    /// Changed numbers with the kind of change: assign, add, or scale.
     changed: BTreeSet<(Atom, u8)>,
 }
 
@@ -101,7 +101,7 @@ impl Touch {
         }
         for (_, body) in task.axioms.iter().filter(|(head, _)| *head == predicate) {
             let mut inner = Self { predicates: self.predicates.clone(), ..Self::default() };
-            // Its variables stand for any objects: the predicates and functions are all that matters.
+            // Variables may denote any object, so only the predicates and functions matter.
             inner.reads_of_formula(task, body, &vec![0; PREDICATES[predicate].1]);
             self.functions.extend(inner.values.iter().map(|(function, _)| *function));
             self.functions.extend(inner.functions);

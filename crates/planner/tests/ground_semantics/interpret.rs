@@ -9,13 +9,13 @@ use crate::ground_semantics::model::{
     Action, Atom, DERIVED, Effect, Expression, Formula, Number, PREDICATES, Task, Term, UPPER, Way,
 };
 
-/// What holds, what functions are worth, and how much time has passed.
+/// A state: true atoms, values of functions, and elapsed time.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct State {
     pub facts: BTreeSet<Atom>,
     pub values: BTreeMap<Atom, Number>,
     pub time: Number,
-    /// How many timed literals have taken place.
+    /// Number of timed literals that have taken place.
     timed: usize,
 }
 
@@ -279,7 +279,7 @@ impl State {
         exact.or(stated).filter(|duration| *duration >= Ratio::from_integer(0))
     }
 
-    /// What an expression over functions is worth here.
+    /// Value of an expression over functions in this state.
     pub fn value(&self, task: &Task, expression: &Expression, scope: &[usize]) -> Option<Number> {
         View::new(task, self, None).value(expression, scope)
     }
@@ -378,7 +378,7 @@ impl State {
         Some(state)
     }
 
-    /// What holds and what follows from it.
+    /// True atoms, including derived ones.
     pub fn all_facts(&self, task: &Task) -> BTreeSet<Atom> {
         let derived = View::new(task, self, None).derived;
         self.facts.iter().cloned().chain(derived).collect()
@@ -388,7 +388,7 @@ impl State {
         View::new(task, self, None).holds(&task.goal, &[])
     }
 
-    /// What the metric is worth in this state; without a metric nothing.
+    /// Value of the metric in this state. Returns `None` without a metric.
     pub fn metric(&self, task: &Task) -> Option<Number> {
         let (_, value) = task.metric.as_ref()?;
         View::new(task, self, None).value(value, &[])

@@ -36,7 +36,7 @@ pub const TOTAL_COST: usize = 2;
 /// The functions that only the initial state sets.
 pub const CONSTANT: [usize; 2] = [3, 4];
 
-/// What a variable ranges over.
+/// Range of a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Range {
     Object,
@@ -327,7 +327,7 @@ pub fn function_text((function, arguments): &Atom) -> String {
     ground_text(FUNCTIONS[*function].0, arguments)
 }
 
-/// So many variables of any type.
+/// Declaration of `arity` variables of any type.
 fn objects_of(arity: usize) -> String {
     join(&(0..arity).collect::<Vec<_>>(), |at| format!("?v{at} - object"))
 }

@@ -6,7 +6,7 @@ use crate::ground_semantics::interpret::{State, Step, choices};
 use crate::ground_semantics::model::{Action, Atom, Expression, Formula, Number, Sign, Task, Term};
 use crate::ground_semantics::text;
 
-/// How many changed plans there are for each valid one.
+/// Number of changed plans per valid plan.
 const CHANGES: usize = 8;
 
 fn needs_duration(action: &Action) -> bool {

@@ -1,4 +1,4 @@
-//! What is generated reads without errors, and printing and reading it gives the same tree; a plan is judged by the
+//! Generated files are read without errors, and printing and reading them gives the same tree; a plan is judged by the
 //! validator as the interpreter judges it.
 
 use pddl::ast::{Domain, Problem};

@@ -31,7 +31,7 @@ fn compiled(domain: &str, problem: &str) -> (pddl::ast::Domain, pddl::ast::Probl
     (tree, task)
 }
 
-/// None where an effect at start or on a number depends on too many values.
+/// Solves a task. Returns `None` if an effect at start or on a number depends on too many values.
 fn solve(domain: &str, problem: &str) -> Option<Solution> {
     let (tree, task) = compiled(domain, problem);
     tally::solve(&tree, &task, "with more than 64 cases")

@@ -12,7 +12,7 @@ use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, read};
 use testing::random::Random;
 
-/// None where an instance has too many cases.
+/// Solves a task. Returns `None` if an instance has too many cases.
 fn solve(domain: &str, problem: &str, engine: Engine) -> Option<Solution> {
     let (domain, problem, _) = read(&Source::new("domain", domain), &Source::new("problem", problem))
         .unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));

@@ -80,7 +80,7 @@ impl LandmarkCut {
         })
     }
 
-    /// Work units done so far.
+    /// Work units done up to now.
     pub(crate) fn work(&self) -> u64 {
         self.work.saturating_mul(WORK_PER_VISIT)
     }

@@ -84,7 +84,7 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
         }))
     }
 
-    /// Number of searches that have ended so far.
+    /// Number of searches that have ended.
     pub fn restarts(&self) -> usize {
         self.phase
     }

@@ -60,7 +60,7 @@ pub(super) struct Search<N> {
     /// Reached landmarks: a bitset of `LandmarkStatus::stride` words per state.
     reached: Vec<u64>,
     open: AlternatingOpenList<u64>,
-    /// Best value of each heuristic so far.
+    /// Best value of each heuristic up to now.
     best: [u32; 2],
     /// Whether states were pruned because their numbers overflow or their cost reaches the limit.
     pub(super) incomplete: bool,

@@ -44,7 +44,7 @@ pub enum SearchOutcome<N = Int> {
     /// Proof that no plan exists: every reachable state was expanded or is dominated by an expanded
     /// one.
     None,
-    /// No proof: the best plan so far. Returned if a limit was reached, or (with `None`) if the
+    /// No proof: the best plan found. Returned if a limit was reached, or (with `None`) if the
     /// search proved that no plan is cheaper than the external incumbent.
     Unknown(Option<GroundPlan<N>>),
 }
@@ -106,11 +106,11 @@ pub struct AStar<'a, N, E> {
     pub(super) lazy_heuristic: Option<Box<dyn LazyHeuristic<N>>>,
     /// Stubborn-set pruning, if enabled.
     pub(super) pruning: Option<StubbornSetPruning>,
-    /// Work units done so far, without those of the lazy heuristic.
+    /// Work units done, without those of the lazy heuristic.
     own_work: u64,
     /// Number of searches that share the memory limit.
     sharing: usize,
-    /// Lower bound on the cost of every plan, as proved so far.
+    /// Current lower bound on the cost of every plan.
     bound: Option<N>,
     is_interrupted: bool,
     pub(super) patience: OutOfMemoryPolicy,
@@ -273,7 +273,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         None
     }
 
-    /// Work units done so far (deterministic, not wall time).
+    /// Work units done (deterministic, not wall time).
     pub(super) fn work(&self) -> u64 {
         self.own_work.saturating_add(self.lazy_heuristic.as_ref().map_or(0, |sharper| sharper.work()))
     }

@@ -80,8 +80,8 @@ impl Table {
             let mut news = word & !self.bits[start.saturating_add(index)];
             is_new |= news != 0;
             while news != 0 {
-                let other = dense(index).saturating_mul(64).saturating_add(news.trailing_zeros());
-                self.insert(fact, other);
+                let new_fact = dense(index).saturating_mul(64).saturating_add(news.trailing_zeros());
+                self.insert(fact, new_fact);
                 news &= news.saturating_sub(1);
             }
         }

@@ -28,7 +28,7 @@ pub trait LazyHeuristic<N> {
     /// Heuristic value of a state. Returns `None` if the goal is unreachable.
     fn estimate(&mut self, state: &State<N>) -> Option<N>;
 
-    /// Work units done so far.
+    /// Work units done up to now.
     fn work(&self) -> u64;
 }
 

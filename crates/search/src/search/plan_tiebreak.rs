@@ -33,7 +33,7 @@ const LABEL_LIMIT: usize = 100_000;
 /// Maximum number of comparisons between labels.
 const PAIR_LIMIT: usize = 50_000_000;
 
-/// A partial plan: the state that it reaches and its quality so far.
+/// A partial plan: the state that it reaches and its quality.
 #[derive(Debug, Clone)]
 struct Label {
     state: State,
@@ -394,9 +394,9 @@ impl Ties<'_> {
             .or_default()
             .push(labels.all.len());
         labels.all.push(label);
-        let made = self.made.get() + 1;
-        self.made.set(made);
-        (made < LABEL_LIMIT && self.compared.get() < PAIR_LIMIT).then_some(())
+        let label_count = self.made.get() + 1;
+        self.made.set(label_count);
+        (label_count < LABEL_LIMIT && self.compared.get() < PAIR_LIMIT).then_some(())
     }
 
     fn no_worse(&self, a: &Label, b: &Label) -> bool {

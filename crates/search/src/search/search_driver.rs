@@ -261,7 +261,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
             self.figures = self.figures.plus(search.statistics);
             self.best = cheaper(self.best.take(), search.best_plan());
         }
-        // No search is left to resume, so the answer is the best plan without a proof.
+        // Without a search to resume, the answer is the best plan without a proof.
         self.searches.is_empty().then(|| SearchOutcome::Unknown(self.best.clone()))
     }
 

@@ -180,7 +180,7 @@ mod tests {
         (:durative-action lock :parameters () :duration (= ?duration 1)
           :condition (and (at start (key)) (at start (open))) :effect (at end (locked))))";
 
-    /// Happenings that begin a relaxed plan. Returns `None` if there is none.
+    /// Happenings that begin a relaxed plan. Returns `None` if no relaxed plan exists.
     fn guide(facts: &str, goal: &str) -> Option<Vec<String>> {
         let problem = format!("(define (problem p) (:domain d) (:init {facts}) (:goal {goal}))");
         let (domain, problem, _) =

@@ -147,7 +147,7 @@ impl<'a> Footprints<'a> {
         Ok(())
     }
 
-    /// Index of everything that has been written so far.
+    /// Index of all collected writes.
     pub(super) fn index(&self) -> WriteIndex {
         let mut written = WriteIndex::default();
         for (index, (predicate, arguments)) in self.world.atoms.keys().enumerate() {

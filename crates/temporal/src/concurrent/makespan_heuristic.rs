@@ -60,11 +60,11 @@ impl Estimate {
             remaining.makespan = remaining.makespan.max(end);
         }
         for path in &self.paths {
-            let more = path.left[state.values[path.variable] as usize]?;
-            if more > 0 {
+            let remaining_time = path.left[state.values[path.variable] as usize]?;
+            if remaining_time > 0 {
                 let since = clocks.changed(dense(path.variable)).unwrap_or(-self.separation);
-                remaining.makespan = remaining.makespan.max(since + more);
-                remaining.sum += more;
+                remaining.makespan = remaining.makespan.max(since + remaining_time);
+                remaining.sum += remaining_time;
             }
         }
         Some(remaining)

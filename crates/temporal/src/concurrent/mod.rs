@@ -70,7 +70,7 @@ use search_log::Record;
 use solution::{ended, in_names};
 use source_task::SourceTask;
 
-/// Where durations are chosen, a strict comparison requires a difference of at least 1 /
+/// Precision with chosen durations: a strict comparison requires a difference of at least 1 /
 /// `PRECISION`.
 const PRECISION: Int = 1_000_000;
 

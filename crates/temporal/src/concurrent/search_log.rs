@@ -59,10 +59,10 @@ impl<'r> Record<'r> {
         let caps = self.ceiling.iter().chain(&self.cost);
         let lower = caps.fold(lower, |lower, cap| if *cap < lower { cap.clone() } else { lower });
         let is_news = self.noted.as_ref().is_none_or(|(cost, bound)| {
-            let more = lower.clone() - bound;
+            let rise = lower.clone() - bound;
             *cost != self.cost
-                || more.clone() * Rational::from_integer(REPORT_STEP) > *bound
-                || more.is_positive() && self.cost.as_ref() == Some(&lower)
+                || rise.clone() * Rational::from_integer(REPORT_STEP) > *bound
+                || rise.is_positive() && self.cost.as_ref() == Some(&lower)
         });
         if is_news && self.concurrent.is_whole {
             self.noted = Some((self.cost.clone(), lower.clone()));

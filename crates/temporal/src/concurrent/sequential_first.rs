@@ -146,7 +146,7 @@ pub(super) struct SequentialPlanner<'w> {
 }
 
 enum Exact<'w> {
-    /// Not begun. Computing its heuristics may take longer than finding a plan.
+    /// The search has not begun. Computing its heuristics may take longer than finding a plan.
     Later,
     Begun(Box<InterleavedSearch<'w, Int, Bounds>>),
     Over,

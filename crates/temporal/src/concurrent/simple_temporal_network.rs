@@ -56,9 +56,9 @@ pub(super) struct SimpleTemporalNetwork {
     opens: Vec<RunningAction>,
     /// Time at which all further happenings take place until every condition over all holds again.
     group: Option<(TimePoint, Int)>,
-    /// Time of the last happening; negative if there is none.
+    /// Time of the last happening; negative without happenings.
     latest: TimeExpression,
-    /// Time of the last timed initial literals; negative if there are none.
+    /// Time of the last timed initial literals; negative before the first ones.
     floor: Int,
 }
 
@@ -118,7 +118,7 @@ impl SimpleTemporalNetwork {
         dense(self.opens.iter().filter(|open| open.instance == instance).count())
     }
 
-    /// Time of the last timed initial literals; negative if there are none.
+    /// Time of the last timed initial literals; negative before the first ones.
     pub(super) fn floor(&self) -> Int {
         self.floor
     }
@@ -225,7 +225,7 @@ impl SimpleTemporalNetwork {
         Some(next)
     }
 
-    /// Constrains the end of a running action, given by index, to follow the accesses so far.
+    /// Constrains the end of a running action, given by index, to follow the earlier accesses.
     /// Returns `None` if that is inconsistent.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn expect_end(&mut self, position: usize, after: &[(Key, Int)]) -> Option<()> {

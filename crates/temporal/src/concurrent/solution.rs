@@ -47,19 +47,20 @@ pub(super) fn in_names(concurrent: &TemporalTask, sequence: &Sequence) -> Plan {
     }
     for (position, ((id, time), duration)) in sequence.happenings.iter().zip(times).zip(durations).enumerate()
     {
-        let mut more = measured[position].clone();
+        let mut measured_cost = measured[position].clone();
         let end = match concurrent.happenings[id.index()].role {
             Role::Start(instance) => {
                 let instance = &concurrent.instances[instance as usize];
                 let added = ends.get_mut(&instance.end).and_then(VecDeque::pop_front);
-                more += added.cloned().unwrap_or_default();
+                measured_cost += added.cloned().unwrap_or_default();
                 concurrent.task.operators[instance.end.index()].cost.constant
             }
             Role::Whole => 0,
             _ => continue,
         };
         let operator = &concurrent.task.operators[id.index()];
-        let cost = Rational::from_integer(operator.cost.constant) + &Rational::from_integer(end) + &more;
+        let cost =
+            Rational::from_integer(operator.cost.constant) + &Rational::from_integer(end) + &measured_cost;
         let cost = if concurrent.task.objective.maximize { -cost } else { cost };
         let [start, duration] = [time, duration].map(Rational::from_integer);
         steps.push(((time, *id), Step::new(&concurrent.task, operator, &[], (start, duration, cost))));

@@ -30,7 +30,7 @@ pub(super) struct Origin {
     pub(super) compressed: bool,
     /// Whether the happening takes place at the time of the previous one.
     pub(super) together: bool,
-    /// Number of happenings so far.
+    /// Number of happenings from the root.
     pub(super) depth: u32,
 }
 

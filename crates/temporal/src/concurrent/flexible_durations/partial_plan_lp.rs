@@ -1,7 +1,7 @@
-//! Partial plans with open times and durations: the happenings so far and their linear program.
+//! Partial plans with open times and durations: a prefix of happenings and its linear program.
 //!
 //! As in POPF \[1\] and COLIN \[2\]. Each start has a column for its time, and one for its duration if the planner
-//! chooses the duration. Numeric fluents are expressions over the durations so far. So are conditions, each of
+//! chooses the duration. Numeric fluents are expressions over earlier durations. So are conditions, each of
 //! which is a constraint. Interfering happenings are a separation apart, in the order of the sequence. The end
 //! of a running action is constrained as soon as its predecessors have happened. The first column is the makespan.
 //!
@@ -76,7 +76,7 @@ pub(super) struct Course {
     ranges: Vec<(Column, Rational, Option<Rational>)>,
     /// Time of the last timed initial literals, or -1.
     floor: Int,
-    /// Cost so far in the task's cost unit.
+    /// Path cost in the task's cost unit.
     pub(super) cost: Int,
     pub(super) program: Program,
 }

@@ -61,7 +61,7 @@ pub(super) struct Search<'a> {
     order: u32,
     nearest: u64,
     bytes: usize,
-    /// Least metric of the plans found so far if durations need not be decimals.
+    /// Least metric of the known plans if durations need not be decimals.
     reached: Option<Rational>,
     pub(super) figures: SearchStatistics,
 }
