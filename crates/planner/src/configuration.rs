@@ -300,6 +300,8 @@ impl Problem {
                     if is_hopeless || next.iter().any(is_worse) {
                         continue;
                     }
+                    // Of equally good labels the older one is kept, since it comes first in the
+                    // order of preference.
                     next.retain(|old| old.worth >= new.worth || !new.is_as_free(old));
                     next.push(new);
                 }

@@ -122,6 +122,7 @@ impl<'a> Planner<'a> {
                 let (config, mut hear) = (self.config.clone(), self.hear());
                 Ok(lexicographic(&task, &config, &mut hear).solution)
             }
+            // Exact rationals can only help if machine integers are the sole problem.
             Err(errors) if errors.iter().all(|error| matches!(error, Error::Overflow { .. })) => {
                 if self.grounding.objectives.len() > 1 {
                     return Err(errors);

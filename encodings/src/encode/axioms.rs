@@ -84,6 +84,8 @@ fn levels(
         }
         later.insert(*variable, literals);
     }
+    // Each true variable needs a supporting rule whose own variables were derived in earlier
+    // rounds.
     debug_assert!(layer.recursive);
     for (variable, bodies) in bodies {
         let head = builder.variables.values[step][variable.index()][0];

@@ -108,6 +108,7 @@ impl<'a> Encoding<'a> {
 
     /// Clause that excludes exactly one plan.
     pub fn blocking_clause(&self, plan: &[GroundStep]) -> Vec<Lit> {
+        // A longer plan with this prefix is a different plan, so it stays admitted.
         let longer = self.variables.busy.get(plan.len()).copied();
         let choices = plan.iter().enumerate().flat_map(|(at, step)| {
             let slots = (0..dense(step.choice.len())).map(Some);

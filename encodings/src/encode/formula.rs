@@ -151,6 +151,7 @@ impl Formula {
     #[expect(clippy::arithmetic_side_effects, reason = "clauses are held in memory")]
     pub fn add(&mut self, family: Family, clause: impl IntoIterator<Item = Lit>) {
         let start = self.literals.len();
+        // Marks carry the number of the clause, so they need no reset between clauses.
         let number = dense(self.clauses.len() + 1);
         for literal in clause {
             if literal == Self::truth() || self.last[(!literal).index()] == number {
@@ -211,6 +212,8 @@ impl Formula {
     /// \[1\] C. Sinz: Towards an optimal CNF encoding of Boolean cardinality constraints, CP 2005.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub(crate) fn at_most_one(&mut self, family: Family, literals: &[Lit]) {
+        // For few literals pairwise clauses are fewer than those of the counter and need no
+        // variables.
         if literals.len() <= 5 {
             for (position, a) in literals.iter().enumerate() {
                 for b in &literals[position + 1..] {

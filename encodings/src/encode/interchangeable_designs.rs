@@ -101,6 +101,7 @@ fn witnesses(context: Context<'_>, slot: SlotId) -> Result<Vec<Witness<'_>>, Int
         let operator = operator?;
         let Some(position) = operator.slots.iter().position(|usage| usage.slot == slot) else { continue };
         let designs = &operator.slots[position].designs[..];
+        // Operators share their tables, so addresses identify parts that are already listed.
         let mut is_new =
             |address: *const u8, slots: &SlotSet| seen.insert((designs.as_ptr(), address, slots.clone()));
         if is_new(std::ptr::null(), &SlotSet::new()) {

@@ -136,6 +136,7 @@ impl Transition<'_, '_> {
             Arithmetic { formula: &mut self.builder.formula, family: Family::Numeric }
                 .equal_if(group, &base, &bits);
         }
+        // Without an operator that changes the number, the number keeps its value.
         let unchanged = self.builder.formula.fresh(VariableMeaning::Ladder);
         self.builder.formula.add(Family::Numeric, changing.into_iter().chain([unchanged]));
         Arithmetic { formula: &mut self.builder.formula, family: Family::Numeric }

@@ -39,6 +39,7 @@ impl Callbacks for Watch {
     fn stop(&self) -> bool {
         let decisions = self.decisions.get().wrapping_add(1);
         self.decisions.set(decisions);
+        // Reading the clock at every decision would slow the solver down.
         if self.conflicts > self.budget || (decisions % CLOCK_INTERVAL == 1 && self.limits.reached()) {
             self.stopped.set(true);
         }

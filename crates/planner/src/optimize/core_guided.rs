@@ -177,6 +177,7 @@ fn trimmed(run: &mut Run<'_>, live: &mut IncrementalSolver, encoding: &Encoding<
         if core.len() < 2 {
             break;
         }
+        // A call that assumes only the core often returns a smaller one.
         match run.call(live, encoding, &core) {
             (Answer::Unsatisfiable, _) if live.solver.core().len() < core.len() => {
                 core = live.solver.core().to_vec();

@@ -214,6 +214,7 @@ impl<'a> Run<'a> {
         if let Some(reason) = live.solver.failure() {
             self.statistics.failure = Some(reason.to_owned());
         }
+        // A model of an external program is checked by replaying the plan; its refutation is not.
         if let (Answer::Unsatisfiable, Backend::Program { command, arguments }) =
             (answer, &self.config.backend)
         {

@@ -105,6 +105,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         }
         let mut stored = unit;
         for round in 0..u32::MAX {
+            // The work doubles in each round, up to a factor of 2^20.
             let work = unit.saturating_mul(1_usize.checked_shl(round.min(20)).unwrap_or(1));
             stored = stored.saturating_add(work);
             let turns: [fn(&mut Self, usize, usize) -> Turn; 3] =

@@ -138,6 +138,7 @@ impl Replanner {
         if !is_solvable(&[])? {
             return Some(Vec::new());
         }
+        // An object can be dropped if the others alone still make the mission unsolvable.
         for candidate in &missing {
             let reduced: Vec<_> = blocking.iter().copied().filter(|object| object != candidate).collect();
             if !is_solvable(&reduced)? {

@@ -67,51 +67,51 @@ impl<N: TaskNumber> PolarityAnalysis<'_, N> {
                 self.fact(literal.fact, BOTH);
             }
             for effect in &operator.numeric_effects {
-                let asked = self.numbers[effect.variable.index()];
-                self.linear(&effect.value, asked);
+                let polarity = self.numbers[effect.variable.index()];
+                self.linear(&effect.value, polarity);
             }
         }
         for rule in task.axioms.iter().flat_map(|layer| &layer.rules) {
             let head = self.facts[rule.head.variable.index()];
-            let asked = if rule.head.value == 0 { head } else { head.flipped() };
-            self.condition(&rule.body, asked);
+            let polarity = if rule.head.value == 0 { head } else { head.flipped() };
+            self.condition(&rule.body, polarity);
         }
     }
 
-    fn condition(&mut self, condition: &Condition<N>, asked: Polarity) {
+    fn condition(&mut self, condition: &Condition<N>, polarity: Polarity) {
         for fact in &condition.facts {
-            self.fact(*fact, asked);
+            self.fact(*fact, polarity);
         }
         for literal in condition.clauses.iter().flatten() {
-            self.fact(literal.fact, if literal.positive { asked } else { asked.flipped() });
+            self.fact(literal.fact, if literal.positive { polarity } else { polarity.flipped() });
         }
         for linear in condition.linears() {
-            self.linear(linear, asked);
+            self.linear(linear, polarity);
         }
     }
 
     /// Adds a polarity to the variable of a fact. A derived variable is true if its value is 0.
-    fn fact(&mut self, fact: Fact, asked: Polarity) {
-        let asked = if fact.value == 0 { asked } else { asked.flipped() };
-        let polarity = &mut self.facts[fact.variable.index()];
-        let next = polarity.with(asked);
-        self.changed |= next != *polarity;
-        *polarity = next;
+    fn fact(&mut self, fact: Fact, polarity: Polarity) {
+        let polarity = if fact.value == 0 { polarity } else { polarity.flipped() };
+        let current = &mut self.facts[fact.variable.index()];
+        let next = current.with(polarity);
+        self.changed |= next != *current;
+        *current = next;
     }
 
-    fn linear(&mut self, linear: &Linear<N>, asked: Polarity) {
+    fn linear(&mut self, linear: &Linear<N>, polarity: Polarity) {
         for (variable, factor) in &linear.coefficients {
             // A negative coefficient swaps the directions.
-            let asked = if *factor >= N::zero() { asked } else { asked.flipped() };
-            let polarity = &mut self.numbers[variable.index()];
-            let next = polarity.with(asked);
-            self.changed |= next != *polarity;
-            *polarity = next;
+            let polarity = if *factor >= N::zero() { polarity } else { polarity.flipped() };
+            let current = &mut self.numbers[variable.index()];
+            let next = current.with(polarity);
+            self.changed |= next != *current;
+            *current = next;
         }
     }
 }
 
 /// Returns `true` if a higher value of any numeric variable never hurts.
 pub fn is_monotone<N: TaskNumber>(task: &Task<N>) -> bool {
-    directions(task).iter().all(|asked| !asked.down)
+    directions(task).iter().all(|polarity| !polarity.down)
 }
