@@ -1,4 +1,4 @@
-//! Certificates of generated missions: accepted for what is true, rejected for what is not, however they are changed.
+//! Certificates of generated missions: true claims are accepted, false claims and changed certificates are rejected.
 
 #[allow(dead_code, reason = "another suite uses the rest")]
 use certificate::{Faithful, check as check_argument, faithful, verification_conditions, witness};
@@ -19,7 +19,7 @@ fn files(seed: u64) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// The certificate of a mission, and the least cost (none if there is no plan).
+/// The certificate of a mission, and the least cost (`None` if there is no plan).
 fn certified(seed: u64) -> (Certificate, Option<BigRational>) {
     let mission = Mission::random(seed);
     let (domain, problem) = files(seed);
@@ -93,7 +93,7 @@ fn mutate(value: &mut Value, random: &mut Random) {
     }
 }
 
-/// However an argument is changed, it does not prove what is false; and a changed task is not the task.
+/// Checks that a changed argument proves no false claim, and that a changed task fails the grounding check.
 fn withstands(seed: u64, mutants: usize) {
     let (certificate, cost) = certified(seed);
     let files = files(seed);
@@ -177,7 +177,7 @@ fn tasks_that_can_be_read_in_two_ways_are_refused() {
 
 /// An instance that leaves everything as it is has no operator, and needs none.
 #[test]
-fn what_changes_nothing_needs_no_operator() {
+fn instances_without_effect_need_no_operator() {
     let domain = "(define (domain d) (:requirements :typing :action-costs)
       (:types design place - object) (:constants slow fast - design)
       (:predicates (at ?p - place) (mode ?d - design) (suits ?d - design))

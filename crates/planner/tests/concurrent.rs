@@ -151,16 +151,16 @@ fn windows_of_timed_initial_literals() {
     check("closes at the end", domain, &closes("7"), (1, 1000), Some(("7", &["3: (work) [4]"])));
     check("closes before the end", domain, &closes("6.999"), (1, 1000), None);
     let late = "(at 2 (open)) (at 5 (not (open))) (at 9 (open))";
-    // It reads at its end what the event at 9 changes.
+    // Its end reads a fact that the event at 9 changes.
     let plan = ["3.001: (tell) [6]", "9: (work) [4]"];
     check("the second window", domain, &problem(late, both), (1, 1000), Some(("13", &plan)));
-    // A plan lasts until its last action ends, and what comes after that does not happen.
+    // A plan lasts until its last action ends; later events do not take place.
     let problem = problem("(open) (at 5 (open)) (at 20 (not (open)))", "(done) (open)");
     check("before it closes", domain, &problem, (1, 1000), Some(("4", &["0: (work) [4]"])));
 }
 
 #[test]
-fn a_plan_waits_for_what_happens_by_itself() {
+fn a_plan_waits_for_timed_literals() {
     let domain = "(define (domain d) (:requirements :durative-actions :timed-initial-literals)
       (:predicates (gate) (done))
       (:durative-action work :parameters () :duration (= ?duration 4) :condition (and) :effect (at end (done))))";
@@ -253,7 +253,7 @@ fn timed(random: &mut Random, times: &[&str], most: u64, part: fn(&mut Random) -
     text + ")"
 }
 
-/// A task and what brute force has to know of it.
+/// A task and the data for brute force.
 struct Sample {
     durations: [i64; 3],
     domain: String,
@@ -445,7 +445,7 @@ fn robots(count: u64, side: u64, looks: u64, seed: u64) -> String {
     format!("{text}) (:goal (and{goal})) (:metric minimize (total-time)))")
 }
 
-/// Prints what is proved in ten seconds.
+/// Prints the result proved in ten seconds.
 #[test]
 #[ignore = "a measurement"]
 #[allow(clippy::print_stdout)]

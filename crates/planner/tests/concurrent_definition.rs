@@ -77,7 +77,7 @@ fn over_all_is_about_the_open_interval() {
 
 #[test]
 fn events_that_interfere_lie_apart() {
-    // After the event, which adds what the start reads; after it, because the start deletes what it adds.
+    // After the event, which adds the fact that the start reads; strictly after it, because the start deletes that fact.
     check(&[durative("a", "2", "(at start (p))", "(at end (g))")], "(at 5 (p))", "(g)", "7.001");
     let deletes = || durative("a", "2", "", "(at end (g)) (at end (not (p)))");
     check(&[deletes()], "(at 2 (p))", "(g)", "2.001");
@@ -189,7 +189,7 @@ fn a_value_is_left_during_an_action_and_taken_again() {
 
 /// A landing waits for the approach, which comes by itself, and then the plane is on the ground until the end.
 #[test]
-fn what_waits_for_an_event_comes_a_moment_after_it() {
+fn an_action_that_waits_for_an_event_keeps_the_separation() {
     let domain = "(define (domain airport) (:predicates (approach) (free) (landed) (cleared) (gone))
       (:durative-action land :parameters () :duration (= ?duration 2) :condition (and (at start (approach)) (at start (free)))
         :effect (and (at start (not (free))) (at start (not (approach))) (at end (free)) (at end (landed))))
@@ -206,7 +206,7 @@ fn what_waits_for_an_event_comes_a_moment_after_it() {
     assert_eq!(proved(domain, &problem("6")), "9.002");
 }
 
-/// Tasks that others found, with what the definition says about them.
+/// Tasks from the literature, with the results by the definition.
 #[test]
 #[allow(clippy::print_stderr)]
 fn tasks_that_were_answered_wrongly() {

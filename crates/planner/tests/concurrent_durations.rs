@@ -23,7 +23,7 @@ pub fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// The best plan, by the planner; what it claims of it, the validator confirms.
+/// Best plan by the planner; its claims are checked by the validator.
 pub fn solve(domain: &Domain, problem: &Problem, separation: &BigRational, limits: &Limits) -> Solution {
     let task = ground_concurrent(domain, problem, &GroundConfig::default(), separation)
         .unwrap_or_else(|errors| panic!("{errors:?}"));
@@ -127,7 +127,7 @@ fn as_much_is_charged_as_is_needed() {
 }
 
 #[test]
-fn what_is_spent_at_the_start_is_paid_for() {
+fn consumption_at_the_start_counts() {
     // The fuel consumption is twice the duration; the tank has 9.
     let burn = durative(
         "burn",
@@ -266,7 +266,7 @@ fn no_action_is_shorter_than_the_separation() {
 
 /// A boiler must be warm enough all along, and cools when it is used.
 #[test]
-fn what_holds_over_all_rests_on_durations() {
+fn conditions_over_all_may_depend_on_durations() {
     let heat = durative(
         "heat",
         "(and (>= ?duration 1) (<= ?duration 30))",

@@ -1,4 +1,4 @@
-//! Actions that overlap with themselves: what is planned, and what is claimed of it.
+//! Actions that overlap with themselves: plans and claims.
 
 use crate::concurrent::{check, metric, parse, rational, solve, written};
 
@@ -23,12 +23,12 @@ fn actions_overlap_with_themselves() {
     let own = react("", "(at end (increase (y) 1))");
     let plan = ["0: (react) [5]", "0: (react) [5]", "0: (react) [5]"];
     check("at one time", &own, &problem("(>= (y) 3)"), (1, 1000), Some(("5", &plan)));
-    // Starts that read what they change lie apart, and there is enough for two of them.
+    // Starts that read a number that they change keep the separation, and there is enough for two of them.
     let own = react("(at start (>= (x) 1))", "(at start (decrease (x) 1)) (at end (increase (y) 1))");
     let plan = ["0: (react) [5]", "0.001: (react) [5]"];
     check("apart", &own, &problem("(>= (y) 2)"), (1, 1000), Some(("5.001", &plan)));
     check("too little", &own, &problem("(>= (y) 3)"), (1, 1000), None);
-    // A second run cannot start: its start needs what the first one has taken.
+    // A second run cannot start: its start needs the fact that the first one has deleted.
     let own =
         react("(at start (ready))", "(at start (not (ready))) (at end (ready)) (at end (increase (y) 1))");
     let plan = ["0: (react) [5]", "5.001: (react) [5]"];
@@ -58,7 +58,7 @@ fn actions_overlap_with_themselves() {
 
 /// A battery that is charged, and actions that need it: `first` and then `second`, each of which takes one unit of it when it ends.
 #[test]
-fn what_is_charged_again_while_it_is_charged() {
+fn a_battery_can_be_charged_by_overlapping_runs() {
     let domain = |others: &str| {
         let work = |name: &str, needs: &str, gives: &str| {
             format!(

@@ -97,8 +97,8 @@ fn times_are_kept() {
 }
 
 #[test]
-fn what_costs_nothing_is_the_best() {
-    // The search keeps happenings apart that need not be; that no plan costs less than nothing is known all the same.
+fn a_plan_without_cost_is_optimal() {
+    // The search is incomplete here, but no plan costs less than 0.
     let wish = "(preference w (always (imply (q) (p)))) (sometime (q))";
     let metric = "(:metric minimize (is-violated w))";
     let lines = ["0: (raise) [3]", "3.5: (light) [2]"];
@@ -106,7 +106,7 @@ fn what_costs_nothing_is_the_best() {
 }
 
 #[test]
-fn what_has_to_follow_in_time_is_judged_by_the_times_of_the_plan() {
+fn deadlines_are_checked_on_the_times_of_the_plan() {
     let soon = |time: &str| format!("(sometime (q)) (always-within {time} (q) (p))");
     let time = "(:metric minimize (total-time))";
     let both = ["0: (raise) [3]", "0: (light) [2]"];

@@ -1,7 +1,7 @@
 //! The ground task of generated missions against instantiation by brute force: the same reachable atoms and the same
 //! operators, once the choices of function designs are multiplied out.
 //!
-//! The other side reads nothing but the syntax tree: it binds parameters one by one, decides what never changes, and
+//! The oracle only reads the syntax tree: it binds parameters one by one, evaluates static conditions, and
 //! repeats relaxed reachability with intervals of numbers until nothing is added. Atoms without influence on the goal are left
 //! out by its own definition of that. The missions come from a script that is not part of the project.
 

@@ -166,7 +166,7 @@ print(used.ru_utime + used.ru_stime)";
 /// `METAPLAN_PEERS=peers/bin/python`.
 #[test]
 #[ignore = "measures beside a peer; in release"]
-fn reading_and_grounding_beside_the_translator_of_fast_downward() {
+fn reading_and_grounding_compared_with_the_translator_of_fast_downward() {
     let Ok(python) = std::env::var("METAPLAN_PEERS") else { panic!("METAPLAN_PEERS names no Python") };
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("speed");
     std::fs::create_dir_all(&folder).expect("a folder");

@@ -13,7 +13,7 @@ use num_rational::BigRational;
 use pddl::ast::{Direction, Domain, Problem};
 use pddl::{Source, read, read_objective};
 
-/// Nearly the largest number of a task, 2^118. So many times as much does not fit 128 bits.
+/// Nearly the largest number of a task, 2^118. Multiples of it overflow 128 bits.
 const LARGE: &str = "330000000000000000000000000000000000";
 const MANY: usize = 520;
 

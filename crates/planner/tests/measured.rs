@@ -89,7 +89,7 @@ fn plans_one_after_another_have_the_metric_of_their_end() {
 }
 
 #[test]
-fn that_there_is_no_plan_is_still_proved() {
+fn unsolvability_is_still_proved() {
     let (domain, mut problem) = market("minimize (spent)");
     problem.init.retain(|element| !format!("{element:?}").contains("road"));
     let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");

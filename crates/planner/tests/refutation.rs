@@ -117,7 +117,7 @@ fn check(seed: u64, by: StepBound) {
 }
 
 #[test]
-fn there_is_a_refutation_of_what_is_false_only() {
+fn only_unsatisfiable_claims_have_a_refutation() {
     for seed in 0..60 {
         check(seed, StepBound::Spent);
         check(seed, StepBound::Potential);
@@ -156,7 +156,7 @@ fn mutate(text: &str, random: &mut Random) -> String {
 /// A changed formula or legend is not the task's; a changed proof proves nothing that is false, and nothing at all once it is
 /// cut off.
 #[test]
-fn what_is_changed_is_noticed() {
+fn changed_refutations_are_rejected() {
     for seed in 0..40 {
         let Some((certificate, cost)) = certified(seed) else { continue };
         let Ok((steps, files)) = refutation(&certificate, &cost, StepBound::Spent) else { continue };

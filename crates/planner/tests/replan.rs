@@ -142,7 +142,7 @@ fn new(domain: &Domain, problem: &Problem) -> Replanner {
     Replanner::new(domain, problem, &available, &GroundConfig::default()).expect("the domain is suited")
 }
 
-/// Both answers are the same plan, or none.
+/// Both answers are the same plan, or both report that none exists.
 fn compare(expected: &Solution, found: &ReplanOutcome, context: &dyn Fn() -> String) {
     match (&expected.plan, found) {
         (Some(plan), ReplanOutcome::Optimal { steps, metric, .. }) => {
@@ -359,7 +359,7 @@ fn check_blocking(seed: u64) -> bool {
 }
 
 #[test]
-fn what_blocks_a_mission_is_minimal() {
+fn the_blocking_set_of_a_mission_is_minimal() {
     let found = (0..150).filter(|seed| check_blocking(*seed)).count();
     assert!(found > 10, "{found}");
 }
@@ -408,7 +408,7 @@ fn used() -> f64 {
 
 #[test]
 #[ignore = "a measurement, for release builds"]
-fn live_planning_beside_planning_anew() {
+fn replanning_time_compared_with_planning_from_scratch() {
     if !Path::new(TOOL).exists() {
         println!("skipped: {TOOL} is absent");
         return;
@@ -453,7 +453,7 @@ fn live_planning_beside_planning_anew() {
 
 /// A state in which two atoms hold that exclude each other in the mission, though they are values of different variables.
 #[test]
-fn a_state_that_breaks_what_the_mission_excludes_is_planned_for_anew() {
+fn a_state_that_violates_a_mutex_group_is_ground_again() {
     let moves = [("t1", "c", "a"), ("x1", "a", "b"), ("x2", "b", "a"), ("u1", "c", "d"), ("u2", "d", "e")];
     let moves = moves.into_iter().chain([("u3", "e", "f"), ("u4", "f", "d")]);
     let actions: String = moves

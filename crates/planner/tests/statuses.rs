@@ -97,7 +97,7 @@ fn a_metric_without_a_best_value_is_read_with_bounds() {
 }
 
 #[test]
-fn proofs_name_what_they_rest_on() {
+fn proofs_name_their_reason() {
     let problem = format!(
         "(define (problem p) (:domain d) (:objects a b c - place)
           (:init (at a) (= (total-cost) 0) (= (reward) 0) (= (fuel) 2) {FREE}) (:goal (at c)) {COST})"

@@ -80,7 +80,7 @@ const INSPECTION: &str = "(define (domain inspection)
     :condition (and (at start (at-pipe)) (at end (daylight))) :effect (at end (recorded))))";
 
 #[test]
-fn actions_wait_for_what_happens_by_itself() {
+fn actions_wait_for_timed_literals() {
     let problem = |init: &str, goal: &str| {
         format!(
             "(define (problem p) (:domain inspection) (:init (= (level) 10) {init}) (:goal {goal})
@@ -160,7 +160,7 @@ fn timed(random: &mut Random, times: &[&str], most: u64) -> String {
     text + ")"
 }
 
-/// A task and what brute force has to know of it.
+/// A task and the data for brute force.
 struct Sample {
     durations: [i64; 3],
     events: Vec<i64>,

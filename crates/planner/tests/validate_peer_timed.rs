@@ -72,7 +72,7 @@ fn text(plan: &[Timed]) -> String {
     plan.iter().map(line).collect()
 }
 
-/// A cheapest plan, its steps a little apart; no steps where the planner finds none.
+/// Cheapest plan with slightly separated steps; empty if the planner finds no plan.
 fn plan(domain: &Domain, problem: &Problem) -> Vec<Timed> {
     let steps: Vec<(Vec<String>, Exact)> = ground(domain, problem, &GroundConfig::default())
         .ok()

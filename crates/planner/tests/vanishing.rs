@@ -1,4 +1,4 @@
-//! Actions that must not vanish: cases, designs and values that are missing take away what needs them, and nothing else.
+//! Actions that must not vanish: missing cases, designs and values remove only the actions that need them.
 //!
 //! Each of these was answered with a false "no plan exists" or a false optimum once. What is right follows from the definition in
 //! `validate`, which also executes the expected plan.

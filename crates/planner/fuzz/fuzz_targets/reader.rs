@@ -1,5 +1,5 @@
-//! Any bytes are a domain, a problem and a plan, or messages; what is read without errors prints and reads back as the
-//! same trees. The three files are separated by a byte that is in no text.
+//! Arbitrary bytes as a domain, a problem and a plan: the reader returns messages, or trees that print and read back as the
+//! same trees. A byte that occurs in no text separates the three files.
 
 #![no_main]
 

@@ -340,7 +340,7 @@ impl<'a> Search<'a> {
             } else {
                 pareto_optimal_combinations(operator, self.monotone, false, limits)?
             };
-            // The cell is empty, so that this does not fail.
+            // The cell is empty, so this cannot fail.
             let _ = cell.set(combinations);
         }
         cell.get().and_then(Option::as_ref).ok_or(Stopped::TooMany)

@@ -1,4 +1,4 @@
-//! Bytes to a lifted task, so that whatever produces bytes (a property test, a fuzzer) produces tasks.
+//! Decodes bytes into a lifted task, so that every source of bytes (property test, fuzzer) generates tasks.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -57,7 +57,7 @@ pub const PLANNED: Features = Features {
 pub struct Draw<'b> {
     bytes: &'b [u8],
     features: Features,
-    /// Whether expressions over what never changes may be undefined.
+    /// Whether static expressions may be undefined.
     partial: bool,
 }
 

@@ -15,7 +15,7 @@ const LIMIT: usize = 60;
 /// States with numbers beyond are not followed: exact integers end somewhere.
 const LARGE: i128 = 100_000;
 
-/// The codes of what the planner may refuse: a construct, a product of fluents, numbers that are too large.
+/// Codes of admitted rejections: a construct, a product of fluents, numbers that are too large.
 const REFUSALS: [&str; 3] = ["E301", "E303", "E304"];
 
 /// Whether the metric rewards time.
@@ -55,7 +55,7 @@ fn after(task: &Task, state: &State, index: usize, objects: Vec<usize>) -> Optio
     state.after(task, &(index, objects, duration))
 }
 
-/// Looks for a state of the lifted task in which the goal holds.
+/// Searches for a state of the lifted task in which the goal holds.
 fn goal_is_out_of_reach(task: &Task) {
     let mut open = vec![State::initial(task)];
     let mut next = 0;
@@ -83,7 +83,7 @@ struct Pair {
     steps: Option<usize>,
 }
 
-/// Compares as many states as the limit allows; nothing if the task is refused.
+/// Compares states up to the limit. Returns `None` if the task is rejected.
 pub fn check(task: &Task, (domain, problem): &(Domain, Problem)) -> Option<usize> {
     let context = || format!("{}\n{}", task.domain(), task.problem());
     let ground = match ground(domain, problem, &GroundConfig::default()) {

@@ -94,7 +94,7 @@ impl Touch {
         }
     }
 
-    /// Everything that a derived predicate depends on, whatever the objects are.
+    /// Everything that a derived predicate depends on, for all objects.
     fn below(&mut self, task: &Task, predicate: usize) {
         if !self.predicates.insert(predicate) {
             return;
@@ -125,7 +125,7 @@ impl Touch {
         }));
     }
 
-    /// Whether this writes what the other one reads, or both write in ways that do not go together.
+    /// Returns `true` if this happening writes an atom or number that `other` reads, or both write it and do not commute.
     pub fn disturbs(&self, other: &Self) -> bool {
         let is_read = |atom: &Atom| other.facts.contains(atom) || other.predicates.contains(&atom.0);
         let is_read_number = |atom: &Atom| other.values.contains(atom) || other.functions.contains(&atom.0);

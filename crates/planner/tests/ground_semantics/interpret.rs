@@ -1,4 +1,4 @@
-//! The meaning of a lifted task, as plainly as it can be said: nothing is compiled, indexed or remembered.
+//! Reference interpreter of lifted tasks: direct evaluation without compilation, indices or caches.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -41,7 +41,7 @@ fn disjunction(parts: impl Iterator<Item = Truth>) -> Truth {
     negation(conjunction(parts.map(negation)))
 }
 
-/// A state with what follows in it, and the variables around a condition.
+/// A state with its derived atoms, and the variables in scope of a condition.
 struct View<'a> {
     state: &'a State,
     derived: BTreeSet<Atom>,
@@ -142,7 +142,7 @@ impl<'a> View<'a> {
         })
     }
 
-    /// Notes what an effect changes; nothing where that is undefined or contradicts another change.
+    /// Collects the changes of an effect. Returns `None` if they are undefined or contradict another change.
     fn collect(&self, effect: &Effect, scope: &[usize], changes: &mut Changes) -> Option<()> {
         match effect {
             Effect::And(parts) => parts.iter().try_for_each(|part| self.collect(part, scope, changes))?,
@@ -207,7 +207,7 @@ impl Changes {
     }
 }
 
-/// The start or the end of an action: its condition, its effects, and what bounds its duration.
+/// The start or the end of an action: its condition, its effects, and the bounds of its duration.
 type Half<'a> = (&'a Formula, &'a [Effect], Vec<&'a Expression>);
 
 impl State {

@@ -1,4 +1,4 @@
-//! A small lifted task as plain data, and the PDDL text that says the same.
+//! A small lifted task as plain data, and its PDDL text.
 //!
 //! Three objects, a few predicates and functions of fixed names; whatever varies is in the actions, axioms, goal and
 //! initial state. A variable is the number of quantifiers and parameters around the one that binds it.
@@ -24,7 +24,7 @@ pub const FLUENTS: [usize; 3] = [0, 1, 2];
 pub const STATICS: [usize; 2] = [3, 4];
 /// The predicates that follow, positively, from fluents and from each other.
 pub const DERIVED: [usize; 2] = [5, 6];
-/// A predicate that follows from all others, also from what is not.
+/// A derived predicate that may depend on all others, also negatively.
 pub const UPPER: usize = 7;
 
 /// A function: its name and its number of arguments.

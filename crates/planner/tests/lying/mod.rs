@@ -71,7 +71,7 @@ fn true_certificates_are_accepted() {
     }
 }
 
-/// Every place in a document at which something can be changed, with what it becomes.
+/// All changes that can be made in a document: place and new value.
 fn changes(value: &Value, path: &str, found: &mut Vec<(String, Option<Value>)>) {
     match value {
         Value::Array(elements) => {
@@ -291,7 +291,7 @@ const FIELD: [(&str, &str, &str); 4] = [
 ];
 
 #[test]
-fn what_grounders_have_lost_is_missed() {
+fn omitted_instances_are_detected() {
     for (action, domain, problem) in FIELD {
         let example = Example { name: action, domain, problem, optimum: None };
         let (domain, problem) = files(&example);

@@ -1,4 +1,4 @@
-//! The least cost of a written task, by visiting its states in the order of what they cost.
+//! Least cost of a written task by uniform-cost search over its states.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 

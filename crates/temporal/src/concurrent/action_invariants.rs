@@ -63,7 +63,7 @@ impl<'a> Index<'a> {
         Self { task, happenings, instances, waiting, marking, setting, changing, joint }
     }
 
-    /// Facts that hold strictly between the start and the end of an action, whatever else happens.
+    /// Facts that hold strictly between the start and the end of an action, for all other happenings.
     /// If `alone`, other runs of the instance do not start or end in between. Returns `None` if the
     /// work limit is reached.
     pub(super) fn invariant(&self, own: &Instance, alone: bool, left: &mut usize) -> Option<Invariant> {

@@ -1,6 +1,6 @@
 //! Compression-safe actions: their end can follow their start directly, so that they take one step of the search.
 //!
-//! Happenings that do not interfere are unordered in time, whatever their order in a sequence. If an end
+//! Happenings that do not interfere are unordered in time, independent of their order in a sequence. If an end
 //! interferes with nothing that can happen while its action runs, it can be moved before all of that without
 //! changing times or states. Coles et al. \[1\] require actions that only add facts at their end. Here the
 //! condition is about what can happen in between, by the facts that hold while the action runs, so more actions
