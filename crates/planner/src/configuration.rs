@@ -1,20 +1,23 @@
-//! Design selection without a plan: assigns designs to functions that compete for components or share budgets.
+//! Design selection without a plan: assigns designs to functions that compete for components or
+//! share budgets.
 //!
-//! The best assignment serves as many functions as possible, then violates the fewest requirements, then has the
-//! greatest sum of utilities. Ties go to the earlier designs of earlier functions. The three criteria form one
-//! integer, the worth: one more function outweighs all requirements, and one requirement outweighs all
-//! utilities. A component that only one design can use is a budget of one.
+//! The best assignment serves as many functions as possible, then violates the fewest requirements,
+//! then has the greatest sum of utilities. Ties go to the earlier designs of earlier functions. The
+//! three criteria form one integer, the worth: one more function outweighs all requirements, and
+//! one requirement outweighs all utilities. A component that only one design can use is a budget of
+//! one.
 //!
-//! The algorithm is dynamic programming over the functions with dominance: a partial assignment is dropped if
-//! another one has at least its worth and uses no more of any budget. It is also dropped if no completion keeps
-//! a budget, or if its upper bound does not exceed the best known worth. The upper bound is a Lagrangian
-//! relaxation of the budgets, valid for any multipliers \[1\]. Subgradients find good multipliers in
-//! floating-point numbers \[2\]; they are rounded, so that the bound is exact.
+//! The algorithm is dynamic programming over the functions with dominance: a partial assignment is
+//! dropped if another one has at least its worth and uses no more of any budget. It is also dropped
+//! if no completion keeps a budget, or if its upper bound does not exceed the best known worth. The
+//! upper bound is a Lagrangian relaxation of the budgets, valid for any multipliers \[1\].
+//! Subgradients find good multipliers in floating-point numbers \[2\]; they are rounded, so that
+//! the bound is exact.
 //!
 //! - \[1\] H. Everett: Generalized Lagrange Multiplier Method for Solving Problems of Optimum Allocation of
 //!   Resources, Operations Research 11(3), 1963.
-//! - \[2\] M. Held, R. M. Karp: The Traveling-Salesman Problem and Minimum Spanning Trees: Part II, Mathematical
-//!   Programming 1, 1971.
+//! - \[2\] M. Held, R. M. Karp: The Traveling-Salesman Problem and Minimum Spanning Trees: Part II,
+//!   Mathematical Programming 1, 1971.
 
 use std::collections::BTreeSet;
 

@@ -1,6 +1,6 @@
-//! Plans with conditional effects, derived predicates, quantifiers and disjunctions: known optima, and random tasks on
-//! which the quick search and the SAT solver alone must agree. (That ground tasks mean what the files mean is
-//! checked elsewhere, against an interpreter of the files.)
+//! Plans with conditional effects, derived predicates, quantifiers and disjunctions: known optima,
+//! and random tasks on which the quick search and the SAT solver alone must agree. (That ground
+//! tasks mean what the files mean is checked elsewhere, against an interpreter of the files.)
 
 use metaplan_planner::{Config, Engine, GroundConfig, Solution, Status, ground, optimize};
 use testing::adl::Generator;
@@ -192,7 +192,8 @@ fn numbers_below_zero_do_no_harm_where_nothing_is_used() {
     check("dug", &digging, &problem("1"), Some("2"));
 }
 
-/// Plans of at most this many steps are compared: the solver alone has no proof that there is no plan of any length.
+/// Plans of at most this many steps are compared: the solver alone has no proof that there is no
+/// plan of any length.
 const HORIZON: usize = 4;
 
 fn agree(seeds: std::ops::Range<u64>) {

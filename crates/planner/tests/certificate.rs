@@ -1,4 +1,5 @@
-//! Certificates of generated missions: true claims are accepted, false claims and changed certificates are rejected.
+//! Certificates of generated missions: true claims are accepted, false claims and changed
+//! certificates are rejected.
 
 #[allow(dead_code, reason = "another suite uses the rest")]
 use certificate::{Faithful, check as check_argument, faithful, verification_conditions, witness};
@@ -129,8 +130,8 @@ fn changed_arguments_prove_nothing_that_is_false() {
     (200..230).for_each(|seed| withstands(seed, 40));
 }
 
-/// Ambiguous tasks prove nothing: a number that an operator changes twice, a number with two factors, a design that
-/// is not there.
+/// Ambiguous tasks prove nothing: a number that an operator changes twice, a number with two
+/// factors, a design that is not there.
 #[test]
 fn tasks_that_can_be_read_in_two_ways_are_refused() {
     let (mut twice, mut factors, mut designs) = (0, 0, 0);
@@ -210,8 +211,8 @@ fn answers(solver: &str, certificate: &Certificate, claim: Option<&BigRational>)
     String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect()
 }
 
-/// Needs an SMT solver that reads SMT-LIB 2, named by `METAPLAN_SMT`, such as Z3 (`python3 -m venv z3; z3/bin/pip install z3-solver`,
-/// then `METAPLAN_SMT=z3/bin/z3`).
+/// Needs an SMT solver that reads SMT-LIB 2, named by `METAPLAN_SMT`, such as Z3
+/// (`python3 -m venv z3; z3/bin/pip install z3-solver`, then `METAPLAN_SMT=z3/bin/z3`).
 #[test]
 #[ignore = "needs an SMT solver"]
 fn an_smt_solver_accepts_the_truth_and_nothing_else() {

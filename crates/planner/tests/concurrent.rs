@@ -1,5 +1,6 @@
-//! Plans whose actions overlap: known optima, among them tasks that no sequence of actions solves, and random tasks on which the
-//! planner must agree with the validator run on every plan of up to three actions over a grid of times.
+//! Plans whose actions overlap: known optima, among them tasks that no sequence of actions solves,
+//! and random tasks on which the planner must agree with the validator run on every plan of up to
+//! three actions over a grid of times.
 
 use std::fmt::Write as _;
 
@@ -115,7 +116,8 @@ fn required_concurrency() {
     check("too far apart", MATCH, &problem("m1 - match f1 f2 - fuse", goal), (2, 1), None);
 }
 
-/// Cushing et al. (2007), figure 3: what is needed holds at the end of one action only in the midst of another one.
+/// Cushing et al. (2007), figure 3: what is needed holds at the end of one action only in the midst
+/// of another one.
 const WINDOW: &str = "(define (domain window) (:requirements :durative-actions)
   (:predicates (p) (q) (r) (s))
   (:durative-action a :parameters () :duration (= ?duration 10)
@@ -125,7 +127,8 @@ const WINDOW: &str = "(define (domain window) (:requirements :durative-actions)
 
 #[test]
 fn actions_start_between_other_happenings() {
-    // The end of the long action must lie within the short one, so the short one starts when nothing else happens.
+    // The end of the long action must lie within the short one, so the short one starts when
+    // nothing else happens.
     let problem = "(define (problem w) (:domain window) (:init) (:goal (and (q) (r))))";
     let plan = ["0: (a) [10]", "7.001: (b) [3]"];
     check("window", WINDOW, problem, (1, 1000), Some(("10.001", &plan)));
@@ -146,7 +149,8 @@ fn windows_of_timed_initial_literals() {
     let window = "(at 3 (open)) (at 8 (not (open)))";
     let plan = ["0: (tell) [6]", "3: (work) [4]"];
     check("both fit", domain, &problem(window, both), (1, 1000), Some(("7", &plan)));
-    // A condition over all is about the open interval: the window may close when the action ends, but no earlier.
+    // A condition over all is about the open interval: the window may close when the action ends,
+    // but no earlier.
     let closes = |time: &str| problem(&format!("(at 3 (open)) (at {time} (not (open)))"), "(done)");
     check("closes at the end", domain, &closes("7"), (1, 1000), Some(("7", &["3: (work) [4]"])));
     check("closes before the end", domain, &closes("6.999"), (1, 1000), None);
@@ -316,7 +320,8 @@ fn sample(random: &mut Random) -> Sample {
     Sample { durations, domain, problem }
 }
 
-/// The last start that brute force tries. With a separation of one unit all times of a best plan are whole numbers.
+/// The last start that brute force tries. With a separation of one unit all times of a best plan
+/// are whole numbers.
 const LAST: i128 = 7;
 
 /// The least metric of valid plans of up to three actions.

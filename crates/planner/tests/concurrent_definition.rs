@@ -1,5 +1,5 @@
-//! The planner for actions that overlap at the borders of the definition (the head of `validate`): what it claims to be the
-//! least makespan, or out of reach, and the validator with it.
+//! The planner for actions that overlap at the borders of the definition (the head of `validate`):
+//! what it claims to be the least makespan, or out of reach, and the validator with it.
 
 use std::fs::read_to_string;
 use std::path::Path;
@@ -77,7 +77,8 @@ fn over_all_is_about_the_open_interval() {
 
 #[test]
 fn events_that_interfere_lie_apart() {
-    // After the event, which adds the fact that the start reads; strictly after it, because the start deletes that fact.
+    // After the event, which adds the fact that the start reads; strictly after it, because the
+    // start deletes that fact.
     check(&[durative("a", "2", "(at start (p))", "(at end (g))")], "(at 5 (p))", "(g)", "7.001");
     let deletes = || durative("a", "2", "", "(at end (g)) (at end (not (p)))");
     check(&[deletes()], "(at 2 (p))", "(g)", "2.001");
@@ -187,7 +188,8 @@ fn a_value_is_left_during_an_action_and_taken_again() {
     assert_eq!(proved(domain, problem), "10");
 }
 
-/// A landing waits for the approach, which comes by itself, and then the plane is on the ground until the end.
+/// A landing waits for the approach, which comes by itself, and then the plane is on the ground
+/// until the end.
 #[test]
 fn an_action_that_waits_for_an_event_keeps_the_separation() {
     let domain = "(define (domain airport) (:predicates (approach) (free) (landed) (cleared) (gone))

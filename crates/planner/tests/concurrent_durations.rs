@@ -1,5 +1,6 @@
-//! Durations that the planner chooses: known optima, and random tasks on which no plan over a grid of times and durations, executed by the
-//! validator, is better than what is found, or exists where none is claimed to.
+//! Durations that the planner chooses: known optima, and random tasks on which no plan over a grid
+//! of times and durations, executed by the validator, is better than what is found, or exists where
+//! none is claimed to.
 
 use std::fmt::Write as _;
 
@@ -369,7 +370,8 @@ fn sample(random: &mut Random) -> (String, String, [Vec<i128>; 3]) {
 /// The last start that brute force tries.
 const LAST: i128 = 4;
 
-/// The least metric of valid plans of up to three actions that start and last whole units, which are the separation.
+/// The least metric of valid plans of up to three actions that start and last whole units, which
+/// are the separation.
 fn brute_force(durations: &[Vec<i128>; 3], domain: &Domain, problem: &Problem) -> Option<BigRational> {
     let separation = rational(1, 1);
     let mut best: Option<BigRational> = None;

@@ -1,4 +1,5 @@
-//! Overlapping actions with state-dependent durations or effects, and with bounded durations: plans and claims.
+//! Overlapping actions with state-dependent durations or effects, and with bounded durations: plans
+//! and claims.
 
 use metaplan_planner::{GroundConfig, Limits, PlannerPart, Status, ground_concurrent, optimize_concurrent};
 use num_bigint::BigInt;

@@ -37,7 +37,8 @@ fn actions_overlap_with_themselves() {
     let own = react("(at start (ready))", "(at end (not (ready))) (at end (increase (y) 1))");
     let plan = ["0: (react) [5]", "0: (react) [5]", "0: (react) [5]"];
     check("before the first end", &own, &problem("(>= (y) 3)"), (1, 1000), Some(("5", &plan)));
-    // What an end brings about is used up, and the end of a run that started a little later brings it about again.
+    // What an end brings about is used up, and the end of a run that started a little later brings
+    // it about again.
     let own = domain(
         "(:durative-action charge :parameters () :duration (= ?duration 10) :condition () :effect (at end (p)))
          (:durative-action use :parameters () :duration (= ?duration 6)
@@ -47,7 +48,8 @@ fn actions_overlap_with_themselves() {
     );
     let plan = ["0: (charge) [10]", "0.002: (charge) [10]", "10.001: (spend) [7]", "10.003: (use) [6]"];
     check("used up", &own, &problem("(q) (r)"), (1, 1000), Some(("17.001", &plan)));
-    // The light is on until the first run ends, and each run needs it all along: two of them start and end together, or not at all.
+    // The light is on until the first run ends, and each run needs it all along: two of them start
+    // and end together, or not at all.
     let own = domain(
         "(:durative-action light :parameters () :duration (= ?duration 5)
            :condition (over all (p)) :effect (and (at start (p)) (at end (not (p)))))
@@ -56,7 +58,8 @@ fn actions_overlap_with_themselves() {
     check("light", &own, &problem("(q)"), (1, 1000), None);
 }
 
-/// A battery that is charged, and actions that need it: `first` and then `second`, each of which takes one unit of it when it ends.
+/// A battery that is charged, and actions that need it: `first` and then `second`, each of which
+/// takes one unit of it when it ends.
 #[test]
 fn a_battery_can_be_charged_by_overlapping_runs() {
     let domain = |others: &str| {
@@ -106,7 +109,8 @@ fn a_battery_can_be_charged_by_overlapping_runs() {
 
 #[test]
 fn runs_whose_duration_the_state_decides() {
-    // The second run takes longer, for the number has grown: all the same it may start while the first one is under way.
+    // The second run takes longer, for the number has grown: all the same it may start while the
+    // first one is under way.
     let domain =
         "(define (domain d) (:requirements :durative-actions) (:predicates (go)) (:functions (x) (y))
       (:durative-action react :parameters () :duration (= ?duration (x))

@@ -1,5 +1,6 @@
-//! Preferences, and constraints on trajectories and times, where actions overlap: known answers, and random tasks on which plans over a
-//! grid of times, executed by the validator, are no better than what is found.
+//! Preferences, and constraints on trajectories and times, where actions overlap: known answers,
+//! and random tasks on which plans over a grid of times, executed by the validator, are no better
+//! than what is found.
 
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
@@ -201,8 +202,8 @@ fn sample(random: &mut Random) -> (String, String, [i128; 3]) {
 /// The last start that brute force tries.
 const LAST: i128 = 5;
 
-/// The least metric of valid plans of up to three actions that start at whole times: of all, and of those with no two happenings at one
-/// time.
+/// The least metric of valid plans of up to three actions that start at whole times: of all, and of
+/// those with no two happenings at one time.
 fn brute_force(durations: [i128; 3], domain: &Domain, problem: &Problem) -> [Option<BigRational>; 2] {
     let mut best = [None, None];
     let mut open: Vec<Vec<(i128, usize)>> = vec![Vec::new()];

@@ -28,7 +28,8 @@ fn found(cost: &str, steps: &[&str]) -> Option<(String, Vec<String>)> {
     Some((cost.to_owned(), steps.iter().map(|step| (*step).to_owned()).collect()))
 }
 
-/// `count` designs, of which each solves `f1` and `f2`; `value` writes what is known of the design with an index.
+/// `count` designs, of which each solves `f1` and `f2`; `value` writes what is known of the design
+/// with an index.
 fn designs(count: usize, value: impl Fn(usize) -> String) -> String {
     let mut text = String::from("(define (problem p) (:domain d) (:objects");
     for index in 0..count {

@@ -1,5 +1,6 @@
-//! Tasks whose numbers no scale makes integers: random ones against all sequences of actions, executed in big rationals by the
-//! definition of their effects, and cases of known cost. The validator executes every plan.
+//! Tasks whose numbers no scale makes integers: random ones against all sequences of actions,
+//! executed in big rationals by the definition of their effects, and cases of known cost. The
+//! validator executes every plan.
 
 #![allow(clippy::format_collect, clippy::print_stderr)]
 
@@ -311,8 +312,8 @@ impl Model {
     }
 }
 
-/// Compares the answer for a model with all of its plans; whether its numbers are too large for integers, and whether it has
-/// a plan.
+/// Compares the answer for a model with all of its plans; whether its numbers are too large for
+/// integers, and whether it has a plan.
 fn check(seed: u64, rewards: bool, horizon: Option<usize>) -> (bool, bool) {
     let model = Model::random(seed, rewards);
     let (domain_text, problem_text) = model.text();
@@ -473,7 +474,8 @@ fn times_may_be_quotients_of_measured_speeds() {
     assert!(plan.cost.to_rational().is_positive());
 }
 
-/// A random task that was answered with "no plan" once: an effect that contradicts itself removed the whole action.
+/// A random task that was answered with "no plan" once: an effect that contradicts itself removed
+/// the whole action.
 #[test]
 fn a_task_of_another_generator_has_its_plan() {
     let directory =

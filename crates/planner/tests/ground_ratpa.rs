@@ -1,9 +1,10 @@
-//! The ground task of generated missions against instantiation by brute force: the same reachable atoms and the same
-//! operators, once the choices of function designs are multiplied out.
+//! The ground task of generated missions against instantiation by brute force: the same reachable
+//! atoms and the same operators, once the choices of function designs are multiplied out.
 //!
-//! The oracle only reads the syntax tree: it binds parameters one by one, evaluates static conditions, and
-//! repeats relaxed reachability with intervals of numbers until nothing is added. Atoms without influence on the goal are left
-//! out by its own definition of that. The missions come from a script that is not part of the project.
+//! The oracle only reads the syntax tree: it binds parameters one by one, evaluates static
+//! conditions, and repeats relaxed reachability with intervals of numbers until nothing is added.
+//! Atoms without influence on the goal are left out by its own definition of that. The missions
+//! come from a script that is not part of the project.
 
 #![expect(clippy::print_stdout, reason = "a skipped test says so")]
 
@@ -327,8 +328,9 @@ fn mentions(expression: &Expression, name: &str) -> bool {
     }
 }
 
-/// Leaves out what has no influence on the goal: additions and deletions that nothing reads, and then instances that do
-/// nothing at all (their costs are never below zero). Returns the facts that are read.
+/// Leaves out what has no influence on the goal: additions and deletions that nothing reads, and
+/// then instances that do nothing at all (their costs are never below zero). Returns the facts that
+/// are read.
 fn relevant<'i>(
     world: &World<'_>,
     mut instances: Vec<&'i Instance>,

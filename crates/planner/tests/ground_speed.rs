@@ -1,6 +1,7 @@
 //! Speed of reading and grounding compared with the translator of Fast Downward, and size of the ground task.
 //!
-//! Times are CPU times of this thread and of the translator's process, so that other work on the machine disturbs little.
+//! Times are CPU times of this thread and of the translator's process, so that other work on the
+//! machine disturbs little.
 
 #![expect(clippy::print_stdout, reason = "measurements are shown")]
 
@@ -162,8 +163,9 @@ print(used.ru_utime + used.ru_stime)";
     seconds
 }
 
-/// The largest instances, for which the factor is asserted, and smaller ones for comparison. Needs a Python with the translator (`python3 -m venv peers; peers/bin/pip install up-fast-downward`), named by
-/// `METAPLAN_PEERS=peers/bin/python`.
+/// The largest instances, for which the factor is asserted, and smaller ones for comparison. Needs
+/// a Python with the translator (`python3 -m venv peers; peers/bin/pip install up-fast-downward`),
+/// named by `METAPLAN_PEERS=peers/bin/python`.
 #[test]
 #[ignore = "measures beside a peer; in release"]
 fn reading_and_grounding_compared_with_the_translator_of_fast_downward() {

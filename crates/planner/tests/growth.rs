@@ -1,5 +1,5 @@
-//! Costs, times and numbers that grow beyond their types while actions are executed: nothing panics, and nothing is claimed that
-//! is not so.
+//! Costs, times and numbers that grow beyond their types while actions are executed: nothing
+//! panics, and nothing is claimed that is not so.
 
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -38,7 +38,8 @@ fn large(times: usize) -> BigRational {
     BigRational::from_integer(LARGE.parse::<BigInt>().expect("a number") * BigInt::from(times))
 }
 
-/// A robot that has to go to the end of a corridor with `places` places; each move has the cost effect `cost`.
+/// A robot that has to go to the end of a corridor with `places` places; each move has the cost
+/// effect `cost`.
 fn corridor(places: usize, cost: &str, metric: &str) -> Task {
     let domain = format!(
         "(define (domain d) (:requirements :typing :numeric-fluents) (:types place)

@@ -1,5 +1,5 @@
-//! Metrics over fluents whose changes depend on the state: plans are found, measured as the validator measures them, and none is called
-//! the best.
+//! Metrics over fluents whose changes depend on the state: plans are found, measured as the
+//! validator measures them, and none is called the best.
 
 use metaplan_planner::{
     Config, GroundConfig, Limits, Plan, Solution, Status, ground, ground_concurrent, lexicographic, optimize,
@@ -19,7 +19,8 @@ fn text(plan: &Plan) -> String {
     lines.collect()
 }
 
-/// Checks that a plan is valid, has the metric that the validator has, and that its steps add up to it from what it is at first.
+/// Checks that a plan is valid, has the metric that the validator has, and that its steps add up to
+/// it from what it is at first.
 fn judge((domain, problem): (&Domain, &Problem), concurrent: bool, solution: &Solution, at_first: i64) {
     assert_eq!(solution.status, Status::Feasible, "{solution:?}");
     assert!(solution.proof.is_none() && solution.lower_bound.is_none(), "{solution:?}");

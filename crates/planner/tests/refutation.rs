@@ -1,5 +1,5 @@
-//! Formulas of generated missions, and their refutations: there is one for the truth, none for what is false, and what is changed
-//! is noticed.
+//! Formulas of generated missions, and their refutations: there is one for the truth, none for what
+//! is false, and what is changed is noticed.
 
 #[allow(dead_code, reason = "another suite uses the rest")]
 use std::cell::RefCell;
@@ -153,8 +153,8 @@ fn mutate(text: &str, random: &mut Random) -> String {
     lines.join("\n") + "\n"
 }
 
-/// A changed formula or legend is not the task's; a changed proof proves nothing that is false, and nothing at all once it is
-/// cut off.
+/// A changed formula or legend is not the task's; a changed proof proves nothing that is false, and
+/// nothing at all once it is cut off.
 #[test]
 fn changed_refutations_are_rejected() {
     for seed in 0..40 {

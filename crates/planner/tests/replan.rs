@@ -36,7 +36,8 @@ fn words(atom: &Atom) -> Vec<String> {
     std::iter::once(atom.predicate.name.to_string()).chain(atom.arguments.iter().map(term)).collect()
 }
 
-/// Changeable parts of a mission: names of its position predicate, places and designs, and the battery's capacity.
+/// Changeable parts of a mission: names of its position predicate, places and designs, and the
+/// battery's capacity.
 struct Changes {
     at: &'static str,
     places: Vec<String>,
@@ -160,7 +161,8 @@ fn compare(expected: &Solution, found: &ReplanOutcome, context: &dyn Fn() -> Str
     }
 }
 
-/// Applies changes to a mission one by one, each answered in both ways. Returns how often it had to be ground again.
+/// Applies changes to a mission one by one, each answered in both ways. Returns how often it had to
+/// be ground again.
 fn check(seed: u64, changes: usize) -> usize {
     let mission = Mission::random(seed);
     let (domain, mut problem) = parse(&mission.domain(), &mission.problem());
@@ -208,8 +210,8 @@ fn named(steps: &[metaplan_planner::Step]) -> Named {
     steps.iter().map(|step| (step.action.clone(), step.arguments.clone())).collect()
 }
 
-/// After a change the plan that stays close to the old one is a best one with fewest steps, and of all of those, as the SAT solver
-/// enumerates them, none has more steps of the old one.
+/// After a change the plan that stays close to the old one is a best one with fewest steps, and of
+/// all of those, as the SAT solver enumerates them, none has more steps of the old one.
 fn check_close(seed: u64) {
     let mission = Mission::random(seed);
     let (domain, mut problem) = parse(&mission.domain(), &mission.problem());
@@ -283,7 +285,8 @@ fn plans_stay_close_to_the_old_one() {
     assert_eq!(plan(&mut replanner, Some(&old)), old);
 }
 
-/// Switches that a robot turns on, in an order of its own, with a limit that has been reached before it begins.
+/// Switches that a robot turns on, in an order of its own, with a limit that has been reached
+/// before it begins.
 #[test]
 fn the_old_plan_serves_when_time_is_up() {
     let domain = "(define (domain robot) (:types switch design function)
@@ -451,7 +454,8 @@ fn replanning_time_compared_with_planning_from_scratch() {
     }
 }
 
-/// A state in which two atoms hold that exclude each other in the mission, though they are values of different variables.
+/// A state in which two atoms hold that exclude each other in the mission, though they are values
+/// of different variables.
 #[test]
 fn a_state_that_violates_a_mutex_group_is_ground_again() {
     let moves = [("t1", "c", "a"), ("x1", "a", "b"), ("x2", "b", "a"), ("u1", "c", "d"), ("u2", "d", "e")];

@@ -15,7 +15,8 @@ const DOMAIN: &str = "(define (domain d)
   (:action flip :parameters () :precondition (not (on)) :effect (on))
   (:action flop :parameters () :precondition (on) :effect (not (on))))";
 
-/// Status, cost and steps of the answer, with and without the quick search, by every solver and in all semantics.
+/// Status, cost and steps of the answer, with and without the quick search, by every solver and in
+/// all semantics.
 fn check(name: &str, init: &str, goal: &str, metric: &str, expected: (Status, Option<&str>, Option<usize>)) {
     let problem = format!(
         "(define (problem p) (:domain d) (:objects a b c - place)
@@ -112,7 +113,8 @@ fn proofs_name_their_reason() {
     assert_eq!(optimize(&task, &within, &mut |_| {}).status, Status::UnsolvableWithinHorizon);
 }
 
-/// Changes of one number at one time that contradict each other leave an action inapplicable, as the validator has it.
+/// Changes of one number at one time that contradict each other leave an action inapplicable, as
+/// the validator has it.
 #[test]
 fn contradictory_changes_leave_an_action_inapplicable() {
     let solve = |effect: &str| {

@@ -48,7 +48,8 @@ impl Tally {
         self.unsolvable += u64::from(solution.status == Status::Unsolvable);
     }
 
-    /// Checks that the test is meaningful: a quarter of the tasks is proved optimal, and one in `one_in` unsolvable.
+    /// Checks that the test is meaningful: a quarter of the tasks is proved optimal, and one in
+    /// `one_in` unsolvable.
     pub fn check(&self, one_in: u64) {
         let Self { seeds, proved, unsolvable } = self;
         assert!(

@@ -1,5 +1,5 @@
-//! Plans with timed initial literals: known optima, and random tasks on which the planner must agree with the validator
-//! run on every sequence of up to three actions.
+//! Plans with timed initial literals: known optima, and random tasks on which the planner must
+//! agree with the validator run on every sequence of up to three actions.
 
 use std::fmt::Write as _;
 
@@ -129,7 +129,8 @@ fn literal(random: &mut Random) -> String {
 
 #[test]
 fn a_wait_is_no_step_of_a_plan() {
-    // Without a metric plans are measured by their length: two actions and a wait are shorter than three actions.
+    // Without a metric plans are measured by their length: two actions and a wait are shorter than
+    // three actions.
     let domain =
         "(define (domain d) (:requirements :timed-initial-literals) (:predicates (at-b) (at-c) (at-d) (gate))
       (:action to-b :parameters () :precondition (and) :effect (at-b))
@@ -206,8 +207,9 @@ fn sample(random: &mut Random) -> Sample {
     Sample { durations, events, domain, problem }
 }
 
-/// The least cost of valid plans of up to three actions. All times of the files are integers; so an action that can start at all
-/// at some time can start as soon as the last has ended, or so that it starts or ends with an event or half a unit later. Times are doubled.
+/// The least cost of valid plans of up to three actions. All times of the files are integers; so an
+/// action that can start at all at some time can start as soon as the last has ended, or so that it
+/// starts or ends with an event or half a unit later. Times are doubled.
 fn brute_force(task: &Sample, domain: &Domain, problem: &Problem) -> Option<i64> {
     let mut best = None;
     let mut open: Vec<(i64, String, usize)> = vec![(0, String::new(), 0)];

@@ -6,8 +6,9 @@ use task::limits::Limits;
 use testing::missions::Mission;
 use testing::{depot, fleet, ground_text, successors};
 
-/// Checks that heuristic values are consistent and 0 at the goal, so they are lower bounds. Returns whether cost partitioning over
-/// several projections gives a higher value of the initial state than any projection alone.
+/// Checks that heuristic values are consistent and 0 at the goal, so they are lower bounds. Returns
+/// whether cost partitioning over several projections gives a higher value of the initial state
+/// than any projection alone.
 fn check_estimates(text: &(String, String)) -> bool {
     let task = ground_text(text.clone());
     if task.unreachable.is_some() {

@@ -2,8 +2,9 @@
 //!
 //! - body: `b@t ↔ ⋀ l@t` for each rule;
 //! - completion: `h@t ↔ ⋁ b@t` over the rules with head h \[1\];
-//! - levels: in a layer of n variables that depend on each other, `h@t` needs a rule whose own variables of the
-//!   layer follow in fewer rounds: `h@t → ⋁ s@t`, `s@t → b@t`, `s@t ∧ r(h) ≤ k → r(a) ≤ k−1` with r in order encoding \[2\].
+//! - levels: in a layer of n variables that depend on each other, `h@t` needs a rule whose own
+//!   variables of the layer follow in fewer rounds: `h@t → ⋁ s@t`, `s@t → b@t`,
+//!   `s@t ∧ r(h) ≤ k → r(a) ≤ k−1` with r in order encoding \[2\].
 //!
 //! \[1\] K. Clark: Negation as failure, Logic and Data Bases, 1978.
 //! \[2\] T. Janhunen: Representing normal programs with clauses, ECAI 2004.

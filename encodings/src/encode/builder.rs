@@ -1,7 +1,7 @@
 //! Formula under construction, shared by the families of clauses.
 //!
-//! A group of operators has one variable that is true if the operator at the step is a member: `o@t
-//! → g@t` for each member, and `g@t → ⋁ o@t`. Groups make clauses about designs, costs and
+//! A group of operators has one variable that is true if the operator at the step is a member:
+//! `o@t → g@t` for each member, and `g@t → ⋁ o@t`. Groups make clauses about designs, costs and
 //! consumptions independent of the number of operators that share them.
 
 use std::collections::BTreeMap;

@@ -6,7 +6,8 @@
 //! the operators that change a fact (or a variable that is read other than by a plain condition),
 //! and R those that need it:
 //!
-//! - ∃-step: `¬o@t ∨ ¬p@t` for o ∈ E before p ∈ R in the order, by a ladder: `o@t → a@t`, `a@t → a'@t`, `a@t → ¬p@t`;
+//! - ∃-step: `¬o@t ∨ ¬p@t` for o ∈ E before p ∈ R in the order, by a ladder: `o@t → a@t`,
+//!   `a@t → a'@t`, `a@t → ¬p@t`;
 //! - ∀-step: the same, and again in the reverse order;
 //! - exclusion: at most one of the operators that share a slot, a numeric variable, or a transition
 //!   of the cost potential. So numbers, designs and costs are encoded as in sequential semantics.
@@ -14,9 +15,10 @@
 //! Every sequential plan is a plan in these semantics, so bounds on the length of sequential plans
 //! remain valid.
 //!
-//! \[1\] H. Kautz, B. Selman: Pushing the envelope: planning, propositional logic and stochastic search, AAAI 1996.
-//! \[2\] J. Rintanen, K. Heljanko, I. Niemelä: Planning as satisfiability: parallel plans and algorithms for plan search,
-//! Artificial Intelligence 170(12-13), 2006.
+//! \[1\] H. Kautz, B. Selman: Pushing the envelope: planning, propositional logic and stochastic
+//! search, AAAI 1996.
+//! \[2\] J. Rintanen, K. Heljanko, I. Niemelä: Planning as satisfiability: parallel plans and
+//! algorithms for plan search, Artificial Intelligence 170(12-13), 2006.
 
 use search::bounds::Projection;
 use std::collections::BTreeMap;

@@ -6,7 +6,8 @@
 //! formula grows with the sum of the numbers of designs, not with their product. Each family of
 //! clauses has a file.
 //!
-//! \[1\] H. Kautz, B. Selman: Pushing the envelope: planning, propositional logic and stochastic search, AAAI 1996.
+//! \[1\] H. Kautz, B. Selman: Pushing the envelope: planning, propositional logic and stochastic
+//! search, AAAI 1996.
 
 mod arithmetic;
 mod axioms;

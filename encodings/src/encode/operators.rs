@@ -1,7 +1,7 @@
 //! Operators: their order, conditions and effects.
 //!
-//! - sequence: at most one operator per step in sequential semantics; `o@t → busy@t`, `busy@t → ⋁
-//!   o@t`, `busy@t+1 → busy@t`;
+//! - sequence: at most one operator per step in sequential semantics; `o@t → busy@t`,
+//!   `busy@t → ⋁ o@t`, `busy@t+1 → busy@t`;
 //! - condition: `o@t → p@t` for each fact, `o@t → ⋁ l@t` for each clause;
 //! - effect: `o@t → e@t+1`, unless a conditional effect of the operator prevails.
 

@@ -1,8 +1,9 @@
 //! Selection of function designs, factored.
 //!
-//! With `g@t` for the operators that admit the same designs D of a slot: `g@t → ⋁_{d ∈ D}
-//! slot=d@t`, at most one design of a slot, and `slot=d@t → ⋁ {g@t : d ∈ D}`, so an unused slot
-//! stays empty. Unsuitable combinations are forbidden one by one: `¬g@t ∨ ¬slot=d@t ∨ ¬slot'=d'@t`.
+//! With `g@t` for the operators that admit the same designs D of a slot:
+//! `g@t → ⋁_{d ∈ D} slot=d@t`, at most one design of a slot, and `slot=d@t → ⋁ {g@t : d ∈ D}`, so
+//! an unused slot stays empty. Unsuitable combinations are forbidden one by one:
+//! `¬g@t ∨ ¬slot=d@t ∨ ¬slot'=d'@t`.
 
 use task::limits::Interrupted;
 

@@ -1,7 +1,8 @@
 //! Totalizer \[1\] of `RustSAT`: counts true literals, and is extended incrementally \[2\].
 //!
 //! \[1\] O. Bailleux, Y. Boufkhad: Efficient CNF encoding of Boolean cardinality constraints, CP 2003.
-//! \[2\] R. Martins, S. Joshi, V. Manquinho, I. Lynce: Incremental cardinality constraints for `MaxSAT`, CP 2014.
+//! \[2\] R. Martins, S. Joshi, V. Manquinho, I. Lynce: Incremental cardinality constraints for
+//! `MaxSAT`, CP 2014.
 
 use rustsat::encodings::card::{BoundUpper as _, BoundUpperIncremental as _, Totalizer as Tree};
 use rustsat::instances::{BasicVarManager, Cnf, ManageVars as _};

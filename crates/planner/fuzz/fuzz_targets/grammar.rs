@@ -1,5 +1,6 @@
-//! Generated domains and problems are read without errors, printed and read again as the same trees, and ground or rejected.
-//! With some words deleted, doubled or exchanged, they are read without a crash.
+//! Generated domains and problems are read without errors, printed and read again as the same
+//! trees, and ground or rejected. With some words deleted, doubled or exchanged, they are read
+//! without a crash.
 
 #![no_main]
 

@@ -1,5 +1,5 @@
-//! Arbitrary bytes as a domain, a problem and a plan: the reader returns messages, or trees that print and read back as the
-//! same trees. A byte that occurs in no text separates the three files.
+//! Arbitrary bytes as a domain, a problem and a plan: the reader returns messages, or trees that
+//! print and read back as the same trees. A byte that occurs in no text separates the three files.
 
 #![no_main]
 

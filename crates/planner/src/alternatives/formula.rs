@@ -3,10 +3,10 @@
 //! The formula "a plan that costs at most the optimum", with as many steps as such a plan can have, is solved
 //! repeatedly. Each time, the plans found before are excluded.
 //!
-//! The choices that every cheapest plan makes are the backbone of that formula \[1\]. The solver is queried for a plan
-//! that differs from the first one in at least one of the remaining candidates. Such a plan rules out the candidates
-//! in which it differs; unsatisfiability proves that all remaining candidates are shared. Equal designs or objects
-//! count as different here.
+//! The choices that every cheapest plan makes are the backbone of that formula \[1\]. The solver is
+//! queried for a plan that differs from the first one in at least one of the remaining candidates.
+//! Such a plan rules out the candidates in which it differs; unsatisfiability proves that all
+//! remaining candidates are shared. Equal designs or objects count as different here.
 //!
 //! \[1\] J. Marques-Silva, M. Janota, I. Lynce: On computing backbones of propositional theories, ECAI 2010.
 
@@ -21,8 +21,8 @@ use task::task::Task;
 use crate::alternatives::choices::{Alternatives, Choice, forced, shares};
 use crate::optimize::Config;
 
-/// Searches for at most `most` cheapest plans other than `first`. Returns `None` if the formula cannot be built
-/// within the limits.
+/// Searches for at most `most` cheapest plans other than `first`. Returns `None` if the formula
+/// cannot be built within the limits.
 pub(super) fn by_formula(
     context: Context<'_>,
     bounds: &Bounds,
@@ -111,8 +111,8 @@ impl Run<'_> {
         (answer, is_plan.then_some(steps))
     }
 
-    /// Choices of the first plan that all cheapest plans make. The plans in `known` narrow the candidates before the
-    /// first query. Returns `None` if the solver gives no answer.
+    /// Choices of the first plan that all cheapest plans make. The plans in `known` narrow the
+    /// candidates before the first query. Returns `None` if the solver gives no answer.
     fn forced(&mut self, first: &[GroundStep], known: &[Vec<GroundStep>]) -> Option<Vec<Choice>> {
         let mut choices = Choice::all(first);
         for plan in known {

@@ -1,17 +1,19 @@
 //! Graph of all cheapest plans: the states that such plans pass through, and the steps between them.
 //!
-//! A cheapest plan reaches each of its states at the least cost at which that state can be reached. So each state is
-//! expanded once, and every path from the initial state to a goal is a cheapest plan. K\* and its successors
-//! represent top-k plans in this way \[1\].
+//! A cheapest plan reaches each of its states at the least cost at which that state can be reached.
+//! So each state is expanded once, and every path from the initial state to a goal is a cheapest
+//! plan. K\* and its successors represent top-k plans in this way \[1\].
 //!
-//! If resources distinguish many states, expanding every state whose estimate admits a cheapest plan is too much
-//! work. So a label-setting search comes first. Each of its labels represents all states that cost no less and have
-//! no more of any resource. If no path in *its* graph leads from a label to the goal, no cheapest plan passes through
-//! a state that the label represents. The second search distinguishes all states, and expands only those that the
-//! first search has not ruled out.
+//! If resources distinguish many states, expanding every state whose estimate admits a cheapest
+//! plan is too much work. So a label-setting search comes first. Each of its labels represents all
+//! states that cost no less and have no more of any resource. If no path in *its* graph leads from
+//! a label to the goal, no cheapest plan passes through a state that the label represents. The
+//! second search distinguishes all states, and expands only those that the first search has not
+//! ruled out.
 //!
-//! \[1\] J. Lee, M. Katz, S. Sohrabi: On K* search for top-k planning, 2023; H. Aljazzar, S. Leue: K*: a heuristic search algorithm for
-//! finding the k shortest paths, Artificial Intelligence 175, 2011.
+//! \[1\] J. Lee, M. Katz, S. Sohrabi: On K* search for top-k planning, 2023; H. Aljazzar, S. Leue:
+//! K*: a heuristic search algorithm for finding the k shortest paths, Artificial Intelligence 175,
+//! 2011.
 
 use std::cell::OnceCell;
 use std::cmp::Reverse;
@@ -64,8 +66,8 @@ pub(super) const ROOT: u32 = 0;
 /// Predicate on an unfinished graph: returns `true` if it contains enough plans.
 pub(super) type IsEnough<'e> = dyn FnMut(&Graph) -> bool + 'e;
 
-/// Graph of the plans that cost `cost`, which must be the cost of a cheapest plan. Returns `None` if an operator has too
-/// many combinations of designs, or a negative cost.
+/// Graph of the plans that cost `cost`, which must be the cost of a cheapest plan. Returns `None`
+/// if an operator has too many combinations of designs, or a negative cost.
 pub(super) fn cheapest(
     context: Context<'_>,
     bounds: &Bounds,
@@ -203,8 +205,8 @@ struct Growth {
     steps: Vec<GroundStep>,
     numbers: FxHashMap<GroundStep, u32>,
     goals: Vec<bool>,
-    /// Open list: the estimate for the whole plan (0 in the second search), the cost (the highest first), and the
-    /// label.
+    /// Open list: the estimate for the whole plan (0 in the second search), the cost (the highest
+    /// first), and the label.
     open: BinaryHeap<Reverse<(Int, Reverse<Int>, u32)>>,
     is_complete: bool,
 }
@@ -272,10 +274,11 @@ impl<'a> Search<'a> {
         Some(Self { context, bounds, cost, index, monotone, best: choices(), all: choices() })
     }
 
-    /// Grows a graph from the initial state until it is complete, a limit is reached, or `is_enough` returns `true`.
-    /// Returns `None` if an operator has too many combinations of designs. With a guide (the labels of the first
-    /// search, and whether a goal can be reached from each of them), every label is a single state, and the states
-    /// that a dead label of the guide represents are omitted.
+    /// Grows a graph from the initial state until it is complete, a limit is reached, or
+    /// `is_enough` returns `true`. Returns `None` if an operator has too many combinations of
+    /// designs. With a guide (the labels of the first search, and whether a goal can be reached
+    /// from each of them), every label is a single state, and the states that a dead label of the
+    /// guide represents are omitted.
     fn explore(
         &self,
         labels: Labels,
@@ -375,8 +378,8 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Label of a state that was reached at some cost, added if necessary. Returns `None` if no cheapest plan reaches
-    /// the state at this cost.
+    /// Label of a state that was reached at some cost, added if necessary. Returns `None` if no
+    /// cheapest plan reaches the state at this cost.
     fn reach(
         &self,
         growth: &mut Growth,

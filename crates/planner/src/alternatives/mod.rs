@@ -1,8 +1,9 @@
 //! Further cheapest plans, and the choices that all of them share.
 //!
-//! `graph` searches for all states that cheapest plans pass through, and the steps between them. `paths` lists the
-//! plans of that graph. Where search does not apply or is disabled, `formula` queries the SAT solver for one plan
-//! after the other. Equal designs or objects count as different here.
+//! `graph` searches for all states that cheapest plans pass through, and the steps between them.
+//! `paths` lists the plans of that graph. Where search does not apply or is disabled, `formula`
+//! queries the SAT solver for one plan after the other. Equal designs or objects count as different
+//! here.
 
 mod choices;
 mod formula;
@@ -27,8 +28,9 @@ use paths::{End, Paths};
 
 pub use choices::{Alternatives, Forced};
 
-/// Searches for at most `most` cheapest plans other than that of an optimal solution, those with the fewest steps
-/// first. At a limit, returns the plans found until then. Returns `None` if the solution is not optimal.
+/// Searches for at most `most` cheapest plans other than that of an optimal solution, those with
+/// the fewest steps first. At a limit, returns the plans found until then. Returns `None` if the
+/// solution is not optimal.
 pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Config) -> Option<Alternatives> {
     let first = solution.ground.as_ref().filter(|_| solution.status == Status::Optimal)?;
     let context = Context::new(task, &config.limits);

@@ -1,4 +1,5 @@
-//! Paths in the graph of all cheapest plans: those with the fewest steps first, and of these in the order of the model.
+//! Paths in the graph of all cheapest plans: those with the fewest steps first, and of these in the
+//! order of the model.
 
 use rustc_hash::FxHashSet;
 use task::plan::ground::GroundStep;
@@ -148,8 +149,8 @@ impl<'g> Paths<'g> {
         (unsorted == 0).then(|| ends.map(|(depth, _)| *depth).max().unwrap_or(0))
     }
 
-    /// For each of the first `length` positions, the steps that cheapest plans make there. The entries are `None`
-    /// from the position on at which a cheapest plan has ended.
+    /// For each of the first `length` positions, the steps that cheapest plans make there. The
+    /// entries are `None` from the position on at which a cheapest plan has ended.
     pub(super) fn layers(&self, length: usize) -> Vec<Option<Vec<&'g GroundStep>>> {
         let mut layer: Vec<u32> = vec![ROOT];
         let mut layers = Vec::new();

@@ -1,12 +1,13 @@
 //! Trims a DRAT proof of a solver to a short proof with hints.
 //!
-//! Each clause of the solver follows from the clauses before by unit propagation \[1\]; the clauses used in the
-//! propagation become its hints. Literals that are implied permanently become unit clauses, which keeps hints
-//! short. Only the clauses on which the empty clause depends are kept.
+//! Each clause of the solver follows from the clauses before by unit propagation \[1\]; the clauses
+//! used in the propagation become its hints. Literals that are implied permanently become unit
+//! clauses, which keeps hints short. Only the clauses on which the empty clause depends are kept.
 //!
 //! Crate `certificate`, which shares no code with this file, checks the result again.
 //!
-//! \[1\] L. Cruz-Filipe, M. Heule, W. Hunt, M. Kaufmann, P. Schneider-Kamp: Efficient certified RAT verification, CADE 2017.
+//! \[1\] L. Cruz-Filipe, M. Heule, W. Hunt, M. Kaufmann, P. Schneider-Kamp: Efficient certified RAT
+//! verification, CADE 2017.
 
 use std::io::{BufRead, Write};
 

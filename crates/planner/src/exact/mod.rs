@@ -1,8 +1,9 @@
 //! Tasks whose numbers do not fit integers of a fixed size: search in exact rationals.
 //!
-//! No scale makes the numbers integers if an action multiplies by one half, and a common denominator of many
-//! measured numbers can exceed any machine integer. The search needs only addition and comparison. Its heuristic
-//! values come from the task without numeric variables, with costs rounded down to integers, and stay admissible.
+//! No scale makes the numbers integers if an action multiplies by one half, and a common
+//! denominator of many measured numbers can exceed any machine integer. The search needs only
+//! addition and comparison. Its heuristic values come from the task without numeric variables, with
+//! costs rounded down to integers, and stay admissible.
 
 mod integer_scaling;
 

@@ -1,16 +1,19 @@
 //! Core-guided optimisation: unsatisfiable cores raise the lower bound until a plan meets it (OLL \[1, 2\]).
 //!
-//! The cost of a plan above the lower bound is a weighted sum of literals, all of which are assumed to be false.
-//! The solver returns either a plan, which is then a cheapest one, or a core: at least one of its literals is
-//! true in every plan. So the lower bound rises by the least weight in the core, which is subtracted from each of
-//! its weights. The remaining cost, that more than one of them is true, more than two, and so on, is expressed by
-//! the literals of a totalizer with that weight, added one by one. Heavy literals come first (stratification
-//! \[3\]), so that plans are found early. A literal whose weight alone reaches the incumbent's cost is fixed to
-//! false \[3\].
+//! The cost of a plan above the lower bound is a weighted sum of literals, all of which are assumed
+//! to be false. The solver returns either a plan, which is then a cheapest one, or a core: at least
+//! one of its literals is true in every plan. So the lower bound rises by the least weight in the
+//! core, which is subtracted from each of its weights. The remaining cost, that more than one of
+//! them is true, more than two, and so on, is expressed by the literals of a totalizer with that
+//! weight, added one by one. Heavy literals come first (stratification \[3\]), so that plans are
+//! found early. A literal whose weight alone reaches the incumbent's cost is fixed to false \[3\].
 //!
-//! \[1\] B. Andres, B. Kaufmann, O. Matheis, T. Schaub: Unsatisfiability-based optimization in clasp, ICLP 2012.
-//! \[2\] A. Morgado, C. Dodaro, J. Marques-Silva: Core-guided `MaxSAT` with soft cardinality constraints, CP 2014.
-//! \[3\] C. Ansótegui, M. L. Bonet, J. Gabàs, J. Levy: Improving SAT-based weighted `MaxSAT` solvers, CP 2012.
+//! \[1\] B. Andres, B. Kaufmann, O. Matheis, T. Schaub: Unsatisfiability-based optimization in
+//! clasp, ICLP 2012.
+//! \[2\] A. Morgado, C. Dodaro, J. Marques-Silva: Core-guided `MaxSAT` with soft cardinality
+//! constraints, CP 2014.
+//! \[3\] C. Ansótegui, M. L. Bonet, J. Gabàs, J. Levy: Improving SAT-based weighted `MaxSAT`
+//! solvers, CP 2012.
 
 use std::collections::BTreeMap;
 

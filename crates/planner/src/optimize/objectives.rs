@@ -1,8 +1,9 @@
 //! Several objectives: lexicographic, or as a Pareto front.
 //!
-//! The value of an earlier objective becomes a budget for the later ones: a numeric variable that each operator
-//! reduces by its cost. Each query is then a task with one objective and an ordinary proof. The Pareto front is
-//! enumerated by the ε-constraint method \[1\]: best by A, then best by B among those, then strictly better by B.
+//! The value of an earlier objective becomes a budget for the later ones: a numeric variable that
+//! each operator reduces by its cost. Each query is then a task with one objective and an ordinary
+//! proof. The Pareto front is enumerated by the ε-constraint method \[1\]: best by A, then best by
+//! B among those, then strictly better by B.
 //!
 //! \[1\] Y. Haimes, L. Lasdon, D. Wismer: On a bicriterion formulation of the problems of integrated system
 //! identification and system optimization, IEEE Trans. SMC 1(3), 1971.

@@ -1,17 +1,19 @@
 //! Incremental replanning for one mission: the planner of an adaptation loop.
 //!
-//! Availability and state are assumptions, not facts \[1\]. The mission is grounded once, with every design
-//! available and without conclusions from numbers. A problem is then a state of that task (see
-//! [`state_mapping`]), and a set of available designs restricts its operators (see [`restrict_designs`]). Data
-//! that depend on that set alone (operators, pattern databases, undominated designs) are cached for recent sets,
-//! since failed components often recover. The remaining work per problem is the search, whose heuristic is exact
-//! in the projections, and the tie-breaking. The answers equal those of grounding and optimising from scratch,
-//! except that SAT does not prove them a second time.
+//! Availability and state are assumptions, not facts \[1\]. The mission is grounded once, with
+//! every design available and without conclusions from numbers. A problem is then a state of that
+//! task (see [`state_mapping`]), and a set of available designs restricts its operators (see
+//! [`restrict_designs`]). Data that depend on that set alone (operators, pattern databases,
+//! undominated designs) are cached for recent sets, since failed components often recover. The
+//! remaining work per problem is the search, whose heuristic is exact in the projections, and the
+//! tie-breaking. The answers equal those of grounding and optimising from scratch, except that SAT
+//! does not prove them a second time.
 //!
 //! The previous plan, if it is still valid, is an upper bound, and the answer if time runs out first.
 //!
-//! No SAT solver is kept with assumptions: on maps of 50 to 200 places the search takes milliseconds and a SAT
-//! proof seconds, and clauses learnt for one cost limit do not help with the next.
+//! No SAT solver is kept with assumptions: on maps of 50 to 200 places the search takes
+//! milliseconds and a SAT proof seconds, and clauses learnt for one cost limit do not help with the
+//! next.
 //!
 //! - \[1\] N. Eén, N. Sörensson: Temporal induction by incremental SAT solving, ENTCS 89(4), 2003.
 

@@ -1,8 +1,8 @@
 //! Restricts a task with all designs to the available ones.
 //!
-//! Operators that require an unavailable design are removed. In tables and exclusions of open slots only the
-//! rows of available designs remain. The result is the task that grounding would make of the problem with these
-//! designs, apart from operators that become unreachable.
+//! Operators that require an unavailable design are removed. In tables and exclusions of open slots
+//! only the rows of available designs remain. The result is the task that grounding would make of
+//! the problem with these designs, apart from operators that become unreachable.
 
 use std::sync::Arc;
 

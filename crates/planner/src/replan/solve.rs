@@ -1,9 +1,9 @@
 //! Optimal replanning from a situation: one search per possible first step, then tie-breaking.
 //!
-//! The most promising first step is searched first; a step whose lower bound exceeds the best metric is skipped.
-//! Ties are broken as without first steps: fewest steps, fewest reconfigurations, model order. A plan to stay
-//! close to is kept if it is optimal; otherwise, among plans with the fewest steps, one that shares most of its
-//! steps is chosen.
+//! The most promising first step is searched first; a step whose lower bound exceeds the best
+//! metric is skipped. Ties are broken as without first steps: fewest steps, fewest
+//! reconfigurations, model order. A plan to stay close to is kept if it is optimal; otherwise,
+//! among plans with the fewest steps, one that shares most of its steps is chosen.
 
 use num_rational::BigRational;
 use rustc_hash::FxHashSet;

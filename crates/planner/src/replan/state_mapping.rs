@@ -1,4 +1,5 @@
-//! Maps a problem to a state of a task that was grounded for another problem, if both have the same operators.
+//! Maps a problem to a state of a task that was grounded for another problem, if both have the same
+//! operators.
 //!
 //! Two problems of one domain have the same operators if they differ in three respects only: availability,
 //! numbers that actions change, and facts that actions change and for which the task has variables. The facts

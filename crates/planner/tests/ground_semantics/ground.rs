@@ -1,5 +1,5 @@
-//! The ground task against the interpreter: from state to state, the same actions can be executed, the same atoms hold,
-//! the goal is reached in the same states, and the metric is the same.
+//! The ground task against the interpreter: from state to state, the same actions can be executed,
+//! the same atoms hold, the goal is reached in the same states, and the metric is the same.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -33,7 +33,8 @@ fn rewards_time(task: &Task) -> bool {
     if *maximize { sum > zero } else { sum < zero }
 }
 
-/// Duration of an action: the value of its only equation, or else the only bound that is optimal for the metric.
+/// Duration of an action: the value of its only equation, or else the only bound that is optimal
+/// for the metric.
 fn duration(task: &Task, action: &Action, scope: &[usize], state: &State) -> Option<Number> {
     let bounds = action.duration.as_ref()?;
     let among = |signs: &[Sign]| {
@@ -79,7 +80,8 @@ fn is_small(state: &State) -> bool {
 struct Pair {
     lifted: State,
     ground: TaskState,
-    /// Number of actions from the initial state. `None` if some of them are not in the ground task, so that their costs are unknown.
+    /// Number of actions from the initial state. `None` if some of them are not in the ground task,
+    /// so that their costs are unknown.
     steps: Option<usize>,
 }
 
@@ -134,7 +136,8 @@ pub fn check(task: &Task, (domain, problem): &(Domain, Problem)) -> Option<usize
                 let after = after(task, &lifted, index, objects);
                 let pair = match (after, transitions.remove(&key)) {
                     (Some(after), Some(ground)) => (after, ground, steps.map(|steps| steps + 1)),
-                    // Left out where it changes nothing that matters; of one with conditional effects, such a case.
+                    // Left out where it changes nothing that matters; of one with conditional
+                    // effects, such a case.
                     (Some(after), None) if !actions.contains(&key) || action.is_conditional() => {
                         (after, state.clone(), None)
                     }

@@ -1,4 +1,5 @@
-//! Interference of happenings: one writes an atom or number that the other reads, or both write it and do not commute.
+//! Interference of happenings: one writes an atom or number that the other reads, or both write it
+//! and do not commute.
 
 use std::collections::BTreeSet;
 
@@ -125,7 +126,8 @@ impl Touch {
         }));
     }
 
-    /// Returns `true` if this happening writes an atom or number that `other` reads, or both write it and do not commute.
+    /// Returns `true` if this happening writes an atom or number that `other` reads, or both write
+    /// it and do not commute.
     pub fn disturbs(&self, other: &Self) -> bool {
         let is_read = |atom: &Atom| other.facts.contains(atom) || other.predicates.contains(&atom.0);
         let is_read_number = |atom: &Atom| other.values.contains(atom) || other.functions.contains(&atom.0);

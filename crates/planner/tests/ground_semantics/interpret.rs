@@ -284,7 +284,8 @@ impl State {
         View::new(task, self, None).value(expression, scope)
     }
 
-    /// The state after a happening: all its effects read this state, and neither its halves nor an event of its time interfere with it.
+    /// The state after a happening: all its effects read this state, and neither its halves nor an
+    /// event of its time interfere with it.
     fn happen(
         &self,
         task: &Task,

@@ -1,5 +1,5 @@
-//! Random lifted tasks with all that the language has, against an interpreter that shares nothing with the library:
-//! printing and reading, the validator, and the ground task.
+//! Random lifted tasks with all that the language has, against an interpreter that shares nothing
+//! with the library: printing and reading, the validator, and the ground task.
 
 mod generate;
 mod ground;

@@ -1,7 +1,8 @@
 //! A small lifted task as plain data, and its PDDL text.
 //!
-//! Three objects, a few predicates and functions of fixed names; whatever varies is in the actions, axioms, goal and
-//! initial state. A variable is the number of quantifiers and parameters around the one that binds it.
+//! Three objects, a few predicates and functions of fixed names; whatever varies is in the actions,
+//! axioms, goal and initial state. A variable is the number of quantifiers and parameters around
+//! the one that binds it.
 
 use std::collections::{BTreeMap, BTreeSet};
 

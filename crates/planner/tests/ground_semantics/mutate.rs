@@ -1,5 +1,5 @@
-//! Generates a valid plan of a task, by deriving the goal from its final state, and plans that differ from it in
-//! one place. The validator must reject the plans that the interpreter rejects.
+//! Generates a valid plan of a task, by deriving the goal from its final state, and plans that
+//! differ from it in one place. The validator must reject the plans that the interpreter rejects.
 
 use crate::ground_semantics::generate::Draw;
 use crate::ground_semantics::interpret::{State, Step, choices};

@@ -1,5 +1,5 @@
-//! Generated files are read without errors, and printing and reading them gives the same tree; a plan is judged by the
-//! validator as the interpreter judges it.
+//! Generated files are read without errors, and printing and reading them gives the same tree; a
+//! plan is judged by the validator as the interpreter judges it.
 
 use pddl::ast::{Domain, Problem};
 use pddl::validate::{Options, PlanText, validate};

@@ -1,8 +1,10 @@
-//! Certificates as a faulty grounder would write them: operators, effects, conditions and numbers of the ground task are changed,
-//! the witness with them. Whatever the comparison with the files still accepts proves nothing that is false of them.
+//! Certificates as a faulty grounder would write them: operators, effects, conditions and numbers
+//! of the ground task are changed, the witness with them. Whatever the comparison with the files
+//! still accepts proves nothing that is false of them.
 //!
-//! The judge is a search of its own over the written task, from what `metaplan-task/1` says of it: a task that has no plan, or a more expensive
-//! one, although the files have one for the known least cost, must not be accepted.
+//! The judge is a search of its own over the written task, from what `metaplan-task/1` says of it:
+//! a task that has no plan, or a more expensive one, although the files have one for the known
+//! least cost, must not be accepted.
 
 mod search;
 mod tasks;
@@ -165,7 +167,8 @@ fn no_change_of_the_task_makes_a_false_claim_verified() {
     assert!(count.lies >= 200 && count.harmless >= 100, "{count:?}");
 }
 
-/// Borders and starts that are a moment, half a unit or a unit of time early or late, and events that are forgotten in part.
+/// Borders and starts that are a moment, half a unit or a unit of time early or late, and events
+/// that are forgotten in part.
 #[test]
 fn no_shift_of_a_time_makes_a_false_claim_verified() {
     let mut count = Count::default();
@@ -252,8 +255,8 @@ fn each_difference_has_its_own_cause() {
     assert!(matches!(found, Faithful::No(Difference::Form { .. })), "{found:?}");
 }
 
-/// Instances that grounders have lost in practice: one of whose cases contradicts itself, and one whose condition is a product of
-/// decimals.
+/// Instances that grounders have lost in practice: one of whose cases contradicts itself, and one
+/// whose condition is a product of decimals.
 const FIELD: [(&str, &str, &str); 4] = [
     (
         "a",

@@ -254,7 +254,8 @@ pub const TASKS: &[Example] = &[
           (:goal (at d)) (:metric maximize (* 2 (fuel))))",
         optimum: Some("25"),
     },
-    // Work takes as little as it may; the shorter of two kinds may not take less than the longer of its bounds.
+    // Work takes as little as it may; the shorter of two kinds may not take less than the longer of
+    // its bounds.
     Example {
         name: "as little",
         domain: "(define (domain d) (:predicates (p ?x) (q)) (:functions (least ?x))

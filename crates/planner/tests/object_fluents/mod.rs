@@ -1,5 +1,6 @@
-//! Functions with objects as values: random tasks against a search through all states, executed with functions as they are defined.
-//! Planner and validator have to agree with that, though they only see what the functions are compiled to.
+//! Functions with objects as values: random tasks against a search through all states, executed
+//! with functions as they are defined. Planner and validator have to agree with that, though they
+//! only see what the functions are compiled to.
 
 #![expect(clippy::print_stdout, reason = "a skipped test says so")]
 

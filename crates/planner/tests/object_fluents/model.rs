@@ -146,7 +146,8 @@ impl Effect {
     }
 }
 
-/// State after some effects, and their cost. Returns `None` if they read an undefined term or assign two values to one term.
+/// State after some effects, and their cost. Returns `None` if they read an undefined term or
+/// assign two values to one term.
 pub(crate) fn after(state: &State, effects: &[Effect], arguments: &[usize]) -> Option<(State, u32)> {
     let mut assigned: BTreeMap<(usize, usize), Option<usize>> = BTreeMap::new();
     let (mut added, mut deleted, mut cost) = (BTreeSet::new(), BTreeSet::new(), 0);

@@ -1,4 +1,5 @@
-//! Small tasks with preferences and constraints on trajectories, executed and judged by the definition; and as PDDL.
+//! Small tasks with preferences and constraints on trajectories, executed and judged by the
+//! definition; and as PDDL.
 
 use std::fmt::Write as _;
 
@@ -221,7 +222,8 @@ pub fn follows(constraint: &Constraint, states: &[State], bound: Bound) -> bool 
 }
 
 impl Task {
-    /// States of a plan, its cost, and its number of violations of the action preference. Returns `None` if an action is not applicable.
+    /// States of a plan, its cost, and its number of violations of the action preference. Returns
+    /// `None` if an action is not applicable.
     pub fn execute(&self, plan: &[(usize, usize)]) -> Option<(Vec<State>, i64, i64)> {
         let mut states = vec![self.init.clone()];
         let (mut cost, mut violated) = (0, 0);

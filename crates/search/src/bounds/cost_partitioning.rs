@@ -1,11 +1,13 @@
 //! Saturated cost partitioning \[1\] over projections.
 //!
-//! Projections take their share of the operators' costs one after another: as much as their heuristic values
-//! need. The remaining costs go to the next projection. The result depends on the order, so several orders are
-//! tried. The sum of the values is consistent, since each of them is for its own costs. It counts costs that a
-//! single projection cannot see, such as goals of another robot or design changes outside its pattern.
+//! Projections take their share of the operators' costs one after another: as much as their
+//! heuristic values need. The remaining costs go to the next projection. The result depends on the
+//! order, so several orders are tried. The sum of the values is consistent, since each of them is
+//! for its own costs. It counts costs that a single projection cannot see, such as goals of another
+//! robot or design changes outside its pattern.
 //!
-//! \[1\] J. Seipp, T. Keller, M. Helmert: Saturated cost partitioning for optimal classical planning, JAIR 67, 2020.
+//! \[1\] J. Seipp, T. Keller, M. Helmert: Saturated cost partitioning for optimal classical
+//! planning, JAIR 67, 2020.
 
 use std::cmp::Reverse;
 

@@ -1,9 +1,9 @@
 //! Delete relaxation \[1\] of a task: rules that derive facts from facts, each at the cost of an operator.
 //!
-//! An operator becomes one rule for its unconditional effects and one rule per conditional effect. All of them
-//! have the operator's least cost, which is paid once. Axioms and the literals of clauses are rules without
-//! cost. Numbers are ignored, and derived variables may be false at any time, so the relaxation admits every
-//! plan of the task.
+//! An operator becomes one rule for its unconditional effects and one rule per conditional effect.
+//! All of them have the operator's least cost, which is paid once. Axioms and the literals of
+//! clauses are rules without cost. Numbers are ignored, and derived variables may be false at any
+//! time, so the relaxation admits every plan of the task.
 //!
 //! \[1\] B. Bonet, H. Geffner: Planning as heuristic search, Artificial Intelligence 129, 2001.
 

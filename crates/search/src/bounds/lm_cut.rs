@@ -1,11 +1,13 @@
 //! LM-cut \[1\]: an admissible heuristic that sums the costs of disjunctive action landmarks.
 //!
-//! h^max selects the supporting fact of each rule of the delete relaxation. The rules that lead from the facts
-//! before the cut into the zone from which the goal costs nothing form a landmark: every plan uses one of their
-//! operators. The least of their costs is counted and subtracted from all of them, until the goal costs
-//! nothing. The rules of an operator with conditional effects share one cost, so nothing is counted twice.
+//! h^max selects the supporting fact of each rule of the delete relaxation. The rules that lead
+//! from the facts before the cut into the zone from which the goal costs nothing form a landmark:
+//! every plan uses one of their operators. The least of their costs is counted and subtracted from
+//! all of them, until the goal costs nothing. The rules of an operator with conditional effects
+//! share one cost, so nothing is counted twice.
 //!
-//! \[1\] M. Helmert, C. Domshlak: Landmarks, critical paths and abstractions: what's the difference anyway?, ICAPS 2009.
+//! \[1\] M. Helmert, C. Domshlak: Landmarks, critical paths and abstractions: what's the difference
+//! anyway?, ICAPS 2009.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

@@ -1,9 +1,10 @@
 //! Admissible heuristics, and upper bounds on the number of steps of a cheaper plan.
 //!
-//! A projection to a few finite-domain variables is solved exactly. Dijkstra's algorithm from the abstract goal
-//! states gives a consistent, admissible heuristic: a pattern database \[1\]. Dynamic programming over steps and
-//! abstract states gives the operators that can occur at each step of a plan cheaper than the best known one,
-//! and the number of steps beyond which there is no such plan. Cost partitioning adds up several projections.
+//! A projection to a few finite-domain variables is solved exactly. Dijkstra's algorithm from the
+//! abstract goal states gives a consistent, admissible heuristic: a pattern database \[1\]. Dynamic
+//! programming over steps and abstract states gives the operators that can occur at each step of a
+//! plan cheaper than the best known one, and the number of steps beyond which there is no such
+//! plan. Cost partitioning adds up several projections.
 //!
 //! \[1\] S. Edelkamp: Planning with pattern databases, ECP 2001.
 

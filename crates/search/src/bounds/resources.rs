@@ -1,8 +1,9 @@
 //! Lower bounds on the consumption of a resource before it is replenished.
 //!
-//! A numeric variable is a resource if every operator that may lower it requires that it does not fall below 0.
-//! The least consumption, in a projection, on the way to the goal or to a replenishing operator is what a state
-//! must have left: the resource-to-go of constrained shortest paths \[1\].
+//! A numeric variable is a resource if every operator that may lower it requires that it does not
+//! fall below 0. The least consumption, in a projection, on the way to the goal or to a
+//! replenishing operator is what a state must have left: the resource-to-go of constrained shortest
+//! paths \[1\].
 //!
 //! \[1\] I. Dumitrescu, N. Boland: Improved preprocessing, labeling and scaling algorithms for the
 //! weight-constrained shortest path problem, Networks 42(3), 2003.

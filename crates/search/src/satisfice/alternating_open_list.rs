@@ -1,7 +1,8 @@
 //! Alternating open list: several lists in turns, each sorted by its heuristic value.
 //!
-//! The search is lazy: the operators applicable in a state inherit its value \[1\]. A list therefore holds states,
-//! each with its operators. Lists of preferred operators are boosted after progress.
+//! The search is lazy: the operators applicable in a state inherit its value \[1\]. A list
+//! therefore holds states, each with its operators. Lists of preferred operators are boosted after
+//! progress.
 //!
 //! \[1\] M. Helmert: The Fast Downward planning system, JAIR 26, 2006, section 5.
 

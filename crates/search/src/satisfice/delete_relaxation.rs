@@ -1,10 +1,10 @@
 //! Delete relaxation of a ground task as nodes with conditions and effects.
 //!
-//! Propositions are facts, disjunctions and numeric comparisons. A node is an operator, a conditional effect, a
-//! rule of a derived variable, or one way to make a disjunction true. A derived variable that is required to be
-//! false counts as false. The best designs are selected for each purpose separately. The number of repetitions
-//! until a comparison holds is estimated as by Scala et al. \[1\]; an operator that does not add a constant counts
-//! as achieving it at once.
+//! Propositions are facts, disjunctions and numeric comparisons. A node is an operator, a
+//! conditional effect, a rule of a derived variable, or one way to make a disjunction true. A
+//! derived variable that is required to be false counts as false. The best designs are selected for
+//! each purpose separately. The number of repetitions until a comparison holds is estimated as by
+//! Scala et al. \[1\]; an operator that does not add a constant counts as achieving it at once.
 //!
 //! \[1\] E. Scala, P. Haslum, S. Thiébaux: Heuristics for numeric planning via subgoaling, IJCAI 2016.
 

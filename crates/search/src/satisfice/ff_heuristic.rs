@@ -1,7 +1,8 @@
-//! FF heuristic with additive costs: the cost of a relaxed plan, and its applicable operators as preferred operators.
+//! FF heuristic with additive costs: the cost of a relaxed plan, and its applicable operators as
+//! preferred operators.
 //!
-//! Costs of propositions are those of h^add \[1\], computed in the order of Dijkstra's algorithm. The relaxed plan
-//! consists of the cheapest supporters, followed back from the goal \[2\].
+//! Costs of propositions are those of h^add \[1\], computed in the order of Dijkstra's algorithm.
+//! The relaxed plan consists of the cheapest supporters, followed back from the goal \[2\].
 //!
 //! - \[1\] B. Bonet, H. Geffner: Planning as heuristic search, Artificial Intelligence 129, 2001.
 //! - \[2\] E. Keyder, H. Geffner: Heuristics for planning with action costs revisited, ECAI 2008.

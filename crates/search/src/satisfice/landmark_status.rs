@@ -1,7 +1,8 @@
 //! Landmark status: the landmarks that were reached on the path to a state, and the number still required.
 //!
-//! A landmark is reached when it holds and its predecessors were reached. A reached landmark is required again
-//! if it is a goal that does not hold, or needed right before another landmark that was not reached \[1\].
+//! A landmark is reached when it holds and its predecessors were reached. A reached landmark is
+//! required again if it is a goal that does not hold, or needed right before another landmark that
+//! was not reached \[1\].
 //!
 //! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 5.
 

@@ -1,9 +1,10 @@
 //! Landmarks and their orders, found backwards from the goal \[1\].
 //!
-//! Each condition that all possible first achievers of a landmark share is a landmark, ordered greedily-necessary
-//! before it. If each achiever requires a fact of one predicate, the disjunction of these facts is a landmark.
-//! Facts that are unreachable without a landmark come after it. Reasonable orders delay a landmark that would
-//! be deleted on the way to another one; they only guide the search.
+//! Each condition that all possible first achievers of a landmark share is a landmark, ordered
+//! greedily-necessary before it. If each achiever requires a fact of one predicate, the disjunction
+//! of these facts is a landmark. Facts that are unreachable without a landmark come after it.
+//! Reasonable orders delay a landmark that would be deleted on the way to another one; they only
+//! guide the search.
 //!
 //! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 4.
 

@@ -1,13 +1,15 @@
-//! Satisficing search: lazy greedy best-first search, then weighted A\*, guided by the FF heuristic and landmarks, as in LAMA \[1\].
+//! Satisficing search: lazy greedy best-first search, then weighted A\*, guided by the FF heuristic
+//! and landmarks, as in LAMA \[1\].
 //!
 //! `delete_relaxation` is the task without deletes, `ff_heuristic` computes relaxed plans, `landmarks` finds
 //! landmarks, and `landmark_status` tracks which of them a path has reached. `search` is the search with an
 //! `alternating_open_list` over the states of a `store`.
 //!
-//! Heuristic values never serve as proofs: callers execute each plan, and only an exhausted search reports that
-//! there is no plan.
+//! Heuristic values never serve as proofs: callers execute each plan, and only an exhausted search
+//! reports that there is no plan.
 //!
-//! \[1\] S. Richter, M. Westphal: The LAMA planner: guiding cost-based anytime planning with landmarks, JAIR 39, 2010.
+//! \[1\] S. Richter, M. Westphal: The LAMA planner: guiding cost-based anytime planning with
+//! landmarks, JAIR 39, 2010.
 
 pub mod alternating_open_list;
 pub mod bucket_queue;
@@ -41,7 +43,8 @@ const SEARCH_SEQUENCE: [(bool, HeuristicWeight); 6] = [
     (true, HeuristicWeight::Times(1)),
 ];
 
-/// One part in `MEMORY_SHARE` of the available memory is the limit of one search; beyond it the next search begins.
+/// One part in `MEMORY_SHARE` of the available memory is the limit of one search; beyond it the
+/// next search begins.
 const MEMORY_SHARE: usize = 16;
 
 /// Outcome of one turn of the satisficing search.

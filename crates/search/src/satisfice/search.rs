@@ -1,9 +1,9 @@
 //! Lazy greedy best-first search with preferred operators, then weighted A\* with decreasing weights.
 //!
-//! A state is evaluated when it is expanded, and its successors are queued with its values \[1\]: the cost of the
-//! relaxed plan and the number of required landmarks, in turns. The first search counts steps, the next ones
-//! costs, with smaller and smaller weights \[2\]. A search that ends without a plan is exhaustive, except for
-//! states without a relaxed plan.
+//! A state is evaluated when it is expanded, and its successors are queued with its values \[1\]:
+//! the cost of the relaxed plan and the number of required landmarks, in turns. The first search
+//! counts steps, the next ones costs, with smaller and smaller weights \[2\]. A search that ends
+//! without a plan is exhaustive, except for states without a relaxed plan.
 //!
 //! - \[1\] M. Helmert: The Fast Downward planning system, JAIR 26, 2006, section 5.
 //! - \[2\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 6.

@@ -7,7 +7,7 @@ use rustc_hash::FxBuildHasher;
 
 use task::task::{State, Task};
 
-/// Position of a variable in a packed state.
+/// Bit field of a variable in a packed state.
 #[derive(Debug, Clone, Copy)]
 struct Field {
     word: usize,

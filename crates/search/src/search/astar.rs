@@ -1,4 +1,5 @@
-//! A\* with Pareto dominance over numeric variables. Among the cheapest plans it returns one with the fewest steps.
+//! A\* with Pareto dominance over numeric variables. Among the cheapest plans it returns one with
+//! the fewest steps.
 //!
 //! States with equal finite-domain variables are compared by cost and by numeric variables. Where a higher
 //! value is never worse (a battery), a state is dominated by another one that costs no more and has at least

@@ -1,9 +1,10 @@
 //! h² mutexes: pairs of facts that no state on a path from the initial state to the goal contains.
 //!
-//! Forward h² \[1\] finds pairs that no reachable state contains. Backward h² \[2\] finds pairs that no state contains
-//! from which the goal is reachable, so it detects dead ends. An operator is useless if such a pair holds
-//! before or after it. Numeric conditions, clauses and derived facts are ignored, and conditional effects may
-//! fire or not. The analysis is therefore conservative: it may miss mutexes.
+//! Forward h² \[1\] finds pairs that no reachable state contains. Backward h² \[2\] finds pairs
+//! that no state contains from which the goal is reachable, so it detects dead ends. An operator is
+//! useless if such a pair holds before or after it. Numeric conditions, clauses and derived facts
+//! are ignored, and conditional effects may fire or not. The analysis is therefore conservative: it
+//! may miss mutexes.
 //!
 //! \[1\] P. Haslum, H. Geffner: Admissible heuristics for optimal planning, AIPS 2000.
 //! \[2\] V. Alcázar, Á. Torralba: A reminder about the importance of computing and exploiting invariants in

@@ -1,10 +1,11 @@
 //! Pareto front of many labels, stored as a tree of boxes.
 //!
-//! Each box stores the best and the worst value of each criterion among its labels. Whole boxes are skipped in
-//! dominance queries, as in the ND-tree \[1\]. Boxes are split where their labels differ, as in a k-d tree.
+//! Each box stores the best and the worst value of each criterion among its labels. Whole boxes are
+//! skipped in dominance queries, as in the ND-tree \[1\]. Boxes are split where their labels
+//! differ, as in a k-d tree.
 //!
-//! \[1\] A. Jaszkiewicz, T. Lust: ND-Tree-Based Update: A Fast Algorithm for the Dynamic Nondominance Problem,
-//! IEEE Transactions on Evolutionary Computation 22(5), 2018.
+//! \[1\] A. Jaszkiewicz, T. Lust: ND-Tree-Based Update: A Fast Algorithm for the Dynamic
+//! Nondominance Problem, IEEE Transactions on Evolutionary Computation 22(5), 2018.
 
 use task::number::dense;
 

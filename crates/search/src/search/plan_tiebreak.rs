@@ -5,9 +5,9 @@
 //! in the domain, of its arguments in the problem, and of its designs. Names play no part. A design is not
 //! chosen if a strictly better one exists (cheaper, or with less consumption).
 //!
-//! The known plan bounds both searches: one for the fewest reconfigurations, and a depth-first search in model
-//! order that stops at the first plan. If these bounds do not keep the searches small, the choice is still
-//! deterministic, but not in this order.
+//! The known plan bounds both searches: one for the fewest reconfigurations, and a depth-first
+//! search in model order that stops at the first plan. If these bounds do not keep the searches
+//! small, the choice is still deterministic, but not in this order.
 
 use std::cell::{Cell, RefCell};
 use std::cmp::Reverse;

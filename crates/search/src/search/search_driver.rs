@@ -1,9 +1,10 @@
 //! The order of searches: a first plan, an optimal plan, and the closed states that prove it.
 //!
-//! A\* with pattern databases runs first. If it does not finish soon, greedy best-first search finds some plan.
-//! Then two searches run interleaved with equal work: one with pattern databases only, one with LM-cut as well.
-//! The first to finish has the answer, so the total work is at most twice that of the better search. Work is
-//! counted in units, not in time, so the result is deterministic.
+//! A\* with pattern databases runs first. If it does not finish soon, greedy best-first search
+//! finds some plan. Then two searches run interleaved with equal work: one with pattern databases
+//! only, one with LM-cut as well. The first to finish has the answer, so the total work is at most
+//! twice that of the better search. Work is counted in units, not in time, so the result is
+//! deterministic.
 
 use std::sync::Arc;
 
@@ -312,7 +313,8 @@ fn cheaper<N: Ord>(first: Option<GroundPlan<N>>, second: Option<GroundPlan<N>>) 
 pub type ClosedEntry<N> = (Vec<u32>, Vec<N>, N);
 
 /// States whose f value is below `cost` (all of them if `cost` is `None`), after an exhaustive
-/// search. Returns `None` if a plan cheaper than `cost` exists or a limit is reached.
+/// search. Returns `None` if a plan cheaper than `cost` (or any plan, if `cost` is `None`) exists,
+/// or a limit is reached.
 pub fn closed_labels<N: TaskNumber>(
     context: Context<'_, N>,
     bounds: &impl Heuristic<N>,

@@ -1,9 +1,10 @@
 //! State registry and closed list with packed states.
 //!
-//! Finite-domain values take as many bits as they need. Equal numbers are stored once, and states hold their
-//! positions. A *place* combines the finite-domain values with the numbers that are not monotone. Places are
-//! found by a hash table over one arena. The states of a place differ in cost and in comparable numbers; those
-//! that no other state of the place dominates form its Pareto front.
+//! Finite-domain values take as many bits as they need. Equal numbers are stored once, and states
+//! hold their positions. A *place* combines the finite-domain values with the numbers that are not
+//! monotone. Places are found by a hash table over one arena. The states of a place differ in cost
+//! and in comparable numbers; those that no other state of the place dominates form its Pareto
+//! front.
 
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;

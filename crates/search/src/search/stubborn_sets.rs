@@ -4,27 +4,31 @@
 //! operators is stubborn in a state \[1\] if it contains
 //!
 //! - every operator that makes some unsatisfied part of the goal true;
-//! - for each of its inapplicable operators, every operator that makes some unsatisfied part of its precondition true;
-//! - for each of its applicable operators, every operator that it *disturbs*: one that requires or sets another
-//!   value of a variable that it sets, or has a conditional effect on such a value. If it has conditional
-//!   effects itself, it also contains every operator that sets one of their conditions.
+//! - for each of its inapplicable operators, every operator that makes some unsatisfied part of its
+//!   precondition true;
+//! - for each of its applicable operators, every operator that it *disturbs*: one that requires or
+//!   sets another value of a variable that it sets, or has a conditional effect on such a value. If
+//!   it has conditional effects itself, it also contains every operator that sets one of their
+//!   conditions.
 //!
-//! Proof sketch. Take any plan from the state, and its first operator in the set. One exists by the first
-//! condition. It is applicable, because by the second condition an earlier operator would otherwise be in the
-//! set. By the third condition it can be moved to the front: the plan has the same operators in another order.
-//! An earlier operator may make it inapplicable for a while; weak stubborn sets allow this \[2\]. So a cheapest
-//! plan with the fewest steps is preserved from each state. Pruning of dominated states and of symmetric states
-//! remains sound \[3\]: the representative has a plan with the same operators or their images.
+//! Proof sketch. Take any plan from the state, and its first operator in the set. One exists by the
+//! first condition. It is applicable, because by the second condition an earlier operator would
+//! otherwise be in the set. By the third condition it can be moved to the front: the plan has the
+//! same operators in another order. An earlier operator may make it inapplicable for a while; weak
+//! stubborn sets allow this \[2\]. So a cheapest plan with the fewest steps is preserved from each
+//! state. Pruning of dominated states and of symmetric states remains sound \[3\]: the
+//! representative has a plan with the same operators or their images.
 //!
 //! If an operator requires one value of a variable and sets another one, other operators change the variable
 //! only from that value or from any value.
 //!
 //! Pruning is switched off when it removes too few operators to pay for its time.
 //!
-//! - \[1\] M. Wehrle, M. Helmert: Efficient stubborn sets: generalized algorithms and selection strategies, ICAPS 2014.
+//! - \[1\] M. Wehrle, M. Helmert: Efficient stubborn sets: generalized algorithms and selection
+//!   strategies, ICAPS 2014.
 //! - \[2\] S. Sievers, M. Wehrle: On weak stubborn sets in classical planning, IJCAI 2021.
-//! - \[3\] M. Wehrle, M. Helmert, A. Shleyfman, M. Katz: Integrating partial order reduction and symmetry elimination
-//!   for cost-optimal classical planning, IJCAI 2015.
+//! - \[3\] M. Wehrle, M. Helmert, A. Shleyfman, M. Katz: Integrating partial order reduction and
+//!   symmetry elimination for cost-optimal classical planning, IJCAI 2015.
 
 use std::sync::Arc;
 

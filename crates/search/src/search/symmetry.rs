@@ -1,9 +1,10 @@
 //! Symmetry reduction: one state represents all states that differ only in interchangeable objects.
 //!
-//! Orbit search \[1\]: every plan from a state has an image, of the same cost, from the image of the state under an
-//! exchange of objects that changes neither operators nor goal. A state is made canonical by exchanges of
-//! neighbouring objects as long as they lower it in the lexicographic order. Symmetric states usually get the
-//! same canonical state; completeness is not needed for soundness.
+//! Orbit search \[1\]: every plan from a state has an image, of the same cost, from the image of
+//! the state under an exchange of objects that changes neither operators nor goal. A state is made
+//! canonical by exchanges of neighbouring objects as long as they lower it in the lexicographic
+//! order. Symmetric states usually get the same canonical state; completeness is not needed for
+//! soundness.
 //!
 //! \[1\] C. Domshlak, M. Katz, A. Shleyfman: Enhanced symmetry breaking in cost-optimal planning as forward
 //! search, ICAPS 2012.

@@ -1,10 +1,11 @@
-//! Compression-safe actions: their end can follow their start directly, so that they take one step of the search.
+//! Compression-safe actions: their end can follow their start directly, so that they take one step
+//! of the search.
 //!
-//! Happenings that do not interfere are unordered in time, independent of their order in a sequence. If an end
-//! interferes with nothing that can happen while its action runs, it can be moved before all of that without
-//! changing times or states. Coles et al. \[1\] require actions that only add facts at their end. Here the
-//! condition is about what can happen in between, by the facts that hold while the action runs, so more actions
-//! qualify and no plan is lost.
+//! Happenings that do not interfere are unordered in time, independent of their order in a
+//! sequence. If an end interferes with nothing that can happen while its action runs, it can be
+//! moved before all of that without changing times or states. Coles et al. \[1\] require actions
+//! that only add facts at their end. Here the condition is about what can happen in between, by the
+//! facts that hold while the action runs, so more actions qualify and no plan is lost.
 //!
 //! \[1\] A. Coles, M. Fox, K. Halsey, D. Long, A. Smith: Managing concurrency in temporal planning using
 //! planner-scheduler interaction, Artificial Intelligence 173, 2009.

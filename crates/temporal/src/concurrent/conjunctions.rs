@@ -1,12 +1,12 @@
 //! Explicit conjunctions in the delete relaxation, for facts that no action restores.
 //!
-//! A relaxed plan deletes nothing, so an action that deletes a fact needed later looks useful even if nothing
-//! adds the fact again. For each such fact the relaxed task gets conjunctions with the facts that are needed at
-//! the same time. Only rules that keep the fact achieve them. These are conjunctions of two facts as in the task
-//! Π^C \[1\], for a few selected facts.
+//! A relaxed plan deletes nothing, so an action that deletes a fact needed later looks useful even
+//! if nothing adds the fact again. For each such fact the relaxed task gets conjunctions with the
+//! facts that are needed at the same time. Only rules that keep the fact achieve them. These are
+//! conjunctions of two facts as in the task Π^C \[1\], for a few selected facts.
 //!
-//! \[1\] E. Keyder, J. Hoffmann, P. Haslum: Improving delete relaxation heuristics through explicitly represented
-//! conjunctions, JAIR 50, 2014.
+//! \[1\] E. Keyder, J. Hoffmann, P. Haslum: Improving delete relaxation heuristics through
+//! explicitly represented conjunctions, JAIR 50, 2014.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 use task::lists::Lists;

@@ -1,8 +1,10 @@
-//! Durations that depend on the state or that the planner chooses: one fluent per schema, set by the start and cleared by the end.
+//! Durations that depend on the state or that the planner chooses: one fluent per schema, set by
+//! the start and cleared by the end.
 //!
-//! `?duration` has the value of the expression in the state in which the action starts \[1\]. The start assigns it
-//! to the fluent, which the end, its effects and the temporal network read. A duration that the planner chooses
-//! is set by an operator that never happens; the reachability analysis lets it be any value from 0.
+//! `?duration` has the value of the expression in the state in which the action starts \[1\]. The
+//! start assigns it to the fluent, which the end, its effects and the temporal network read. A
+//! duration that the planner chooses is set by an operator that never happens; the reachability
+//! analysis lets it be any value from 0.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 5.2.
 

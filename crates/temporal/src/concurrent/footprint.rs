@@ -1,7 +1,8 @@
 //! Read and write sets of happenings, by the rule of no moving targets of PDDL 2.1 \[1\].
 //!
-//! Everything that a condition or an effect mentions counts as read, even if it does not matter in a state: all
-//! instances of an atom below a quantifier, and everything that the axioms of a derived predicate depend on.
+//! Everything that a condition or an effect mentions counts as read, even if it does not matter in
+//! a state: all instances of an atom below a quantifier, and everything that the axioms of a
+//! derived predicate depend on.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.4.
 

@@ -1,10 +1,11 @@
 //! Lazy greedy best-first search over sequences of happenings, for a first plan and then better ones.
 //!
-//! Temporal states are evaluated when they are expanded, and queued by the value of their predecessor. Preferred
-//! happenings have a second queue \[1\]. A third queue prefers successors of states with a novel fact, among
-//! states with as many unsatisfied goals \[2\]. If ends directly follow their starts in the sequence, far fewer
-//! states remain, and most tasks still have a plan; times overlap all the same. Only the first state with the
-//! same facts and running actions is expanded, so this search may miss plans and proves nothing.
+//! Temporal states are evaluated when they are expanded, and queued by the value of their
+//! predecessor. Preferred happenings have a second queue \[1\]. A third queue prefers successors of
+//! states with a novel fact, among states with as many unsatisfied goals \[2\]. If ends directly
+//! follow their starts in the sequence, far fewer states remain, and most tasks still have a plan;
+//! times overlap all the same. Only the first state with the same facts and running actions is
+//! expanded, so this search may miss plans and proves nothing.
 //!
 //! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010.
 //! \[2\] N. Lipovetzky, H. Geffner: Best-first width search, AAAI 2017.

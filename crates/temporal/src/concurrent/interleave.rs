@@ -1,6 +1,7 @@
 //! Interleaves exact and greedy search with growing, equal budgets.
 //!
-//! Small tasks are proved before the greedy search begins. After that, its plans are incumbents of both searches.
+//! Small tasks are proved before the greedy search begins. After that, its plans are incumbents of
+//! both searches.
 
 use search::bounds::Bounds;
 use task::limits::Limits;
@@ -20,8 +21,8 @@ use crate::concurrent::temporal_task::TemporalTask;
 
 /// Expansions of the exact search per evaluation of the greedy search.
 const EXACT_BUDGET: usize = 4;
-/// Number of rounds in which the search for sequential plans runs although a plan is known. Its best plan is an upper
-/// bound.
+/// Number of rounds in which the search for sequential plans runs although a plan is known. Its
+/// best plan is an upper bound.
 const WHOLE: usize = 2;
 
 /// Interleaves the searches until the exact one is exhausted, a limit is reached, or `rounds`

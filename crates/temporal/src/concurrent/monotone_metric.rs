@@ -1,4 +1,5 @@
-//! Monotonicity of numbers that only the metric reads: if they only grow, their current value is a lower bound.
+//! Monotonicity of numbers that only the metric reads: if they only grow, their current value is a
+//! lower bound.
 
 use rustc_hash::FxHashSet;
 use task::number::{Int, Rational};

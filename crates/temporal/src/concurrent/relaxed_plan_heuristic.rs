@@ -1,7 +1,8 @@
 //! Relaxed-plan heuristic of temporal states, with preferred happenings.
 //!
-//! Costs are added over the conditions of a rule \[1\], and the cheapest rule of each proposition forms the relaxed
-//! plan \[2\]. Its goals are those of the task and the ends of all running actions.
+//! Costs are added over the conditions of a rule \[1\], and the cheapest rule of each proposition
+//! forms the relaxed plan \[2\]. Its goals are those of the task and the ends of all running
+//! actions.
 //!
 //! \[1\] B. Bonet, H. Geffner: Planning as heuristic search, Artificial Intelligence 129, 2001.
 //! \[2\] J. Hoffmann, B. Nebel: The FF planning system, JAIR 14, 2001; E. Keyder, H. Geffner: Heuristics for

@@ -1,8 +1,9 @@
 //! Upper bounds on the number of simultaneous runs of one ground action.
 //!
-//! PDDL 2.1 lets an action start while it runs. Most cannot, because their start requires a fact that it deletes.
-//! A run that starts and ends without a change is redundant. Both are proved by the facts that hold while the
-//! action runs; docs/decisions/runs-that-overlap.md has the arguments.
+//! PDDL 2.1 lets an action start while it runs. Most cannot, because their start requires a fact
+//! that it deletes. A run that starts and ends without a change is redundant. Both are proved by
+//! the facts that hold while the action runs; docs/decisions/runs-that-overlap.md has the
+//! arguments.
 
 use std::collections::BTreeMap;
 

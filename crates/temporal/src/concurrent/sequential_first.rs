@@ -1,11 +1,12 @@
-//! Sequential plans, moved to the earliest times: the first plan of a task that does not require overlap, and an
-//! upper bound on the cost of a best plan for all other tasks.
+//! Sequential plans, moved to the earliest times: the first plan of a task that does not require
+//! overlap, and an upper bound on the cost of a best plan for all other tasks.
 //!
-//! These plans solve the task in which actions do not overlap. Searches for that task are better informed: it has
-//! fewer variables with more values, landmarks, mutexes and interchangeable objects. Each resulting sequence is
-//! executed like any other sequence, so that its actions overlap where they can. So every plan that is returned is
-//! one of the overlapping task. A sequence that is not, for example because a timed initial literal would interrupt
-//! an action, is dropped.
+//! These plans solve the task in which actions do not overlap. Searches for that task are better
+//! informed: it has fewer variables with more values, landmarks, mutexes and interchangeable
+//! objects. Each resulting sequence is executed like any other sequence, so that its actions
+//! overlap where they can. So every plan that is returned is one of the overlapping task. A
+//! sequence that is not, for example because a timed initial literal would interrupt an action, is
+//! dropped.
 
 use std::cell::OnceCell;
 

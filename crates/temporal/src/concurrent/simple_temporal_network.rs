@@ -1,14 +1,15 @@
 //! The temporal part of a search node: an incrementally propagated simple temporal network \[1\].
 //!
-//! The times of a sequence of happenings and the constraints between them form a simple temporal network. Later
-//! happenings only add lower bounds: not before a time, and not within the separation of a time. The network
-//! therefore keeps, for each kind of access to each atom, only the latest time as a lower bound. Starts of
-//! running actions are *time points* that can still be delayed, together with the happenings that depend on
-//! them, so that an end meets its constraints. An end fixes its time point at the earliest possible time.
-//! Happenings that do not interfere are not ordered by their position in the sequence \[2\].
+//! The times of a sequence of happenings and the constraints between them form a simple temporal
+//! network. Later happenings only add lower bounds: not before a time, and not within the
+//! separation of a time. The network therefore keeps, for each kind of access to each atom, only
+//! the latest time as a lower bound. Starts of running actions are *time points* that can still be
+//! delayed, together with the happenings that depend on them, so that an end meets its constraints.
+//! An end fixes its time point at the earliest possible time. Happenings that do not interfere are
+//! not ordered by their position in the sequence \[2\].
 //!
-//! Times are sums over the happenings of a sequence: fewer than 2^32 terms, each below 2^91 (a duration plus the
-//! separation). Missing upper bounds (`Int::MAX`) take no part in arithmetic.
+//! Times are sums over the happenings of a sequence: fewer than 2^32 terms, each below 2^91 (a
+//! duration plus the separation). Missing upper bounds (`Int::MAX`) take no part in arithmetic.
 //!
 //! \[1\] R. Dechter, I. Meiri, J. Pearl: Temporal constraint networks, Artificial Intelligence 49, 1991.
 //! \[2\] A. Coles, A. Coles, M. Fox, D. Long: Forward-chaining partial-order planning, ICAPS 2010.

@@ -1,9 +1,10 @@
 //! Splits durative actions into starts and ends: a lifted task in which each schema is a single happening.
 //!
-//! A durative action becomes two instantaneous ones, the *snap actions* of Fox and Long \[1\], joined by an atom
-//! that holds while the instance runs. Its condition over all becomes a third schema that never happens; the
-//! condition is checked while the instance runs. An instance of duration 0 is one happening without a condition
-//! over all. Timed initial literals become a sequence of schemas without parameters.
+//! A durative action becomes two instantaneous ones, the *snap actions* of Fox and Long \[1\],
+//! joined by an atom that holds while the instance runs. Its condition over all becomes a third
+//! schema that never happens; the condition is checked while the instance runs. An instance of
+//! duration 0 is one happening without a condition over all. Timed initial literals become a
+//! sequence of schemas without parameters.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.
 

@@ -1,7 +1,8 @@
 //! Packed temporal states of the exact search.
 //!
-//! Finite-domain values take as many bits as they need, and times as many bytes. States that can dominate each
-//! other share a *place*: the state, the running actions, and the numbers that are not comparable.
+//! Finite-domain values take as many bits as they need, and times as many bytes. States that can
+//! dominate each other share a *place*: the state, the running actions, and the numbers that are
+//! not comparable.
 
 use std::hash::{Hash, Hasher};
 

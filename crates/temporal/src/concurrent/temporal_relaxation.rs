@@ -1,11 +1,13 @@
 //! Delete relaxation of the split task: rules from conditions to effects.
 //!
-//! Each start, end and instantaneous action becomes a rule, as in the relaxed planning graphs of CRIKEY \[1\]. That
-//! an instance runs is a fact that its start adds and its end requires, so required concurrency is visible. An
-//! end requires the condition over all as well. A numeric condition needs as many applications of a rule as its
-//! amount \[2\]; a condition on a duration that the planner chooses always holds.
+//! Each start, end and instantaneous action becomes a rule, as in the relaxed planning graphs of
+//! CRIKEY \[1\]. That an instance runs is a fact that its start adds and its end requires, so
+//! required concurrency is visible. An end requires the condition over all as well. A numeric
+//! condition needs as many applications of a rule as its amount \[2\]; a condition on a duration
+//! that the planner chooses always holds.
 //!
-//! \[1\] A. Coles, M. Fox, D. Long, A. Smith: Planning with problems requiring temporal coordination, AAAI 2008.
+//! \[1\] A. Coles, M. Fox, D. Long, A. Smith: Planning with problems requiring temporal
+//! coordination, AAAI 2008.
 //! \[2\] E. Scala, P. Haslum, S. Thiébaux: Heuristics for numeric planning via subgoaling, IJCAI 2016.
 
 use rustc_hash::{FxHashMap, FxHashSet};

@@ -1,11 +1,12 @@
 //! Linear programs in exact rationals, solved again after each added constraint.
 //!
-//! A program is stored as a *dictionary* \[1\]: basic columns and slacks as expressions over the nonbasic columns.
-//! The dual simplex algorithm repairs a violated constraint from the last optimum; the primal one minimises
-//! another objective. Both use Bland's rule, so that they terminate \[2\].
+//! A program is stored as a *dictionary* \[1\]: basic columns and slacks as expressions over the
+//! nonbasic columns. The dual simplex algorithm repairs a violated constraint from the last
+//! optimum; the primal one minimises another objective. Both use Bland's rule, so that they
+//! terminate \[2\].
 //!
-//! \[1\] V. Chvátal: Linear Programming, 1983. \[2\] R. Bland: New finite pivoting rules for the simplex method,
-//! Mathematics of Operations Research 2, 1977.
+//! \[1\] V. Chvátal: Linear Programming, 1983. \[2\] R. Bland: New finite pivoting rules for the
+//! simplex method, Mathematics of Operations Research 2, 1977.
 
 use num_traits::Zero;
 use task::number::Rational;

@@ -4,7 +4,8 @@
 //! Only the lexicographically first sequence of each trace is searched. An end names the run of its instance
 //! that it ends; runs of one instance keep their order.
 //!
-//! \[1\] A. Mazurkiewicz: Concurrent program schemes and their interpretations, DAIMI PB 78, Aarhus University, 1977.
+//! \[1\] A. Mazurkiewicz: Concurrent program schemes and their interpretations, DAIMI PB 78, Aarhus
+//! University, 1977.
 
 use rustc_hash::FxHashMap;
 use task::task::OperatorId;

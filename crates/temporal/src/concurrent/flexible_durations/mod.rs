@@ -1,12 +1,15 @@
-//! Temporal planning with durations that the planner chooses: a linear program for each sequence of happenings.
+//! Temporal planning with durations that the planner chooses: a linear program for each sequence of
+//! happenings.
 //!
-//! The bounds of a duration are conditions at the start of its action, and effects may depend on it. A sequence
-//! has a plan if some times and durations satisfy all constraints. This is a linear program, as in COLIN \[1\].
-//! It is solved in exact arithmetic (`linear_program`): a plan must not be wrong by a rounded epsilon, and
-//! infeasibility is part of proofs. An exhaustive and a greedy search run interleaved (`search`). If every action
-//! can have its minimal duration, the searches for fixed durations are used as well.
+//! The bounds of a duration are conditions at the start of its action, and effects may depend on
+//! it. A sequence has a plan if some times and durations satisfy all constraints. This is a linear
+//! program, as in COLIN \[1\]. It is solved in exact arithmetic (`linear_program`): a plan must not
+//! be wrong by a rounded epsilon, and infeasibility is part of proofs. An exhaustive and a greedy
+//! search run interleaved (`search`). If every action can have its minimal duration, the searches
+//! for fixed durations are used as well.
 //!
-//! \[1\] A. Coles, A. Coles, M. Fox, D. Long: COLIN: planning with continuous linear numeric change, JAIR 44, 2012.
+//! \[1\] A. Coles, A. Coles, M. Fox, D. Long: COLIN: planning with continuous linear numeric
+//! change, JAIR 44, 2012.
 
 mod affine;
 mod answer;

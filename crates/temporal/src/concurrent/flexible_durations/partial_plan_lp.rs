@@ -1,12 +1,14 @@
 //! Partial plans with open times and durations: a prefix of happenings and its linear program.
 //!
-//! As in POPF \[1\] and COLIN \[2\]. Each start has a column for its time, and one for its duration if the planner
-//! chooses the duration. Numeric fluents are expressions over earlier durations. So are conditions, each of
-//! which is a constraint. Interfering happenings are a separation apart, in the order of the sequence. The end
-//! of a running action is constrained as soon as its predecessors have happened. The first column is the makespan.
+//! As in POPF \[1\] and COLIN \[2\]. Each start has a column for its time, and one for its duration
+//! if the planner chooses the duration. Numeric fluents are expressions over earlier durations. So
+//! are conditions, each of which is a constraint. Interfering happenings are a separation apart, in
+//! the order of the sequence. The end of a running action is constrained as soon as its
+//! predecessors have happened. The first column is the makespan.
 //!
 //! \[1\] A. Coles, A. Coles, M. Fox, D. Long: Forward-chaining partial-order planning, ICAPS 2010.
-//! \[2\] A. Coles, A. Coles, M. Fox, D. Long: COLIN: planning with continuous linear numeric change, JAIR 44, 2012.
+//! \[2\] A. Coles, A. Coles, M. Fox, D. Long: COLIN: planning with continuous linear numeric
+//! change, JAIR 44, 2012.
 
 use task::number::{Int, Rational, dense};
 use task::task::number::TaskNumber;

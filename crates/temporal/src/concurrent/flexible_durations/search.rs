@@ -1,9 +1,10 @@
 //! Search over sequences of happenings with durations from linear programs: greedy and exhaustive.
 //!
-//! Both searches are lazy: a sequence is evaluated, and its program solved, when it is expanded. The greedy
-//! search is guided by relaxed plans in which a number takes the best value that the bounds of durations allow.
-//! It keeps one sequence for each combination of values, running actions and ranges of numbers. The exhaustive
-//! search expands the sequence with the least metric of its program first, and keeps one sequence per trace.
+//! Both searches are lazy: a sequence is evaluated, and its program solved, when it is expanded.
+//! The greedy search is guided by relaxed plans in which a number takes the best value that the
+//! bounds of durations allow. It keeps one sequence for each combination of values, running actions
+//! and ranges of numbers. The exhaustive search expands the sequence with the least metric of its
+//! program first, and keeps one sequence per trace.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
