@@ -1,18 +1,15 @@
-//! Design selection without a plan: assigns designs to functions that compete for components or
-//! share budgets.
+//! Design selection without a plan, for functions that compete for components or share budgets.
 //!
-//! The best assignment serves as many functions as possible, then violates the fewest requirements,
-//! then has the greatest sum of utilities. Ties go to the earlier designs of earlier functions. The
-//! three criteria form one integer, the worth: one more function outweighs all requirements, and
-//! one requirement outweighs all utilities. A component that only one design can use is a budget of
-//! one.
+//! The best assignment serves as many functions as possible, then violates the fewest requirements, then has
+//! the greatest sum of utilities. Ties go to the earlier designs of earlier functions. The three criteria
+//! form one integer, the worth: one more function outweighs all requirements, and one requirement outweighs
+//! all utilities. A component that only one design can use is a budget of one.
 //!
-//! The algorithm is dynamic programming over the functions with dominance: a partial assignment is
-//! dropped if another one has at least its worth and uses no more of any budget. It is also dropped
-//! if no completion keeps a budget, or if its upper bound does not exceed the best known worth. The
-//! upper bound is a Lagrangian relaxation of the budgets, valid for any multipliers \[1\].
-//! Subgradients find good multipliers in floating-point numbers \[2\]; they are rounded, so that
-//! the bound is exact.
+//! The algorithm is dynamic programming over the functions with dominance: a partial assignment is dropped
+//! if another one has at least its worth and uses no more of any budget. It is also dropped if no completion
+//! keeps a budget, or if its upper bound does not exceed the best known worth. The upper bound is a
+//! Lagrangian relaxation of the budgets, valid for any multipliers \[1\]. Subgradients find good multipliers
+//! in floating-point numbers \[2\]; rounding them keeps the bound exact.
 //!
 //! - \[1\] H. Everett: Generalized Lagrange Multiplier Method for Solving Problems of Optimum Allocation of
 //!   Resources, Operations Research 11(3), 1963.
@@ -57,8 +54,7 @@ pub struct Assignment {
     pub optimal: bool,
 }
 
-/// Computes the best assignment of designs to functions under budgets. Among equally good
-/// assignments, earlier designs are preferred.
+/// Computes the best assignment under budgets. Of equal assignments, earlier designs are preferred.
 pub fn configure(functions: &[Vec<DesignChoice>], budgets: &[BigRational], limits: &Limits) -> Assignment {
     let problem = Problem::new(functions, budgets);
     let (prices, incumbent) = problem.prices();
@@ -80,13 +76,11 @@ struct Item {
     demands: Vec<BigInt>,
 }
 
-/// The problem in integers.
 struct Problem {
     functions: Vec<Vec<Item>>,
     /// Budgets of the caller, followed by one budget per component.
     budgets: Vec<BigInt>,
-    /// Per function: least consumption of each budget by it and all later functions. One more entry
-    /// for the end.
+    /// Per function: least consumption of each budget by it and later ones; then a final entry.
     least: Vec<Vec<BigInt>>,
 }
 
@@ -115,8 +109,7 @@ impl Label {
     }
 }
 
-/// Lagrangian multiplier of each budget, as a multiple of 2^-`PRICE_BITS`, and the resulting upper
-/// bounds on the worth of functions.
+/// Lagrangian multipliers of the budgets in units of 2^-`PRICE_BITS`, and the resulting bounds.
 struct LagrangeMultipliers {
     each: Vec<BigInt>,
     /// Per function: bound for it and all later functions. One more entry for the end.
@@ -133,8 +126,7 @@ impl Problem {
     fn new(functions: &[Vec<DesignChoice>], budgets: &[BigRational]) -> Self {
         let all_designs = || functions.iter().flatten();
         let (utilities, _) = scaled(all_designs().map(|design| &design.utility));
-        // Utilities may be negative: a requirement outweighs the difference between any two sums of
-        // utilities.
+        // Utilities may be negative: a requirement outweighs any difference of two sums of them.
         let requirement: BigInt = utilities.iter().map(BigInt::abs).sum::<BigInt>() * 2 + 1;
         let function = &requirement * all_designs().map(|design| BigInt::from(design.missed)).sum::<BigInt>()
             + &requirement;
@@ -186,8 +178,7 @@ impl Problem {
         Label { spent: vec![BigInt::zero(); self.budgets.len()], ..Label::default() }
     }
 
-    /// Returns `true` if the budgets can be kept by some choice for the functions from index `from`
-    /// on.
+    /// Returns `true` if some choice for the functions from index `from` on keeps the budgets.
     fn fits(&self, label: &Label, from: usize) -> bool {
         let Some(least) = self.least.get(from) else { return true };
         let ahead = label.spent.iter().zip(least).map(|(spent, least)| spent + least);
@@ -205,8 +196,7 @@ impl Problem {
             let feasible = extended.find(|new| self.fits(new, at.saturating_add(1)));
             label = feasible.unwrap_or_else(|| label.with(None, None));
         }
-        // A later function with negative demand may not have been served, so feasibility is checked
-        // at the end.
+        // A later function with negative demand may be unserved, so feasibility is checked again.
         if self.fits(&label, self.functions.len()) {
             return label;
         }
@@ -273,8 +263,7 @@ impl Problem {
         (LagrangeMultipliers { each, after }, incumbent)
     }
 
-    /// Upper bound on the worth of completions of a partial assignment, as a multiple of
-    /// 2^-`PRICE_BITS`.
+    /// Upper bound on the worth of completions of a label, in units of 2^-`PRICE_BITS`.
     fn bound(&self, label: &Label, from: usize, prices: &LagrangeMultipliers) -> BigInt {
         let slack = self.budgets.iter().zip(&label.spent).map(|(budget, spent)| budget - spent);
         let paid: BigInt = slack.zip(&prices.each).map(|(slack, price)| slack * price).sum();
@@ -303,8 +292,7 @@ impl Problem {
                     if is_hopeless || next.iter().any(is_worse) {
                         continue;
                     }
-                    // Of equally good labels the older one is kept, since it comes first in the
-                    // order of preference.
+                    // Of equally good labels the older one is kept, which is preferred.
                     next.retain(|old| old.worth >= new.worth || !new.is_as_free(old));
                     next.push(new);
                 }

@@ -1,5 +1,4 @@
-//! A\* with Pareto dominance over numeric variables. Among the cheapest plans it returns one with
-//! the fewest steps.
+//! A\* with Pareto dominance over numeric variables; returns a cheapest plan with the fewest steps.
 //!
 //! States with equal finite-domain variables are compared by cost and by numeric variables. Where a higher
 //! value is never worse (a battery), a state is dominated by another one that costs no more and has at least
@@ -29,8 +28,7 @@ use crate::search::statistics::SearchStatistics;
 use crate::search::stubborn_sets::StubbornSetPruning;
 use crate::search::symmetry::Orbits;
 
-/// Work units charged for one expansion: taking a node from the open list and finding its
-/// applicable operators.
+/// Work units of an expansion: open list and applicable operators.
 const EXPANSION_COST: u64 = 2_000;
 /// Work units charged for one generated successor: applying the operator and looking the state up.
 const GENERATION_COST: u64 = 600;
@@ -42,8 +40,7 @@ const STUBBORN_SET_COST: u64 = 10;
 pub enum SearchOutcome<N = Int> {
     /// An optimal plan.
     Optimal(GroundPlan<N>),
-    /// Proof that no plan exists: every reachable state was expanded or is dominated by an expanded
-    /// one.
+    /// Proof that no plan exists: all reachable states were expanded or dominated.
     None,
     /// No proof: the best plan found. Returned if a limit was reached, or (with `None`) if the
     /// search proved that no plan is cheaper than the external incumbent.
@@ -62,11 +59,9 @@ pub struct SearchProblem<'a, N, E> {
 /// Order of the open list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OpenListOrder {
-    /// By f value, then by the lower bound on the length of the whole plan. The result has the
-    /// fewest steps among the cheapest plans.
+    /// By f value, then by lower bound on the plan length: fewest steps among the cheapest plans.
     Fewest,
-    /// By f value, then by the lower bound on the steps to the goal. The result is a cheapest plan
-    /// of any length.
+    /// By f value, then by lower bound on the steps to the goal: a cheapest plan of any length.
     Nearest,
     /// By heuristic value only, without the path cost (greedy best-first search).
     Greedy,
@@ -83,8 +78,7 @@ pub(super) enum OutOfMemoryPolicy {
     Needed,
 }
 
-/// Sort key of an open node: primary value, lower bound on steps, and a tie-breaker that prefers
-/// greater depth.
+/// Sort key of an open node: primary value, lower bound on steps, and depth (deepest first).
 type NodeKey<N> = (N, u32, u32);
 
 /// Tie-breaker that decreases with the depth of a node.
@@ -121,8 +115,7 @@ pub struct AStar<'a, N, E> {
     limit: Option<N>,
     /// Whether the incumbent was found by another component of the portfolio.
     incumbent_is_external: bool,
-    /// Length of the incumbent, if ties are broken by length. Nodes of equal cost that cannot lead
-    /// to a shorter plan are pruned.
+    /// Length of the incumbent, if ties are broken by length: nodes of equal cost must be shorter.
     fewest: Option<u32>,
     /// Number of stored states at which the search first compares its progress with its memory.
     first_look: usize,
@@ -175,8 +168,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         search
     }
 
-    /// Runs until more than `max_states` states are stored. Returns `None` if the search is not
-    /// finished by then; it can be resumed.
+    /// Runs until more than `max_states` states are stored. `None` if unfinished; it can be resumed.
     pub(super) fn run_until_states(
         &mut self,
         max_states: usize,
@@ -185,8 +177,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.resume(max_states, u64::MAX, hear)
     }
 
-    /// Runs until the total work exceeds `work` units. Returns `None` if the search is not finished
-    /// by then; it can be resumed.
+    /// Runs until the total work exceeds `work` units. `None` if unfinished; it can be resumed.
     pub(super) fn run_for_work(
         &mut self,
         work: u64,
@@ -213,8 +204,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
             if self.store.is_dominated(id) {
                 continue;
             }
-            // Nodes are popped in ascending order, so the first node that cannot improve the
-            // incumbent ends the search.
+            // Keys ascend, so the first node that cannot improve the incumbent ends the search.
             let (total, least, _) = &key;
             if self.can_stop_at(total, *least) {
                 return Some(self.outcome_when_exhausted());
@@ -300,8 +290,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         }
     }
 
-    /// Sets the cost of an external incumbent. More expensive nodes are pruned, and the search ends
-    /// once the lower bound reaches this cost.
+    /// Sets the cost of an external incumbent. The search ends once the lower bound reaches it.
     pub(crate) fn set_upper_bound(&mut self, cost: N) {
         if self.limit.as_ref().is_none_or(|limit| cost < *limit) {
             self.limit = Some(cost);
@@ -311,8 +300,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         }
     }
 
-    /// Returns `true` if the lower bound has reached the cost of the external incumbent, which is
-    /// then optimal.
+    /// Returns `true` if the lower bound has reached the cost of the external incumbent.
     pub(super) fn proves_upper_bound(&self) -> bool {
         self.incumbent_is_external && self.limit == self.bound
     }
@@ -392,8 +380,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         if let Some(choosing) = &mut self.pruning {
             let size = choosing.prune_operators(self.task, &self.state.values, &mut applicable);
             self.own_work = self.own_work.saturating_add(size.saturating_mul(STUBBORN_SET_COST));
-            // The closure costs time, so pruning is switched off for good if it removes too few
-            // operators.
+            // The closure costs time, so pruning ends if it removes too few operators.
             if choosing.prunes_too_little() {
                 self.pruning = None;
             }
