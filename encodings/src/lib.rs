@@ -1,4 +1,5 @@
-//! SAT encodings of ground planning tasks with the selection of function designs in the same formula, and SAT solvers behind one trait.
+//! SAT encodings of ground planning tasks with the selection of function designs in the same
+//! formula, and SAT solvers behind one trait.
 //!
 //! Absent: PDDL and OWL. Which designs are available is part of the ground task.
 

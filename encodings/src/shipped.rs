@@ -1,4 +1,4 @@
-//! Domains and problems that we ship, embedded for who starts from them. Nothing here is read but as text.
+//! Shipped domains and problems, embedded as text for templates and examples.
 
 /// The plain domain of the ground vehicle, `ugv/plain.pddl`.
 pub const UGV_PLAIN: &str = include_str!("../ugv/plain.pddl");

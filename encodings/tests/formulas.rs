@@ -1,4 +1,5 @@
-//! Formulas against an oracle: for every number of steps, a formula has a plan at the oracle's cost, and none one below.
+//! Formulas against an oracle: for every number of steps, a formula is satisfiable at the oracle's
+//! cost and unsatisfiable below.
 
 use std::cell::OnceCell;
 
@@ -15,16 +16,17 @@ use task::task::Task;
 use testing::missions::Mission;
 use testing::{costs_by_steps, depot, fleet, ground_text, optimum};
 
-/// Plans of so many steps are looked for at least.
+/// Minimal horizon of the tests.
 const STEPS: usize = 6;
 
-/// Longer ones, up to the step bound, only to this number.
+/// Maximum horizon of the tests.
 const MOST_STEPS: usize = 16;
 
-/// More than any plan of the small tasks below costs.
+/// A cost above that of any plan of the small tasks below.
 const MUCH: Int = 200;
 
-/// Whether there is a plan with at most so many steps and at most this cost; if so, it is one.
+/// Returns `true` if there is a plan with at most `steps` steps and at most this cost, and checks
+/// the decoded plan.
 fn is_solvable(
     task: &Task,
     bounds: &Bounds,
@@ -98,7 +100,7 @@ fn check(seed: u64, backend: &Backend) {
 }
 
 #[test]
-fn formulas_have_plans_at_the_cost_of_the_oracle_and_none_below() {
+fn formulas_are_satisfiable_exactly_from_the_cost_of_the_oracle_on() {
     for backend in Backend::built_in() {
         (0..25).for_each(|seed| check(seed, &backend));
     }
@@ -106,22 +108,22 @@ fn formulas_have_plans_at_the_cost_of_the_oracle_and_none_below() {
 
 #[test]
 #[ignore = "takes minutes"]
-fn many_formulas_have_plans_at_the_cost_of_the_oracle_and_none_below() {
+fn many_formulas_are_satisfiable_exactly_from_the_cost_of_the_oracle_on() {
     for backend in crate::solvers::backends() {
         (25..2_100).for_each(|seed| check(seed, &backend));
     }
 }
 
-/// What a task's formulas say in all semantics. Returns whether several operators stood at a step, and whether anything
-/// was equal.
+/// Checks a task's formulas in all semantics. Returns whether several operators shared a step, and
+/// whether there were symmetries.
 fn check_all(text: (String, String), backend: &Backend) -> (bool, bool) {
     let task = ground_text(text.clone());
     let text = text.1;
     if task.unreachable.is_some() {
         return (false, false);
     }
-    let most = 4;
-    let (costs, optimum) = (costs_by_steps(&task, most), optimum(&task));
+    let max_steps = 4;
+    let (costs, optimum) = (costs_by_steps(&task, max_steps), optimum(&task));
     let bounds = Bounds::new(Context::new(&task, &Limits::none())).expect("no limit");
     let mut together = false;
     for bounds in [&bounds, &Bounds::trivial(Context::new(&task, &Limits::none())).expect("no limit")] {
@@ -145,7 +147,7 @@ fn check_all(text: (String, String), backend: &Backend) -> (bool, bool) {
             }
         }
     }
-    let allowed = vec![vec![true; task.operators.len()]; most];
+    let allowed = vec![vec![true; task.operators.len()]; max_steps];
     let limits = Limits::none();
     let encoding = Encoding::new(
         Context::new(&task, &limits),
@@ -162,7 +164,7 @@ fn check_all(text: (String, String), backend: &Backend) -> (bool, bool) {
 }
 
 #[test]
-fn neither_parallel_steps_nor_broken_symmetries_change_an_optimum() {
+fn parallel_steps_and_symmetry_breaking_preserve_the_optimum() {
     for backend in Backend::built_in() {
         let fleets = (0..8).map(|seed| check_all(fleet(seed), &backend));
         let together = fleets.filter(|(together, _)| *together).count();
@@ -175,7 +177,7 @@ fn neither_parallel_steps_nor_broken_symmetries_change_an_optimum() {
 
 #[test]
 #[ignore = "takes minutes"]
-fn neither_parallel_steps_nor_broken_symmetries_change_the_optimum_of_many() {
+fn parallel_steps_and_symmetry_breaking_preserve_the_optimum_of_many_tasks() {
     for backend in Backend::built_in() {
         for seed in 8..1_100 {
             check_all(fleet(seed), &backend);

@@ -1,4 +1,4 @@
-//! What every back end has to do: one suite over all of them.
+//! Conformance suite for all back ends.
 
 use std::time::{Duration, Instant};
 
@@ -6,7 +6,7 @@ use metaplan_encodings::sat::{Answer, Backend, BackendError, Lit, Solver};
 use task::limits::Limits;
 use testing::random::Random;
 
-/// Programs that distributions ship, as a user would name them.
+/// Programs that distributions ship, with the arguments that a user would give.
 const PROGRAMS: [&str; 6] = [
     "minisat -verb=0 /dev/stdin /dev/stdout",
     "glucose -verb=0 /dev/stdin /dev/stdout",
@@ -16,21 +16,21 @@ const PROGRAMS: [&str; 6] = [
     "cryptominisat5 --verb 0",
 ];
 
-/// The built-in ones, and the programs that are there.
+/// Built-in solvers, and the programs that are installed.
 #[allow(clippy::print_stdout)]
 pub fn backends() -> Vec<Backend> {
     let built_in = Backend::BUILT_IN.iter().map(|name| name.parse().expect("a name"));
-    let mut found: Vec<Backend> = built_in.collect();
+    let mut backends: Vec<Backend> = built_in.collect();
     for program in PROGRAMS {
         let mut words = program.split(' ').map(str::to_owned);
         let backend =
             Backend::Program { command: words.next().expect("a command"), arguments: words.collect() };
         match backend.check() {
-            Ok(()) => found.push(backend),
+            Ok(()) => backends.push(backend),
             Err(error) => println!("skipped: {error}"),
         }
     }
-    found
+    backends
 }
 
 fn literals(numbers: &[i32]) -> Vec<Lit> {
@@ -45,7 +45,7 @@ fn solver(backend: &Backend, clauses: &[Vec<i32>]) -> Box<dyn Solver> {
     solver
 }
 
-/// All back ends answer as expected, and their assignments satisfy the clauses.
+/// Checks the answers of all back ends, and that their assignments satisfy the clauses.
 fn check(backends: &[Backend], clauses: &[Vec<i32>], expected: Answer) {
     for backend in backends {
         let mut solver = solver(backend, clauses);
@@ -57,7 +57,7 @@ fn check(backends: &[Backend], clauses: &[Vec<i32>], expected: Answer) {
     }
 }
 
-/// No `holes + 1` pigeons fit: hard for all that only resolve.
+/// Pigeonhole formula: `holes + 1` pigeons do not fit. Hard for resolution.
 fn pigeons(holes: i32) -> Vec<Vec<i32>> {
     let inside = |pigeon: i32, hole: i32| pigeon * holes + hole + 1;
     let mut clauses: Vec<Vec<i32>> =
@@ -71,7 +71,7 @@ fn pigeons(holes: i32) -> Vec<Vec<i32>> {
 }
 
 #[test]
-fn special_formulas() {
+fn every_back_end_decides_special_formulas() {
     use Answer::{Satisfiable, Unsatisfiable};
     let backends = backends();
     check(&backends, &[], Satisfiable);
@@ -84,7 +84,7 @@ fn special_formulas() {
     check(&backends, &pigeons(4), Unsatisfiable);
 }
 
-/// Formulas with three literals in each clause.
+/// Random formulas with three literals per clause.
 struct Formulas(Random);
 
 impl Formulas {
@@ -98,7 +98,7 @@ impl Formulas {
     }
 }
 
-/// Whether some assignment satisfies the clauses and the assumptions.
+/// Returns `true` if some assignment satisfies the clauses and the assumptions.
 fn by_enumeration(variables: u64, clauses: &[Vec<i32>], assumptions: &[i32]) -> bool {
     (0..1_u32 << variables).any(|bits| {
         let literal = |l: &i32| (bits >> (l.unsigned_abs() - 1) & 1 == 1) == (*l > 0);
@@ -107,7 +107,7 @@ fn by_enumeration(variables: u64, clauses: &[Vec<i32>], assumptions: &[i32]) -> 
 }
 
 #[test]
-fn random_formulas_as_enumeration() {
+fn answers_for_random_formulas_agree_with_enumeration() {
     let backends = backends();
     let mut formulas = Formulas(Random(1));
     let mut satisfiable = 0;
@@ -122,12 +122,12 @@ fn random_formulas_as_enumeration() {
     assert!((10..50).contains(&satisfiable), "the formulas are of one kind: {satisfiable} of 60");
 }
 
-/// Clauses come in portions, each followed by calls under several sets of assumptions. Returns how many of these calls found
-/// an assignment, how many a contradiction, and how often a core left assumptions out.
+/// Adds clauses in portions, each followed by calls under several sets of assumptions. Returns the
+/// numbers of satisfiable calls, of unsatisfiable calls, and of cores that omit an assumption.
 fn check_growing(backend: &Backend, seed: u64) -> (usize, usize, usize) {
     let mut formulas = Formulas(Random(seed));
     let variables = 4 + formulas.0.below(7) as u64;
-    let mut known: Vec<Vec<i32>> = Vec::new();
+    let mut all_clauses: Vec<Vec<i32>> = Vec::new();
     let mut solver = solver(backend, &[]);
     let (mut satisfiable, mut unsatisfiable, mut smaller) = (0, 0, 0);
     for _ in 0..5 {
@@ -135,24 +135,25 @@ fn check_growing(backend: &Backend, seed: u64) -> (usize, usize, usize) {
         for clause in &clauses {
             solver.add_clause(&literals(clause));
         }
-        known.extend(clauses);
+        all_clauses.extend(clauses);
         for _ in 0..4 {
             let count = formulas.0.below(6);
-            // Some contradict each other, some come twice, and one is of a variable that no clause has.
+            // Assumptions may contradict each other or repeat, and one is about a variable that no
+            // clause contains.
             let mut assumptions: Vec<i32> = (0..count).map(|_| formulas.literal(variables)).collect();
             assumptions.push(variables as i32 + 1);
-            let context = || format!("{backend:?}, seed {seed}: {known:?} under {assumptions:?}");
+            let context = || format!("{backend:?}, seed {seed}: {all_clauses:?} under {assumptions:?}");
             let answer = solver.solve(&literals(&assumptions));
             if answer == Answer::Satisfiable {
                 let holds = |l: &i32| solver.value(l.unsigned_abs() - 1) == (*l > 0);
-                assert!(known.iter().all(|clause| clause.iter().any(holds)), "{}", context());
+                assert!(all_clauses.iter().all(|clause| clause.iter().any(holds)), "{}", context());
                 assert!(assumptions.iter().all(holds), "{}", context());
                 satisfiable += 1;
             } else {
                 assert_eq!(answer, Answer::Unsatisfiable, "{}: {:?}", context(), solver.failure());
                 let core: Vec<i32> = solver.core().iter().map(|literal| literal.dimacs()).collect();
                 assert!(core.iter().all(|literal| assumptions.contains(literal)), "{}: {core:?}", context());
-                assert!(!by_enumeration(variables + 1, &known, &core), "{}: {core:?}", context());
+                assert!(!by_enumeration(variables + 1, &all_clauses, &core), "{}: {core:?}", context());
                 unsatisfiable += 1;
                 smaller += usize::from(core.len() < assumptions.len());
             }
@@ -161,7 +162,7 @@ fn check_growing(backend: &Backend, seed: u64) -> (usize, usize, usize) {
     (satisfiable, unsatisfiable, smaller)
 }
 
-/// Here a solver that is asked again named assumptions that do not contradict each other.
+/// Regression test: repeated calls once returned cores that were not contradictory.
 #[test]
 fn cores_of_later_calls_are_contradictory() {
     for backend in backends() {
@@ -184,19 +185,20 @@ fn check_many_growing(seeds: std::ops::Range<u64>) {
 }
 
 #[test]
-fn clauses_and_assumptions_come_and_cores_are_contradictory() {
+fn incremental_answers_are_right_and_cores_are_contradictory() {
     check_many_growing(0..30);
 }
 
 #[test]
 #[ignore = "takes minutes"]
-fn many_clauses_and_assumptions_come_and_cores_are_contradictory() {
+fn many_incremental_answers_are_right_and_cores_are_contradictory() {
     check_many_growing(30..3_000);
 }
 
-/// Pigeons with a literal for each hole that closes it: what was learnt must not outlive the assumptions that it rests on.
+/// Pigeonhole formula with a literal that lets one pigeon stay outside: learnt clauses must not
+/// outlive the assumptions that they depend on.
 #[test]
-fn answers_do_not_depend_on_what_was_asked_before() {
+fn answers_do_not_depend_on_earlier_calls() {
     let holes = 6;
     for backend in backends() {
         let mut clauses = pigeons(holes);
@@ -216,7 +218,7 @@ fn answers_do_not_depend_on_what_was_asked_before() {
 }
 
 #[test]
-fn limits_interrupt() {
+fn limits_interrupt_every_back_end() {
     let clauses = pigeons(13);
     for backend in backends() {
         let mut limited = backend.start(&Limits::none().with_time(Duration::from_millis(50)), u64::MAX);
@@ -231,7 +233,7 @@ fn limits_interrupt() {
         assert_eq!(counted.solve(&[]), Answer::Interrupted, "{backend:?}, by conflicts");
         assert!(started.elapsed() < Duration::from_secs(20), "{backend:?}");
         assert!(counted.failure().is_none());
-        // Time stays up, and who asks once more hears so.
+        // The time limit stays exceeded, so further calls are interrupted as well.
         for solver in [&mut limited, &mut counted] {
             solver.add_clause(&literals(&[1, 1_000]));
             assert_ne!(solver.solve(&literals(&[-1])), Answer::Satisfiable, "{backend:?}");
@@ -241,7 +243,7 @@ fn limits_interrupt() {
 }
 
 #[test]
-fn names_and_programs_that_do_not_serve() {
+fn unusable_solver_names_and_programs_are_reported() {
     assert_eq!("batsat".parse(), Ok(Backend::Batsat));
     assert_eq!(" ".parse::<Backend>(), Err(BackendError::Empty));
     let message = |name: &str| match name.parse::<Backend>().and_then(|backend| backend.check()) {

@@ -1,4 +1,4 @@
-//! A plan while it gets better: every improvement, what is proved, and the plan as other tools read it.
+//! Anytime planning: prints every improvement, the proof, and the plan in the standard format.
 //!
 //! `cargo run -p metaplan-planner --example anytime -- DOMAIN PROBLEM`
 #![expect(clippy::print_stdout, reason = "an example prints")]

@@ -1,6 +1,8 @@
-//! Plans with the SAT solver alone, and says what that took: `formulas DOMAIN PROBLEM SOLVER STRATEGY SECONDS`.
+//! Plans with the SAT solver alone and prints its statistics:
+//! `formulas DOMAIN PROBLEM SOLVER STRATEGY SECONDS`.
 //!
-//! One line: status, cost, lower bound, steps, calls of the solver, conflicts, seconds. For measuring strategies.
+//! One line: status, cost, lower bound, steps, calls of the solver, conflicts, seconds. For
+//! measuring strategies.
 
 #![allow(clippy::print_stdout)]
 

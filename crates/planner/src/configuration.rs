@@ -1,20 +1,20 @@
-//! Design selection without a plan: assigns designs to functions that compete for components or share budgets.
+//! Design selection without a plan, for functions that compete for components or share budgets.
 //!
-//! The best assignment serves as many functions as possible, then violates the fewest requirements, then has the
-//! greatest sum of utilities. Ties go to the earlier designs of earlier functions. The three criteria form one
-//! integer, the worth: one more function outweighs all requirements, and one requirement outweighs all
-//! utilities. A component that only one design can use is a budget of one.
+//! The best assignment serves as many functions as possible, then violates the fewest requirements, then has
+//! the greatest sum of utilities. Ties go to the earlier designs of earlier functions. The three criteria
+//! form one integer, the worth: one more function outweighs all requirements, and one requirement outweighs
+//! all utilities. A component that only one design can use is a budget of one.
 //!
-//! The algorithm is dynamic programming over the functions with dominance: a partial assignment is dropped if
-//! another one has at least its worth and uses no more of any budget. It is also dropped if no completion keeps
-//! a budget, or if its upper bound does not exceed the best known worth. The upper bound is a Lagrangian
-//! relaxation of the budgets, valid for any multipliers \[1\]. Subgradients find good multipliers in
-//! floating-point numbers \[2\]; they are rounded, so that the bound is exact.
+//! The algorithm is dynamic programming over the functions with dominance: a partial assignment is dropped
+//! if another one has at least its worth and uses no more of any budget. It is also dropped if no completion
+//! keeps a budget, or if its upper bound does not exceed the best known worth. The upper bound is a
+//! Lagrangian relaxation of the budgets, valid for any multipliers \[1\]. Subgradients find good multipliers
+//! in floating-point numbers \[2\]; rounding them keeps the bound exact.
 //!
 //! - \[1\] H. Everett: Generalized Lagrange Multiplier Method for Solving Problems of Optimum Allocation of
 //!   Resources, Operations Research 11(3), 1963.
-//! - \[2\] M. Held, R. M. Karp: The Traveling-Salesman Problem and Minimum Spanning Trees: Part II, Mathematical
-//!   Programming 1, 1971.
+//! - \[2\] M. Held, R. M. Karp: The Traveling-Salesman Problem and Minimum Spanning Trees: Part II,
+//!   Mathematical Programming 1, 1971.
 
 use std::collections::BTreeSet;
 
@@ -25,44 +25,47 @@ use num_traits::{One as _, Signed as _, ToPrimitive as _, Zero as _};
 
 use task::limits::{Interrupted, Limits};
 
-/// Prices are looked for so often.
+/// Number of subgradient iterations.
 const ROUNDS: usize = 300;
-/// Prices are fractions of this power of two.
+/// Multipliers are fractions with this power of two as denominator.
 const PRICE_BITS: i32 = 40;
 
-/// One of the designs of a function.
+/// A design of a function.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct DesignChoice {
-    /// How many requirements of the function it misses.
+    /// Number of the function's requirements that the design misses.
     pub missed: usize,
-    /// What it is worth; larger is better.
+    /// Utility; larger is better.
     pub utility: BigRational,
-    /// What it takes of each budget.
+    /// Consumption of each budget.
     pub demands: Vec<BigRational>,
-    /// Components that only one of all chosen designs can use, as numbers of the caller's.
+    /// Components that at most one chosen design can use, numbered by the caller.
     pub components: BTreeSet<usize>,
 }
 
-/// A choice for each function, if it can be served.
+/// A design for each function that can be served.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Assignment {
-    /// The position of the design in the function's list.
+    /// Index of the design in the function's list; `None` if the function is not served.
     pub designs: Vec<Option<usize>>,
-    /// The sum of the utilities.
+    /// Sum of the utilities.
     pub utility: BigRational,
-    /// Whether it is proved that no choice is better; a limit was reached if not.
+    /// Whether the assignment is proved optimal; otherwise a limit was reached.
     pub optimal: bool,
 }
 
-/// The best choice for functions, each with its designs in the order of preference among equals, under budgets.
+/// Computes the best assignment under budgets. Of equal assignments, earlier designs are preferred.
 pub fn configure(functions: &[Vec<DesignChoice>], budgets: &[BigRational], limits: &Limits) -> Assignment {
     let problem = Problem::new(functions, budgets);
-    let (prices, known) = problem.prices();
-    let (designs, optimal) = match problem.search(&prices, &known, limits) {
+    let (prices, incumbent) = problem.prices();
+    let (designs, optimal) = match problem.search(&prices, &incumbent, limits) {
         Ok(designs) => (designs, true),
-        Err(Interrupted) => (known.designs, false),
+        Err(Interrupted) => (incumbent.designs, false),
     };
-    let chosen = functions.iter().zip(&designs).filter_map(|(own, at)| at.and_then(|at| own.get(at)));
+    let chosen = functions
+        .iter()
+        .zip(&designs)
+        .filter_map(|(designs, index)| index.and_then(|index| designs.get(index)));
     let utility = chosen.map(|design| &design.utility).sum();
     Assignment { designs, utility, optimal }
 }
@@ -73,16 +76,15 @@ struct Item {
     demands: Vec<BigInt>,
 }
 
-/// The problem in integers.
 struct Problem {
     functions: Vec<Vec<Item>>,
-    /// Those of the caller, and one for each component.
+    /// Budgets of the caller, followed by one budget per component.
     budgets: Vec<BigInt>,
-    /// For each function, the least that it and those after it can take of each budget; one more entry for none.
+    /// Per function: least consumption of each budget by it and later ones; then a final entry.
     least: Vec<Vec<BigInt>>,
 }
 
-/// What has been chosen for the functions so far.
+/// A partial assignment.
 #[derive(Clone, Default)]
 struct Label {
     designs: Vec<Option<usize>>,
@@ -101,20 +103,20 @@ impl Label {
         label
     }
 
-    /// Whether whatever can be added to the other one can be added to this one.
+    /// Returns `true` if every completion of `other` is feasible for `self`.
     fn is_as_free(&self, other: &Self) -> bool {
-        self.spent.iter().zip(&other.spent).all(|(own, other)| own <= other)
+        self.spent.iter().zip(&other.spent).all(|(left, right)| left <= right)
     }
 }
 
-/// A price for each budget, as a fraction of 2^`PRICE_BITS`, and what functions are worth at most at these prices.
+/// Lagrangian multipliers of the budgets in units of 2^-`PRICE_BITS`, and the resulting bounds.
 struct LagrangeMultipliers {
     each: Vec<BigInt>,
-    /// For each function, of it and those after it; one more entry for none.
+    /// Per function: bound for it and all later functions. One more entry for the end.
     after: Vec<BigInt>,
 }
 
-/// Numbers as integers of one scale, and the scale.
+/// Numbers as integers with a common scale, and the scale.
 fn scaled<'a>(numbers: impl Iterator<Item = &'a BigRational> + Clone) -> (Vec<BigInt>, BigInt) {
     let scale = numbers.clone().fold(BigInt::one(), |scale, number| scale.lcm(number.denom()));
     (numbers.map(|number| (number * &scale).to_integer()).collect(), scale)
@@ -122,16 +124,17 @@ fn scaled<'a>(numbers: impl Iterator<Item = &'a BigRational> + Clone) -> (Vec<Bi
 
 impl Problem {
     fn new(functions: &[Vec<DesignChoice>], budgets: &[BigRational]) -> Self {
-        let all = || functions.iter().flatten();
-        let (utilities, _) = scaled(all().map(|design| &design.utility));
-        // Utilities may be negative: one requirement outweighs the difference of any two sums of them.
+        let all_designs = || functions.iter().flatten();
+        let (utilities, _) = scaled(all_designs().map(|design| &design.utility));
+        // Utilities may be negative: a requirement outweighs any difference of two sums of them.
         let requirement: BigInt = utilities.iter().map(BigInt::abs).sum::<BigInt>() * 2 + 1;
-        let function =
-            &requirement * all().map(|design| BigInt::from(design.missed)).sum::<BigInt>() + &requirement;
-        let mut worths =
-            all().zip(utilities).map(|(design, utility)| &function - &requirement * design.missed + utility);
+        let function = &requirement * all_designs().map(|design| BigInt::from(design.missed)).sum::<BigInt>()
+            + &requirement;
+        let mut worths = all_designs()
+            .zip(utilities)
+            .map(|(design, utility)| &function - &requirement * design.missed + utility);
         let components: BTreeSet<usize> =
-            all().flat_map(|design| design.components.iter().copied()).collect();
+            all_designs().flat_map(|design| design.components.iter().copied()).collect();
         let zero = BigRational::zero();
         let demand =
             |design: &'_ DesignChoice, budget: usize| design.demands.get(budget).unwrap_or(&zero).clone();
@@ -139,13 +142,14 @@ impl Problem {
         let mut whole = Vec::new();
         for (budget, most) in budgets.iter().enumerate() {
             let numbers: Vec<BigRational> =
-                all().map(|design| demand(design, budget)).chain([most.clone()]).collect();
+                all_designs().map(|design| demand(design, budget)).chain([most.clone()]).collect();
             let (mut column, _) = scaled(numbers.iter());
             whole.push(column.pop().unwrap_or_default());
             columns.push(column.into_iter());
         }
         for component in components {
-            let uses = all().map(|design| BigInt::from(u8::from(design.components.contains(&component))));
+            let uses =
+                all_designs().map(|design| BigInt::from(u8::from(design.components.contains(&component))));
             columns.push(uses.collect::<Vec<_>>().into_iter());
             whole.push(BigInt::one());
         }
@@ -158,13 +162,13 @@ impl Problem {
         let mut least = vec![vec![BigInt::zero(); whole.len()]];
         for designs in functions.iter().rev() {
             let after = least.last().cloned().unwrap_or_default();
-            let own = after.into_iter().enumerate().map(|(budget, after)| {
+            let least_here = after.into_iter().enumerate().map(|(budget, after)| {
                 let demands = designs.iter().filter_map(|design| design.demands.get(budget));
-                // A function that is not served takes nothing.
+                // A function that is not served consumes nothing.
                 after + demands.min().cloned().unwrap_or_default().min(BigInt::zero())
             });
-            let own = own.collect();
-            least.push(own);
+            let least_here = least_here.collect();
+            least.push(least_here);
         }
         least.reverse();
         Self { functions, budgets: whole, least }
@@ -174,37 +178,37 @@ impl Problem {
         Label { spent: vec![BigInt::zero(); self.budgets.len()], ..Label::default() }
     }
 
-    /// Whether the functions from this one on can be chosen for so that all budgets are kept.
+    /// Returns `true` if some choice for the functions from index `from` on keeps the budgets.
     fn fits(&self, label: &Label, from: usize) -> bool {
         let Some(least) = self.least.get(from) else { return true };
         let ahead = label.spent.iter().zip(least).map(|(spent, least)| spent + least);
         ahead.zip(&self.budgets).all(|(spent, budget)| spent <= *budget)
     }
 
-    /// For each function the first design that fits, in an order of preference.
+    /// Assigns to each function the first design that fits, in an order of preference.
     fn greedy(&self, preference: impl Fn(&Item) -> f64) -> Label {
         let mut label = self.nothing();
         for (at, designs) in self.functions.iter().enumerate() {
             let mut order: Vec<(usize, f64)> = designs.iter().map(&preference).enumerate().collect();
             order.sort_by(|a, b| b.1.total_cmp(&a.1));
-            let mut with =
+            let mut extended =
                 order.into_iter().map(|(position, _)| label.with(Some(position), designs.get(position)));
-            let found = with.find(|new| self.fits(new, at.saturating_add(1)));
-            label = found.unwrap_or_else(|| label.with(None, None));
+            let feasible = extended.find(|new| self.fits(new, at.saturating_add(1)));
+            label = feasible.unwrap_or_else(|| label.with(None, None));
         }
-        // What a later function would have given back may not have come.
+        // A later function with negative demand may be unserved, so feasibility is checked again.
         if self.fits(&label, self.functions.len()) {
             return label;
         }
         self.functions.iter().fold(self.nothing(), |label, _| label.with(None, None))
     }
 
-    /// Good prices, and the best choice that was met on the way.
+    /// Good multipliers by subgradient ascent, and the best assignment found on the way.
     #[expect(clippy::cast_possible_truncation, reason = "rounding is meant; bounds hold for whatever prices")]
     fn prices(&self) -> (LagrangeMultipliers, Label) {
         let float = |number: &BigInt| number.to_f64().unwrap_or(f64::MAX);
         let budgets: Vec<f64> = self.budgets.iter().map(float).collect();
-        let mut known = self.greedy(|item| float(&item.worth));
+        let mut incumbent = self.greedy(|item| float(&item.worth));
         let mut prices = vec![0.0_f64; budgets.len()];
         let mut best = (f64::INFINITY, prices.clone());
         let mut stride = 1.0;
@@ -214,86 +218,91 @@ impl Problem {
                     item.demands.iter().zip(&prices).map(|(demand, price)| float(demand) * price).sum();
                 float(&item.worth) - paid
             };
-            let (mut bound, mut left) = (0.0, budgets.clone());
+            let (mut bound, mut slack) = (0.0, budgets.clone());
             for designs in &self.functions {
                 let chosen =
                     designs.iter().map(|item| (item, reduced(item))).max_by(|a, b| a.1.total_cmp(&b.1));
                 let Some((item, worth)) = chosen.filter(|(_, worth)| *worth > 0.0) else { continue };
                 bound += worth;
-                left.iter_mut().zip(&item.demands).for_each(|(left, demand)| *left -= float(demand));
+                slack.iter_mut().zip(&item.demands).for_each(|(slack, demand)| *slack -= float(demand));
             }
             bound += budgets.iter().zip(&prices).map(|(budget, price)| budget * price).sum::<f64>();
-            let met = self.greedy(reduced);
-            if met.worth > known.worth {
-                known = met;
+            let candidate = self.greedy(reduced);
+            if candidate.worth > incumbent.worth {
+                incumbent = candidate;
             }
             if bound < best.0 {
                 best = (bound, prices.clone());
             } else {
                 stride *= 0.97;
             }
-            let length: f64 = left.iter().map(|left| left * left).sum();
+            let length: f64 = slack.iter().map(|slack| slack * slack).sum();
             if length <= 0.0 {
                 break;
             }
-            let step = stride * (bound - float(&known.worth)).max(0.0) / length;
-            prices.iter_mut().zip(&left).for_each(|(price, left)| *price = (*price - step * left).max(0.0));
+            let step = stride * (bound - float(&incumbent.worth)).max(0.0) / length;
+            prices
+                .iter_mut()
+                .zip(&slack)
+                .for_each(|(price, slack)| *price = (*price - step * slack).max(0.0));
         }
-        let one = 2.0_f64.powi(PRICE_BITS);
+        let unit = 2.0_f64.powi(PRICE_BITS);
         let each: Vec<BigInt> =
-            best.1.iter().map(|price| BigInt::from((price * one).min(1e30) as i128)).collect();
+            best.1.iter().map(|price| BigInt::from((price * unit).min(1e30) as i128)).collect();
         let mut after = vec![BigInt::zero()];
         for designs in self.functions.iter().rev() {
             let reduced = designs.iter().map(|item| {
                 let paid: BigInt = item.demands.iter().zip(&each).map(|(demand, price)| demand * price).sum();
                 (&item.worth << PRICE_BITS) - paid
             });
-            let own = reduced.max().unwrap_or_default().max(BigInt::zero());
-            let sum = after.last().cloned().unwrap_or_default() + own;
+            let best_value = reduced.max().unwrap_or_default().max(BigInt::zero());
+            let sum = after.last().cloned().unwrap_or_default() + best_value;
             after.push(sum);
         }
         after.reverse();
-        (LagrangeMultipliers { each, after }, known)
+        (LagrangeMultipliers { each, after }, incumbent)
     }
 
-    /// At most so much is a choice worth that begins like this, as a fraction of 2^`PRICE_BITS`.
+    /// Upper bound on the worth of completions of a label, in units of 2^-`PRICE_BITS`.
     fn bound(&self, label: &Label, from: usize, prices: &LagrangeMultipliers) -> BigInt {
-        let left = self.budgets.iter().zip(&label.spent).map(|(budget, spent)| budget - spent);
-        let paid: BigInt = left.zip(&prices.each).map(|(left, price)| left * price).sum();
+        let slack = self.budgets.iter().zip(&label.spent).map(|(budget, spent)| budget - spent);
+        let paid: BigInt = slack.zip(&prices.each).map(|(slack, price)| slack * price).sum();
         (&label.worth << PRICE_BITS) + paid + prices.after.get(from).cloned().unwrap_or_default()
     }
 
-    /// The best choice, where one is known.
+    /// Finds the best assignment, given a feasible one.
     fn search(
         &self,
         prices: &LagrangeMultipliers,
-        known: &Label,
+        incumbent: &Label,
         limits: &Limits,
     ) -> Result<Vec<Option<usize>>, Interrupted> {
-        let wanted: BigInt = &known.worth << PRICE_BITS;
+        let target: BigInt = &incumbent.worth << PRICE_BITS;
         let mut labels = vec![self.nothing()];
         for (from, designs) in (1..).zip(&self.functions) {
             let mut next: Vec<Label> = Vec::new();
             for label in limits.watch(&labels) {
                 let label = label?;
-                let with = designs.iter().enumerate().map(|(at, item)| label.with(Some(at), Some(item)));
-                for new in limits.watch(with.chain([label.with(None, None)])) {
+                let extensions =
+                    designs.iter().enumerate().map(|(at, item)| label.with(Some(at), Some(item)));
+                for new in limits.watch(extensions.chain([label.with(None, None)])) {
                     let new = new?;
                     let is_worse = |old: &Label| old.worth >= new.worth && old.is_as_free(&new);
-                    let is_hopeless = !self.fits(&new, from) || self.bound(&new, from, prices) < wanted;
+                    let is_hopeless = !self.fits(&new, from) || self.bound(&new, from, prices) < target;
                     if is_hopeless || next.iter().any(is_worse) {
                         continue;
                     }
+                    // Of equally good labels the older one is kept, which is preferred.
                     next.retain(|old| old.worth >= new.worth || !new.is_as_free(old));
                     next.push(new);
                 }
             }
             labels = next;
         }
-        // Labels are in the order of preference.
+        // Labels are generated in the order of preference, so the first of equal ones wins.
         let best =
-            labels.into_iter().reduce(|best, other| if other.worth > best.worth { other } else { best });
-        Ok(best.map_or_else(|| known.designs.clone(), |best| best.designs))
+            labels.into_iter().reduce(|best, label| if label.worth > best.worth { label } else { best });
+        Ok(best.map_or_else(|| incumbent.designs.clone(), |best| best.designs))
     }
 }
 
@@ -308,37 +317,42 @@ mod tests {
         BigRational::from_integer(value.into())
     }
 
-    /// Functions served, requirements missed, utility.
+    /// Number of served functions, missed requirements, and utility.
     type Worth = (usize, std::cmp::Reverse<usize>, BigRational);
 
-    /// All choices, the preferred ones first; the first of the best ones.
+    /// Enumerates all assignments, preferred ones first, and returns the first optimal one.
     fn by_enumeration(
         functions: &[Vec<DesignChoice>],
         budgets: &[BigRational],
     ) -> (Worth, Vec<Option<usize>>) {
-        let mut all: Vec<Vec<Option<usize>>> = vec![Vec::new()];
+        let mut assignments: Vec<Vec<Option<usize>>> = vec![Vec::new()];
         for designs in functions {
             let choices = || (0..designs.len()).map(Some).chain([None]);
-            all = all
+            assignments = assignments
                 .iter()
-                .flat_map(|known| choices().map(|own| [known.clone(), vec![own]].concat()))
+                .flat_map(|prefix| choices().map(|choice| [prefix.clone(), vec![choice]].concat()))
                 .collect();
         }
         let mut best: Option<(Worth, Vec<Option<usize>>)> = None;
-        for designs in all {
-            let chosen: Vec<&DesignChoice> =
-                functions.iter().zip(&designs).filter_map(|(own, at)| at.map(|at| &own[at])).collect();
-            let used: usize = chosen.iter().map(|own| own.components.len()).sum();
-            let different: BTreeSet<usize> = chosen.iter().flat_map(|own| own.components.clone()).collect();
-            let spent =
-                |budget: usize| chosen.iter().map(|own| own.demands[budget].clone()).sum::<BigRational>();
+        for designs in assignments {
+            let chosen: Vec<&DesignChoice> = functions
+                .iter()
+                .zip(&designs)
+                .filter_map(|(designs, index)| index.map(|index| &designs[index]))
+                .collect();
+            let used: usize = chosen.iter().map(|design| design.components.len()).sum();
+            let different: BTreeSet<usize> =
+                chosen.iter().flat_map(|design| design.components.clone()).collect();
+            let spent = |budget: usize| {
+                chosen.iter().map(|design| design.demands[budget].clone()).sum::<BigRational>()
+            };
             if used > different.len() || (0..budgets.len()).any(|budget| spent(budget) > budgets[budget]) {
                 continue;
             }
-            let missed: usize = chosen.iter().map(|own| own.missed).sum();
-            let utility = chosen.iter().map(|own| own.utility.clone()).sum::<BigRational>();
+            let missed: usize = chosen.iter().map(|design| design.missed).sum();
+            let utility = chosen.iter().map(|design| design.utility.clone()).sum::<BigRational>();
             let worth = (chosen.len(), std::cmp::Reverse(missed), utility);
-            if best.as_ref().is_none_or(|(known, _)| worth > *known) {
+            if best.as_ref().is_none_or(|(best_worth, _)| worth > *best_worth) {
                 best = Some((worth, designs));
             }
         }
@@ -360,13 +374,13 @@ mod tests {
     }
 
     #[test]
-    fn the_best_choice_is_that_of_an_enumeration() {
+    fn the_assignment_agrees_with_enumeration() {
         let mut draw = Random(7);
         let mut partly = 0;
         for round in 0..3000 {
             let (functions, budgets) = random(&mut draw);
             let chosen = configure(&functions, &budgets, &Limits::none());
-            // Where less than nothing is left, nothing is chosen at all.
+            // With a negative budget nothing is chosen at all.
             if budgets.iter().any(|budget| *budget < BigRational::zero()) {
                 continue;
             }
@@ -382,9 +396,9 @@ mod tests {
         assert!((300..2700).contains(&partly), "the choices are of one kind: {partly}");
     }
 
-    /// Numbers as sensors and spreadsheets write them: 16 digits, huge and tiny ones, side by side.
+    /// Numbers as in sensor data and spreadsheets: 16 digits, huge and tiny ones mixed.
     #[test]
-    fn numbers_of_the_field_are_exact() {
+    fn assignments_are_exact_for_numbers_of_any_magnitude() {
         let mut draw = Random(11);
         let power = |exponent: usize| {
             BigRational::from_integer(BigInt::from(10).pow(u32::try_from(exponent).expect("small")))
@@ -409,10 +423,13 @@ mod tests {
                     (0..=draw.below(3)).map(|_| design(&mut draw)).collect()
                 })
                 .collect();
-            // Just enough for some choice, or too little for it by as little as can be.
-            let some: BigRational =
-                functions.iter().filter_map(|own| own.first()).map(|own| own.demands[0].clone()).sum();
-            for budget in [some.clone(), some - power(0) / power(640)] {
+            // Budgets that are just enough, or too small by the least amount.
+            let sufficient: BigRational = functions
+                .iter()
+                .filter_map(|designs| designs.first())
+                .map(|design| design.demands[0].clone())
+                .sum();
+            for budget in [sufficient.clone(), sufficient - power(0) / power(640)] {
                 let budgets = [budget.max(BigRational::zero())];
                 let chosen = configure(&functions, &budgets, &Limits::none());
                 let ((_, _, utility), designs) = by_enumeration(&functions, &budgets);
@@ -425,23 +442,24 @@ mod tests {
         }
     }
 
-    /// The multiple-choice knapsack problem by dynamic programming over each amount that can be spent.
+    /// Multiple-choice knapsack by dynamic programming over amounts.
     fn by_amounts(functions: &[Vec<(i64, usize)>], budget: usize) -> (usize, i64) {
         let mut best = vec![(0, 0); budget + 1];
         for designs in functions {
-            let with = |left: usize| {
-                let fitting = designs.iter().filter(|(_, demand)| *demand <= left);
-                let worths = fitting
-                    .map(|(utility, demand)| (best[left - demand].0 + 1, best[left - demand].1 + utility));
-                worths.chain([best[left]]).max()
+            let with = |amount: usize| {
+                let fitting = designs.iter().filter(|(_, demand)| *demand <= amount);
+                let worths = fitting.map(|(utility, demand)| {
+                    (best[amount - demand].0 + 1, best[amount - demand].1 + utility)
+                });
+                worths.chain([best[amount]]).max()
             };
-            best = (0..=budget).map(|left| with(left).expect("one")).collect();
+            best = (0..=budget).map(|amount| with(amount).expect("one")).collect();
         }
         best[budget]
     }
 
     #[test]
-    fn thousands_of_designs_are_as_by_dynamic_programming() {
+    fn assignments_of_thousands_of_designs_agree_with_dynamic_programming() {
         let mut draw = Random(5);
         for (count, designs, budget) in [(40, 50, 300), (20, 200, 90), (100, 20, 450), (8, 3, 9)] {
             let functions: Vec<Vec<(i64, usize)>> = (0..count)
@@ -454,7 +472,7 @@ mod tests {
                 components: BTreeSet::new(),
             };
             let choices: Vec<Vec<DesignChoice>> =
-                functions.iter().map(|own| own.iter().map(item).collect()).collect();
+                functions.iter().map(|designs| designs.iter().map(item).collect()).collect();
             let chosen = configure(&choices, &[number(budget)], &Limits::none());
             let (served, utility) = by_amounts(&functions, budget as usize);
             assert!(chosen.optimal);
@@ -463,7 +481,7 @@ mod tests {
     }
 
     #[test]
-    fn a_limit_leaves_a_choice_that_is_allowed() {
+    fn a_limit_returns_a_feasible_assignment() {
         let item = |utility: i64, demand: i64| DesignChoice {
             missed: 0,
             utility: number(utility),

@@ -1,4 +1,5 @@
-//! Proved optimal plans of PDDL tasks: a portfolio of heuristic search and SAT, lists of objectives, alternatives, replanning, certificates.
+//! Proved optimal plans of PDDL tasks: a portfolio of heuristic search and SAT, lists of
+//! objectives, alternatives, replanning, certificates.
 //!
 //! Absent: OWL. Availability of designs arrives as facts of the problem.
 

@@ -16,10 +16,11 @@ use temporal::{ground_concurrent, optimize_concurrent};
 use crate::exact::{ground_exact, optimize_exact};
 use crate::optimize::{Config, Front, lexicographic, pareto};
 
-/// Hears of a better plan or a better bound.
+/// Callback for improved plans and bounds.
 type Report<'a> = dyn FnMut(&Improvement) -> ControlFlow<()> + 'a;
 
-/// Plans for a domain and a problem that have passed [`pddl::check()`], as those that [`pddl::read`] returns have.
+/// Plans for a domain and a problem that have passed [`pddl::check()`]; those returned by
+/// [`pddl::read`] have.
 ///
 /// ```
 /// use std::time::Duration;
@@ -48,27 +49,27 @@ pub struct Planner<'a> {
 }
 
 impl<'a> Planner<'a> {
-    /// With no limits, and silent.
+    /// Creates a planner without limits that reports nothing.
     pub fn new(domain: &'a Domain, problem: &'a Problem) -> Self {
         let (grounding, config) = (GroundConfig::default(), Config::default());
         Self { domain, problem, grounding, config, report: Box::new(|_| ControlFlow::Continue(())) }
     }
 
-    /// Gives the best plan so far after this long, counted from now, grounding included.
+    /// Returns the incumbent after this time, counted from now and including grounding.
     #[must_use]
     pub fn time_limit(self, time: Duration) -> Self {
         let limits = self.config.limits.clone().with_time(time);
         self.limits(limits)
     }
 
-    /// Lets searches store so many bytes, as they estimate them; 2 GiB unless said otherwise.
+    /// Limits the memory of searches, by their own estimates; the default is 2 GiB.
     #[must_use]
     pub fn memory_limit(self, bytes: usize) -> Self {
         let limits = self.config.limits.clone().with_room(bytes);
         self.limits(limits)
     }
 
-    /// When to stop; [`Limits::interrupt`] is a flag that another thread can set.
+    /// Sets the limits. [`Limits::interrupt`] is a flag that another thread can set.
     #[must_use]
     pub fn limits(mut self, limits: Limits) -> Self {
         self.grounding.limits = limits.clone();
@@ -76,7 +77,7 @@ impl<'a> Planner<'a> {
         self
     }
 
-    /// What the optimizer is asked for, with its limits.
+    /// Sets the options of the optimizer, including its limits.
     #[must_use]
     pub fn config(mut self, config: Config) -> Self {
         self.grounding.limits = config.limits.clone();
@@ -84,40 +85,44 @@ impl<'a> Planner<'a> {
         self
     }
 
-    /// Only plans with at most this many steps count.
+    /// Limits the number of steps of a plan.
     #[must_use]
     pub fn horizon(mut self, steps: usize) -> Self {
         self.config.horizon = Some(steps);
         self
     }
 
-    /// What plans are measured by, the most important first, in place of the metric of the problem; [`pddl::read_objective`]
-    /// makes them.
+    /// Sets the objectives, the most important first; they replace the metric of the problem.
+    /// [`pddl::read_objective`] parses them.
     #[must_use]
     pub fn objectives(mut self, objectives: impl IntoIterator<Item = Metric>) -> Self {
         self.grounding.objectives = objectives.into_iter().collect();
         self
     }
 
-    /// Hears of every better plan and better bound; planning ends with the best plan so far when it says `Break`.
+    /// Calls `report` for every better plan and bound. If it returns `Break`, planning ends with
+    /// the incumbent.
     #[must_use]
     pub fn on_improvement(mut self, report: impl FnMut(&Improvement) -> ControlFlow<()> + 'a) -> Self {
         self.report = Box::new(report);
         self
     }
 
-    /// A plan whose actions come one after the other, best by the first objective, of those best by the second, and so on. Numbers
-    /// may be of any size: what does not fit into machine integers is searched for in exact rationals, which takes longer.
+    /// Computes a sequential plan, optimal by the first objective, among those by the second, and
+    /// so on. Numbers may have any size: a task that overflows machine integers is solved in exact
+    /// rationals, which is slower.
     ///
     /// # Errors
-    /// Every construct that the planner does not handle, with its place; or that a limit was reached before the task was ground. A
-    /// plan that is not proved optimal, or none, is not an error: see [`Solution::status`].
+    /// Fails with every unsupported construct and its place, or if a limit is reached before the
+    /// task is ground. A plan that is not proved optimal, or no plan, is not an error: see
+    /// [`Solution::status`].
     pub fn plan(mut self) -> Result<Solution, Errors> {
         match ground(self.domain, self.problem, &self.grounding) {
             Ok(task) => {
                 let (config, mut hear) = (self.config.clone(), self.hear());
                 Ok(lexicographic(&task, &config, &mut hear).solution)
             }
+            // Exact rationals can only help if machine integers are the sole problem.
             Err(errors) if errors.iter().all(|error| matches!(error, Error::Overflow { .. })) => {
                 if self.grounding.objectives.len() > 1 {
                     return Err(errors);
@@ -129,7 +134,7 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// The plans of which no other one is better by one of two objectives and not worse by the other, one for each pair of values.
+    /// Computes the Pareto front of two objectives, with one plan for each pair of values.
     ///
     /// # Errors
     /// As [`Planner::plan`].
@@ -139,8 +144,8 @@ impl<'a> Planner<'a> {
         Ok(pareto(&task, &config, &mut hear))
     }
 
-    /// A plan whose actions may overlap, as PDDL 2.1 has it; those that interfere lie `separation` apart, in the domain's time unit. The
-    /// horizon is not heeded.
+    /// Computes a plan with overlapping actions, as defined by PDDL 2.1. Interfering happenings are
+    /// at least `separation` apart, in the domain's time unit. The horizon is ignored.
     ///
     /// # Errors
     /// As [`Planner::plan`].
@@ -150,7 +155,8 @@ impl<'a> Planner<'a> {
         Ok(optimize_concurrent(&task, &limits, &mut hear))
     }
 
-    /// What the optimizer tells, to who listens; the flag is set when that wants to end.
+    /// Adapter from the optimizer's reports to the callback. Sets the interrupt flag if the
+    /// callback breaks.
     fn hear(&mut self) -> impl FnMut(Improvement) {
         let flag = self.config.limits.interrupt();
         let report = &mut self.report;

@@ -1,6 +1,6 @@
-//! Plans with conditional effects, derived predicates, quantifiers and disjunctions: known optima, and random tasks on
-//! which the quick search and the SAT solver alone must agree. (That ground tasks mean what the files mean is
-//! checked elsewhere, against an interpreter of the files.)
+//! Plans with conditional effects, derived predicates, quantifiers and disjunctions: known optima,
+//! and random tasks on which the quick search and the SAT solver alone must agree. (That ground
+//! tasks mean what the files mean is checked elsewhere, against an interpreter of the files.)
 
 use metaplan_planner::{Config, Engine, GroundConfig, Solution, Status, ground, optimize};
 use testing::adl::Generator;
@@ -24,7 +24,7 @@ fn solve(domain: &str, problem: &str, engine: Engine, head_start: usize) -> Solu
     optimize(&task, &config, &mut |_| {})
 }
 
-/// All ways find the cost; none stands for "no plan exists".
+/// Checks that all engines find the cost; `None` means that no plan exists.
 fn check(name: &str, domain: &str, problem: &str, expected: Option<&str>) {
     for (engine, head_start) in WAYS {
         let solution = solve(domain, problem, engine, head_start);
@@ -192,7 +192,8 @@ fn numbers_below_zero_do_no_harm_where_nothing_is_used() {
     check("dug", &digging, &problem("1"), Some("2"));
 }
 
-/// Plans of at most this many steps are compared: the solver alone has no proof that there is no plan of any length.
+/// Plans of at most this many steps are compared: the solver alone has no proof that there is no
+/// plan of any length.
 const HORIZON: usize = 4;
 
 fn agree(seeds: std::ops::Range<u64>) {

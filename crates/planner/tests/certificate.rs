@@ -1,4 +1,5 @@
-//! Certificates of generated missions: accepted for what is true, rejected for what is not, however they are changed.
+//! Certificates of generated missions: true claims are accepted, false claims and changed
+//! certificates are rejected.
 
 #[allow(dead_code, reason = "another suite uses the rest")]
 use certificate::{Faithful, check as check_argument, faithful, verification_conditions, witness};
@@ -19,7 +20,7 @@ fn files(seed: u64) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// The certificate of a mission, and the least cost (none if there is no plan).
+/// The certificate of a mission, and the least cost (`None` if there is no plan).
 fn certified(seed: u64) -> (Certificate, Option<BigRational>) {
     let mission = Mission::random(seed);
     let (domain, problem) = files(seed);
@@ -33,12 +34,12 @@ fn certified(seed: u64) -> (Certificate, Option<BigRational>) {
     (certificate.unwrap_or_else(|| panic!("seed {seed}: no certificate")), cost)
 }
 
-/// Claims that are false: that plans cost more than they do, or that there are none.
+/// False claims: a higher least cost, and unsolvability.
 fn false_claims(cost: &BigRational) -> [Option<BigRational>; 2] {
     [Some(cost + BigRational::from_integer(1.into())), None]
 }
 
-/// What the comparison of a written task with the files of a mission says.
+/// Result of the grounding check of a written task against the files of a mission.
 fn compared((domain, problem): &(Domain, Problem), task: &str) -> Faithful {
     match witness(domain, problem, task, &|| false) {
         Ok(witness) => faithful(domain, problem, task, &witness, &|| false),
@@ -93,7 +94,7 @@ fn mutate(value: &mut Value, random: &mut Random) {
     }
 }
 
-/// However an argument is changed, it does not prove what is false; and a changed task is not the task.
+/// Checks that a changed argument proves no false claim, and that a changed task fails the grounding check.
 fn withstands(seed: u64, mutants: usize) {
     let (certificate, cost) = certified(seed);
     let files = files(seed);
@@ -111,7 +112,7 @@ fn withstands(seed: u64, mutants: usize) {
         }
         let mut mutant = written.clone();
         mutate(&mut mutant, &mut random);
-        // It may still stand for the files, but then it proves nothing that is false of them.
+        // A mutant that passes the grounding check must not prove a false claim.
         let written = mutant.to_string();
         let stands = matches!(compared(&files, &written), Faithful::Yes { .. });
         for claim in cost.iter().flat_map(false_claims).chain([cost.clone()]) {
@@ -129,8 +130,8 @@ fn changed_arguments_prove_nothing_that_is_false() {
     (200..230).for_each(|seed| withstands(seed, 40));
 }
 
-/// What can be read in two ways proves nothing: a number that an operator changes twice, a number with two factors, a design that
-/// is not there.
+/// Ambiguous tasks prove nothing: a number that an operator changes twice, a number with two
+/// factors, a design that is not there.
 #[test]
 fn tasks_that_can_be_read_in_two_ways_are_refused() {
     let (mut twice, mut factors, mut designs) = (0, 0, 0);
@@ -177,7 +178,7 @@ fn tasks_that_can_be_read_in_two_ways_are_refused() {
 
 /// An instance that leaves everything as it is has no operator, and needs none.
 #[test]
-fn what_changes_nothing_needs_no_operator() {
+fn instances_without_effect_need_no_operator() {
     let domain = "(define (domain d) (:requirements :typing :action-costs)
       (:types design place - object) (:constants slow fast - design)
       (:predicates (at ?p - place) (mode ?d - design) (suits ?d - design))
@@ -200,7 +201,7 @@ fn what_changes_nothing_needs_no_operator() {
     assert!(matches!(found, Faithful::Yes { instances: 8, idle: 4, .. }), "{found:?}");
 }
 
-/// What the SMT solver answers to the verification conditions of a claim.
+/// Answers of the SMT solver to the verification conditions of a claim.
 fn answers(solver: &str, certificate: &Certificate, claim: Option<&BigRational>) -> Vec<String> {
     let conditions = verification_conditions(&certificate.task, &certificate.argument, claim);
     let conditions = conditions.expect("documents").expect("no derived variables");
@@ -210,8 +211,8 @@ fn answers(solver: &str, certificate: &Certificate, claim: Option<&BigRational>)
     String::from_utf8_lossy(&output.stdout).lines().map(str::to_owned).collect()
 }
 
-/// Needs an SMT solver that reads SMT-LIB 2, named by `METAPLAN_SMT`, such as Z3 (`python3 -m venv z3; z3/bin/pip install z3-solver`,
-/// then `METAPLAN_SMT=z3/bin/z3`).
+/// Needs an SMT solver that reads SMT-LIB 2, named by `METAPLAN_SMT`, such as Z3
+/// (`python3 -m venv z3; z3/bin/pip install z3-solver`, then `METAPLAN_SMT=z3/bin/z3`).
 #[test]
 #[ignore = "needs an SMT solver"]
 fn an_smt_solver_accepts_the_truth_and_nothing_else() {

@@ -1,5 +1,6 @@
-//! Plans whose actions overlap: known optima, among them tasks that no sequence of actions solves, and random tasks on which the
-//! planner must agree with the validator run on every plan of up to three actions over a grid of times.
+//! Plans whose actions overlap: known optima, among them tasks that no sequence of actions solves,
+//! and random tasks on which the planner must agree with the validator run on every plan of up to
+//! three actions over a grid of times.
 
 use std::fmt::Write as _;
 
@@ -39,7 +40,7 @@ pub fn written(plan: &Plan) -> String {
     text
 }
 
-/// What the validator says a plan costs; else why it is not valid.
+/// Metric of a plan by the validator, or the reason why the plan is invalid.
 pub fn metric(
     domain: &Domain,
     problem: &Problem,
@@ -56,7 +57,7 @@ pub fn metric(
     }
 }
 
-/// The metric and the lines of the plan; none if it is proved that there is no plan.
+/// Checks the metric and the lines of the plan; `None` means a proof that there is no plan.
 pub fn check(
     name: &str,
     domain: &str,
@@ -115,7 +116,8 @@ fn required_concurrency() {
     check("too far apart", MATCH, &problem("m1 - match f1 f2 - fuse", goal), (2, 1), None);
 }
 
-/// Cushing et al. (2007), figure 3: what is needed holds at the end of one action only in the midst of another one.
+/// Cushing et al. (2007), figure 3: what is needed holds at the end of one action only in the midst
+/// of another one.
 const WINDOW: &str = "(define (domain window) (:requirements :durative-actions)
   (:predicates (p) (q) (r) (s))
   (:durative-action a :parameters () :duration (= ?duration 10)
@@ -125,7 +127,8 @@ const WINDOW: &str = "(define (domain window) (:requirements :durative-actions)
 
 #[test]
 fn actions_start_between_other_happenings() {
-    // The end of the long action must lie within the short one, so the short one starts when nothing else happens.
+    // The end of the long action must lie within the short one, so the short one starts when
+    // nothing else happens.
     let problem = "(define (problem w) (:domain window) (:init) (:goal (and (q) (r))))";
     let plan = ["0: (a) [10]", "7.001: (b) [3]"];
     check("window", WINDOW, problem, (1, 1000), Some(("10.001", &plan)));
@@ -146,21 +149,22 @@ fn windows_of_timed_initial_literals() {
     let window = "(at 3 (open)) (at 8 (not (open)))";
     let plan = ["0: (tell) [6]", "3: (work) [4]"];
     check("both fit", domain, &problem(window, both), (1, 1000), Some(("7", &plan)));
-    // A condition over all is about the open interval: the window may close when the action ends, but no earlier.
+    // A condition over all is about the open interval: the window may close when the action ends,
+    // but no earlier.
     let closes = |time: &str| problem(&format!("(at 3 (open)) (at {time} (not (open)))"), "(done)");
     check("closes at the end", domain, &closes("7"), (1, 1000), Some(("7", &["3: (work) [4]"])));
     check("closes before the end", domain, &closes("6.999"), (1, 1000), None);
     let late = "(at 2 (open)) (at 5 (not (open))) (at 9 (open))";
-    // It reads at its end what the event at 9 changes.
+    // Its end reads a fact that the event at 9 changes.
     let plan = ["3.001: (tell) [6]", "9: (work) [4]"];
     check("the second window", domain, &problem(late, both), (1, 1000), Some(("13", &plan)));
-    // A plan lasts until its last action ends, and what comes after that does not happen.
+    // A plan lasts until its last action ends; later events do not take place.
     let problem = problem("(open) (at 5 (open)) (at 20 (not (open)))", "(done) (open)");
     check("before it closes", domain, &problem, (1, 1000), Some(("4", &["0: (work) [4]"])));
 }
 
 #[test]
-fn a_plan_waits_for_what_happens_by_itself() {
+fn a_plan_waits_for_timed_literals() {
     let domain = "(define (domain d) (:requirements :durative-actions :timed-initial-literals)
       (:predicates (gate) (done))
       (:durative-action work :parameters () :duration (= ?duration 4) :condition (and) :effect (at end (done))))";
@@ -253,7 +257,7 @@ fn timed(random: &mut Random, times: &[&str], most: u64, part: fn(&mut Random) -
     text + ")"
 }
 
-/// A task and what brute force has to know of it.
+/// A task and the data for brute force.
 struct Sample {
     durations: [i64; 3],
     domain: String,
@@ -316,7 +320,8 @@ fn sample(random: &mut Random) -> Sample {
     Sample { durations, domain, problem }
 }
 
-/// The last start that brute force tries. With a separation of one unit all times of a best plan are whole numbers.
+/// The last start that brute force tries. With a separation of one unit all times of a best plan
+/// are whole numbers.
 const LAST: i128 = 7;
 
 /// The least metric of valid plans of up to three actions.
@@ -360,7 +365,7 @@ fn agree(seed: u64) -> bool {
     let separation = rational(1, 1);
     let ground = ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation)
         .unwrap_or_else(|errors| panic!("{errors:?}"));
-    // Numbers can grow for ever.
+    // Numbers can grow without bound.
     let limits = Limits::none().with_time(std::time::Duration::from_secs(2));
     let solution = optimize_concurrent(&ground, &limits, &mut |_| {});
     let context = || format!("seed {seed}\n{}\n{}", task.domain, task.problem);
@@ -445,7 +450,7 @@ fn robots(count: u64, side: u64, looks: u64, seed: u64) -> String {
     format!("{text}) (:goal (and{goal})) (:metric minimize (total-time)))")
 }
 
-/// Prints what is proved in ten seconds.
+/// Prints the result proved in ten seconds.
 #[test]
 #[ignore = "a measurement"]
 #[allow(clippy::print_stdout)]

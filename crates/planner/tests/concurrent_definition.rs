@@ -1,5 +1,5 @@
-//! The planner for actions that overlap at the borders of the definition (the head of `validate`): what it claims to be the
-//! least makespan, or out of reach, and the validator with it.
+//! The planner for actions that overlap at the borders of the definition (the head of `validate`):
+//! what it claims to be the least makespan, or out of reach, and the validator with it.
 
 use std::fs::read_to_string;
 use std::path::Path;
@@ -12,7 +12,7 @@ use pddl::{Source, read};
 
 const NONE: &str = "none";
 
-/// What is proved of a task with a separation of a thousandth: the least metric, or that there is no plan.
+/// Proved result of a task with a separation of a thousandth: the least metric, or that there is no plan.
 fn proved(domain: &str, problem: &str) -> String {
     let read = read(&Source::new("domain", domain), &Source::new("problem", problem));
     let (domain, problem, _) = read.unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
@@ -51,7 +51,7 @@ fn durative(name: &str, duration: &str, condition: &str, effect: &str) -> String
     )
 }
 
-/// What is proved of actions over the atoms `p`, `q`, `r`, `g` and the number `x` (2).
+/// Checks the proved result for actions over the atoms `p`, `q`, `r`, `g` and the number `x` (2).
 fn check(actions: &[String], init: &str, goal: &str, expected: &str) {
     let domain =
         format!("(define (domain d) (:predicates (p) (q) (r) (g)) (:functions (x))\n{})", actions.concat());
@@ -77,7 +77,8 @@ fn over_all_is_about_the_open_interval() {
 
 #[test]
 fn events_that_interfere_lie_apart() {
-    // After the event, which adds what the start reads; after it, because the start deletes what it adds.
+    // After the event, which adds the fact that the start reads; strictly after it, because the
+    // start deletes that fact.
     check(&[durative("a", "2", "(at start (p))", "(at end (g))")], "(at 5 (p))", "(g)", "7.001");
     let deletes = || durative("a", "2", "", "(at end (g)) (at end (not (p)))");
     check(&[deletes()], "(at 2 (p))", "(g)", "2.001");
@@ -173,7 +174,7 @@ fn one_number_is_assigned_the_same_value_twice() {
     check(&[assigns("a", "g"), assigns("b", "p")], "", "(g) (p)", "3.001");
 }
 
-/// The value that the start of `a` sets and its end requires is left in between and taken again.
+/// The value that the start of `a` sets and its end requires may change in between and be restored.
 #[test]
 fn a_value_is_left_during_an_action_and_taken_again() {
     let domain = "(define (domain f2) (:requirements :durative-actions) (:predicates (i) (x) (y) (g) (h))
@@ -187,9 +188,10 @@ fn a_value_is_left_during_an_action_and_taken_again() {
     assert_eq!(proved(domain, problem), "10");
 }
 
-/// A landing waits for the approach, which comes by itself, and then the plane is on the ground until the end.
+/// A landing waits for the approach, which comes by itself, and then the plane is on the ground
+/// until the end.
 #[test]
-fn what_waits_for_an_event_comes_a_moment_after_it() {
+fn an_action_that_waits_for_an_event_keeps_the_separation() {
     let domain = "(define (domain airport) (:predicates (approach) (free) (landed) (cleared) (gone))
       (:durative-action land :parameters () :duration (= ?duration 2) :condition (and (at start (approach)) (at start (free)))
         :effect (and (at start (not (free))) (at start (not (approach))) (at end (free)) (at end (landed))))
@@ -206,7 +208,7 @@ fn what_waits_for_an_event_comes_a_moment_after_it() {
     assert_eq!(proved(domain, &problem("6")), "9.002");
 }
 
-/// Tasks that others found, with what the definition says about them.
+/// Tasks from the literature, with the results by the definition.
 #[test]
 #[allow(clippy::print_stderr)]
 fn tasks_that_were_answered_wrongly() {

@@ -1,5 +1,6 @@
-//! Durations that the planner chooses: known optima, and random tasks on which no plan over a grid of times and durations, executed by the
-//! validator, is better than what is found, or exists where none is claimed to.
+//! Durations that the planner chooses: known optima, and random tasks on which no plan over a grid
+//! of times and durations, executed by the validator, is better than what is found, or exists where
+//! none is claimed to.
 
 use std::fmt::Write as _;
 
@@ -23,7 +24,7 @@ pub fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// The best plan, by the planner; what it claims of it, the validator confirms.
+/// Best plan by the planner; its claims are checked by the validator.
 pub fn solve(domain: &Domain, problem: &Problem, separation: &BigRational, limits: &Limits) -> Solution {
     let task = ground_concurrent(domain, problem, &GroundConfig::default(), separation)
         .unwrap_or_else(|errors| panic!("{errors:?}"));
@@ -45,7 +46,7 @@ pub fn written(plan: &Plan) -> String {
     text
 }
 
-/// What the validator says a plan costs; else why it is not valid.
+/// Metric of a plan by the validator, or the reason why the plan is invalid.
 pub fn metric(
     domain: &Domain,
     problem: &Problem,
@@ -127,8 +128,8 @@ fn as_much_is_charged_as_is_needed() {
 }
 
 #[test]
-fn what_is_spent_at_the_start_is_paid_for() {
-    // Twice as long as it takes, so much fuel; the tank has 9.
+fn consumption_at_the_start_counts() {
+    // The fuel consumption is twice the duration; the tank has 9.
     let burn = durative(
         "burn",
         "(and (>= ?duration 2) (<= ?duration 8))",
@@ -245,7 +246,7 @@ fn more_than_a_number_is_a_little_more() {
     assert_eq!(solve(&domain, &problem, &rational(1, 1000), &limits).status, Status::Unknown);
 }
 
-/// What is shorter than the separation the planner does not look at, and claims nothing of.
+/// The planner does not search durations below the separation, and claims nothing about such plans.
 #[test]
 fn no_action_is_shorter_than_the_separation() {
     for (bounds, status) in [
@@ -266,7 +267,7 @@ fn no_action_is_shorter_than_the_separation() {
 
 /// A boiler must be warm enough all along, and cools when it is used.
 #[test]
-fn what_holds_over_all_rests_on_durations() {
+fn conditions_over_all_may_depend_on_durations() {
     let heat = durative(
         "heat",
         "(and (>= ?duration 1) (<= ?duration 30))",
@@ -369,7 +370,8 @@ fn sample(random: &mut Random) -> (String, String, [Vec<i128>; 3]) {
 /// The last start that brute force tries.
 const LAST: i128 = 4;
 
-/// The least metric of valid plans of up to three actions that start and last whole units, which are the separation.
+/// The least metric of valid plans of up to three actions that start and last whole units, which
+/// are the separation.
 fn brute_force(durations: &[Vec<i128>; 3], domain: &Domain, problem: &Problem) -> Option<BigRational> {
     let separation = rational(1, 1);
     let mut best: Option<BigRational> = None;
@@ -402,7 +404,7 @@ fn brute_force(durations: &[Vec<i128>; 3], domain: &Domain, problem: &Problem) -
     best
 }
 
-/// Whether a task is decided; then no plan of brute force is better than the one that is found, or there is none.
+/// Compares a solution with brute force. Returns `true` if the planner decided the task.
 fn agree(seed: u64) -> bool {
     let (domain, problem, durations) = sample(&mut Random(seed));
     let (read_domain, read_problem) = parse(&domain, &problem);

@@ -1,4 +1,5 @@
-//! Overlapping actions whose durations or effects the state decides, and durations that are bounded: what is planned, and what is claimed of it.
+//! Overlapping actions with state-dependent durations or effects, and with bounded durations: plans
+//! and claims.
 
 use metaplan_planner::{GroundConfig, Limits, PlannerPart, Status, ground_concurrent, optimize_concurrent};
 use num_bigint::BigInt;
@@ -68,7 +69,7 @@ fn a_duration_is_that_of_the_state_at_the_start() {
         "(at start (increase (fuel) 5)) (at start (not (q)))",
     );
     check(&[fill(), pour.clone()].concat(), "(q)", "(g)", (Status::Optimal, Some("1.001")));
-    // `?duration` at the end is what it was at the start, whatever has changed since.
+    // `?duration` at the end has its value from the start, even if the state has changed.
     let counted = || {
         durative(
             "fill",
@@ -93,7 +94,7 @@ fn a_duration_is_that_of_the_state_at_the_start() {
 }
 
 #[test]
-fn a_duration_of_the_state_may_be_divided_by_what_no_action_changes() {
+fn a_state_dependent_duration_may_have_a_static_divisor() {
     let fill = |divisor: &str| {
         let duration = format!("(= ?duration (/ (- 10 (fuel)) {divisor}))");
         durative("fill", &duration, "", "(at end (assign (fuel) 10)) (at end (g))")
@@ -112,7 +113,7 @@ fn a_duration_of_the_state_may_be_divided_by_what_no_action_changes() {
 }
 
 #[test]
-fn what_effects_under_a_condition_do_is_planned_and_not_claimed_to_be_best() {
+fn conditional_numeric_effects_are_planned_without_a_proof() {
     let helps = durative("helps", "(= ?duration 2)", "", "(at start (p)) (at end (not (p)))");
     let asks =
         |effect: &str| durative("asks", "(= ?duration 1)", "", &format!("(at end (when (p) {effect}))"));
@@ -132,7 +133,7 @@ fn durations_within_bounds() {
 }
 
 #[test]
-fn numbers_that_no_scale_makes_integers_are_told_with_their_action() {
+fn errors_about_unscalable_numbers_name_the_action() {
     let domain = "(define (domain d) (:functions (fuel))
       (:action halve :parameters () :effect (scale-up (fuel) 0.5)))";
     let problem = "(define (problem p) (:domain d) (:init (= (fuel) 4)) (:goal (<= (fuel) 1)))";
@@ -150,7 +151,7 @@ fn numbers_that_no_scale_makes_integers_are_told_with_their_action() {
 }
 
 #[test]
-fn what_a_search_does_is_counted_and_dated() {
+fn search_statistics_and_history_are_recorded() {
     let tower = |count: usize| {
         let names: Vec<String> = (0..count).map(|index| format!("k{index}")).collect();
         let each = |text: &str| names.iter().map(|name| [text, name, ")"].concat()).collect::<String>();

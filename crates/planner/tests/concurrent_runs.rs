@@ -1,4 +1,4 @@
-//! Actions that overlap with themselves: what is planned, and what is claimed of it.
+//! Actions that overlap with themselves: plans and claims.
 
 use crate::concurrent::{check, metric, parse, rational, solve, written};
 
@@ -23,12 +23,12 @@ fn actions_overlap_with_themselves() {
     let own = react("", "(at end (increase (y) 1))");
     let plan = ["0: (react) [5]", "0: (react) [5]", "0: (react) [5]"];
     check("at one time", &own, &problem("(>= (y) 3)"), (1, 1000), Some(("5", &plan)));
-    // Starts that read what they change lie apart, and there is enough for two of them.
+    // Starts that read a number that they change keep the separation, and there is enough for two of them.
     let own = react("(at start (>= (x) 1))", "(at start (decrease (x) 1)) (at end (increase (y) 1))");
     let plan = ["0: (react) [5]", "0.001: (react) [5]"];
     check("apart", &own, &problem("(>= (y) 2)"), (1, 1000), Some(("5.001", &plan)));
     check("too little", &own, &problem("(>= (y) 3)"), (1, 1000), None);
-    // A second run cannot start: its start needs what the first one has taken.
+    // A second run cannot start: its start needs the fact that the first one has deleted.
     let own =
         react("(at start (ready))", "(at start (not (ready))) (at end (ready)) (at end (increase (y) 1))");
     let plan = ["0: (react) [5]", "5.001: (react) [5]"];
@@ -37,7 +37,8 @@ fn actions_overlap_with_themselves() {
     let own = react("(at start (ready))", "(at end (not (ready))) (at end (increase (y) 1))");
     let plan = ["0: (react) [5]", "0: (react) [5]", "0: (react) [5]"];
     check("before the first end", &own, &problem("(>= (y) 3)"), (1, 1000), Some(("5", &plan)));
-    // What an end brings about is used up, and the end of a run that started a little later brings it about again.
+    // What an end brings about is used up, and the end of a run that started a little later brings
+    // it about again.
     let own = domain(
         "(:durative-action charge :parameters () :duration (= ?duration 10) :condition () :effect (at end (p)))
          (:durative-action use :parameters () :duration (= ?duration 6)
@@ -47,7 +48,8 @@ fn actions_overlap_with_themselves() {
     );
     let plan = ["0: (charge) [10]", "0.002: (charge) [10]", "10.001: (spend) [7]", "10.003: (use) [6]"];
     check("used up", &own, &problem("(q) (r)"), (1, 1000), Some(("17.001", &plan)));
-    // The light is on until the first run ends, and each run needs it all along: two of them start and end together, or not at all.
+    // The light is on until the first run ends, and each run needs it all along: two of them start
+    // and end together, or not at all.
     let own = domain(
         "(:durative-action light :parameters () :duration (= ?duration 5)
            :condition (over all (p)) :effect (and (at start (p)) (at end (not (p)))))
@@ -56,9 +58,10 @@ fn actions_overlap_with_themselves() {
     check("light", &own, &problem("(q)"), (1, 1000), None);
 }
 
-/// A battery that is charged, and actions that need it: `first` and then `second`, each of which takes one unit of it when it ends.
+/// A battery that is charged, and actions that need it: `first` and then `second`, each of which
+/// takes one unit of it when it ends.
 #[test]
-fn what_is_charged_again_while_it_is_charged() {
+fn a_battery_can_be_charged_by_overlapping_runs() {
     let domain = |others: &str| {
         let work = |name: &str, needs: &str, gives: &str| {
             format!(
@@ -106,7 +109,8 @@ fn what_is_charged_again_while_it_is_charged() {
 
 #[test]
 fn runs_whose_duration_the_state_decides() {
-    // The second run takes longer, for the number has grown: all the same it may start while the first one is under way.
+    // The second run takes longer, for the number has grown: all the same it may start while the
+    // first one is under way.
     let domain =
         "(define (domain d) (:requirements :durative-actions) (:predicates (go)) (:functions (x) (y))
       (:durative-action react :parameters () :duration (= ?duration (x))

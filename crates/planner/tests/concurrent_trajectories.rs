@@ -1,5 +1,6 @@
-//! Preferences, and constraints on trajectories and times, where actions overlap: known answers, and random tasks on which plans over a
-//! grid of times, executed by the validator, are no better than what is found.
+//! Preferences, and constraints on trajectories and times, where actions overlap: known answers,
+//! and random tasks on which plans over a grid of times, executed by the validator, are no better
+//! than what is found.
 
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
@@ -97,8 +98,8 @@ fn times_are_kept() {
 }
 
 #[test]
-fn what_costs_nothing_is_the_best() {
-    // The search keeps happenings apart that need not be; that no plan costs less than nothing is known all the same.
+fn a_plan_without_cost_is_optimal() {
+    // The search is incomplete here, but no plan costs less than 0.
     let wish = "(preference w (always (imply (q) (p)))) (sometime (q))";
     let metric = "(:metric minimize (is-violated w))";
     let lines = ["0: (raise) [3]", "3.5: (light) [2]"];
@@ -106,12 +107,12 @@ fn what_costs_nothing_is_the_best() {
 }
 
 #[test]
-fn what_has_to_follow_in_time_is_judged_by_the_times_of_the_plan() {
+fn deadlines_are_checked_on_the_times_of_the_plan() {
     let soon = |time: &str| format!("(sometime (q)) (always-within {time} (q) (p))");
     let time = "(:metric minimize (total-time))";
     let both = ["0: (raise) [3]", "0: (light) [2]"];
     check(&soon("3"), "(p)", time, (Status::Feasible, Some("3"), &both));
-    // It is put off until nothing has to follow.
+    // It is delayed until no further action has to follow.
     let late = ["0: (raise) [3]", "3.5: (light) [2]"];
     check(&soon("1"), "(p)", time, (Status::Feasible, Some("5.5"), &late));
     let weighed = "(:metric minimize (+ (total-time) (* 2 (is-violated w))))";
@@ -201,8 +202,8 @@ fn sample(random: &mut Random) -> (String, String, [i128; 3]) {
 /// The last start that brute force tries.
 const LAST: i128 = 5;
 
-/// The least metric of valid plans of up to three actions that start at whole times: of all, and of those with no two happenings at one
-/// time.
+/// The least metric of valid plans of up to three actions that start at whole times: of all, and of
+/// those with no two happenings at one time.
 fn brute_force(durations: [i128; 3], domain: &Domain, problem: &Problem) -> [Option<BigRational>; 2] {
     let mut best = [None, None];
     let mut open: Vec<Vec<(i128, usize)>> = vec![Vec::new()];

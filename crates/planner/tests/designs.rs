@@ -1,5 +1,5 @@
-//! Many designs, designs that depend on each other, and expressions over designs and fluents at once: what is claimed is
-//! what the definition of a plan says, worked out by hand for each task.
+//! Many designs, dependent designs, and expressions over designs and fluents together: claims must agree
+//! with the definition of a plan, evaluated by hand for each task.
 
 use std::fmt::Write as _;
 
@@ -28,7 +28,8 @@ fn found(cost: &str, steps: &[&str]) -> Option<(String, Vec<String>)> {
     Some((cost.to_owned(), steps.iter().map(|step| (*step).to_owned()).collect()))
 }
 
-/// `count` designs, of which each solves `f1` and `f2`; `value` writes what is known of the design with an index.
+/// `count` designs, of which each solves `f1` and `f2`; `value` writes what is known of the design
+/// with an index.
 fn designs(count: usize, value: impl Fn(usize) -> String) -> String {
     let mut text = String::from("(define (problem p) (:domain d) (:objects");
     for index in 0..count {
@@ -99,7 +100,7 @@ fn a_function_may_be_a_design_itself() {
     assert_eq!(solve(&domain, problem).status, Status::Unsolvable);
 }
 
-/// Products and quotients of what a design determines and of what actions change.
+/// Products and quotients of design-dependent values and fluents.
 #[test]
 fn factors_of_a_design_and_of_a_fluent_may_meet() {
     let task = |precondition: &str, effect: &str| {

@@ -1,5 +1,6 @@
-//! Tasks whose numbers no scale makes integers: random ones against all sequences of actions, executed in big rationals by the
-//! definition of their effects, and cases of known cost. The validator executes every plan.
+//! Tasks whose numbers no scale makes integers: random ones against all sequences of actions,
+//! executed in big rationals by the definition of their effects, and cases of known cost. The
+//! validator executes every plan.
 
 #![allow(clippy::format_collect, clippy::print_stderr)]
 
@@ -30,7 +31,7 @@ fn number(decimal: &str) -> BigRational {
     BigRational::new(digits, BigInt::from(10).pow(fraction.len() as u32))
 }
 
-/// What the validator says a plan costs; none if it is not valid.
+/// Cost of a plan by the validator. Returns `None` if the plan is invalid.
 fn metric(domain: &Domain, problem: &Problem, plan: &Plan) -> Option<BigRational> {
     let steps = plan.steps.iter().map(|step| PlanStep {
         action: Name::new(&step.action),
@@ -64,11 +65,11 @@ fn too_large(domain: &Domain, problem: &Problem) -> bool {
     }
 }
 
-/// How many actions a random plan has at most.
+/// Maximum number of actions of a random plan.
 const STEPS: usize = 4;
 const NUMBERS: [&str; 2] = ["x", "y"];
 
-/// What becomes of a number.
+/// Effect on a number.
 #[derive(Debug, Clone)]
 enum Change {
     ScaleUp(String),
@@ -283,7 +284,7 @@ impl Model {
         (domain, problem)
     }
 
-    /// For each number of actions the least cost of a plan with so many.
+    /// Least cost of a plan, by number of actions.
     fn oracle(&self) -> Vec<Option<BigRational>> {
         let mut layer: HashMap<Moment, BigRational> = HashMap::new();
         let [x, y] = &self.initial;
@@ -311,8 +312,8 @@ impl Model {
     }
 }
 
-/// Compares the answer for a model with all of its plans; whether its numbers are too large for integers, and whether it has
-/// a plan.
+/// Compares the answer for a model with all of its plans; whether its numbers are too large for
+/// integers, and whether it has a plan.
 fn check(seed: u64, rewards: bool, horizon: Option<usize>) -> (bool, bool) {
     let model = Model::random(seed, rewards);
     let (domain_text, problem_text) = model.text();
@@ -473,7 +474,8 @@ fn times_may_be_quotients_of_measured_speeds() {
     assert!(plan.cost.to_rational().is_positive());
 }
 
-/// A random task that was answered with "no plan" once: an effect that contradicts itself removed the whole action.
+/// A random task that was answered with "no plan" once: an effect that contradicts itself removed
+/// the whole action.
 #[test]
 fn a_task_of_another_generator_has_its_plan() {
     let directory =

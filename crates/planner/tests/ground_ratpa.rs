@@ -1,9 +1,10 @@
-//! The ground task of generated missions against instantiation by brute force: the same reachable atoms and the same
-//! operators, once the choices of function designs are multiplied out.
+//! The ground task of generated missions against instantiation by brute force: the same reachable
+//! atoms and the same operators, once the choices of function designs are multiplied out.
 //!
-//! The other side reads nothing but the syntax tree: it binds parameters one by one, decides what never changes, and
-//! repeats relaxed reachability with intervals of numbers until nothing is added. What has no influence on the goal is left
-//! out by its own definition of that. The missions come from a script that is not part of the project.
+//! The oracle only reads the syntax tree: it binds parameters one by one, evaluates static
+//! conditions, and repeats relaxed reachability with intervals of numbers until nothing is added.
+//! Atoms without influence on the goal are left out by its own definition of that. The missions
+//! come from a script that is not part of the project.
 
 #![expect(clippy::print_stdout, reason = "a skipped test says so")]
 
@@ -116,7 +117,7 @@ impl<'d> World<'d> {
         Some((folded(&atom.predicate.name), arguments))
     }
 
-    /// All instances whose unchanging conditions hold; numbers are left aside.
+    /// All instances whose static conditions hold; numbers are ignored.
     fn instances(&self) -> Vec<Instance> {
         let mut found = Vec::new();
         for index in 0..self.schemas.len() {
@@ -327,8 +328,9 @@ fn mentions(expression: &Expression, name: &str) -> bool {
     }
 }
 
-/// Leaves out what has no influence on the goal: additions and deletions that nothing reads, and then instances that do
-/// nothing at all (their costs are never below zero). Returns the facts that are read.
+/// Leaves out what has no influence on the goal: additions and deletions that nothing reads, and
+/// then instances that do nothing at all (their costs are never below zero). Returns the facts that
+/// are read.
 fn relevant<'i>(
     world: &World<'_>,
     mut instances: Vec<&'i Instance>,
@@ -386,7 +388,7 @@ fn compare(name: &str, domain: &Domain, problem: &Problem, task: &Task) {
     assert!(counts.0 <= counts.1, "{name}: {counts:?}");
 }
 
-/// The pairs of files of one mission, in all encodings; none where the script is absent.
+/// Pairs of files of one mission in all encodings; empty if the script is missing.
 fn mission(family: &str, seed: u64, sizes: [usize; 3], encodings: &str) -> Vec<(String, Source, Source)> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("ratpa");
     let [n, m, k] = sizes.map(|size| size.to_string());

@@ -1,6 +1,7 @@
-//! How fast files are read and ground, beside the translator of Fast Downward, and how large the ground task becomes.
+//! Speed of reading and grounding compared with the translator of Fast Downward, and size of the ground task.
 //!
-//! Times are CPU times of this thread and of the translator's process, so that other work on the machine disturbs little.
+//! Times are CPU times of this thread and of the translator's process, so that other work on the
+//! machine disturbs little.
 
 #![expect(clippy::print_stdout, reason = "measurements are shown")]
 
@@ -19,7 +20,7 @@ fn cpu_time() -> Option<f64> {
     Some(text.split_whitespace().next()?.parse::<f64>().ok()? / 1e9)
 }
 
-/// What `work` makes, and the CPU seconds that it takes.
+/// Result of `work`, and its CPU time in seconds.
 fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let before = cpu_time().unwrap_or_default();
     let result = work();
@@ -85,7 +86,7 @@ fn ground_size_is_linear_in_the_number_of_functions() {
             let (domain, problem) = ring(12, k, 6);
             let task = task(domain, problem);
             assert_eq!(task.operator_count(), 12, "k = {k}");
-            // The text of all that the task holds stands for its size in memory.
+            // The length of the debug text approximates the size in memory.
             format!("{task:?}").len()
         })
         .collect();
@@ -95,7 +96,7 @@ fn ground_size_is_linear_in_the_number_of_functions() {
     assert!(most.zip(least).is_some_and(|(most, least)| most * 10 <= least * 11), "{sizes:?}");
 }
 
-/// A problem of so many bytes, of facts and values as generators write them.
+/// A problem of about `bytes` bytes, with facts and values as generators write them.
 fn large_problem(bytes: usize) -> String {
     let mut text = String::from("(define (problem large) (:domain d)\n  (:objects");
     let places = 1000;
@@ -162,11 +163,12 @@ print(used.ru_utime + used.ru_stime)";
     seconds
 }
 
-/// The largest instances, for which the factor is asserted, and smaller ones beside them. Needs a Python with the translator (`python3 -m venv peers; peers/bin/pip install up-fast-downward`), named by
-/// `METAPLAN_PEERS=peers/bin/python`.
+/// The largest instances, for which the factor is asserted, and smaller ones for comparison. Needs
+/// a Python with the translator (`python3 -m venv peers; peers/bin/pip install up-fast-downward`),
+/// named by `METAPLAN_PEERS=peers/bin/python`.
 #[test]
 #[ignore = "measures beside a peer; in release"]
-fn reading_and_grounding_beside_the_translator_of_fast_downward() {
+fn reading_and_grounding_compared_with_the_translator_of_fast_downward() {
     let Ok(python) = std::env::var("METAPLAN_PEERS") else { panic!("METAPLAN_PEERS names no Python") };
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("speed");
     std::fs::create_dir_all(&folder).expect("a folder");

@@ -1,5 +1,5 @@
-//! Costs, times and numbers that grow beyond their types while actions are executed: nothing panics, and nothing is claimed that
-//! is not so.
+//! Costs, times and numbers that grow beyond their types while actions are executed: nothing
+//! panics, and nothing is claimed that is not so.
 
 use std::fmt::Write as _;
 use std::time::Duration;
@@ -13,7 +13,7 @@ use num_rational::BigRational;
 use pddl::ast::{Direction, Domain, Problem};
 use pddl::{Source, read, read_objective};
 
-/// Nearly the largest number of a task, 2^118. So many times as much does not fit 128 bits.
+/// Nearly the largest number of a task, 2^118. Multiples of it overflow 128 bits.
 const LARGE: &str = "330000000000000000000000000000000000";
 const MANY: usize = 520;
 
@@ -38,7 +38,8 @@ fn large(times: usize) -> BigRational {
     BigRational::from_integer(LARGE.parse::<BigInt>().expect("a number") * BigInt::from(times))
 }
 
-/// A robot in a corridor of so many places, to whose end it has to go; each move costs as much as `cost` says.
+/// A robot that has to go to the end of a corridor with `places` places; each move has the cost
+/// effect `cost`.
 fn corridor(places: usize, cost: &str, metric: &str) -> Task {
     let domain = format!(
         "(define (domain d) (:requirements :typing :numeric-fluents) (:types place)
@@ -144,7 +145,7 @@ fn an_objective_whose_sum_does_not_fit_is_shown_and_not_proved() {
 
 #[test]
 fn the_least_number_of_the_type_is_too_large_as_well() {
-    // From 2^112 to 2^124, which is the most that a number may come to, and then to -2^127.
+    // From 2^112 to 2^124, the greatest admitted number, and then to -2^127.
     let domain =
         "(define (domain d) (:requirements :numeric-fluents) (:predicates (a) (b) (c)) (:functions (x))
         (:action grow :parameters () :precondition (a) :effect (and (not (a)) (b) (scale-up (x) 4096)))

@@ -74,7 +74,7 @@ fn run(domain: &Domain, problem: &Problem, limit: Duration, engine: Engine) -> (
     (Some(solution.status), started.elapsed())
 }
 
-/// There is a plan, so whenever time is up, it is never said that there is none.
+/// The task is solvable, so no time limit may lead to the answer that it is unsolvable.
 #[test]
 fn wherever_time_is_up_there_is_no_false_answer() {
     let (domain, problem) = depot(4, 2, 3);

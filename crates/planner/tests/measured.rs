@@ -1,5 +1,5 @@
-//! Metrics over fluents whose changes depend on the state: plans are found, measured as the validator measures them, and none is called
-//! the best.
+//! Metrics over fluents whose changes depend on the state: plans are found, measured as the
+//! validator measures them, and none is called the best.
 
 use metaplan_planner::{
     Config, GroundConfig, Limits, Plan, Solution, Status, ground, ground_concurrent, lexicographic, optimize,
@@ -19,7 +19,8 @@ fn text(plan: &Plan) -> String {
     lines.collect()
 }
 
-/// Checks that a plan is valid, has the metric that the validator has, and that its steps add up to it from what it is at first.
+/// Checks that a plan is valid, has the metric that the validator has, and that its steps add up to
+/// it from what it is at first.
 fn judge((domain, problem): (&Domain, &Problem), concurrent: bool, solution: &Solution, at_first: i64) {
     assert_eq!(solution.status, Status::Feasible, "{solution:?}");
     assert!(solution.proof.is_none() && solution.lower_bound.is_none(), "{solution:?}");
@@ -34,7 +35,7 @@ fn judge((domain, problem): (&Domain, &Problem), concurrent: bool, solution: &So
     assert_eq!(steps + BigRational::from_integer(at_first.into()), plan.cost.to_rational(), "{text}");
 }
 
-/// What is bought costs as much as is still wanted.
+/// Each purchase costs as much as the remaining demand.
 const MARKET: &str = "(define (domain market) (:types good shop)
   (:predicates (sells ?s - shop ?g - good) (at ?s - shop) (road ?a - shop ?b - shop) (done ?g - good))
   (:functions (price ?s - shop ?g - good) (wanted ?g - good) (spent) (fame))
@@ -89,7 +90,7 @@ fn plans_one_after_another_have_the_metric_of_their_end() {
 }
 
 #[test]
-fn that_there_is_no_plan_is_still_proved() {
+fn unsolvability_is_still_proved() {
     let (domain, mut problem) = market("minimize (spent)");
     problem.init.retain(|element| !format!("{element:?}").contains("road"));
     let task = ground(&domain, &problem, &GroundConfig::default()).expect("a task");

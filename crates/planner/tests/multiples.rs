@@ -1,5 +1,5 @@
-//! Numbers that add to each other by fractions, stored as multiples of themselves: the same answers as in exact rationals, which know no
-//! multiples.
+//! Numbers that add to each other by fractions, stored as multiples of themselves: the same answers
+//! as in exact rationals, which know no multiples.
 
 use metaplan_planner::{
     Config, Engine, GroundConfig, Status, ground, ground_exact, optimize, optimize_exact,

@@ -1,5 +1,5 @@
-//! Formulas of generated missions, and their refutations: there is one for the truth, none for what is false, and what is changed
-//! is noticed.
+//! Formulas of generated missions, and their refutations: there is one for the truth, none for what
+//! is false, and what is changed is noticed.
 
 #[allow(dead_code, reason = "another suite uses the rest")]
 use std::cell::RefCell;
@@ -15,7 +15,7 @@ use pddl::{Source, read};
 use testing::missions::Mission;
 use testing::random::Random;
 
-/// The certificate of a mission and its least cost; none if there is no plan.
+/// Certificate of a mission and its least cost. Returns `None` if there is no plan.
 fn certified(seed: u64) -> Option<(Certificate, BigRational)> {
     let mission = Mission::random(seed);
     let cost = BigRational::from_integer(mission.oracle()?.into());
@@ -71,7 +71,7 @@ fn refutation(
     Ok((steps, files.map(|file| file.text())))
 }
 
-/// What is said of formula, proof and steps.
+/// Verdicts on formula, proof and steps.
 fn verdicts(
     certificate: &Certificate,
     claim: &BigRational,
@@ -117,7 +117,7 @@ fn check(seed: u64, by: StepBound) {
 }
 
 #[test]
-fn there_is_a_refutation_of_what_is_false_only() {
+fn only_unsatisfiable_claims_have_a_refutation() {
     for seed in 0..60 {
         check(seed, StepBound::Spent);
         check(seed, StepBound::Potential);
@@ -153,10 +153,10 @@ fn mutate(text: &str, random: &mut Random) -> String {
     lines.join("\n") + "\n"
 }
 
-/// A changed formula or legend is not the task's; a changed proof proves nothing that is false, and nothing at all once it is
-/// cut off.
+/// A changed formula or legend is not the task's; a changed proof proves nothing that is false, and
+/// nothing at all once it is cut off.
 #[test]
-fn what_is_changed_is_noticed() {
+fn changed_refutations_are_rejected() {
     for seed in 0..40 {
         let Some((certificate, cost)) = certified(seed) else { continue };
         let Ok((steps, files)) = refutation(&certificate, &cost, StepBound::Spent) else { continue };

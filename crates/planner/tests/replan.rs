@@ -1,4 +1,4 @@
-//! The live planner against planning anew: the same plan, for random changes of state and availability.
+//! The replanner against planning from scratch: the same plan, for random changes of state and availability.
 
 #![allow(clippy::format_collect)]
 #![expect(clippy::print_stdout, reason = "times are what one of these tests is for")]
@@ -36,7 +36,8 @@ fn words(atom: &Atom) -> Vec<String> {
     std::iter::once(atom.predicate.name.to_string()).chain(atom.arguments.iter().map(term)).collect()
 }
 
-/// What can change in a mission: names of its fact of place, of its places and designs, and the battery's capacity.
+/// Changeable parts of a mission: names of its position predicate, places and designs, and the
+/// battery's capacity.
 struct Changes {
     at: &'static str,
     places: Vec<String>,
@@ -126,7 +127,7 @@ fn live_with(
     };
     let mut told = Vec::new();
     let found = replanner.plan_aloud(&query, &mut |progress| told.push(progress));
-    // What is told on the way is true in the end.
+    // Progress reports must agree with the final result.
     if let ReplanOutcome::Optimal { metric, .. } = &found {
         for progress in told {
             let dearest = progress.metric.as_ref();
@@ -142,7 +143,7 @@ fn new(domain: &Domain, problem: &Problem) -> Replanner {
     Replanner::new(domain, problem, &available, &GroundConfig::default()).expect("the domain is suited")
 }
 
-/// Both answers are the same plan, or none.
+/// Both answers are the same plan, or both report that none exists.
 fn compare(expected: &Solution, found: &ReplanOutcome, context: &dyn Fn() -> String) {
     match (&expected.plan, found) {
         (Some(plan), ReplanOutcome::Optimal { steps, metric, .. }) => {
@@ -160,7 +161,8 @@ fn compare(expected: &Solution, found: &ReplanOutcome, context: &dyn Fn() -> Str
     }
 }
 
-/// So many changes of a mission, one after the other, each answered in both ways; how often it had to be ground anew.
+/// Applies changes to a mission one by one, each answered in both ways. Returns how often it had to
+/// be ground again.
 fn check(seed: u64, changes: usize) -> usize {
     let mission = Mission::random(seed);
     let (domain, mut problem) = parse(&mission.domain(), &mission.problem());
@@ -178,7 +180,7 @@ fn check(seed: u64, changes: usize) -> usize {
         }
         let context = || format!("seed {seed}, change {number}: {mission:?}: {:?}", problem.init);
         compare(&from_scratch(&domain, &problem), &found, &context);
-        // A plan that is known is none the worse.
+        // A known plan must not change the result.
         let again = live_with(&mut replanner, &domain, &problem, old.as_ref());
         assert_eq!(again, found, "{}", context());
         if let ReplanOutcome::Optimal { steps, .. } = &found {
@@ -208,8 +210,8 @@ fn named(steps: &[metaplan_planner::Step]) -> Named {
     steps.iter().map(|step| (step.action.clone(), step.arguments.clone())).collect()
 }
 
-/// After a change the plan that stays close to the old one is a best one with fewest steps, and of all of those, as the SAT solver
-/// enumerates them, none has more steps of the old one.
+/// After a change the plan that stays close to the old one is a best one with fewest steps, and of
+/// all of those, as the SAT solver enumerates them, none has more steps of the old one.
 fn check_close(seed: u64) {
     let mission = Mission::random(seed);
     let (domain, mut problem) = parse(&mission.domain(), &mission.problem());
@@ -283,7 +285,8 @@ fn plans_stay_close_to_the_old_one() {
     assert_eq!(plan(&mut replanner, Some(&old)), old);
 }
 
-/// Switches that a robot turns on, in an order of its own, with a limit that has been reached before it begins.
+/// Switches that a robot turns on, in an order of its own, with a limit that has been reached
+/// before it begins.
 #[test]
 fn the_old_plan_serves_when_time_is_up() {
     let domain = "(define (domain robot) (:types switch design function)
@@ -321,7 +324,7 @@ fn the_old_plan_serves_when_time_is_up() {
     );
 }
 
-/// What blocks a mission is minimal: alone it leaves no plan, and without any part of it there is one.
+/// Checks that the blocking set is minimal: alone it makes the mission unsolvable, and no proper part does.
 fn check_blocking(seed: u64) -> bool {
     let mission = Mission::random(seed);
     let (domain, mut problem) = parse(&mission.domain(), &mission.problem());
@@ -359,7 +362,7 @@ fn check_blocking(seed: u64) -> bool {
 }
 
 #[test]
-fn what_blocks_a_mission_is_minimal() {
+fn the_blocking_set_of_a_mission_is_minimal() {
     let found = (0..150).filter(|seed| check_blocking(*seed)).count();
     assert!(found > 10, "{found}");
 }
@@ -400,7 +403,7 @@ fn generated(waypoints: usize, designs: usize, functions: usize) -> Option<(Doma
     command.output().ok()?.status.success().then(|| parse(&read("domain"), &read("problem")))
 }
 
-/// What the thread has used of the processor so far, in milliseconds.
+/// CPU time of the thread in milliseconds.
 fn used() -> f64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux tells");
     text.split(' ').next().and_then(|first| first.parse::<f64>().ok()).expect("nanoseconds") / 1e6
@@ -408,7 +411,7 @@ fn used() -> f64 {
 
 #[test]
 #[ignore = "a measurement, for release builds"]
-fn live_planning_beside_planning_anew() {
+fn replanning_time_compared_with_planning_from_scratch() {
     if !Path::new(TOOL).exists() {
         println!("skipped: {TOOL} is absent");
         return;
@@ -451,9 +454,10 @@ fn live_planning_beside_planning_anew() {
     }
 }
 
-/// A state in which two atoms hold that exclude each other in the mission, though they are values of different variables.
+/// A state in which two atoms hold that exclude each other in the mission, though they are values
+/// of different variables.
 #[test]
-fn a_state_that_breaks_what_the_mission_excludes_is_planned_for_anew() {
+fn a_state_that_violates_a_mutex_group_is_ground_again() {
     let moves = [("t1", "c", "a"), ("x1", "a", "b"), ("x2", "b", "a"), ("u1", "c", "d"), ("u2", "d", "e")];
     let moves = moves.into_iter().chain([("u3", "e", "f"), ("u4", "f", "d")]);
     let actions: String = moves

@@ -1,4 +1,4 @@
-//! What is claimed of tasks at the edges: nothing to do, nothing that helps, free cycles, metrics without a best value.
+//! Statuses of edge cases: empty plans, unsolvable tasks, cycles without cost, metrics without an optimum.
 
 use metaplan_planner::{
     Backend, Config, GroundConfig, MetricUnbounded, Proof, Status, StepSemantics, ground, optimize,
@@ -15,7 +15,8 @@ const DOMAIN: &str = "(define (domain d)
   (:action flip :parameters () :precondition (not (on)) :effect (on))
   (:action flop :parameters () :precondition (on) :effect (not (on))))";
 
-/// Status, cost and steps of the answer, with and without the quick search, by every solver and in all semantics.
+/// Status, cost and steps of the answer, with and without the quick search, by every solver and in
+/// all semantics.
 fn check(name: &str, init: &str, goal: &str, metric: &str, expected: (Status, Option<&str>, Option<usize>)) {
     let problem = format!(
         "(define (problem p) (:domain d) (:objects a b c - place)
@@ -97,7 +98,7 @@ fn a_metric_without_a_best_value_is_read_with_bounds() {
 }
 
 #[test]
-fn proofs_name_what_they_rest_on() {
+fn proofs_name_their_reason() {
     let problem = format!(
         "(define (problem p) (:domain d) (:objects a b c - place)
           (:init (at a) (= (total-cost) 0) (= (reward) 0) (= (fuel) 2) {FREE}) (:goal (at c)) {COST})"
@@ -112,7 +113,8 @@ fn proofs_name_what_they_rest_on() {
     assert_eq!(optimize(&task, &within, &mut |_| {}).status, Status::UnsolvableWithinHorizon);
 }
 
-/// Changes of one number at one time that contradict each other leave an action inapplicable, as the validator has it.
+/// Changes of one number at one time that contradict each other leave an action inapplicable, as
+/// the validator has it.
 #[test]
 fn contradictory_changes_leave_an_action_inapplicable() {
     let solve = |effect: &str| {

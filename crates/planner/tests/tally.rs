@@ -11,7 +11,7 @@ pub fn limits(head_start: usize) -> Limits {
     Limits::none().with_thresholds(thresholds)
 }
 
-/// What the planner says of a task; none where it refuses it, which it may for one reason only.
+/// Solution of a task. Returns `None` if the planner rejects the task, for which only `reason` is admitted.
 pub fn solve(domain: &Domain, problem: &Problem, reason: &str) -> Option<Solution> {
     let task = match ground(domain, problem, &GroundConfig::default()) {
         Ok(task) => task,
@@ -25,7 +25,7 @@ pub fn solve(domain: &Domain, problem: &Problem, reason: &str) -> Option<Solutio
     Some(optimize(&task, &Config::default().with_limits(limits), &mut |_| {}))
 }
 
-/// How many tasks came to a proof.
+/// Number of tasks that were decided.
 pub struct Tally {
     seeds: u64,
     proved: u64,
@@ -33,7 +33,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// As many seeds as `METAPLAN_SEEDS` says, or 300.
+    /// Reads the number of seeds from `METAPLAN_SEEDS`; the default is 300.
     pub fn new() -> Self {
         let seeds = std::env::var("METAPLAN_SEEDS").map_or(300, |text| text.parse().expect("a number"));
         Self { seeds, proved: 0, unsolvable: 0 }
@@ -48,7 +48,8 @@ impl Tally {
         self.unsolvable += u64::from(solution.status == Status::Unsolvable);
     }
 
-    /// A test of hardly any proofs would say little: a quarter is proved optimal, and one in so many unsolvable.
+    /// Checks that the test is meaningful: a quarter of the tasks is proved optimal, and one in
+    /// `one_in` unsolvable.
     pub fn check(&self, one_in: u64) {
         let Self { seeds, proved, unsolvable } = self;
         assert!(

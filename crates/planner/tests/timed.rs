@@ -1,5 +1,5 @@
-//! Plans with timed initial literals: known optima, and random tasks on which the planner must agree with the validator
-//! run on every sequence of up to three actions.
+//! Plans with timed initial literals: known optima, and random tasks on which the planner must
+//! agree with the validator run on every sequence of up to three actions.
 
 use std::fmt::Write as _;
 
@@ -16,7 +16,7 @@ fn parse(domain: &str, problem: &str) -> (Domain, Problem) {
     (domain, problem)
 }
 
-/// The cheapest plan; none if it is proved that there is none. `Engine::Sat` is the SAT solver alone.
+/// Cheapest plan. Returns `None` if it is proved that no plan exists. `Engine::Sat` is the SAT solver alone.
 fn plan(domain: &Domain, problem: &Problem, engine: Engine) -> Option<Plan> {
     let task =
         ground(domain, problem, &GroundConfig::default()).unwrap_or_else(|errors| panic!("{errors:?}"));
@@ -43,7 +43,7 @@ fn written(plan: &Plan) -> String {
     text
 }
 
-/// What the validator says a plan costs; none if it is not valid.
+/// Metric of a plan by the validator. Returns `None` if the plan is invalid.
 fn metric(domain: &Domain, problem: &Problem, text: &str) -> Option<String> {
     let plan =
         PlanText::parse(&Source::new("plan", text)).unwrap_or_else(|errors| panic!("{errors:?}\n{text}"));
@@ -80,7 +80,7 @@ const INSPECTION: &str = "(define (domain inspection)
     :condition (and (at start (at-pipe)) (at end (daylight))) :effect (at end (recorded))))";
 
 #[test]
-fn actions_wait_for_what_happens_by_itself() {
+fn actions_wait_for_timed_literals() {
     let problem = |init: &str, goal: &str| {
         format!(
             "(define (problem p) (:domain inspection) (:init (= (level) 10) {init}) (:goal {goal})
@@ -129,7 +129,8 @@ fn literal(random: &mut Random) -> String {
 
 #[test]
 fn a_wait_is_no_step_of_a_plan() {
-    // Without a metric plans are measured by their length: two actions and a wait are shorter than three actions.
+    // Without a metric plans are measured by their length: two actions and a wait are shorter than
+    // three actions.
     let domain =
         "(define (domain d) (:requirements :timed-initial-literals) (:predicates (at-b) (at-c) (at-d) (gate))
       (:action to-b :parameters () :precondition (and) :effect (at-b))
@@ -160,7 +161,7 @@ fn timed(random: &mut Random, times: &[&str], most: u64) -> String {
     text + ")"
 }
 
-/// A task and what brute force has to know of it.
+/// A task and the data for brute force.
 struct Sample {
     durations: [i64; 3],
     events: Vec<i64>,
@@ -206,8 +207,9 @@ fn sample(random: &mut Random) -> Sample {
     Sample { durations, events, domain, problem }
 }
 
-/// The least cost of valid plans of up to three actions. All times of the files are integers; so an action that can start at all
-/// at some time can start as soon as the last has ended, or so that it starts or ends with an event or half a unit later. Times are doubled.
+/// The least cost of valid plans of up to three actions. All times of the files are integers; so an
+/// action that can start at all at some time can start as soon as the last has ended, or so that it
+/// starts or ends with an event or half a unit later. Times are doubled.
 fn brute_force(task: &Sample, domain: &Domain, problem: &Problem) -> Option<i64> {
     let mut best = None;
     let mut open: Vec<(i64, String, usize)> = vec![(0, String::new(), 0)];

@@ -1,8 +1,10 @@
-//! The validator beside that of the unified planning framework: the same verdict on cheapest plans of generated missions
-//! and on plans that were changed in one place.
+//! The validator compared with that of the unified planning framework: the same verdict on cheapest
+//! plans of generated missions and on plans that were changed in one place.
 //!
-//! Needs a Python with the framework (`python3 -m venv peers; peers/bin/pip install unified-planning`), named by
-//! `METAPLAN_PEERS=peers/bin/python`. The missions come from a script that is not part of the project.
+//! Needs a Python with the framework
+//! (`python3 -m venv peers; peers/bin/pip install unified-planning`), named by
+//! `METAPLAN_PEERS=peers/bin/python`. The missions come from a script that is not part of the
+//! project.
 
 use std::fmt::Write as _;
 use std::path::Path;

@@ -1,11 +1,13 @@
-//! The validator beside that of the unified planning framework for plans with times: on the real files that the
-//! framework can read, with cheapest plans and with plans that were changed in one place.
+//! The validator compared with that of the unified planning framework for plans with times: on the
+//! real files that the framework can read, with cheapest plans and with plans that were changed in
+//! one place.
 //!
-//! The framework knows neither the mutex rule of PDDL 2.1 nor, where an action has no effect at its start, what holds
-//! over all of it just after its start. So what it rejects is to be rejected, and what it accepts may be rejected for
-//! these two reasons only.
+//! The framework knows neither the mutex rule of PDDL 2.1 nor, where an action has no effect at its
+//! start, what holds over all of it just after its start. So what it rejects is to be rejected, and
+//! what it accepts may be rejected for these two reasons only.
 //!
-//! Needs a Python with the framework (`python3 -m venv peers; peers/bin/pip install unified-planning`), named by
+//! Needs a Python with the framework
+//! (`python3 -m venv peers; peers/bin/pip install unified-planning`), named by
 //! `METAPLAN_PEERS=peers/bin/python`. The files are not part of the project.
 
 #![expect(clippy::print_stdout, reason = "figures are shown")]
@@ -72,7 +74,7 @@ fn text(plan: &[Timed]) -> String {
     plan.iter().map(line).collect()
 }
 
-/// A cheapest plan, its steps a little apart; no steps where the planner finds none.
+/// Cheapest plan with slightly separated steps; empty if the planner finds no plan.
 fn plan(domain: &Domain, problem: &Problem) -> Vec<Timed> {
     let steps: Vec<(Vec<String>, Exact)> = ground(domain, problem, &GroundConfig::default())
         .ok()
@@ -109,7 +111,8 @@ fn changed(plan: &[Timed], objects: &[String], number: usize) -> Vec<Timed> {
             plan.push((start + duration.unwrap_or_default() + 5, words, duration));
         }
         2 => plan.truncate(place),
-        // Earlier, so that it overlaps or comes before what it needs; sometimes at the same time as the one before.
+        // Earlier, so that it overlaps or comes before what it needs; sometimes at the same time as
+        // the one before.
         3 => {
             plan[place].0 = if place > 0 && some == 0 { plan[place - 1].0 } else { plan[place].0 * some / 4 }
         }

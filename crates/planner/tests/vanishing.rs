@@ -1,13 +1,13 @@
-//! Actions that must not vanish: cases, designs and values that are missing take away what needs them, and nothing else.
+//! Actions that must not vanish: missing cases, designs and values remove only the actions that need them.
 //!
-//! Each of these was answered with a false "no plan exists" or a false optimum once. What is right follows from the definition in
-//! `validate`, which also executes the expected plan.
+//! Each of these was answered with a false "no plan exists" or a false optimum once. What is right
+//! follows from the definition in `validate`, which also executes the expected plan.
 
 use metaplan_planner::{Config, GroundConfig, Status, ground, optimize};
 use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, read};
 
-/// What is expected: the metric and a plan that has it, no plan, or a refusal with a code.
+/// Expected result: the metric and a plan with this metric, no plan, or a rejection with a code.
 enum Expected {
     Optimal(&'static str, &'static str),
     Unsolvable,
@@ -42,7 +42,8 @@ fn check(name: &str, domain: &str, problem: &str, expected: &Expected) {
     }
 }
 
-/// An action of duration 2 with these start effects beside `(q)`, and one of duration 100 that also reaches the goal.
+/// An action of duration 2 with these start effects in addition to `(q)`, and one of duration 100
+/// that also reaches the goal.
 fn conditional(effects: &str) -> String {
     format!(
         "(define (domain d) (:requirements :durative-actions :fluents :conditional-effects) (:predicates (p) (q) (r)) (:functions (f) (g) (h))

@@ -6,8 +6,9 @@ use task::limits::Limits;
 use testing::missions::Mission;
 use testing::{depot, fleet, ground_text, successors};
 
-/// Estimates never fall by more than a step costs, and are 0 at the goal: so they are lower bounds. Returns whether the shares of
-/// several projections say more of the initial state than any projection alone.
+/// Checks that heuristic values are consistent and 0 at the goal, so they are lower bounds. Returns
+/// whether cost partitioning over several projections gives a higher value of the initial state
+/// than any projection alone.
 fn check_estimates(text: &(String, String)) -> bool {
     let task = ground_text(text.clone());
     if task.unreachable.is_some() {
@@ -35,7 +36,7 @@ fn check_estimates(text: &(String, String)) -> bool {
 }
 
 #[test]
-fn estimates_are_consistent_and_shares_add_up() {
+fn heuristic_values_are_consistent_and_cost_partitionings_add_up() {
     let fleets = (0..12).filter(|seed| check_estimates(&fleet(*seed))).count();
     let depots = (0..12).filter(|seed| check_estimates(&depot(*seed))).count();
     assert!(fleets > 3 && depots > 3, "shares add up for {fleets} fleets and {depots} depots");
@@ -43,7 +44,7 @@ fn estimates_are_consistent_and_shares_add_up() {
 
 #[test]
 #[ignore = "takes minutes"]
-fn many_estimates_are_consistent() {
+fn many_heuristic_values_are_consistent() {
     for seed in 12..600 {
         check_estimates(&fleet(seed));
         check_estimates(&depot(seed));

@@ -1,14 +1,14 @@
-//! Binary numbers in clauses: two's complement, ripple-carry addition, constants folded.
+//! Binary arithmetic in clauses: two's complement, ripple-carry addition, constant folding.
 
 use task::number::{Int, dense};
 
 use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::sat::Lit;
 
-/// Bits of a number, the lowest first; the last one is the sign.
+/// Bits of a number, lowest first; the last one is the sign.
 pub type Bits = Vec<Lit>;
 
-/// How many bits a number needs, sign included.
+/// Number of bits for a range, including the sign.
 #[expect(clippy::arithmetic_side_effects, reason = "a number has at most 128 leading zeros")]
 pub fn width(low: Int, high: Int) -> usize {
     let bits = |number: Int| {
@@ -17,7 +17,7 @@ pub fn width(low: Int, high: Int) -> usize {
     bits(low).max(bits(high))
 }
 
-/// Builds numbers for one family of clauses.
+/// Builds arithmetic circuits for one family of clauses.
 pub struct Arithmetic<'f> {
     pub(crate) formula: &'f mut Formula,
     pub(crate) family: Family,
@@ -36,7 +36,7 @@ impl Arithmetic<'_> {
         (0..width).map(bit).collect()
     }
 
-    /// The same number with more bits.
+    /// Sign-extends a number to more bits.
     pub(crate) fn extend(bits: &Bits, width: usize) -> Bits {
         let sign = bits.last().copied().unwrap_or(!Formula::truth());
         bits.iter().copied().chain(std::iter::repeat(sign)).take(width.max(bits.len())).collect()
@@ -108,7 +108,7 @@ impl Arithmetic<'_> {
         majority
     }
 
-    /// The sum, at a width that holds it.
+    /// Sum of two numbers at the given width, which must hold it.
     pub(crate) fn add(&mut self, a: &Bits, b: &Bits, width: usize) -> Bits {
         let (a, b) = (Self::extend(a, width), Self::extend(b, width));
         let mut carry = !Formula::truth();
@@ -121,7 +121,7 @@ impl Arithmetic<'_> {
         sum
     }
 
-    /// A multiple of a number, by shifts and additions.
+    /// Multiple of a number, by shifts and additions.
     pub(crate) fn multiple(&mut self, bits: &Bits, factor: Int, width: usize) -> Bits {
         if factor == 1 {
             return Self::extend(bits, width);
@@ -141,8 +141,8 @@ impl Arithmetic<'_> {
         sum
     }
 
-    /// A number that is the given value under each premise (a conjunction), and 0 if `active` is false. At most
-    /// one premise holds at a time, and one does whenever `active` does.
+    /// Number that has the given value under each premise (a conjunction), and is 0 if `active` is
+    /// false. At most one premise must hold at a time, and one must hold if `active` does.
     pub(crate) fn choose(&mut self, premises: &[(Vec<Lit>, Int)], active: Lit) -> Bits {
         let low = premises.iter().map(|(_, value)| *value).fold(0, Int::min);
         let high = premises.iter().map(|(_, value)| *value).fold(0, Int::max);
@@ -163,7 +163,7 @@ impl Arithmetic<'_> {
             .collect()
     }
 
-    /// Under the premise the two numbers are equal.
+    /// Adds clauses that make two numbers equal under the premise.
     pub(crate) fn equal_if(&mut self, premise: Lit, a: &Bits, b: &Bits) {
         let width = a.len().max(b.len());
         for (a, b) in Self::extend(a, width).into_iter().zip(Self::extend(b, width)) {
@@ -172,13 +172,13 @@ impl Arithmetic<'_> {
         }
     }
 
-    /// The number is at most a constant.
+    /// Adds clauses that bound a number from above by a constant.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub(crate) fn at_most(&mut self, bits: &Bits, limit: Int) {
         let width = bits.len().max(width(limit, limit));
         let bits = Self::extend(bits, width);
         let Some((sign, magnitude)) = bits.split_last() else { return };
-        // Two's complement order is that of the magnitudes with the sign inverted as the highest bit.
+        // Order of two's complement: compare magnitudes, with the inverted sign as the highest bit.
         let order: Vec<(Lit, bool)> = magnitude
             .iter()
             .enumerate()
@@ -201,12 +201,12 @@ mod tests {
     use crate::sat::{Answer, Backend};
     use task::limits::Limits;
 
-    /// Whether the formula has an assignment in which the bits read as the value.
+    /// Returns `true` if the formula has an assignment in which the bits have this value.
     fn can_be(formula: &Formula, bits: &Bits, value: Int) -> bool {
         let mut solver = Backend::default().start(&Limits::none(), u64::MAX);
         formula.clauses().for_each(|(_, clause)| solver.add_clause(clause));
-        for (bit, wanted) in bits.iter().zip(Arithmetic::constant(value, bits.len())) {
-            solver.add_clause(&[if wanted == Formula::truth() { *bit } else { !*bit }]);
+        for (bit, expected) in bits.iter().zip(Arithmetic::constant(value, bits.len())) {
+            solver.add_clause(&[if expected == Formula::truth() { *bit } else { !*bit }]);
         }
         solver.solve(&[]) == Answer::Satisfiable
     }
@@ -216,8 +216,8 @@ mod tests {
     }
 
     fn fix(formula: &mut Formula, bits: &Bits, value: Int) {
-        for (bit, wanted) in bits.iter().zip(Arithmetic::constant(value, bits.len())) {
-            formula.add(Family::Numeric, [if wanted == Formula::truth() { *bit } else { !*bit }]);
+        for (bit, expected) in bits.iter().zip(Arithmetic::constant(value, bits.len())) {
+            formula.add(Family::Numeric, [if expected == Formula::truth() { *bit } else { !*bit }]);
         }
     }
 
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn upper_limits_cut_exactly() {
+    fn at_most_admits_exactly_the_values_up_to_the_limit() {
         for limit in -9..9 {
             let mut formula = Formula::new();
             let x = free(&mut formula, 4);

@@ -2,8 +2,9 @@
 //!
 //! - body: `b@t ↔ ⋀ l@t` for each rule;
 //! - completion: `h@t ↔ ⋁ b@t` over the rules with head h \[1\];
-//! - levels: in a layer of n variables that depend on each other, `h@t` needs a rule whose own variables of the
-//!   layer follow in fewer rounds: `h@t → ⋁ s@t`, `s@t → b@t`, `s@t ∧ r(h) ≤ k → r(a) ≤ k−1` with r in order encoding \[2\].
+//! - levels: in a layer of n variables that depend on each other, `h@t` needs a rule whose own
+//!   variables of the layer follow in fewer rounds: `h@t → ⋁ s@t`, `s@t → b@t`,
+//!   `s@t ∧ r(h) ≤ k → r(a) ≤ k−1` with r in order encoding \[2\].
 //!
 //! \[1\] K. Clark: Negation as failure, Logic and Data Bases, 1978.
 //! \[2\] T. Janhunen: Representing normal programs with clauses, ECAI 2004.
@@ -19,7 +20,8 @@ use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::numeric::is_at_least_zero;
 use crate::sat::Lit;
 
-/// What derived variables hold before a step; `numbers` are the numeric variables then. None if numbers do not fit.
+/// Adds the clauses of derived variables before a step, with the numeric variables `numbers`.
+/// Returns `None` if numbers overflow.
 pub(super) fn axioms(builder: &mut Builder<'_>, step: usize, numbers: &[Bits]) -> Option<()> {
     let task = builder.task;
     for (layer, index) in task.axioms.iter().zip(0..) {
@@ -36,9 +38,11 @@ pub(super) fn axioms(builder: &mut Builder<'_>, step: usize, numbers: &[Bits]) -
             }
             let meaning = VariableMeaning::Body { layer: index, rule: position, step: dense(step) };
             let body = builder.formula.equivalent(meaning, &premises, Family::Axiom);
-            let own = rule.body.facts.iter().filter(|fact| fact.value == 0).map(|fact| fact.variable);
-            let own = own.filter(|variable| heads.contains(variable)).collect();
-            bodies.entry(rule.head.variable).or_default().push((body, own));
+            let recursive_variables =
+                rule.body.facts.iter().filter(|fact| fact.value == 0).map(|fact| fact.variable);
+            let recursive_variables =
+                recursive_variables.filter(|variable| heads.contains(variable)).collect();
+            bodies.entry(rule.head.variable).or_default().push((body, recursive_variables));
         }
         for (variable, bodies) in &bodies {
             let head = builder.variables.values[step][variable.index()][0];
@@ -54,7 +58,7 @@ pub(super) fn axioms(builder: &mut Builder<'_>, step: usize, numbers: &[Bits]) -
     Some(())
 }
 
-/// Variables of a layer must not hold because of each other alone.
+/// Adds level constraints, which exclude variables that support only each other.
 #[expect(clippy::arithmetic_side_effects, reason = "rounds count from 1")]
 fn levels(
     builder: &mut Builder<'_>,
@@ -63,7 +67,8 @@ fn levels(
     bodies: &BTreeMap<VariableId, Vec<(Lit, Vec<VariableId>)>>,
 ) {
     let rounds = dense(bodies.len());
-    // `later[v][k]`: v follows in more than k + 1 rounds; it follows in at most `rounds`.
+    // `later[v][k]`: variable v follows in more than k + 1 rounds. Every true variable follows in
+    // at most `rounds`.
     let mut later: BTreeMap<VariableId, Vec<Lit>> = BTreeMap::new();
     for variable in bodies.keys() {
         let literals: Vec<_> = (1..rounds)
@@ -80,19 +85,21 @@ fn levels(
         }
         later.insert(*variable, literals);
     }
+    // Each true variable needs a supporting rule whose own variables were derived in earlier
+    // rounds.
     debug_assert!(layer.recursive);
     for (variable, bodies) in bodies {
         let head = builder.variables.values[step][variable.index()][0];
         let mut supports = vec![!head];
-        for (body, own) in bodies {
-            if own.is_empty() {
+        for (body, recursive_variables) in bodies {
+            if recursive_variables.is_empty() {
                 supports.push(*body);
                 continue;
             }
             let support = builder.formula.fresh(VariableMeaning::Ladder);
             builder.formula.add(Family::Axiom, [!support, *body]);
-            for below in own {
-                // In one round nothing of the layer can have come before.
+            for below in recursive_variables {
+                // In the first round no variable of the layer has been derived before.
                 let first = later[variable].first().copied().unwrap_or(!Formula::truth());
                 builder.formula.add(Family::Axiom, [!support, first]);
                 for k in 1..=later[variable].len() {

@@ -1,7 +1,8 @@
-//! A formula under construction: what each family of clauses gets, and adds to.
+//! Formula under construction, shared by the families of clauses.
 //!
-//! Groups of operators have one variable that says that the operator at the step is one of them: `o@t → g@t` for each member,
-//! and `g@t → ⋁ o@t`. Groups make clauses about designs, costs and consumptions independent of how many operators share them.
+//! A group of operators has one variable that is true if the operator at the step is a member:
+//! `o@t → g@t` for each member, and `g@t → ⋁ o@t`. Groups make clauses about designs, costs and
+//! consumptions independent of the number of operators that share them.
 
 use std::collections::BTreeMap;
 
@@ -15,32 +16,38 @@ use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::variables::Variables;
 use crate::sat::Lit;
 
-/// A task, when to stop, its formula as far as it goes, and what stands for what in it.
+/// A task with its limits, its unfinished formula, and the variables of the formula.
 pub(super) struct Builder<'a> {
     pub(super) task: &'a Task,
     pub(super) limits: &'a Limits,
     pub(super) formula: Formula,
     pub(super) variables: Variables,
-    /// No more clauses than these.
+    /// Maximum number of clauses.
     most: usize,
     groups: FxHashMap<(usize, Vec<OperatorId>), Lit>,
 }
 
 impl<'a> Builder<'a> {
-    /// A formula with variables and without clauses, for plans with the operators that are allowed at each step.
-    pub(super) fn new(context: Context<'a>, allowed: &[Vec<bool>], most: usize) -> Result<Self, Interrupted> {
+    /// Creates a formula without clauses, for plans with the operators that are allowed at each
+    /// step.
+    pub(super) fn new(
+        context: Context<'a>,
+        allowed: &[Vec<bool>],
+        max_clauses: usize,
+    ) -> Result<Self, Interrupted> {
         let Context { task, limits } = context;
         let mut formula = Formula::new();
         let variables = Variables::declare(context, &mut formula, allowed)?;
-        Ok(Self { task, limits, formula, variables, most, groups: FxHashMap::default() })
+        Ok(Self { task, limits, formula, variables, most: max_clauses, groups: FxHashMap::default() })
     }
 
-    /// An error once a limit is reached, or if there are too many clauses.
+    /// Fails if a limit is reached or there are too many clauses.
     pub(super) fn check(&self) -> Result<(), Interrupted> {
         if self.formula.clause_count() > self.most { Err(Interrupted) } else { self.limits.check() }
     }
 
-    /// The variable of a group of operators at a step; members that cannot be at the step are left out.
+    /// Variable of a group of operators at a step. Members that are impossible at the step are
+    /// ignored.
     pub(super) fn group(&mut self, step: usize, members: &[OperatorId], family: Family) -> Lit {
         let present: Vec<_> = {
             let candidates = &self.variables.operators[step];
@@ -54,8 +61,8 @@ impl<'a> Builder<'a> {
             _ => {}
         }
         let key = (step, present.iter().map(|(id, _)| *id).collect::<Vec<_>>());
-        if let Some(known) = self.groups.get(&key) {
-            return *known;
+        if let Some(group) = self.groups.get(&key) {
+            return *group;
         }
         let group =
             self.formula.fresh(VariableMeaning::Group { group: dense(self.groups.len()), step: dense(step) });
@@ -67,7 +74,7 @@ impl<'a> Builder<'a> {
         group
     }
 
-    /// Sorts the operators at a step by a property, in order of the property.
+    /// Groups the operators at a step by the values of a property.
     pub(super) fn partition<K: Ord>(
         &self,
         step: usize,

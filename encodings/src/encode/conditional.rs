@@ -1,7 +1,8 @@
 //! Conditional effects.
 //!
 //! - `f@t ↔ o@t ∧ ⋀ l@t` for an effect of operator o whose condition is the literals l;
-//! - `f@t → e@t+1` for each fact that it sets, unless an effect after it sets the variable to something else.
+//! - `f@t → e@t+1` for each fact that it sets, unless a later effect sets the variable to another
+//!   value.
 
 use task::number::dense;
 use task::task::{Fact, OperatorId};
@@ -10,27 +11,28 @@ use crate::encode::builder::Builder;
 use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::sat::Lit;
 
-/// A conditional effect at a step.
+/// A conditional effect at a step, with its variable.
 pub(super) struct ConditionalEffectVar<'a> {
     operator: OperatorId,
     position: usize,
-    /// Whether it takes place.
+    /// Literal that is true if the effect takes place.
     pub(super) literal: Lit,
     pub(super) effects: &'a [Fact],
 }
 
-/// The conditional effects of the operators at a step.
+/// Conditional effects of the operators at a step.
 pub(super) struct FiredEffects<'a>(Vec<ConditionalEffectVar<'a>>);
 
 impl<'a> FiredEffects<'a> {
-    /// Makes the variables of the conditional effects at a step, and clauses for what they set.
+    /// Creates the variables of the conditional effects at a step, and adds clauses for their
+    /// effects.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "steps are fewer than the horizon, whose formula is in memory"
     )]
     pub(super) fn new(builder: &mut Builder<'a>, step: usize) -> Self {
         let task = builder.task;
-        let mut all = Vec::new();
+        let mut effect_variables = Vec::new();
         for (id, operator) in &builder.variables.operators[step] {
             for (effect, position) in task.operators[id.index()].conditional.iter().zip(0..) {
                 let mut premises = vec![*operator];
@@ -43,15 +45,20 @@ impl<'a> FiredEffects<'a> {
                     builder.formula.equivalent(meaning, &premises, Family::Conditional)
                 };
                 let position = position as usize;
-                all.push(ConditionalEffectVar { operator: *id, position, literal, effects: &effect.effects });
+                effect_variables.push(ConditionalEffectVar {
+                    operator: *id,
+                    position,
+                    literal,
+                    effects: &effect.effects,
+                });
             }
         }
-        let fires = Self(all);
+        let fires = Self(effect_variables);
         for ConditionalEffectVar { operator, position, literal, effects } in fires.iter() {
             for effect in *effects {
                 let fact = builder.variables.fact(*effect, step + 1);
-                let others = fires.prevailing(*operator, position + 1, *effect);
-                builder.formula.add(Family::Conditional, others.chain([!*literal, fact]));
+                let overriding = fires.prevailing(*operator, position + 1, *effect);
+                builder.formula.add(Family::Conditional, overriding.chain([!*literal, fact]));
             }
         }
         fires
@@ -61,7 +68,8 @@ impl<'a> FiredEffects<'a> {
         self.0.iter()
     }
 
-    /// The conditional effects of an operator, from a position on, that set the variable of a fact to something else.
+    /// Conditional effects of an operator, from an index on, that set the variable of a fact to
+    /// another value.
     pub(super) fn prevailing(
         &self,
         operator: OperatorId,
@@ -70,8 +78,8 @@ impl<'a> FiredEffects<'a> {
     ) -> impl Iterator<Item = Lit> + '_ {
         let start = self.0.partition_point(|fired| (fired.operator, fired.position) < (operator, from));
         self.0[start..].iter().take_while(move |fired| fired.operator == operator).filter_map(move |fired| {
-            let other = |effect: &Fact| effect.variable == fact.variable && effect.value != fact.value;
-            fired.effects.iter().any(other).then_some(fired.literal)
+            let overrides = |effect: &Fact| effect.variable == fact.variable && effect.value != fact.value;
+            fired.effects.iter().any(overrides).then_some(fired.literal)
         })
     }
 }

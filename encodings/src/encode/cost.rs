@@ -1,12 +1,14 @@
 //! The accumulated cost, and the limit on it.
 //!
-//! Costs are *reduced* by a potential: with h the cost to go in a projection, an operator from abstract state α to β counts
-//! c + h(β) − h(α) ≥ 0, and the sum over a plan is its cost less h(initial), because h is 0 in goal states. So only
-//! the gap between the limit and the lower bound has to be counted, and an operator on a cheapest path counts nothing.
-//! Tables of designs count what they add to their cheapest entry.
+//! Costs are *reduced* by a potential: with the goal distance h in a projection, an operator from
+//! abstract state α to β costs c + h(β) − h(α) ≥ 0. The sum over a plan is its cost minus
+//! h(initial), because h is 0 in goal states. So only the gap between the limit and the lower bound
+//! has to be counted, and an operator on a cheapest path costs nothing. Tables of designs
+//! contribute the difference from their cheapest entry.
 //!
-//! The sum is kept in order encoding, one variable for each amount that can occur, and one direction only: the
-//! variables say *at least* how much has been spent. Where too many amounts can occur, binary addition takes over.
+//! The sum has an order encoding: one variable for each possible amount, in one direction only. A
+//! variable states that *at least* this amount has been spent. If too many amounts are possible,
+//! binary addition is used instead.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -21,53 +23,55 @@ use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::interference::Interference;
 use crate::sat::Lit;
 
-/// More amounts than this at one step, and the sum is binary.
+/// Maximum number of amounts at a step in the order encoding; beyond it the sum is binary.
 const AMOUNT_LIMIT: usize = 1_000;
 
-/// The cost limit of an encoding: only plans with cost at most `limit` count, by the estimates of `bounds`.
+/// Cost limit of an encoding: only plans with cost at most `limit` are admitted; `bounds` provides
+/// the heuristics.
 pub struct CostLimit<'a> {
     pub limit: Int,
     pub bounds: &'a Bounds,
     pub counting: CostEncoding,
 }
 
-/// What an encoding makes of the costs of steps.
+/// Treatment of the costs of steps in an encoding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CostEncoding {
-    /// Their sum, which the limit holds down.
+    /// Sum of the costs, bounded by the limit.
     Sum,
-    /// Literals with weights, which the solver is to keep false. Only what exceeds the limit by itself is excluded.
+    /// Weighted literals for core-guided search. Only single amounts above the limit are excluded.
     Apart,
 }
 
-/// What one source adds to the cost of a step: the amount if the premise (a conjunction) holds.
+/// Contributions of one source to the cost of a step: each amount is added if its premise (a
+/// conjunction) holds.
 type Increments = Vec<(Vec<Lit>, Int)>;
 
-/// Where cost comes from at a step: the operator itself, or a table of designs.
+/// Source of cost at a step: the operators themselves, or the tables of some slots.
 struct Source {
     step: u32,
-    /// Its position among those of the step.
+    /// Index of the source within the step.
     stage: u32,
     increments: Increments,
 }
 
-/// The spent cost at the end, less its lower bound.
+/// Final cost, minus its lower bound.
 pub(super) struct Cost {
     lower: Int,
     spent: Spent,
 }
 
 enum Spent {
-    /// `at least amount`, for every positive amount that can occur.
+    /// Literal "at least this amount" for every positive amount that can occur.
     Order(BTreeMap<Int, Lit>),
     Binary(Bits),
-    /// Literals that add their weight if they are true.
+    /// Weighted literals.
     Apart(Vec<(Lit, Int)>),
 }
 
 impl Cost {
-    /// Adds up the cost of all steps and limits it; operators stand alone at a step if there is no interference. None if a
-    /// limit of the run was reached meanwhile.
+    /// Sums up and bounds the costs of all steps. Without interference there is one operator per
+    /// step. Returns `None` if a limit of the run is reached.
     pub(super) fn new(
         builder: &mut Builder<'_>,
         cost: &CostLimit<'_>,
@@ -99,7 +103,7 @@ impl Cost {
         Some(Self { lower, spent })
     }
 
-    /// What every plan costs at least, and what it may pay beyond that.
+    /// Lower bound on the cost of every plan, and weighted literals for the costs beyond it.
     pub(super) fn payments(&self) -> (Int, &[(Lit, Int)]) {
         match &self.spent {
             Spent::Apart(literals) => (self.lower, literals),
@@ -109,7 +113,7 @@ impl Cost {
 
     /// Adds clauses that admit only plans with cost at most `limit`.
     pub(super) fn at_most(&self, formula: &mut Formula, limit: Int) {
-        // Below 0 if it is cut off.
+        // The gap is negative if no plan can have this cost.
         let gap = limit.saturating_sub(self.lower);
         if gap < 0 {
             formula.add(Family::Bound, []);
@@ -127,31 +131,36 @@ impl Cost {
     }
 }
 
-/// The sum of costs under construction.
+/// The cost sum under construction.
 struct Sum<'s, 'a> {
     builder: &'s mut Builder<'a>,
     cost: &'s CostLimit<'s>,
     interference: Option<&'s Interference>,
-    /// How much more than the lower bound may be spent.
+    /// Amount that may be spent beyond the lower bound.
     gap: Int,
 }
 
 impl Sum<'_, '_> {
-    /// All sources, in the order of steps. None if a limit of the run was reached meanwhile.
+    /// All sources in the order of steps. Returns `None` if a limit of the run is reached.
     fn sources(&mut self) -> Option<Vec<Source>> {
         let mut sources = Vec::new();
         for step in 0..self.builder.variables.horizon() {
             self.builder.check().ok()?;
-            let own = self.increments(step).into_iter().zip(0..);
-            sources.extend(own.map(|(increments, stage)| Source { step: dense(step), stage, increments }));
+            let increments_by_stage = self.increments(step).into_iter().zip(0..);
+            sources.extend(increments_by_stage.map(|(increments, stage)| Source {
+                step: dense(step),
+                stage,
+                increments,
+            }));
         }
         Some(sources)
     }
 
-    /// What a step can add, by source: the operator itself, and each table of designs.
+    /// Contributions of a step by source: the operators, and the tables of designs.
     fn increments(&mut self, step: usize) -> Vec<Increments> {
-        // Of one source at most one amount counts, so operators that can stand together are sources of their own.
-        let mut own: BTreeMap<(Option<usize>, Option<OperatorId>), Increments> = BTreeMap::new();
+        // Each source contributes at most one amount, so operators that can be executed together
+        // are separate sources.
+        let mut by_source: BTreeMap<(Option<usize>, Option<OperatorId>), Increments> = BTreeMap::new();
         for index in 0..self.builder.variables.operators[step].len() {
             let (id, literal) = self.builder.variables.operators[step][index];
             let source = match self.interference {
@@ -161,9 +170,9 @@ impl Sum<'_, '_> {
                     (class, class.is_none().then_some(id))
                 }
             };
-            self.reduced(step, id, literal, own.entry(source).or_default());
+            self.reduced(step, id, literal, by_source.entry(source).or_default());
         }
-        let mut all: Vec<Increments> = own.into_values().collect();
+        let mut increments_by_source: Vec<Increments> = by_source.into_values().collect();
         let mut by_slots: BTreeMap<Vec<usize>, Increments> = BTreeMap::new();
         for ((entries, values), members) in self.builder.partition(step, residual_tables) {
             let group = self.builder.group(step, &members, Family::Cost);
@@ -176,11 +185,12 @@ impl Sum<'_, '_> {
                 by_slots.entry(slots).or_default().push((premise, value));
             }
         }
-        all.extend(by_slots.into_values());
-        all
+        increments_by_source.extend(by_slots.into_values());
+        increments_by_source
     }
 
-    /// The reduced cost of an operator with its cheapest designs, by abstract state where that matters.
+    /// Reduced cost of an operator with its cheapest designs, by abstract state if it depends on
+    /// it.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "costs to go and the cost of an operator are at most GROWTH_LIMIT; steps are in memory"
@@ -197,18 +207,19 @@ impl Sum<'_, '_> {
         let mut alive = Vec::new();
         for transition in transitions {
             let values = potential.values(transition.source);
-            let known = |variable| operator.condition.facts.iter().any(|fact| fact.variable == variable);
+            let is_required =
+                |variable| operator.condition.facts.iter().any(|fact| fact.variable == variable);
             let mut here: Vec<_> = potential
                 .pattern
                 .iter()
                 .zip(values)
-                .filter(|(variable, _)| !known(**variable))
+                .filter(|(variable, _)| !is_required(**variable))
                 .map(|(variable, value)| {
                     self.builder.variables.values[step][variable.index()][value as usize]
                 })
                 .collect();
             if !operator.conditional.is_empty() {
-                // Where the operator leads to is open: the state after it tells.
+                // With conditional effects the target is open, so it is read from the next state.
                 let after = potential.pattern.iter().zip(potential.values(transition.target));
                 here.extend(after.map(|(variable, value)| {
                     self.builder.variables.values[step + 1][variable.index()][value as usize]
@@ -224,7 +235,7 @@ impl Sum<'_, '_> {
             }
         }
         match alive.split_first() {
-            Some(((_, first), rest)) if rest.iter().all(|(_, amount)| amount == first) => {
+            Some(((_, first), others)) if others.iter().all(|(_, amount)| amount == first) => {
                 out.push((vec![literal], *first));
             }
             _ => out.extend(alive.into_iter().map(|(mut here, amount)| {
@@ -279,7 +290,8 @@ impl Sum<'_, '_> {
         after
     }
 
-    /// A literal for each positive amount that a source can add, which its premise implies; what is above the gap is a conflict.
+    /// Literals for the positive amounts of a source, each implied by its premise. Amounts above
+    /// the gap are conflicts.
     fn amounts(&mut self, source: &Source) -> BTreeMap<Int, Lit> {
         let mut increments: BTreeMap<Int, Lit> = BTreeMap::new();
         for (premise, amount) in source.increments.iter().filter(|(_, amount)| *amount > 0) {
@@ -298,7 +310,8 @@ impl Sum<'_, '_> {
         increments
     }
 
-    /// The amounts of a source, each implying the next smaller one, and what it has more than that.
+    /// Amounts of a source as weighted literals: each literal implies the next smaller one and
+    /// carries the difference.
     #[expect(clippy::arithmetic_side_effects, reason = "amounts come in ascending order")]
     fn apart(&mut self, source: &Source) -> Vec<(Lit, Int)> {
         let mut weighted: Vec<(Lit, Int)> = Vec::new();
@@ -325,17 +338,17 @@ impl Sum<'_, '_> {
             }
             let active = self.builder.variables.busy[*step as usize];
             let mut arithmetic = Arithmetic { formula: &mut self.builder.formula, family: Family::Cost };
-            let more = arithmetic.choose(&possible, active);
-            // Neither summand is above the gap, so their sum fits; then the limit cuts it back.
-            spent = arithmetic.add(&spent, &more, width);
+            let increment = arithmetic.choose(&possible, active);
+            // Neither summand exceeds the gap, so the sum fits; then the limit is enforced again.
+            spent = arithmetic.add(&spent, &increment, width);
             arithmetic.at_most(&spent, gap);
         }
         spent
     }
 }
 
-/// The tables of an operator in the task's numbering: combinations of (slot, design), and how much more than
-/// the cheapest each of them costs.
+/// Tables of an operator in the numbering of the task: combinations of (slot, design), and the
+/// difference of each from the cheapest.
 #[allow(clippy::type_complexity)]
 #[expect(
     clippy::arithmetic_side_effects,
@@ -352,7 +365,7 @@ fn residual_tables(operator: &Operator) -> Vec<(Vec<Vec<(usize, usize)>>, Vec<In
         .collect()
 }
 
-/// The amounts that can be spent after one more source.
+/// Amounts that are possible after one more source.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "amounts are at most the gap, which is at most GROWTH_LIMIT"
@@ -366,7 +379,7 @@ fn next_amounts(spent: &BTreeSet<Int>, increments: impl Iterator<Item = Int>, ga
     amounts
 }
 
-/// Whether so few amounts can occur that the order encoding is worth its clauses.
+/// Returns `true` if few enough amounts are possible for the order encoding.
 fn amounts_fit(sources: &[Source], gap: Int) -> bool {
     let mut spent = BTreeSet::new();
     for source in sources {

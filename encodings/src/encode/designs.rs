@@ -1,29 +1,30 @@
-//! The designs of operators in the task's numbering.
+//! Designs of operators in the numbering of the task.
 
 use task::number::dense;
 use task::task::{Operator, SlotUse};
 
-/// Slot and design in the task's numbering, from positions in an operator.
+/// Slot and design in the numbering of the task, from indices within an operator.
 pub(super) fn task_slot(slots: &[SlotUse], slot: u32, design: u32) -> (usize, usize) {
     let usage = &slots[slot as usize];
     (usage.slot.index(), usage.designs[design as usize] as usize)
 }
 
-/// All combinations of designs of some slots in the order of `Table::values`, in the task's numbering.
+/// All combinations of designs of some slots, in the order of `Table::values` and the numbering of
+/// the task.
 pub(super) fn combinations(operator: &Operator, slots: &[u32]) -> Vec<Vec<(usize, usize)>> {
-    let mut all = vec![Vec::new()];
+    let mut combinations = vec![Vec::new()];
     for slot in slots {
         let designs = 0..dense(operator.slots[*slot as usize].designs.len());
-        all = all
+        combinations = combinations
             .iter()
-            .flat_map(|known: &Vec<(usize, usize)>| {
+            .flat_map(|prefix: &Vec<(usize, usize)>| {
                 designs.clone().map(move |design| {
-                    let mut longer = known.clone();
+                    let mut longer = prefix.clone();
                     longer.push(task_slot(&operator.slots, *slot, design));
                     longer
                 })
             })
             .collect();
     }
-    all
+    combinations
 }

@@ -1,4 +1,4 @@
-//! The families of clauses in their order: a formula, and what its variables mean.
+//! Assembles the families of clauses into a formula, and decodes assignments into plans.
 
 use std::cell::OnceCell;
 
@@ -24,19 +24,19 @@ use crate::encode::symmetry::Symmetry;
 use crate::encode::variables::Variables;
 use crate::sat::{Lit, Solver};
 
-/// Which plans a formula is about.
+/// The plans that a formula admits.
 pub struct PlanConstraints<'a> {
-    /// For each step, whether each operator can be there; there are no more steps.
+    /// Per step: whether each operator may occur. The number of steps is the horizon.
     pub allowed: &'a [Vec<bool>],
-    /// What they cost at most, if that matters.
+    /// Cost limit, if any.
     pub cost: Option<CostLimit<'a>>,
-    /// How many operators stand at a step.
+    /// Number and order of operators within a step.
     pub semantics: StepSemantics,
-    /// A formula that comes to more clauses is not finished.
+    /// Clause limit: encoding stops with `None` beyond it.
     pub max_clauses: usize,
 }
 
-/// A formula and what its variables mean.
+/// A formula and the meaning of its variables.
 pub struct Encoding<'a> {
     pub(super) task: &'a Task,
     pub formula: Formula,
@@ -45,8 +45,10 @@ pub struct Encoding<'a> {
 }
 
 impl<'a> Encoding<'a> {
-    /// Encodes plans; of those that differ by exchanging what is equal only some. What is equal is found out once for a task, and
-    /// kept in `symmetry`. None if a limit was reached meanwhile, if there are too many clauses, or if numbers are too large for a formula.
+    /// Encodes plans with symmetry breaking: among plans that differ by exchanging interchangeable
+    /// designs or objects, only some are admitted. The symmetries are computed once per task and
+    /// cached in `symmetry`. Returns `None` if a limit is reached, there are too many clauses, or
+    /// numbers are too large.
     pub fn new(
         context: Context<'a>,
         plans: PlanConstraints<'_>,
@@ -62,7 +64,7 @@ impl<'a> Encoding<'a> {
         Some(Self::of(builder, cost))
     }
 
-    /// The same with all plans.
+    /// As [`Encoding::new`], without symmetry breaking.
     pub fn with_equals(context: Context<'a>, plans: PlanConstraints<'_>) -> Option<Self> {
         let (builder, cost) = build(context, plans)?;
         Some(Self::of(builder, cost))
@@ -73,24 +75,25 @@ impl<'a> Encoding<'a> {
         Self { task, formula, variables, cost }
     }
 
-    /// From now on only plans with cost at most `limit`, which must not be above the limit of the encoding.
+    /// Lowers the cost limit, which must not exceed the limit of the encoding.
     pub fn tighten(&mut self, limit: Int) {
         if let Some(cost) = &self.cost {
             cost.at_most(&mut self.formula, limit);
         }
     }
 
-    /// So many steps can be executed.
+    /// Number of steps.
     pub fn horizon(&self) -> usize {
         self.variables.horizon()
     }
 
-    /// What every plan costs at least, and literals each of which adds its weight if it is true.
+    /// Lower bound on the cost of every plan, and weighted literals whose weights are added if they
+    /// are true.
     pub fn payments(&self) -> (Int, &[(Lit, Int)]) {
         self.cost.as_ref().map_or((0, &[]), Cost::payments)
     }
 
-    /// The variable of an operator of a plan at its step, or that of the design of one of its slots.
+    /// Variable of the operator of a plan at a step, or of the design of one of its slots.
     pub fn choice(&self, plan: &[GroundStep], (at, slot): (usize, Option<u32>)) -> Lit {
         let step = &plan[at];
         match slot {
@@ -103,8 +106,9 @@ impl<'a> Encoding<'a> {
         }
     }
 
-    /// The clause that excludes exactly one plan.
+    /// Clause that excludes exactly one plan.
     pub fn blocking_clause(&self, plan: &[GroundStep]) -> Vec<Lit> {
+        // A longer plan with this prefix is a different plan, so it stays admitted.
         let longer = self.variables.busy.get(plan.len()).copied();
         let choices = plan.iter().enumerate().flat_map(|(at, step)| {
             let slots = (0..dense(step.choice.len())).map(Some);
@@ -113,14 +117,14 @@ impl<'a> Encoding<'a> {
         choices.chain(longer).collect()
     }
 
-    /// The plan of the assignment that the solver found.
+    /// Decodes the last assignment of a solver into a plan.
     pub fn decode(&self, solver: &dyn Solver) -> Vec<GroundStep> {
         let holds = |literal: Lit| {
             literal == Formula::truth() || solver.value(literal.variable()) == literal.is_positive()
         };
         let mut steps = Vec::new();
         for (step, candidates) in self.variables.operators.iter().enumerate() {
-            // Several stand in the order in which they can be executed.
+            // Operators of one step are listed in an executable order.
             for (id, _) in candidates.iter().filter(|(_, literal)| holds(*literal)) {
                 let operator = &self.task.operators[id.index()];
                 let choice = operator.slots.iter().map(|slot| {
@@ -135,12 +139,13 @@ impl<'a> Encoding<'a> {
     }
 }
 
-/// All families of clauses but that of symmetries. None if a limit was reached meanwhile, or if numbers do not fit.
+/// Adds all families except symmetry breaking. Returns `None` if a limit is reached or numbers
+/// overflow.
 fn build<'a>(context: Context<'a>, plans: PlanConstraints<'_>) -> Option<(Builder<'a>, Option<Cost>)> {
-    let PlanConstraints { allowed, cost, semantics, max_clauses: most } = plans;
+    let PlanConstraints { allowed, cost, semantics, max_clauses: max_clause_count } = plans;
     let potential = cost.as_ref().and_then(|cost| cost.bounds.projections.first());
     let interference = Interference::new(context, semantics, potential).ok()?;
-    let mut builder = Builder::new(context, allowed, most).ok()?;
+    let mut builder = Builder::new(context, allowed, max_clause_count).ok()?;
     let horizon = builder.variables.horizon();
     for step in 0..horizon {
         at_step(&mut builder, step, interference.as_ref()).ok()?;
@@ -159,7 +164,7 @@ fn build<'a>(context: Context<'a>, plans: PlanConstraints<'_>) -> Option<(Builde
     Some((builder, cost))
 }
 
-/// What concerns one step apart from numbers, derived variables and costs.
+/// Adds the clauses of one step, except those for numbers, derived variables and costs.
 fn at_step(
     builder: &mut Builder<'_>,
     step: usize,

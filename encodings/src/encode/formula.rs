@@ -1,4 +1,4 @@
-//! Clauses under construction, each with its family and with names for its variables.
+//! Clauses under construction, with their families and the meanings of variables.
 
 use std::fmt;
 
@@ -6,36 +6,36 @@ use task::number::{Int, dense};
 
 use crate::sat::Lit;
 
-/// What a clause is for. The documentation of each family stands in the file that writes it.
+/// Purpose of a clause. The file that writes a family documents it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Family {
     /// State variables have exactly one value.
     Domain,
-    /// At most one operator a step, none after the last.
+    /// At most one operator per step, and none after the last one.
     Sequence,
-    /// Operators at the same step do not disturb each other.
+    /// Operators at the same step do not interfere.
     Interference,
-    /// Operators need their conditions.
+    /// Operators require their conditions.
     Condition,
     /// Operators have their effects.
     Effect,
-    /// Conditional effects take place where their conditions hold.
+    /// Conditional effects take place if their conditions hold.
     Conditional,
-    /// What no operator changes stays.
+    /// A value changes only if an operator sets it.
     Frame,
     /// Derived variables are the least fixpoint of their rules.
     Axiom,
-    /// Each function in use has one design, and one that suits.
+    /// Each function in use has exactly one suitable design.
     Selection,
-    /// Equal designs and equal objects are used in their order.
+    /// Interchangeable designs and objects are used in a fixed order.
     Symmetry,
-    /// Exact integers of numeric variables.
+    /// Exact integer arithmetic for numeric variables.
     Numeric,
     /// The accumulated cost.
     Cost,
     /// The last state satisfies the goal.
     Goal,
-    /// The plan is cheaper than the best known.
+    /// The plan is cheaper than the incumbent.
     Bound,
 }
 
@@ -57,7 +57,7 @@ impl Family {
         Self::Bound,
     ];
 
-    /// Its name in statistics.
+    /// Name in statistics.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Domain => "domain",
@@ -78,7 +78,7 @@ impl Family {
     }
 }
 
-/// What a variable of the formula stands for.
+/// Meaning of a variable of the formula.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum VariableMeaning {
     /// The constant true.
@@ -93,23 +93,23 @@ pub enum VariableMeaning {
     Design { slot: u32, design: u32, step: u32 },
     /// The operator at the step is one of a group.
     Group { group: u32, step: u32 },
-    /// The accumulated cost before the step, less its lower bound, is at least the amount.
+    /// The accumulated cost before the step, minus its lower bound, is at least the amount.
     CostAtLeast { amount: Int, step: u32, stage: u32 },
     /// The step adds at least the amount.
     Increment { amount: Int, step: u32, stage: u32 },
-    /// The conditional effect (by its position) of the operator takes place at the step.
+    /// The conditional effect with this index of the operator takes place at the step.
     Fires { operator: u32, effect: u32, step: u32 },
-    /// The body of a rule (by its position) of a layer of derived variables holds before the step.
+    /// The body of the rule with this index in a layer of derived variables holds before the step.
     Body { layer: u32, rule: u32, step: u32 },
-    /// The derived variable follows in more than so many rounds of its layer.
+    /// The derived variable follows in more than `rounds` rounds of its layer.
     Later { variable: u32, rounds: u32, step: u32 },
     /// A bit of a number.
     Bit { bit: u32 },
-    /// Plans that are known are excluded.
+    /// Known plans are excluded.
     Others,
-    /// So many literals of a core are true.
+    /// A counted number of literals of a core is true.
     Paid,
-    /// A helper of an at-most-one constraint.
+    /// Auxiliary variable, for example of an at-most-one constraint.
     Ladder,
 }
 
@@ -120,7 +120,7 @@ pub struct Formula {
     literals: Vec<Lit>,
     /// End of each clause in `literals`, and its family.
     clauses: Vec<(u32, Family)>,
-    /// For each literal the last clause that it stood in, as its number plus 1.
+    /// Per literal: number (plus 1) of the last clause that contains it.
     last: Vec<u32>,
 }
 
@@ -146,10 +146,12 @@ impl Formula {
         literal
     }
 
-    /// Adds a clause; one that is true for constants' sake is dropped, false constants are left out.
+    /// Adds a clause. Clauses with a true constant or complementary literals are dropped; false
+    /// constants and duplicates are omitted.
     #[expect(clippy::arithmetic_side_effects, reason = "clauses are held in memory")]
     pub fn add(&mut self, family: Family, clause: impl IntoIterator<Item = Lit>) {
         let start = self.literals.len();
+        // Marks carry the number of the clause, so they need no reset between clauses.
         let number = dense(self.clauses.len() + 1);
         for literal in clause {
             if literal == Self::truth() || self.last[(!literal).index()] == number {
@@ -164,15 +166,15 @@ impl Formula {
         self.clauses.push((dense(self.literals.len()), family));
     }
 
-    /// Drops the literals of a clause that was begun, so that the next one can have its number.
+    /// Drops the literals of an incomplete clause, so that the next clause can reuse its number.
     fn forget(&mut self, start: usize) {
         for literal in self.literals.drain(start..) {
             self.last[literal.index()] = 0;
         }
     }
 
-    /// A literal that is true if one of the given ones is; itself one of them where that is enough. One
-    /// direction only.
+    /// Literal that is implied by each of the given ones (one direction only). Returns the literal
+    /// itself if there is only one.
     pub(crate) fn any(&mut self, family: Family, meaning: VariableMeaning, literals: &[Lit]) -> Lit {
         match literals {
             [] => !Self::truth(),
@@ -187,7 +189,7 @@ impl Formula {
         }
     }
 
-    /// A literal that is true exactly if all premises are.
+    /// Literal that is equivalent to the conjunction of the premises.
     pub(crate) fn equivalent(&mut self, meaning: VariableMeaning, premises: &[Lit], family: Family) -> Lit {
         let premises: Vec<_> = premises.iter().copied().filter(|l| *l != Self::truth()).collect();
         match premises[..] {
@@ -204,11 +206,14 @@ impl Formula {
         }
     }
 
-    /// At most one of the literals: pairwise for few, else Sinz's sequential counter \[1\].
+    /// At-most-one constraint: pairwise for up to five literals, otherwise Sinz's sequential
+    /// counter \[1\].
     ///
     /// \[1\] C. Sinz: Towards an optimal CNF encoding of Boolean cardinality constraints, CP 2005.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub(crate) fn at_most_one(&mut self, family: Family, literals: &[Lit]) {
+        // For few literals pairwise clauses are fewer than those of the counter and need no
+        // variables.
         if literals.len() <= 5 {
             for (position, a) in literals.iter().enumerate() {
                 for b in &literals[position + 1..] {
@@ -238,12 +243,12 @@ impl Formula {
         self.clauses.len()
     }
 
-    /// All clauses in the order in which they were added.
+    /// All clauses in the order of insertion.
     pub fn clauses(&self) -> impl Iterator<Item = (Family, &[Lit])> {
         self.clauses_from(0)
     }
 
-    /// The clauses after so many others.
+    /// Clauses from index `start` on.
     #[expect(clippy::arithmetic_side_effects, reason = "the first clause is told apart")]
     pub fn clauses_from(&self, start: usize) -> impl Iterator<Item = (Family, &[Lit])> {
         (start..self.clauses.len()).map(|index| {
@@ -253,9 +258,10 @@ impl Formula {
         })
     }
 
-    /// How many clauses each family has.
+    /// Number of clauses per family.
     pub fn counts(&self) -> Vec<(&'static str, usize)> {
-        let count = |family| self.clauses.iter().filter(|(_, own)| *own == family).count();
+        let count =
+            |family| self.clauses.iter().filter(|(_, clause_family)| *clause_family == family).count();
         Family::ALL.iter().map(|family| (family.name(), count(*family))).collect()
     }
 

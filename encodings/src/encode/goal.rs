@@ -1,11 +1,12 @@
-//! The goal: what the last state satisfies; idle steps at the end keep it satisfied.
+//! The goal: constraints on the last state. Idle steps at the end preserve it.
 
 use crate::encode::arithmetic::Bits;
 use crate::encode::builder::Builder;
 use crate::encode::formula::Family;
 use crate::encode::numeric::is_at_least_zero;
 
-/// The last state satisfies the goal, `numbers` being its numeric variables; none if numbers do not fit.
+/// Adds the goal for the last state with the numeric variables `numbers`. Returns `None` if numbers
+/// overflow.
 pub(super) fn goal(builder: &mut Builder<'_>, numbers: &[Bits]) -> Option<()> {
     let task = builder.task;
     let last = builder.variables.horizon();

@@ -1,7 +1,8 @@
-//! Designs of a slot that no operator tells apart, found by hashing.
+//! Detects interchangeable designs of a slot by hashing.
 //!
-//! Each design has a signature: a hash of what every table and every exclusion of the task says of it. Only designs with the same
-//! signature are compared. So the time is linear in the size of the tables, however many designs there are.
+//! Each design has a signature: a hash of its entries in all tables and exclusions of the task.
+//! Only designs with the same signature are compared. The time is linear in the size of the tables,
+//! independent of the number of designs.
 
 use std::hash::{BuildHasher, Hash};
 
@@ -13,7 +14,8 @@ use task::number::Int;
 use task::task::quantity::{Quantity, SlotSet};
 use task::task::{Operator, SlotId};
 
-/// Something of a task that may tell designs of a slot apart: it speaks of those that one operator admits, in their order.
+/// Part of a task that may distinguish designs of a slot: it refers to the designs that one
+/// operator admits, in order.
 struct Witness<'t> {
     /// Indices into the slot's designs, ascending.
     designs: &'t [u32],
@@ -21,16 +23,17 @@ struct Witness<'t> {
 }
 
 enum WitnessKind<'t> {
-    /// That the operator admits them.
+    /// The operator admits the designs.
     Admitted,
-    /// The entries of a table in rows of `stride`, of which every `designs.len()`-th belongs to a design.
+    /// Entries of a table in rows of length `stride`; every `designs.len()`-th row belongs to the
+    /// same design.
     Table { values: &'t [Int], stride: usize },
-    /// For each design what must not be chosen with it, sorted.
+    /// Per design: combinations that are forbidden with it, sorted.
     Forbidden(Vec<Vec<SlotSet>>),
 }
 
 impl Witness<'_> {
-    /// Rows of a table that belong to the design at a position.
+    /// Rows of a table that belong to the design at an index.
     fn rows<'v>(&self, values: &'v [Int], stride: usize, position: usize) -> impl Iterator<Item = &'v [Int]> {
         values.chunks(stride).skip(position).step_by(self.designs.len())
     }
@@ -64,7 +67,7 @@ fn hash<T: Hash>(value: &T) -> u64 {
     FxBuildHasher.hash_one(value)
 }
 
-/// Designs of a slot that are equal to an earlier one, ascending.
+/// Designs of a slot that are interchangeable with an earlier one, ascending.
 pub(super) fn equal_designs(context: Context<'_>, slot: SlotId) -> Result<Vec<u32>, Interrupted> {
     let Context { task, limits } = context;
     let witnesses = witnesses(context, slot)?;
@@ -72,65 +75,73 @@ pub(super) fn equal_designs(context: Context<'_>, slot: SlotId) -> Result<Vec<u3
     for (witness, number) in witnesses.iter().zip(0_u64..) {
         for item in limits.watch(witness.designs.iter().enumerate()) {
             let (position, design) = item?;
-            let own = &mut signatures[*design as usize];
-            *own = hash(&(*own, number, witness.signature(position)));
+            let signature = &mut signatures[*design as usize];
+            *signature = hash(&(*signature, number, witness.signature(position)));
         }
     }
     let mut different: FxHashMap<u64, Vec<u32>> = FxHashMap::default();
     let mut equal = Vec::new();
     for (signature, design) in limits.watch(signatures).zip(0..) {
-        let known = different.entry(signature?).or_default();
-        let is_equal = |other: &u32| !witnesses.iter().any(|witness| witness.tells_apart(*other, design));
-        if known.iter().any(is_equal) { equal.push(design) } else { known.push(design) }
+        let representatives = different.entry(signature?).or_default();
+        let is_equal =
+            |candidate: &u32| !witnesses.iter().any(|witness| witness.tells_apart(*candidate, design));
+        if representatives.iter().any(is_equal) { equal.push(design) } else { representatives.push(design) }
     }
     Ok(equal)
 }
 
-/// All that speaks of the designs of a slot; what operators share is there once.
+/// All parts of the task that refer to designs of a slot. Parts that operators share are listed
+/// once.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 fn witnesses(context: Context<'_>, slot: SlotId) -> Result<Vec<Witness<'_>>, Interrupted> {
     let Context { task, limits } = context;
     let mut seen: FxHashSet<(*const u32, *const u8, SlotSet)> = FxHashSet::default();
-    let mut found = Vec::new();
+    let mut witnesses = Vec::new();
     for operator in limits.watch(&task.operators) {
         let operator = operator?;
         let Some(position) = operator.slots.iter().position(|usage| usage.slot == slot) else { continue };
         let designs = &operator.slots[position].designs[..];
+        // Operators share their tables, so addresses identify parts that are already listed.
         let mut is_new =
             |address: *const u8, slots: &SlotSet| seen.insert((designs.as_ptr(), address, slots.clone()));
         if is_new(std::ptr::null(), &SlotSet::new()) {
-            found.push(Witness { designs, says: WitnessKind::Admitted });
+            witnesses.push(Witness { designs, says: WitnessKind::Admitted });
         }
         for table in quantities(operator).flat_map(|quantity| &quantity.tables) {
-            let Some(own) = table.slots.iter().position(|slot| *slot as usize == position) else { continue };
+            let Some(table_position) = table.slots.iter().position(|slot| *slot as usize == position) else {
+                continue;
+            };
             if is_new(table.values.as_ptr().cast(), &table.slots) {
-                let later =
-                    table.slots[own + 1..].iter().map(|slot| operator.slots[*slot as usize].designs.len());
+                let later = table.slots[table_position + 1..]
+                    .iter()
+                    .map(|slot| operator.slots[*slot as usize].designs.len());
                 let says = WitnessKind::Table { values: &table.values, stride: later.product() };
-                found.push(Witness { designs, says });
+                witnesses.push(Witness { designs, says });
             }
         }
         for rule in operator.forbidden.iter() {
-            let Some(own) = rule.slots.iter().position(|slot| *slot as usize == position) else { continue };
+            let Some(rule_position) = rule.slots.iter().position(|slot| *slot as usize == position) else {
+                continue;
+            };
             if is_new(rule.combinations.as_ptr().cast(), &rule.slots) {
-                let mut others: Vec<Vec<SlotSet>> = vec![Vec::new(); designs.len()];
+                let mut partners: Vec<Vec<SlotSet>> = vec![Vec::new(); designs.len()];
                 for combination in limits.watch(&rule.combinations) {
-                    let mut rest = combination?.clone();
-                    let design = rest.remove(own);
-                    others[design as usize].push(rest);
+                    let mut partner = combination?.clone();
+                    let design = partner.remove(rule_position);
+                    partners[design as usize].push(partner);
                 }
-                for rests in &mut others {
+                for rests in &mut partners {
                     rests.sort_unstable();
                     rests.dedup();
                 }
-                found.push(Witness { designs, says: WitnessKind::Forbidden(others) });
+                witnesses.push(Witness { designs, says: WitnessKind::Forbidden(partners) });
             }
         }
     }
-    Ok(found)
+    Ok(witnesses)
 }
 
-/// What plans depend on.
+/// Quantities that affect plans.
 fn quantities(operator: &Operator) -> impl Iterator<Item = &Quantity<Int>> {
     let effects = operator.numeric_effects.iter().map(|effect| &effect.value.quantity);
     let comparisons = operator.condition.comparisons.iter().map(|comparison| &comparison.quantity);

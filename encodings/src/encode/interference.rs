@@ -1,20 +1,24 @@
-//! Several operators at a step: which ones must not stand together.
+//! Interference of operators in parallel steps.
 //!
-//! In ∀-step semantics \[1\] the operators of a step can be executed in any order with the same outcome, in ∃-step semantics
-//! \[2\] in at least one order, which is fixed: that of the ground task. Both ask for all conditions before the step and
-//! for all effects after it. With E the operators that change a fact (or any variable that is read in another way than by a
-//! plain condition) and R those that need it:
+//! In ∀-step semantics \[1\] the operators of a step can be executed in any order with the same
+//! result. In ∃-step semantics \[2\] they can be executed in at least one order, here the order of
+//! the ground task. In both, all conditions hold before the step and all effects after it. Let E be
+//! the operators that change a fact (or a variable that is read other than by a plain condition),
+//! and R those that need it:
 //!
-//! - ∃-step: `¬o@t ∨ ¬p@t` for o ∈ E before p ∈ R in the order, by a ladder: `o@t → a@t`, `a@t → a'@t`, `a@t → ¬p@t`;
-//! - ∀-step: the same, and once more in the reverse order;
-//! - exclusion: at most one of the operators that share a slot, a numeric variable, or a change of the state that costs are
-//!   reduced by. So numbers, designs and costs are encoded as where operators stand alone.
+//! - ∃-step: `¬o@t ∨ ¬p@t` for o ∈ E before p ∈ R in the order, by a ladder: `o@t → a@t`,
+//!   `a@t → a'@t`, `a@t → ¬p@t`;
+//! - ∀-step: the same, and again in the reverse order;
+//! - exclusion: at most one of the operators that share a slot, a numeric variable, or a transition
+//!   of the cost potential. So numbers, designs and costs are encoded as in sequential semantics.
 //!
-//! Every sequential plan is one in these semantics, so a bound on the steps of sequential plans serves them, too.
+//! Every sequential plan is a plan in these semantics, so bounds on the length of sequential plans
+//! remain valid.
 //!
-//! \[1\] H. Kautz, B. Selman: Pushing the envelope: planning, propositional logic and stochastic search, AAAI 1996.
-//! \[2\] J. Rintanen, K. Heljanko, I. Niemelä: Planning as satisfiability: parallel plans and algorithms for plan search,
-//! Artificial Intelligence 170(12-13), 2006.
+//! \[1\] H. Kautz, B. Selman: Pushing the envelope: planning, propositional logic and stochastic
+//! search, AAAI 1996.
+//! \[2\] J. Rintanen, K. Heljanko, I. Niemelä: Planning as satisfiability: parallel plans and
+//! algorithms for plan search, Artificial Intelligence 170(12-13), 2006.
 
 use search::bounds::Projection;
 use std::collections::BTreeMap;
@@ -27,15 +31,15 @@ use crate::encode::builder::Builder;
 use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::sat::Lit;
 
-/// How many operators can stand at one step of a formula.
+/// Number and order of operators at one step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum StepSemantics {
-    /// One.
+    /// One operator.
     Sequential,
-    /// Several that can be executed in any order.
+    /// Several operators that can be executed in any order.
     ForAllStep,
-    /// Several that can be executed in the order of the ground task.
+    /// Several operators that can be executed in the order of the ground task.
     ExistsStep,
 }
 
@@ -43,36 +47,37 @@ words! {
     StepSemantics, "semantics": Sequential = "sequential", ForAllStep = "for-all-step", ExistsStep = "exists-step"
 }
 
-/// What must not happen at the same step, for all steps alike.
+/// Interference relation of a task, the same for all steps.
 pub(super) struct Interference {
-    /// Whether the reverse order counts, too.
+    /// Whether conflicts apply in the reverse order as well.
     both_orders: bool,
-    /// At most one of each group.
+    /// Groups with at most one operator per step.
     exclusions: Vec<Vec<OperatorId>>,
     conflicts: Vec<Conflict>,
-    /// For each operator the first exclusion that holds it.
+    /// Per operator: the first exclusion group that contains it.
     classes: Vec<Option<usize>>,
 }
 
-/// Operators that change something, and operators that need it as it is, both ascending.
+/// Operators that change something, and operators that need it unchanged, both ascending.
 struct Conflict {
     erase: Vec<OperatorId>,
     need: Vec<OperatorId>,
 }
 
-/// What operators read of a variable, and change.
+/// Reads and writes of a variable by operators.
 #[derive(Default)]
 struct Uses {
-    /// By the value that a plain condition asks for.
+    /// Readers by plain conditions, by required value.
     require: BTreeMap<u32, Vec<OperatorId>>,
-    /// In any other way.
+    /// Other readers.
     read: Vec<OperatorId>,
-    /// With the value that they set.
+    /// Writers, with the value that they set.
     write: Vec<(OperatorId, u32)>,
 }
 
 impl Interference {
-    /// The interferences of a task; none if operators stand alone. Costs are reduced by the potential.
+    /// Interference relation of a task. Returns `None` in sequential semantics. `potential` is the
+    /// projection that reduces costs.
     pub(super) fn new(
         context: Context<'_>,
         semantics: StepSemantics,
@@ -92,18 +97,18 @@ impl Interference {
             for usage in operator.slots.iter() {
                 slots[usage.slot.index()].push(id);
             }
-            let mut touched = support.numbers_of(&operator.condition);
+            let mut numbers_used = support.numbers_of(&operator.condition);
             let mut read = support.read_by(&operator.condition);
             for effect in &operator.conditional {
                 let condition = Condition { clauses: vec![effect.condition.clone()], ..Condition::default() };
-                touched.extend(support.numbers_of(&condition));
+                numbers_used.extend(support.numbers_of(&condition));
                 read.extend(support.read_by(&condition));
             }
             for effect in &operator.numeric_effects {
-                touched.push(effect.variable.index());
-                touched.extend(effect.value.coefficients.iter().map(|(variable, _)| variable.index()));
+                numbers_used.push(effect.variable.index());
+                numbers_used.extend(effect.value.coefficients.iter().map(|(variable, _)| variable.index()));
             }
-            for number in sorted(&mut touched) {
+            for number in sorted(&mut numbers_used) {
                 numbers[*number].push(id);
             }
             for variable in sorted(&mut read) {
@@ -137,12 +142,13 @@ impl Interference {
         Ok(Some(Self { both_orders: semantics == StepSemantics::ForAllStep, exclusions, conflicts, classes }))
     }
 
-    /// Operators of the same class never stand at the same step; those without one may stand with any.
+    /// Exclusion class of an operator. Operators of the same class never share a step; those
+    /// without a class may share it with any operator.
     pub(super) fn class(&self, operator: OperatorId) -> Option<usize> {
         self.classes[operator.index()]
     }
 
-    /// The operators at a step do not interfere.
+    /// Adds clauses that exclude interference at a step.
     pub(super) fn add(&self, builder: &mut Builder<'_>, step: usize) -> Result<(), Interrupted> {
         for group in &self.exclusions {
             let literals: Vec<_> =
@@ -163,6 +169,8 @@ impl Interference {
             };
             let mut chain: Vec<_> = users.iter().filter_map(present).collect();
             ladder(&mut builder.formula, &chain);
+            // In ∀-step semantics every order must be executable, so the reverse order is excluded
+            // as well.
             if self.both_orders {
                 chain.reverse();
                 ladder(&mut builder.formula, &chain);
@@ -174,7 +182,7 @@ impl Interference {
 
 impl Uses {
     fn conflicts(&self, out: &mut Vec<Conflict>, limits: &Limits) -> Result<(), Interrupted> {
-        let mut found = Vec::new();
+        let mut conflicts = Vec::new();
         let required: BTreeMap<OperatorId, u32> =
             self.require.iter().flat_map(|(value, all)| all.iter().map(|id| (*id, *value))).collect();
         let mut writers: BTreeMap<Option<u32>, Vec<(OperatorId, u32)>> = BTreeMap::new();
@@ -183,27 +191,28 @@ impl Uses {
         }
         for item in limits.watch(&self.require) {
             let (value, need) = item?;
-            // What needs another value of the variable cannot stand at the step anyway.
+            // Operators that require another value of the variable are excluded at this step
+            // already.
             let possible = [None, Some(*value)].into_iter().filter_map(|required| writers.get(&required));
             let erase = possible.flatten().filter(|(_, set)| set != value);
             let mut erase: Vec<_> = erase.map(|(id, _)| *id).collect();
             erase.sort_unstable();
             erase.dedup();
-            found.push(Conflict { erase, need: need.clone() });
+            conflicts.push(Conflict { erase, need: need.clone() });
         }
         let mut erase: Vec<_> = self.write.iter().map(|(id, _)| *id).collect();
         erase.dedup();
-        found.push(Conflict { erase, need: self.read.clone() });
-        found.retain(|conflict| !conflict.erase.is_empty() && !conflict.need.is_empty());
-        out.append(&mut found);
+        conflicts.push(Conflict { erase, need: self.read.clone() });
+        conflicts.retain(|conflict| !conflict.erase.is_empty() && !conflict.need.is_empty());
+        out.append(&mut conflicts);
         Ok(())
     }
 }
 
-/// What derived variables depend on, in the end.
+/// Basic and numeric variables that derived variables depend on, transitively.
 struct Support {
     basic: usize,
-    /// For each derived variable the basic variables and the numeric ones.
+    /// Per derived variable: basic variables and numeric variables.
     of: Vec<(Vec<usize>, Vec<usize>)>,
 }
 
@@ -213,7 +222,7 @@ impl Support {
         let derived = task.variables.len() - task.basic;
         let mut support = Self { basic: task.basic, of: vec![(Vec::new(), Vec::new()); derived] };
         loop {
-            let mut changed = false;
+            let mut has_changed = false;
             for rule in task.axioms.iter().flat_map(|layer| &layer.rules) {
                 let mut read = support.read_by(&rule.body);
                 read.extend(rule.body.facts.iter().filter_map(|fact| support.if_basic(fact.variable)));
@@ -222,9 +231,9 @@ impl Support {
                 let before = (variables.len(), numerics.len());
                 variables.extend(read);
                 numerics.extend(numbers);
-                changed |= (sorted(variables).len(), sorted(numerics).len()) != before;
+                has_changed |= (sorted(variables).len(), sorted(numerics).len()) != before;
             }
-            if !changed {
+            if !has_changed {
                 return support;
             }
         }
@@ -240,18 +249,18 @@ impl Support {
         facts.chain(literals).filter_map(|variable| self.of.get(variable.index().checked_sub(self.basic)?))
     }
 
-    /// The basic variables that a condition depends on, apart from those of its facts.
+    /// Basic variables that a condition depends on, other than by its facts.
     fn read_by(&self, condition: &Condition) -> Vec<usize> {
         let literals = condition.clauses.iter().flatten();
-        let own = literals.filter_map(|literal| self.if_basic(literal.fact.variable));
-        own.chain(self.derived(condition).flat_map(|(variables, _)| variables.iter().copied())).collect()
+        let direct = literals.filter_map(|literal| self.if_basic(literal.fact.variable));
+        direct.chain(self.derived(condition).flat_map(|(variables, _)| variables.iter().copied())).collect()
     }
 
-    /// The numeric variables that a condition depends on.
+    /// Numeric variables that a condition depends on.
     fn numbers_of(&self, condition: &Condition) -> Vec<usize> {
-        let own = condition.comparisons.iter().flat_map(|linear| &linear.coefficients);
-        let own = own.map(|(variable, _)| variable.index());
-        own.chain(self.derived(condition).flat_map(|(_, numbers)| numbers.iter().copied())).collect()
+        let direct = condition.comparisons.iter().flat_map(|linear| &linear.coefficients);
+        let direct = direct.map(|(variable, _)| variable.index());
+        direct.chain(self.derived(condition).flat_map(|(_, numbers)| numbers.iter().copied())).collect()
     }
 }
 
@@ -261,7 +270,7 @@ fn sorted(numbers: &mut Vec<usize>) -> &[usize] {
     numbers
 }
 
-/// After an operator that erases there is none that needs.
+/// Adds clauses that no operator that needs a fact follows one that erases it.
 fn ladder(formula: &mut Formula, chain: &[(Lit, (bool, bool))]) {
     let last = chain.iter().rposition(|(_, (_, needs))| *needs);
     let mut erased = !Formula::truth();

@@ -1,10 +1,13 @@
-//! Ground task to formula: is there a plan of at most `horizon` steps that costs at most `limit`?
+//! Encoding of ground tasks: is there a plan of at most `horizon` steps that costs at most `limit`?
 //!
-//! An encoding over finite-domain variables with explanatory frame axioms \[1\], sequential or with several operators at a
-//! step. Steps that a plan does not need are idle, and stand at its end. The designs of an operator's slots are variables of their own beside the operator's, so that
-//! the formula grows with the sum of the designs, not with their product. Each family of clauses has a file.
+//! An encoding over finite-domain variables with explanatory frame axioms \[1\], with one or
+//! several operators per step. Unused steps are idle and come at the end. The designs of an
+//! operator's slots have variables of their own, separate from the operator's variable, so the
+//! formula grows with the sum of the numbers of designs, not with their product. Each family of
+//! clauses has a file.
 //!
-//! \[1\] H. Kautz, B. Selman: Pushing the envelope: planning, propositional logic and stochastic search, AAAI 1996.
+//! \[1\] H. Kautz, B. Selman: Pushing the envelope: planning, propositional logic and stochastic
+//! search, AAAI 1996.
 
 mod arithmetic;
 mod axioms;

@@ -1,9 +1,10 @@
-//! Numeric variables, exact, in binary.
+//! Exact numeric variables in binary arithmetic.
 //!
-//! At every step an effect `x := Σ f·y + q` of the operator there gives the next value, where q is a constant plus
-//! tables of designs; what no operator changes stays. A condition `Σ f·y + q ≥ 0` asks for the sign bit of its sum to be 0
-//! whenever its operator is there. Where a condition is the very value that an effect of the same operator assigns (a battery that
-//! must not fall below 0), the sign bit of the next value serves.
+//! At every step an effect `x := Σ f·y + q` of the operator at the step determines the next value,
+//! where q is a constant plus tables of designs. Numbers that no operator changes keep their
+//! values. A condition `Σ f·y + q ≥ 0` requires the sign bit of the sum to be 0 if its operator is
+//! executed. If a condition equals the value that an effect of the same operator assigns (a battery
+//! that must not fall below 0), the sign bit of the next value is used instead.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -18,51 +19,51 @@ use crate::encode::designs::combinations;
 use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::sat::Lit;
 
-/// Conjunctions, each with the number that it stands for.
+/// Conjunctions, each with the number that it selects.
 type Premises = Vec<(Vec<Lit>, Int)>;
 
-/// Factors of numeric variables.
+/// Coefficients of numeric variables.
 type Shape = Vec<(NumericId, Int)>;
 
-/// The combinations of a table in the task's numbering, and its values.
+/// Combinations of a table in the numbering of the task, and its values.
 type TableKey = (Vec<Vec<(usize, usize)>>, Arc<[Int]>);
 
-/// The values that a number can have.
+/// Range of values of a number.
 #[derive(Debug, Clone, Copy)]
 struct Range {
     low: Int,
     high: Int,
 }
 
-/// Encodes all numeric variables; returns their values before each step and after the last one. None if a limit was
-/// reached meanwhile, or if a number can grow beyond what the formula has bits for.
+/// Encodes all numeric variables. Returns their values before each step and after the last one, or
+/// `None` if a limit is reached or a number can exceed the available bits.
 pub(super) fn numeric(builder: &mut Builder<'_>) -> Option<Vec<Vec<Bits>>> {
     let initial = &builder.task.initial.numbers;
     let mut ranges: Vec<Range> = initial.iter().map(|n| Range { low: *n, high: *n }).collect();
     let numbers: Vec<Bits> = initial.iter().map(|n| Arithmetic::constant(*n, width(*n, *n))).collect();
-    let mut all = vec![numbers];
+    let mut numbers_by_step = vec![numbers];
     for step in 0..builder.variables.horizon() {
         builder.check().ok()?;
-        let numbers = all.last()?;
+        let numbers = numbers_by_step.last()?;
         let (next, next_ranges) = Transition { builder, step, numbers, ranges: &ranges }.encode()?;
         ranges = next_ranges;
-        all.push(next);
+        numbers_by_step.push(next);
     }
-    Some(all)
+    Some(numbers_by_step)
 }
 
-/// The change of numbers at a step.
+/// The update of numbers at a step.
 struct Transition<'s, 'a> {
     builder: &'s mut Builder<'a>,
     step: usize,
-    /// The numbers before the step.
+    /// Numbers before the step.
     numbers: &'s [Bits],
-    /// The values that they can have.
+    /// Ranges of the numbers before the step.
     ranges: &'s [Range],
 }
 
 impl Transition<'_, '_> {
-    /// The numbers after the step, and the values that they can have. None if one can grow too large.
+    /// Numbers after the step, and their ranges. Returns `None` if a number can grow too large.
     fn encode(&mut self) -> Option<(Vec<Bits>, Vec<Range>)> {
         let ranges = self.next_ranges()?;
         let mut next = Vec::with_capacity(self.numbers.len());
@@ -73,7 +74,7 @@ impl Transition<'_, '_> {
         Some((next, ranges))
     }
 
-    /// None if a number can grow beyond what the formula has bits for.
+    /// Ranges after the step. Returns `None` if a number can exceed the available bits.
     fn next_ranges(&self) -> Option<Vec<Range>> {
         let mut next = self.ranges.to_vec();
         for (id, _) in &self.builder.variables.operators[self.step] {
@@ -88,12 +89,12 @@ impl Transition<'_, '_> {
 
     #[expect(clippy::arithmetic_side_effects, reason = "widths of numbers of 128 bits")]
     fn next_number(&mut self, variable: NumericId, range: Range) -> Option<Bits> {
-        let own = |operator: &Operator| -> Vec<Linear<Int>> {
+        let values_of = |operator: &Operator| -> Vec<Linear<Int>> {
             let effects = operator.numeric_effects.iter().filter(|effect| effect.variable == variable);
             effects.map(|effect| effect.value.clone()).collect()
         };
         let shapes = self.builder.partition(self.step, |operator| {
-            own(operator).into_iter().map(|value| value.coefficients).collect()
+            values_of(operator).into_iter().map(|value| value.coefficients).collect()
         });
         let current = self.numbers[variable.index()].clone();
         if shapes.is_empty() {
@@ -107,11 +108,13 @@ impl Transition<'_, '_> {
         let base =
             if shapes.keys().all(|shape| *shape == stay) { current } else { self.base(&shapes, &current)? };
         let width = width(range.low, range.high) + 1;
-        let quantity = |operator: &Operator| own(operator).into_iter().map(|value| value.quantity).collect();
+        let quantity =
+            |operator: &Operator| values_of(operator).into_iter().map(|value| value.quantity).collect();
         Some(self.plus_quantities(base, &members, &quantity, active, width))
     }
 
-    /// The part of the next value that depends on the present ones, by the shape of the effect at the step.
+    /// Part of the next value that depends on present values, selected by the coefficients of the
+    /// effect at the step.
     fn base(&mut self, shapes: &BTreeMap<Shape, Vec<OperatorId>>, current: &Bits) -> Option<Bits> {
         let mut options = Vec::new();
         let mut length = current.len();
@@ -133,6 +136,7 @@ impl Transition<'_, '_> {
             Arithmetic { formula: &mut self.builder.formula, family: Family::Numeric }
                 .equal_if(group, &base, &bits);
         }
+        // Without an operator that changes the number, the number keeps its value.
         let unchanged = self.builder.formula.fresh(VariableMeaning::Ladder);
         self.builder.formula.add(Family::Numeric, changing.into_iter().chain([unchanged]));
         Arithmetic { formula: &mut self.builder.formula, family: Family::Numeric }
@@ -140,7 +144,8 @@ impl Transition<'_, '_> {
         Some(base)
     }
 
-    /// Adds what the operators' quantities contribute: one number for their constants, one for each table.
+    /// Adds the quantities of the operators: one summand for their constants, and one per set of
+    /// slots for their tables.
     fn plus_quantities(
         &mut self,
         base: Bits,
@@ -162,9 +167,10 @@ impl Transition<'_, '_> {
                 }
             }
         }
-        let mut own = Premises::new();
+        let mut constant_premises = Premises::new();
         for (constant, members) in constants {
-            own.push((vec![self.builder.group(self.step, &members, Family::Numeric)], constant));
+            constant_premises
+                .push((vec![self.builder.group(self.step, &members, Family::Numeric)], constant));
         }
         let mut by_slots: BTreeMap<Vec<usize>, (Vec<Lit>, Premises)> = BTreeMap::new();
         for ((entries, values), members) in tables {
@@ -182,7 +188,7 @@ impl Transition<'_, '_> {
                 premises.push((designs.chain([group]).collect(), *value));
             }
         }
-        let mut sum = self.add_source(base, &own, active, width);
+        let mut sum = self.add_source(base, &constant_premises, active, width);
         for (groups, premises) in by_slots.into_values() {
             let meaning = VariableMeaning::Ladder;
             let any = self.builder.formula.any(Family::Numeric, meaning, &groups);
@@ -196,14 +202,14 @@ impl Transition<'_, '_> {
 
     fn add_source(&mut self, base: Bits, premises: &[(Vec<Lit>, Int)], active: Lit, width: usize) -> Bits {
         let mut arithmetic = Arithmetic { formula: &mut self.builder.formula, family: Family::Numeric };
-        let more = arithmetic.choose(premises, active);
-        if more.iter().all(|bit| *bit == !Formula::truth()) {
+        let summand = arithmetic.choose(premises, active);
+        if summand.iter().all(|bit| *bit == !Formula::truth()) {
             return base;
         }
-        arithmetic.add(&base, &more, width)
+        arithmetic.add(&base, &summand, width)
     }
 
-    /// The numeric conditions of the operators at a step.
+    /// Adds the numeric conditions of the operators at a step.
     #[expect(clippy::arithmetic_side_effects, reason = "widths of numbers of 128 bits")]
     fn comparisons(&mut self, next: &[Bits]) -> Option<()> {
         for index in 0..self.builder.variables.operators[self.step].len() {
@@ -232,7 +238,7 @@ impl Transition<'_, '_> {
         for ((shape, position), members) in shapes {
             let group = self.builder.group(self.step, &members, Family::Numeric);
             let base = weighted(&mut self.builder.formula, &shape, self.numbers, self.ranges)?;
-            let own = |operator: &Operator| -> Vec<Quantity<Int>> {
+            let quantities = |operator: &Operator| -> Vec<Quantity<Int>> {
                 let matching = remaining(operator)
                     .into_iter()
                     .filter(|(p, l)| *p == position && l.coefficients == shape);
@@ -241,11 +247,14 @@ impl Transition<'_, '_> {
             let values = members.iter().flat_map(|id| remaining(&self.builder.task.operators[id.index()]));
             let mut range = Range { low: 0, high: 0 };
             for (_, linear) in values {
-                let own = linear_range(&linear, self.ranges)?;
-                range = Range { low: range.low.min(own.low), high: range.high.max(own.high) };
+                let comparison_range = linear_range(&linear, self.ranges)?;
+                range = Range {
+                    low: range.low.min(comparison_range.low),
+                    high: range.high.max(comparison_range.high),
+                };
             }
             let width = width(range.low, range.high).max(base.len()) + 2;
-            let sum = self.plus_quantities(base, &members, &own, group, width);
+            let sum = self.plus_quantities(base, &members, &quantities, group, width);
             if let Some(sign) = sum.last() {
                 self.builder.formula.add(Family::Numeric, [!group, !*sign]);
             }
@@ -254,7 +263,7 @@ impl Transition<'_, '_> {
     }
 }
 
-/// A sum of multiples of numbers.
+/// Linear combination of numbers.
 #[expect(clippy::arithmetic_side_effects, reason = "widths of numbers of 128 bits")]
 fn weighted(formula: &mut Formula, shape: &Shape, numbers: &[Bits], ranges: &[Range]) -> Option<Bits> {
     let linear = Linear { coefficients: shape.clone(), quantity: Quantity::constant(0) };
@@ -272,7 +281,7 @@ fn weighted(formula: &mut Formula, shape: &Shape, numbers: &[Bits], ranges: &[Ra
     Some(sum.unwrap_or_else(|| Arithmetic::constant(0, 1)))
 }
 
-/// Whether an expression that mentions no designs is at least 0; none if its numbers do not fit.
+/// Literal that an expression without designs is at least 0. Returns `None` if numbers overflow.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "widths of numbers of 128 bits; a number has a bit at least"
@@ -286,7 +295,8 @@ pub(super) fn is_at_least_zero(
     let ranges: Vec<Range> = numbers
         .iter()
         .map(|bits| {
-            // A number of so many bits is not larger, and `next_ranges` admits none of more.
+            // A number with this many bits has at most this magnitude, and `next_ranges` admits no
+            // larger ones.
             let limit: Int = 1 << bits.len().saturating_sub(1).min(126);
             Range { low: -limit, high: limit }
         })
@@ -299,7 +309,7 @@ pub(super) fn is_at_least_zero(
     Some(sum.last().map_or(Formula::truth(), |sign| !*sign))
 }
 
-/// None if it exceeds what the formula has bits for.
+/// Range of a linear expression. Returns `None` if it exceeds the available bits.
 fn linear_range(linear: &Linear<Int>, ranges: &[Range]) -> Option<Range> {
     let (mut low, mut high) = (linear.quantity.minimum(), linear.quantity.maximum());
     for (variable, factor) in &linear.coefficients {

@@ -1,6 +1,7 @@
 //! Operators: their order, conditions and effects.
 //!
-//! - sequence: at most one operator a step, unless several may stand there; `o@t → busy@t`, `busy@t → ⋁ o@t`, `busy@t+1 → busy@t`;
+//! - sequence: at most one operator per step in sequential semantics; `o@t → busy@t`,
+//!   `busy@t → ⋁ o@t`, `busy@t+1 → busy@t`;
 //! - condition: `o@t → p@t` for each fact, `o@t → ⋁ l@t` for each clause;
 //! - effect: `o@t → e@t+1`, unless a conditional effect of the operator prevails.
 
@@ -10,7 +11,8 @@ use crate::encode::builder::Builder;
 use crate::encode::conditional::FiredEffects;
 use crate::encode::formula::{Family, Formula, VariableMeaning};
 
-/// One operator at most if it is to stand alone, and none after an idle step.
+/// Adds the sequence clauses: at most one operator per step if `is_alone`, and none after an idle
+/// step.
 pub(super) fn sequence(builder: &mut Builder<'_>, step: usize, is_alone: bool) {
     let literals: Vec<_> = builder.variables.operators[step].iter().map(|(_, literal)| *literal).collect();
     let busy = match literals[..] {
@@ -34,7 +36,7 @@ pub(super) fn sequence(builder: &mut Builder<'_>, step: usize, is_alone: bool) {
     builder.variables.busy.push(busy);
 }
 
-/// What operators need, apart from numbers and designs.
+/// Adds the conditions of operators, except those on numbers and designs.
 pub(super) fn conditions(builder: &mut Builder<'_>, step: usize) {
     for index in 0..builder.variables.operators[step].len() {
         let (id, literal) = builder.variables.operators[step][index];
@@ -50,7 +52,7 @@ pub(super) fn conditions(builder: &mut Builder<'_>, step: usize) {
     }
 }
 
-/// What operators change, apart from numbers.
+/// Adds the effects of operators, except those on numbers.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "steps are fewer than the horizon, whose formula is in memory"
@@ -60,8 +62,8 @@ pub(super) fn effects(builder: &mut Builder<'_>, step: usize, fires: &FiredEffec
         let (id, literal) = builder.variables.operators[step][index];
         for effect in &builder.task.operators[id.index()].effects {
             let fact = builder.variables.fact(*effect, step + 1);
-            let others: Vec<_> = fires.prevailing(id, 0, *effect).collect();
-            builder.formula.add(Family::Effect, others.into_iter().chain([!literal, fact]));
+            let overriding: Vec<_> = fires.prevailing(id, 0, *effect).collect();
+            builder.formula.add(Family::Effect, overriding.into_iter().chain([!literal, fact]));
         }
     }
 }

@@ -1,8 +1,9 @@
 //! Selection of function designs, factored.
 //!
-//! With `g@t` for the operators that admit the same designs D of a slot: `g@t → ⋁_{d ∈ D} slot=d@t`, at most one design of a
-//! slot, and `slot=d@t → ⋁ {g@t : d ∈ D}`, so that an idle slot stays empty. Combinations that only together do not
-//! suit are forbidden one by one: `¬g@t ∨ ¬slot=d@t ∨ ¬slot'=d'@t`.
+//! With `g@t` for the operators that admit the same designs D of a slot:
+//! `g@t → ⋁_{d ∈ D} slot=d@t`, at most one design of a slot, and `slot=d@t → ⋁ {g@t : d ∈ D}`, so
+//! an unused slot stays empty. Unsuitable combinations are forbidden one by one:
+//! `¬g@t ∨ ¬slot=d@t ∨ ¬slot'=d'@t`.
 
 use task::limits::Interrupted;
 
@@ -11,12 +12,12 @@ use crate::encode::designs::task_slot;
 use crate::encode::formula::{Family, Formula};
 use crate::sat::Lit;
 
-/// Each function in use has exactly one design, and one that suits.
+/// Adds clauses that give each function in use exactly one suitable design.
 pub(super) fn selection(builder: &mut Builder<'_>, step: usize) -> Result<(), Interrupted> {
     for slot in 0..builder.task.slots.len() {
         let uses = builder.partition(step, |operator| {
-            let own = operator.slots.iter().filter(|usage| usage.slot.index() == slot);
-            own.map(|usage| &usage.designs[..]).collect()
+            let usages = operator.slots.iter().filter(|usage| usage.slot.index() == slot);
+            usages.map(|usage| &usage.designs[..]).collect()
         });
         let literals = builder.variables.designs[step][slot].clone();
         let mut users: Vec<Vec<Lit>> = vec![Vec::new(); literals.len()];

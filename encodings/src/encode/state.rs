@@ -2,7 +2,7 @@
 //!
 //! - domain: `⋁_d v=d@t`, and at most one of them;
 //! - frame (explanatory, after Haas \[1\]): `v=d@t+1 → v=d@t ∨ ⋁ {o@t : o sets v to d}`. With the domain
-//!   constraints on both sides this also keeps what nothing changes.
+//!   constraints on both sides this also preserves unchanged values.
 //!
 //! \[1\] A. Haas: The case for domain-specific frame axioms, The Frame Problem in AI, 1987.
 
@@ -14,7 +14,7 @@ use crate::encode::conditional::FiredEffects;
 use crate::encode::formula::{Family, Formula};
 use crate::sat::Lit;
 
-/// Every variable has exactly one value before the step.
+/// Adds clauses that give every variable exactly one value before the step.
 pub(super) fn domain(builder: &mut Builder<'_>, step: usize) {
     for variable in 0..builder.task.variables.len() {
         let falsum = !Formula::truth();
@@ -27,7 +27,8 @@ pub(super) fn domain(builder: &mut Builder<'_>, step: usize) {
     }
 }
 
-/// A value that holds after the step held before it, or an operator at the step has brought it.
+/// Adds frame axioms: a value that holds after the step held before it, or an operator at the step
+/// sets it.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "steps are fewer than the horizon, whose formula is in memory"

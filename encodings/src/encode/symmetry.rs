@@ -1,13 +1,15 @@
-//! Designs and objects that are equal: of plans that differ by exchanging them, one is enough.
+//! Symmetry breaking for interchangeable designs and objects: one representative of symmetric plans
+//! is enough.
 //!
-//! - designs: of designs of a slot that no operator tells apart, only the first is chosen: `¬slot=d@t`. Designs are chosen anew
-//!   at every step, so each step is symmetric by itself;
-//! - objects: objects x₁ < x₂ < … any two of which can be exchanged without changing the task \[1\] are used first in this order:
-//!   `o@t → s_i@t` for each operator o with x_{i+1} among its arguments and `x_i` not, where `s_i@t → s_i@t−1 ∨ u_i@t` says that
-//!   `x_i` has been used, and `u_i@t ↔ ⋁ o@t` that it is used now. Renaming the objects of a plan in the order of their first use
-//!   makes one that satisfies this, and costs the same.
+//! - designs: of interchangeable designs of a slot, only the first is used: `¬slot=d@t`. Designs
+//!   are chosen independently at every step, so each step is symmetric on its own;
+//! - objects: objects x₁ < x₂ < …, any two of which can be exchanged without changing the task
+//!   \[1\], are first used in this order: `o@t → s_i@t` for each operator o with x_{i+1} but not
+//!   `x_i` among its arguments. Here `s_i@t → s_i@t−1 ∨ u_i@t` states that `x_i` has been used, and
+//!   `u_i@t ↔ ⋁ o@t` that it is used now. Renaming the objects of a plan in the order of their
+//!   first use yields a plan that satisfies this at the same cost.
 //!
-//! Objects whose numeric variables differ, and tasks with derived variables, are left alone.
+//! Objects with different numeric variables, and tasks with derived variables, are not reduced.
 //!
 //! \[1\] J. Rintanen: Symmetry reduction for SAT representations of transition systems, ICAPS 2003.
 
@@ -22,11 +24,12 @@ use crate::encode::formula::{Family, Formula, VariableMeaning};
 use crate::encode::interchangeable_designs::equal_designs;
 use crate::sat::Lit;
 
-/// What of a task is equal.
+/// Symmetries of a task: interchangeable designs and objects.
 pub struct Symmetry {
-    /// Designs of a slot that are equal to an earlier one.
+    /// Designs that are interchangeable with an earlier design of the slot.
     designs: Vec<(SlotId, u32)>,
-    /// For pairs of equal objects: the operators that use the first, and those that use only the second.
+    /// Per pair of interchangeable objects: operators that use the first, and operators that use
+    /// only the second.
     objects: Pairs,
 }
 
@@ -40,7 +43,7 @@ impl Symmetry {
         Ok(Self { designs, objects: equal_objects(context)? })
     }
 
-    /// Equal designs and objects are used in their order.
+    /// Adds the symmetry-breaking clauses.
     pub(super) fn add(&self, builder: &mut Builder<'_>) -> Result<(), Interrupted> {
         let horizon = builder.variables.horizon();
         for step in 0..horizon {
@@ -51,16 +54,16 @@ impl Symmetry {
             }
         }
         for (first, only_second) in &self.objects {
-            let mut seen: Lit = !Formula::truth();
+            let mut used_so_far: Lit = !Formula::truth();
             for step in builder.limits.watch(0..horizon) {
                 let step = step?;
                 let used = builder.group(step, first, Family::Symmetry);
                 let longer = builder.formula.fresh(VariableMeaning::Ladder);
-                builder.formula.add(Family::Symmetry, [!longer, seen, used]);
-                seen = longer;
+                builder.formula.add(Family::Symmetry, [!longer, used_so_far, used]);
+                used_so_far = longer;
                 for id in only_second {
                     if let Some(literal) = builder.variables.operator(step, *id) {
-                        builder.formula.add(Family::Symmetry, [!literal, seen]);
+                        builder.formula.add(Family::Symmetry, [!literal, used_so_far]);
                     }
                 }
             }
@@ -69,25 +72,26 @@ impl Symmetry {
     }
 }
 
-/// Two lists of operators for each of some pairs of objects.
+/// For each pair of objects two lists of operators.
 type Pairs = Vec<(Vec<OperatorId>, Vec<OperatorId>)>;
 
-/// Pairs of neighbours in classes of equal objects.
+/// Neighbouring objects in classes of interchangeable objects.
 fn equal_objects(context: Context<'_>) -> Result<Pairs, Interrupted> {
     let task = context.task;
     let pairs = symmetry_generators(context, true)?.into_iter().map(
         |Exchange { objects: (first, second), .. }| {
-            let (own, all) = (uses_of(task, first), uses_of(task, second));
-            let only = all.into_iter().filter(|id| own.binary_search(id).is_err()).collect();
-            (own, only)
+            let (first_users, second_users) = (uses_of(task, first), uses_of(task, second));
+            let only_second =
+                second_users.into_iter().filter(|id| first_users.binary_search(id).is_err()).collect();
+            (first_users, only_second)
         },
     );
     Ok(pairs.collect())
 }
 
-/// Ascending.
+/// Operators with an object among their arguments, ascending.
 fn uses_of(task: &Task, object: ObjectId) -> Vec<OperatorId> {
-    let all = task.operators.iter().zip(OperatorId::all(task.operators.len()));
-    let own = all.filter(|(operator, _)| operator.arguments.contains(&Argument::Object(object)));
-    own.map(|(_, id)| id).collect()
+    let operators = task.operators.iter().zip(OperatorId::all(task.operators.len()));
+    let users = operators.filter(|(operator, _)| operator.arguments.contains(&Argument::Object(object)));
+    users.map(|(_, id)| id).collect()
 }

@@ -1,4 +1,4 @@
-//! The clauses of a small task, symbolic and sorted, by family.
+//! Snapshots of the clauses of a small task: symbolic and sorted, by family.
 
 use std::cell::OnceCell;
 use std::fmt::Write as _;
@@ -81,8 +81,8 @@ fn clauses(task: &Task, formula: &Formula, family: Family) -> String {
         let name = name(task, formula.meaning(literal.variable()));
         if literal.is_positive() { name } else { format!("¬{name}") }
     };
-    let own = formula.clauses().filter(|(own, _)| *own == family);
-    let mut lines: Vec<String> = own
+    let family_clauses = formula.clauses().filter(|(candidate, _)| *candidate == family);
+    let mut lines: Vec<String> = family_clauses
         .map(|(_, clause)| {
             let mut literals: Vec<String> = clause.iter().map(literal).collect();
             literals.sort();
@@ -113,7 +113,8 @@ fn check(family: Family) -> String {
     clauses(&task, &encoding.formula, family)
 }
 
-/// Two equal lamps that need power, and a switch that takes it away: declared after one action that needs it, and before another.
+/// Two interchangeable lamps that need power, and a switch that cuts it. The switch is declared
+/// between two actions that need power.
 const LAMPS: (&str, &str) = (
     "(define (domain d)
       (:predicates (on ?x) (red ?x) (power))
@@ -195,7 +196,7 @@ fn goal() {
     assert_snapshot!(check(Family::Goal));
 }
 
-/// What a family writes by itself for both steps of the task.
+/// Clauses that a family writes on its own for both steps of the task.
 fn alone(family: Family, write: impl Fn(&mut Builder<'_>, usize)) -> String {
     let (task, limits) = (task(), Limits::none());
     let allowed = vec![vec![true; task.operators.len()]; 2];
@@ -203,13 +204,14 @@ fn alone(family: Family, write: impl Fn(&mut Builder<'_>, usize)) -> String {
     for step in 0..2 {
         write(&mut builder, step);
     }
-    let families: Vec<Family> = builder.formula.clauses_from(1).map(|(own, _)| own).collect();
-    assert!(families.iter().all(|own| *own == family), "{families:?}");
+    let families: Vec<Family> =
+        builder.formula.clauses_from(1).map(|(clause_family, _)| clause_family).collect();
+    assert!(families.iter().all(|clause_family| *clause_family == family), "{families:?}");
     clauses(&task, &builder.formula, family)
 }
 
 #[test]
-fn families_are_written_alone_as_among_the_others() {
+fn a_family_alone_writes_the_same_clauses_as_in_a_whole_encoding() {
     assert_eq!(alone(Family::Condition, operators::conditions), check(Family::Condition));
     let sequence = |builder: &mut Builder<'_>, step| operators::sequence(builder, step, true);
     assert_eq!(alone(Family::Sequence, sequence), check(Family::Sequence));

@@ -1,6 +1,6 @@
-//! The variables of a formula by step: for operators, for the values of state variables, and for designs.
+//! Variables of a formula by step: operators, values of state variables, and designs.
 //!
-//! A value that no sequence of allowed operators can produce by a step gets no variable there.
+//! A value that is unreachable by a step gets no variable there.
 
 use task::context::Context;
 use task::limits::Interrupted;
@@ -10,12 +10,12 @@ use task::task::{Fact, Literal, OperatorId, Task};
 use crate::encode::formula::{Formula, VariableMeaning};
 use crate::sat::Lit;
 
-/// What stands for operators, values and designs.
+/// The variables for operators, values and designs.
 #[derive(Default)]
 pub(super) struct Variables {
-    /// For each step the operators that can be there, ascending, with their variables.
+    /// Per step: possible operators, ascending, with their variables.
     pub(super) operators: Vec<Vec<(OperatorId, Lit)>>,
-    /// Whether any operator is executed at the step.
+    /// Per step: whether any operator is executed.
     pub(super) busy: Vec<Lit>,
     /// `values[step][variable][value]`: the variable has the value before the step.
     pub(super) values: Vec<Vec<Vec<Lit>>>,
@@ -24,7 +24,7 @@ pub(super) struct Variables {
 }
 
 impl Variables {
-    /// Makes the variables for operators, values and designs.
+    /// Creates the variables for operators, values and designs.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "steps are fewer than the horizon, whose formula is in memory"
@@ -35,20 +35,20 @@ impl Variables {
         allowed: &[Vec<bool>],
     ) -> Result<Self, Interrupted> {
         let Context { task, limits } = context;
-        let mut all = Self::default();
+        let mut declared = Self::default();
         let mut possible: Vec<Vec<bool>> =
             task.variables.iter().map(|v| vec![false; v.values.len()]).collect();
         for (variable, value) in task.initial.values.iter().enumerate() {
             possible[variable][*value as usize] = true;
         }
-        // What derived variables hold follows from the others at every step.
+        // Values of derived variables are determined by the other variables at every step.
         for values in &mut possible[task.basic..] {
             values[1] = true;
         }
         for rule in task.axioms.iter().flat_map(|layer| &layer.rules) {
             possible[rule.head.variable.index()][rule.head.value as usize] = true;
         }
-        all.values.push(values(formula, &possible, 0));
+        declared.values.push(values(formula, &possible, 0));
         for (step, allowed) in allowed.iter().enumerate() {
             let mut present = Vec::new();
             for item in limits.watch(task.operators.iter().zip(OperatorId::all(task.operators.len()))) {
@@ -66,40 +66,41 @@ impl Variables {
                     possible[effect.variable.index()][effect.value as usize] = true;
                 }
             }
-            all.designs.push(designs(task, formula, &present, step));
-            all.operators.push(present);
-            all.values.push(values(formula, &possible, step + 1));
+            declared.designs.push(designs(task, formula, &present, step));
+            declared.operators.push(present);
+            declared.values.push(values(formula, &possible, step + 1));
         }
-        Ok(all)
+        Ok(declared)
     }
 
-    /// So many steps can be executed.
+    /// Number of steps.
     pub(super) fn horizon(&self) -> usize {
         self.operators.len()
     }
 
-    /// The variable of a fact before a step.
+    /// Variable of a fact before a step.
     pub(super) fn fact(&self, fact: Fact, step: usize) -> Lit {
         self.values[step][fact.variable.index()][fact.value as usize]
     }
 
-    /// The variable of a fact before a step, or its negation.
+    /// Variable of a fact before a step, or its negation.
     pub(super) fn literal(&self, literal: Literal, step: usize) -> Lit {
         let fact = self.fact(literal.fact, step);
         if literal.positive { fact } else { !fact }
     }
 
-    /// The variable of an operator at a step, if it can stand there.
+    /// Variable of an operator at a step, if the operator is possible there.
     pub(super) fn operator(&self, step: usize, id: OperatorId) -> Option<Lit> {
-        let all = &self.operators[step];
-        all.binary_search_by_key(&id, |(id, _)| *id).ok().map(|index| all[index].1)
+        let candidates = &self.operators[step];
+        candidates.binary_search_by_key(&id, |(id, _)| *id).ok().map(|index| candidates[index].1)
     }
 }
 
-/// The variables of values before a step.
+/// Creates the variables of values before a step.
 fn values(formula: &mut Formula, possible: &[Vec<bool>], step: usize) -> Vec<Vec<Lit>> {
-    let mut all = Vec::with_capacity(possible.len());
+    let mut literals_by_variable = Vec::with_capacity(possible.len());
     for (variable, values) in possible.iter().enumerate() {
+        // A value that is the only possible one is a constant and needs no variable.
         let single = values.iter().filter(|possible| **possible).count() == 1;
         let mut literals = Vec::with_capacity(values.len());
         for (value, possible) in values.iter().enumerate() {
@@ -112,12 +113,12 @@ fn values(formula: &mut Formula, possible: &[Vec<bool>], step: usize) -> Vec<Vec
                 }
             });
         }
-        all.push(literals);
+        literals_by_variable.push(literals);
     }
-    all
+    literals_by_variable
 }
 
-/// The variables of designs that operators may choose at a step.
+/// Creates the variables of designs that operators may use at a step.
 fn designs(task: &Task, formula: &mut Formula, present: &[(OperatorId, Lit)], step: usize) -> Vec<Vec<Lit>> {
     let mut used: Vec<Vec<bool>> = task.slots.iter().map(|slot| vec![false; slot.designs.len()]).collect();
     for slot in present.iter().flat_map(|(id, _)| task.operators[id.index()].slots.iter()) {
@@ -125,7 +126,7 @@ fn designs(task: &Task, formula: &mut Formula, present: &[(OperatorId, Lit)], st
             used[slot.slot.index()][*design as usize] = true;
         }
     }
-    let mut all = Vec::with_capacity(used.len());
+    let mut literals_by_slot = Vec::with_capacity(used.len());
     for (slot, used) in used.into_iter().enumerate() {
         let mut literals = Vec::with_capacity(used.len());
         for (design, used) in used.into_iter().enumerate() {
@@ -133,7 +134,7 @@ fn designs(task: &Task, formula: &mut Formula, present: &[(OperatorId, Lit)], st
                 VariableMeaning::Design { slot: dense(slot), design: dense(design), step: dense(step) };
             literals.push(if used { formula.fresh(meaning) } else { !Formula::truth() });
         }
-        all.push(literals);
+        literals_by_slot.push(literals);
     }
-    all
+    literals_by_slot
 }

@@ -1,6 +1,5 @@
-//! `BatSat` \[1\], `MiniSat` \[2\] in Rust, as a back end.
-//!
-//! Its callbacks count what is learnt and say when to stop.
+//! `BatSat` \[1\] back end, a port of `MiniSat` \[2\] to Rust. Callbacks count learnt clauses and
+//! stop the solver at a limit.
 //!
 //! \[1\] S. Cruanes, M. Hara: `BatSat`, <https://github.com/c-cube/batsat>.
 //! \[2\] N. Eén, N. Sörensson: An extensible SAT-solver, SAT 2003.
@@ -12,7 +11,7 @@ use task::limits::Limits;
 
 use crate::sat::solver::{Answer, Lit, Solver};
 
-/// How many decisions pass between two looks at the clock.
+/// Number of decisions between two polls of the time limit.
 const CLOCK_INTERVAL: u32 = 64;
 
 /// A `BatSat` solver.
@@ -22,7 +21,7 @@ pub(super) struct Batsat {
     core: Vec<Lit>,
 }
 
-/// Counts conflicts, and says when to stop.
+/// Counts conflicts and stops the solver at a limit.
 struct Watch {
     limits: Limits,
     budget: u64,
@@ -40,6 +39,7 @@ impl Callbacks for Watch {
     fn stop(&self) -> bool {
         let decisions = self.decisions.get().wrapping_add(1);
         self.decisions.set(decisions);
+        // Reading the clock at every decision would slow the solver down.
         if self.conflicts > self.budget || (decisions % CLOCK_INTERVAL == 1 && self.limits.reached()) {
             self.stopped.set(true);
         }
@@ -48,7 +48,7 @@ impl Callbacks for Watch {
 }
 
 impl Batsat {
-    /// A solver that gives up at a limit, or after learning `budget` clauses.
+    /// Creates a solver that stops at a limit or after `budget` learnt clauses.
     pub(super) fn new(limits: &Limits, budget: u64) -> Self {
         let watch = Watch {
             limits: limits.clone(),
@@ -61,7 +61,7 @@ impl Batsat {
         Self { solver, buffer: Vec::new(), core: Vec::new() }
     }
 
-    /// Literals of this solver to the buffer.
+    /// Translates literals into the buffer.
     fn translate(&mut self, literals: &[Lit]) {
         self.buffer.clear();
         for literal in literals {
@@ -74,7 +74,7 @@ impl Batsat {
 impl Solver for Batsat {
     fn add_clause(&mut self, clause: &[Lit]) {
         self.translate(clause);
-        // Whether the clauses are contradictory already is what `solve` says, too.
+        // The result is ignored, because `solve` reports a contradiction as well.
         let _ = self.solver.add_clause_reuse(&mut self.buffer);
     }
 
@@ -85,7 +85,7 @@ impl Solver for Batsat {
         if answer == lbool::TRUE {
             Answer::Satisfiable
         } else if answer == lbool::FALSE {
-            // It comes as the clause that follows.
+            // The core is a clause over the negated assumptions.
             let core = self.solver.unsat_core().iter();
             self.core.extend(core.map(|literal| Lit::new(literal.var().idx(), !literal.sign())));
             Answer::Unsatisfiable

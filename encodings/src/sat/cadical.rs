@@ -1,6 +1,4 @@
-//! `CaDiCaL` \[1\] as a back end.
-//!
-//! Its callbacks count what is learnt and say when to stop.
+//! `CaDiCaL` \[1\] back end. Callbacks count learnt clauses and stop the solver at a limit.
 //!
 //! \[1\] A. Biere, T. Faller, K. Fazekas, M. Fleury, N. Froleyks, F. Pollitt: `CaDiCaL` 2.0, CAV 2024.
 
@@ -11,14 +9,14 @@ use crate::sat::solver::{Answer, Lit, Solver};
 /// A `CaDiCaL` solver.
 pub(super) struct Cadical {
     solver: cadical::Solver<Watch>,
-    /// Values of the variables that have one.
+    /// Values of the assigned variables.
     assignment: Vec<bool>,
     variables: u32,
     conflicts: u64,
     core: Vec<Lit>,
 }
 
-/// Counts conflicts, and says when to stop.
+/// Counts conflicts and stops the solver at a limit.
 struct Watch {
     limits: Limits,
     budget: u64,
@@ -40,7 +38,7 @@ impl cadical::Callbacks for Watch {
 }
 
 impl Cadical {
-    /// A solver that gives up at a limit, or after learning `budget` clauses.
+    /// Creates a solver that stops at a limit or after `budget` learnt clauses.
     pub(super) fn new(limits: &Limits, budget: u64) -> Self {
         let mut solver = cadical::Solver::new();
         solver.set_callbacks(Some(Watch { limits: limits.clone(), budget, conflicts: 0 }));

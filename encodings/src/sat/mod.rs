@@ -1,7 +1,8 @@
-//! A formula to an assignment, or to the answer that there is none: SAT solvers behind one trait.
+//! SAT solvers behind one trait.
 //!
-//! Each solver has a file, and only that file names its crate. A solver is incremental: it takes further clauses after each
-//! answer, decides them under assumptions, and says which of these fail together. What it has learnt it keeps.
+//! Each solver has a file, and only that file names its crate. Solvers are incremental: they accept
+//! further clauses after each answer, keep learnt clauses, decide under assumptions, and report
+//! which assumptions fail together.
 
 mod batsat;
 #[cfg(feature = "cadical")]
@@ -19,7 +20,7 @@ use task::limits::Limits;
 pub use totalizer::Totalizer;
 pub use varisat::refute_with_proof;
 
-/// Which SAT solver decides the formulas.
+/// The SAT solver that decides the formulas.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Backend {
@@ -31,40 +32,40 @@ pub enum Backend {
     /// `CaDiCaL`, in C++; with the feature `cadical` only.
     #[cfg(feature = "cadical")]
     Cadical,
-    /// A program and its arguments. It gets the formula in DIMACS on its standard input, and answers on its standard
-    /// output as the SAT competitions ask for, or as `MiniSat` does.
+    /// An external program with its arguments. It receives the formula in DIMACS on standard input,
+    /// and answers on standard output in the format of the SAT competitions or of `MiniSat`.
     Program {
-        /// A path, or a name that is looked up as a shell does.
+        /// Path, or name that is looked up as by a shell.
         command: String,
-        /// Passed as they are.
+        /// Arguments, passed unchanged.
         arguments: Vec<String>,
     },
 }
 
-/// What is wrong with a solver that a user names.
+/// Error in the solver that a user names.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BackendError {
-    /// Nothing but blanks.
+    /// The name is blank.
     #[error("a solver needs a name; built in are: {}", Backend::BUILT_IN.join(", "))]
     Empty,
-    /// It does not answer as it should.
+    /// The program does not behave like a SAT solver.
     #[error("`{command}` does not serve as a SAT solver: {reason}; built in are: {}", Backend::BUILT_IN.join(", "))]
     Unusable {
-        /// The program as the user has named it.
+        /// The program as named by the user.
         command: String,
-        /// What happened.
+        /// Description of the failure.
         reason: String,
     },
 }
 
 impl Backend {
-    /// Solvers that need no other program.
+    /// Solvers that need no external program.
     pub fn built_in() -> impl Iterator<Item = Self> {
         Self::BUILT_IN.iter().filter_map(|name| name.parse().ok())
     }
 
-    /// The names of solvers that need no program.
+    /// Names of the solvers that need no external program.
     pub const BUILT_IN: &[&str] = &[
         "varisat",
         "batsat",
@@ -72,7 +73,7 @@ impl Backend {
         "cadical",
     ];
 
-    /// A solver that gives up at a limit, or after learning `budget` clauses.
+    /// Starts a solver that stops at a limit or after `budget` learnt clauses.
     pub fn start(&self, limits: &Limits, budget: u64) -> Box<dyn Solver> {
         match self {
             Self::Varisat => Box::new(varisat::Varisat::new(limits, budget)),
@@ -85,18 +86,18 @@ impl Backend {
         }
     }
 
-    /// Whether the solver is there and answers: asked of two formulas with one variable.
+    /// Checks that the solver is available and decides two formulas with one variable correctly.
     ///
     /// # Errors
     ///
-    /// The program cannot be started, or does not answer right.
+    /// Fails if the program cannot be started or answers wrongly.
     pub fn check(&self) -> Result<(), BackendError> {
         let Self::Program { command, .. } = self else { return Ok(()) };
-        let one = Lit::TRUE;
+        let variable = Lit::TRUE;
         for (clauses, expected) in
-            [(&[one][..], Answer::Satisfiable), (&[one, !one][..], Answer::Unsatisfiable)]
+            [(&[variable][..], Answer::Satisfiable), (&[variable, !variable][..], Answer::Unsatisfiable)]
         {
-            // A program that has to be killed here would never end.
+            // A budget of 0 gives external programs a short time limit.
             let mut solver = self.start(&Limits::none(), 0);
             for literal in clauses {
                 solver.add_clause(&[*literal]);
@@ -115,7 +116,7 @@ impl Backend {
     }
 }
 
-/// A name that is built in; or a program, with arguments after blanks.
+/// Parses the name of a built-in solver, or a program with arguments after blanks.
 impl FromStr for Backend {
     type Err = BackendError;
 
@@ -125,8 +126,8 @@ impl FromStr for Backend {
             "batsat" => Ok(Self::Batsat),
             #[cfg(feature = "cadical")]
             "cadical" => Ok(Self::Cadical),
-            other => {
-                let mut words = other.split_whitespace().map(str::to_owned);
+            program => {
+                let mut words = program.split_whitespace().map(str::to_owned);
                 let command = words.next().ok_or(BackendError::Empty)?;
                 Ok(Self::Program { command, arguments: words.collect() })
             }

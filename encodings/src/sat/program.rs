@@ -1,9 +1,10 @@
-//! A solver that is a program of its own: DIMACS \[1\] to its standard input, its answer from its standard output.
+//! External solver programs: DIMACS \[1\] on standard input, the answer on standard output.
 //!
-//! Two forms of answers are read: that of the SAT competitions (`s SATISFIABLE`, and the assignment in lines `v …`), and
-//! that of `MiniSat`'s result file (`SAT`, and the assignment on the line below). The process is killed when a limit is
-//! reached. It cannot be told how many clauses it may learn, so where that is limited, its time is. Each call is a process of its
-//! own that gets assumptions as clauses, so nothing that was learnt is kept, and all assumptions count as failed.
+//! Two answer formats are read: that of the SAT competitions (`s SATISFIABLE`, and the assignment
+//! in lines `v …`), and that of `MiniSat`'s result file (`SAT`, and the assignment on the next
+//! line). The process is killed when a limit is reached. Programs have no portable option for a
+//! conflict budget, so a time limit replaces it. Each call starts a new process that receives the
+//! assumptions as clauses; learnt clauses are lost, and all assumptions count as failed.
 //!
 //! \[1\] DIMACS challenge: Satisfiability, suggested format, 1993.
 
@@ -18,17 +19,17 @@ use task::limits::Limits;
 
 use crate::sat::solver::{Answer, Lit, Solver};
 
-/// Time in place of a budget of conflicts.
+/// Time limit that replaces a conflict budget.
 const BUDGET_TIME: Duration = Duration::from_secs(2);
-/// How often limits are looked at while the program runs.
+/// Polling interval of the limits while the program runs.
 const INTERVAL: Duration = Duration::from_millis(5);
 
-/// A formula for a program, and its answer.
+/// A formula for a program, and its last answer.
 pub(super) struct Program {
     command: Command,
     limits: Limits,
     budget: u64,
-    /// Each ends with 0.
+    /// DIMACS literals; each clause ends with 0.
     clauses: Vec<i32>,
     variables: u32,
     assignment: Vec<bool>,
@@ -37,7 +38,8 @@ pub(super) struct Program {
 }
 
 impl Program {
-    /// A run of the program that ends at a limit; or after a short time, if there is a budget.
+    /// Prepares a program. A run ends at a limit, or after [`BUDGET_TIME`] if there is a conflict
+    /// budget.
     pub(super) fn new(command: &str, arguments: &[String], limits: &Limits, budget: u64) -> Self {
         let mut process = Command::new(command);
         process.args(arguments).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null());
@@ -58,13 +60,13 @@ impl Program {
         let mut text = format!("p cnf {} {count}\n", self.variables);
         for literal in &self.clauses {
             let end = if *literal == 0 { '\n' } else { ' ' };
-            // Writing to a string does not fail.
+            // Writing to a string cannot fail.
             let _ = write!(text, "{literal}{end}");
         }
         text
     }
 
-    /// Keeps the assignment if it satisfies every clause.
+    /// Stores the assignment if it satisfies every clause.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "literals are not 0, and each clause has its 0 with it"
@@ -77,7 +79,7 @@ impl Program {
             }
         }
         let holds = |literal: &i32| self.assignment[literal.unsigned_abs() as usize - 1] == (*literal > 0);
-        // Each clause has its 0 with it.
+        // Each piece of the split includes its terminating 0.
         let mut clauses = self.clauses.split_inclusive(|literal| *literal == 0);
         if clauses.all(|clause| clause[..clause.len() - 1].iter().any(holds)) {
             Ok(())
@@ -86,17 +88,17 @@ impl Program {
         }
     }
 
-    /// Runs the program once and judges its answer.
+    /// Runs the program once and checks its answer.
     fn decide(&mut self) -> Answer {
         let read = match self.run() {
             Ok(None) => return Answer::Interrupted,
             Ok(Some(output)) => read(&output),
             Err(reason) => Err(reason),
         };
-        let kept = read.and_then(|(answer, literals)| {
+        let checked = read.and_then(|(answer, literals)| {
             if answer == Answer::Satisfiable { self.keep(&literals).map(|()| answer) } else { Ok(answer) }
         });
-        match kept {
+        match checked {
             Ok(answer) => answer,
             Err(reason) => {
                 self.failure = Some(reason);
@@ -105,7 +107,7 @@ impl Program {
         }
     }
 
-    /// What the program writes; none if it had to be killed.
+    /// Output of the program. Returns `None` if a limit was reached and it was killed.
     fn run(&mut self) -> Result<Option<String>, String> {
         let started = Instant::now();
         let mut child = Process(self.command.spawn().map_err(|error| format!("cannot be started: {error}"))?);
@@ -114,13 +116,14 @@ impl Program {
             thread::spawn(move || {
                 let mut text = Vec::new();
                 let read = output.read_to_end(&mut text).map(|_| text);
-                // Nobody waits any more if the process was killed.
+                // The receiver is gone if the process was killed.
                 let _ = sender.send(read);
             });
         }
         if let Some(mut input) = child.0.stdin.take() {
             let text = self.dimacs();
-            // A program that has seen enough may close its input; whether it has is what its answer shows.
+            // A program that has read enough may close its input; its answer is checked in any
+            // case.
             thread::spawn(move || input.write_all(text.as_bytes()));
         }
         loop {
@@ -133,8 +136,8 @@ impl Program {
                 Ok(Err(error)) => return Err(format!("its output cannot be read: {error}")),
                 Err(mpsc::RecvTimeoutError::Disconnected) => return Err("its output is closed".to_owned()),
                 Err(mpsc::RecvTimeoutError::Timeout) => {
-                    let over = self.budget < u64::MAX && started.elapsed() > BUDGET_TIME;
-                    if over || self.limits.reached() {
+                    let is_over_budget = self.budget < u64::MAX && started.elapsed() > BUDGET_TIME;
+                    if is_over_budget || self.limits.reached() {
                         return Ok(None);
                     }
                 }
@@ -143,8 +146,8 @@ impl Program {
     }
 }
 
-/// Waits for the end of a program that writes nothing more; `false` if a limit comes first. A program ends with 10 or 20 as
-/// solvers do, or with 0; otherwise what it wrote may be half of it.
+/// Waits for a program that has closed its output. Returns `false` if a limit is reached first. A
+/// solver exits with 10, 20 or 0; after any other status the output may be incomplete.
 fn has_ended(child: &mut Child, is_over: &dyn Fn() -> bool) -> Result<bool, String> {
     while !is_over() {
         match child.try_wait().map_err(|error| format!("how it ended is not known: {error}"))? {
@@ -156,18 +159,18 @@ fn has_ended(child: &mut Child, is_over: &dyn Fn() -> bool) -> Result<bool, Stri
     Ok(false)
 }
 
-/// A process that does not outlive this value.
+/// A child process that is killed when this value is dropped.
 struct Process(Child);
 
 impl Drop for Process {
     fn drop(&mut self) {
-        // It may have ended by itself.
+        // The process may have ended by itself.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
 }
 
-/// The answer in what a program has written, and the literals of its assignment.
+/// Parses the output of a program: answer, and literals of the assignment.
 fn read(output: &str) -> Result<(Answer, Vec<i32>), String> {
     let mut answer = None;
     let mut literals = Vec::new();
@@ -203,12 +206,12 @@ impl Solver for Program {
     }
 
     fn solve(&mut self, assumptions: &[Lit]) -> Answer {
-        let own = self.clauses.len();
+        let clause_end = self.clauses.len();
         for literal in assumptions {
             self.add_clause(&[*literal]);
         }
         let answer = self.decide();
-        self.clauses.truncate(own);
+        self.clauses.truncate(clause_end);
         self.core.clear();
         if answer == Answer::Unsatisfiable {
             self.core.extend_from_slice(assumptions);

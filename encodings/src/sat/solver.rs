@@ -1,4 +1,4 @@
-//! What every solver has in common: literals, answers, and the trait.
+//! Common part of all solvers: literals, answers, and the trait.
 
 /// A literal: a variable, counted from 0, or its negation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -20,7 +20,7 @@ impl Lit {
         self.0 >> 1
     }
 
-    /// A number for the literal, counted from 0.
+    /// Dense index of the literal, from 0.
     pub(crate) fn index(self) -> usize {
         self.0 as usize
     }
@@ -29,7 +29,7 @@ impl Lit {
         self.0 & 1 == 0
     }
 
-    /// As in DIMACS files: variables count from 1, negation is the sign.
+    /// DIMACS literal: variables count from 1, negation is the sign.
     ///
     /// # Panics
     /// From 2^31 variables.
@@ -51,29 +51,30 @@ impl std::ops::Not for Lit {
     }
 }
 
-/// What a solver says of its clauses.
+/// Answer of a solver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Answer {
     Satisfiable,
     Unsatisfiable,
-    /// A limit was reached; the solver is of no further use.
+    /// A limit was reached; the solver must not be used again.
     Interrupted,
 }
 
-/// A SAT solver for a formula that grows.
+/// An incremental SAT solver.
 pub trait Solver {
     /// Adds a clause; its variables need no declaration.
     fn add_clause(&mut self, clause: &[Lit]);
-    /// Decides the clauses added so far together with the assumptions, which hold for this call only.
+    /// Decides all added clauses together with the assumptions, which hold for this call only.
     fn solve(&mut self, assumptions: &[Lit]) -> Answer;
-    /// Assumptions of the last call that cannot hold together, if its answer was `Unsatisfiable`; in no particular order, and
-    /// not always as few as possible. None of them if the clauses alone are unsatisfiable.
+    /// Failed assumptions of the last call, if its answer was `Unsatisfiable`: a subset of the
+    /// assumptions that is inconsistent with the clauses, unordered and not necessarily minimal.
+    /// Empty if the clauses alone are unsatisfiable.
     fn core(&self) -> &[Lit];
-    /// The value of a variable in the assignment found last.
+    /// Value of a variable in the last assignment.
     fn value(&self, variable: u32) -> bool;
-    /// Clauses learnt so far, one for each conflict; 0 if the solver does not tell.
+    /// Number of learnt clauses, one per conflict; 0 if the solver does not report it.
     fn conflicts(&self) -> u64;
-    /// Why the solver was interrupted, if not by a limit.
+    /// Reason of an interruption that was not caused by a limit.
     fn failure(&self) -> Option<&str> {
         None
     }

@@ -1,7 +1,8 @@
-//! How many of some literals are true: the totalizer \[1\], of the library `RustSAT`, grown as far as it is needed \[2\].
+//! Totalizer \[1\] of `RustSAT`: counts true literals, and is extended incrementally \[2\].
 //!
 //! \[1\] O. Bailleux, Y. Boufkhad: Efficient CNF encoding of Boolean cardinality constraints, CP 2003.
-//! \[2\] R. Martins, S. Joshi, V. Manquinho, I. Lynce: Incremental cardinality constraints for `MaxSAT`, CP 2014.
+//! \[2\] R. Martins, S. Joshi, V. Manquinho, I. Lynce: Incremental cardinality constraints for
+//! `MaxSAT`, CP 2014.
 
 use rustsat::encodings::card::{BoundUpper as _, BoundUpperIncremental as _, Totalizer as Tree};
 use rustsat::instances::{BasicVarManager, Cnf, ManageVars as _};
@@ -9,7 +10,7 @@ use rustsat::types::{Lit as TreeLit, Var};
 
 use crate::sat::solver::Lit;
 
-/// Counts literals.
+/// Counts true literals.
 pub struct Totalizer {
     tree: Tree,
     literals: usize,
@@ -21,8 +22,9 @@ impl Totalizer {
         Self { tree: inputs.collect(), literals: literals.len() }
     }
 
-    /// A literal that is true if more than so many of the counted ones are; none if there are not more. `variables` are in use,
-    /// and further ones are taken from there on; the clauses that define them go to `add`.
+    /// Literal that is implied if more than `count` of the counted literals are true. Returns
+    /// `None` if there are not that many literals. New variables are taken from `variables` on;
+    /// their defining clauses are passed to `add`.
     pub fn more_than(
         &mut self,
         count: usize,
@@ -34,15 +36,15 @@ impl Totalizer {
         }
         let mut manager = BasicVarManager::from_next_free(Var::new(*variables));
         let mut clauses = Cnf::new();
-        // Memory is what the formula's own limits are for.
+        // Memory is bounded by the clause limit of the formula instead.
         self.tree.encode_ub_change(count..=count, &mut clauses, &mut manager).ok()?;
         *variables = manager.n_used();
-        let own = |literal: &TreeLit| Lit::new(literal.vidx32(), literal.is_pos());
+        let translate = |literal: &TreeLit| Lit::new(literal.vidx32(), literal.is_pos());
         for clause in &clauses {
-            let clause: Vec<Lit> = clause.iter().map(own).collect();
+            let clause: Vec<Lit> = clause.iter().map(translate).collect();
             add(&clause);
         }
-        self.tree.enforce_ub(count).ok()?.first().map(|literal| !own(literal))
+        self.tree.enforce_ub(count).ok()?.first().map(|literal| !translate(literal))
     }
 }
 
@@ -53,21 +55,21 @@ mod tests {
     use task::limits::Limits;
 
     #[test]
-    fn more_than_so_many_as_counted() {
+    fn more_than_compares_the_number_of_true_literals() {
         for size in 2..6_u32 {
             let literals: Vec<Lit> = (0..size).map(|variable| Lit::new(variable, variable != 1)).collect();
             let mut totalizer = Totalizer::new(&literals);
             let mut solver = Backend::default().start(&Limits::none(), u64::MAX);
             let mut variables = size;
             for count in 1..size as usize {
-                let more = totalizer.more_than(count, &mut variables, |clause| solver.add_clause(clause));
-                let more = more.expect("more can be true");
+                let exceeds = totalizer.more_than(count, &mut variables, |clause| solver.add_clause(clause));
+                let exceeds = exceeds.expect("the count can be exceeded");
                 for bits in 0..1_u32 << size {
                     let assigned = |at: u32| {
                         if bits >> at & 1 == 1 { literals[at as usize] } else { !literals[at as usize] }
                     };
                     let mut assumptions: Vec<Lit> = (0..size).map(assigned).collect();
-                    assumptions.push(!more);
+                    assumptions.push(!exceeds);
                     let satisfiable = solver.solve(&assumptions) == Answer::Satisfiable;
                     assert_eq!(satisfiable, bits.count_ones() as usize <= count, "{bits:b}, {count}");
                 }

@@ -1,12 +1,14 @@
-//! Varisat \[1\] as a back end.
+//! Varisat \[1\] back end.
 //!
-//! Varisat has no way to be interrupted. It streams its proof, though, and stops at once when the stream reports an
-//! error; so the proof goes to a sink that counts learnt clauses and fails when a limit is reached. That proof is in Varisat's own
-//! format: DRAT has no place for assumptions and for clauses that come later.
+//! Varisat cannot be interrupted directly. But it streams its proof, and stops at once if the
+//! stream reports an error. So the proof goes to a sink that counts learnt clauses and fails at a
+//! limit. The proof is in Varisat's own format, because DRAT does not support assumptions and later
+//! clauses.
 //!
-//! Its answers are right under assumptions, but which of them fail is so for certain only the first time: from then on there may
-//! be marks left behind by which it names the wrong ones. So later cores are confirmed by one more call, and where that finds an
-//! assignment, a new solver with the same clauses says which assumptions fail.
+//! Answers under assumptions are correct. But after the first failure under assumptions, stale
+//! marks inside the solver may put wrong assumptions into the core. So later cores are confirmed by
+//! one more call. If that call finds an assignment, a new solver with the same clauses computes the
+//! core.
 //!
 //! \[1\] J. Harder: Varisat, <https://jix.github.io/varisat/>.
 
@@ -23,14 +25,14 @@ use crate::sat::solver::{Answer, Lit, Solver};
 /// A Varisat solver.
 pub(super) struct Varisat {
     solver: varisat::Solver<'static>,
-    /// Whether the solver has failed under assumptions before.
+    /// Whether an earlier call failed under assumptions.
     failed: bool,
-    /// Whether a limit was reached. Varisat panics when it is asked once more.
+    /// Whether a limit was reached. Varisat panics if it is called again after that.
     interrupted: bool,
     limits: Limits,
     budget: u64,
     conflicts: Rc<Cell<u64>>,
-    /// All clauses, one after the other, and where each ends.
+    /// All clauses, one after another, and the end of each.
     literals: Vec<varisat::Lit>,
     ends: Vec<usize>,
     assignment: Vec<bool>,
@@ -38,7 +40,7 @@ pub(super) struct Varisat {
 }
 
 impl Varisat {
-    /// A solver that gives up at a limit, or after learning `budget` clauses.
+    /// Creates a solver that stops at a limit or after `budget` learnt clauses.
     pub(super) fn new(limits: &Limits, budget: u64) -> Self {
         let conflicts = Rc::new(Cell::new(0));
         Self {
@@ -55,7 +57,7 @@ impl Varisat {
         }
     }
 
-    /// Decides the clauses under assumptions, once.
+    /// Decides the clauses under assumptions in a single call.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     fn ask(&mut self, assumptions: &[Lit]) -> Answer {
         if self.interrupted {
@@ -90,7 +92,7 @@ impl Varisat {
         }
     }
 
-    /// The same clauses in a new solver.
+    /// Replaces the solver by a new one with the same clauses.
     fn renew(&mut self) {
         self.solver = start(&self.limits, self.budget, &self.conflicts);
         let mut begin = 0;
@@ -114,7 +116,8 @@ fn translate(literal: Lit) -> varisat::Lit {
     varisat::Lit::from_index(literal.variable() as usize, literal.is_positive())
 }
 
-/// Refutes clauses over variables numbered from 1, or finds that they have a model; the proof is in DRAT.
+/// Searches for a DRAT refutation of DIMACS clauses, which is written to `proof`. Also stops if a
+/// model is found.
 pub fn refute_with_proof(
     clauses: impl Iterator<Item = impl Iterator<Item = i32>>,
     proof: Box<dyn io::Write>,
@@ -178,21 +181,21 @@ impl Solver for Varisat {
     }
 }
 
-/// What a step of Varisat's proof format consists of: all are numbers.
+/// Position within a step of Varisat's proof format, which consists of numbers.
 #[derive(Clone, Copy)]
 enum Part {
-    /// Says which step it is.
+    /// Code of the step.
     Code,
-    /// How many numbers follow (each one or two of them), and perhaps a list after these.
+    /// Length of a list of items of `each` numbers, and whether another list follows.
     Length { each: u64, and_list: bool },
-    /// So many more, and perhaps a list after these.
+    /// Number of numbers left in a list, and whether another list follows.
     Numbers { left: u64, and_list: bool },
 }
 
-/// Reads a proof in Varisat's format as it comes, and finds the steps that add a learnt clause.
+/// Streaming parser of Varisat's proof format that detects learnt clauses.
 struct Steps {
     part: Part,
-    /// The number at hand, as far as its bytes have come, and how many have.
+    /// Partially read number, and number of its bytes already read.
     number: u128,
     bytes: u32,
 }
@@ -204,19 +207,19 @@ impl Default for Steps {
 }
 
 impl Steps {
-    /// One more byte; whether it completes the code of a learnt clause.
+    /// Reads one byte. Returns `true` if it completes the code of a learnt clause.
     fn byte(&mut self, byte: u8) -> bool {
         let place = self.bytes.saturating_mul(8);
         self.number |= u128::from(byte).checked_shl(place).unwrap_or(0);
         self.bytes = self.bytes.saturating_add(1);
-        // At its low end a number of n bytes has n - 1 zeros and a one.
+        // The low end of a number of n bytes consists of n - 1 zeros and a one.
         let total = self.number.trailing_zeros().saturating_add(1);
         if self.number == 0 || self.bytes < total {
             return false;
         }
         let value = self.number.checked_shr(total).unwrap_or(0);
         (self.number, self.bytes) = (0, 0);
-        // A number that is too long is none of the codes that count.
+        // An oversized number is not a code of interest.
         self.next(u64::try_from(value).unwrap_or(u64::MAX))
     }
 
@@ -243,7 +246,7 @@ impl Steps {
     }
 }
 
-/// Takes a proof in Varisat's format, counts the clauses that are learnt, and fails when a limit or the budget is reached.
+/// Proof sink that counts learnt clauses and fails at a limit or beyond the budget.
 struct BudgetSink {
     limits: Limits,
     budget: u64,
@@ -266,7 +269,8 @@ impl io::Write for BudgetSink {
     }
 }
 
-/// Passes a DRAT proof on, counts the clauses that it adds, and fails when a limit or the budget is reached.
+/// Proof sink that forwards a DRAT proof, counts added clauses, and fails at a limit or beyond the
+/// budget.
 struct DratSink {
     limits: Limits,
     budget: u64,

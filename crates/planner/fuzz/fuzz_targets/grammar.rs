@@ -1,5 +1,6 @@
-//! Generated domains and problems: read without errors, printed and read again as the same trees, ground or refused;
-//! and with some of their words lost, doubled or exchanged, read without a crash.
+//! Generated domains and problems are read without errors, printed and read again as the same
+//! trees, and ground or rejected. With some words deleted, doubled or exchanged, they are read
+//! without a crash.
 
 #![no_main]
 
@@ -22,7 +23,7 @@ use libfuzzer_sys::fuzz_target;
 use pddl::{Source, read, render};
 use metaplan_planner::{GroundConfig, ground};
 
-/// Words that mean something somewhere.
+/// Words with a meaning in PDDL or in the generated files.
 const WORDS: [&str; 28] = [
     "(",
     ")",
@@ -54,7 +55,7 @@ const WORDS: [&str; 28] = [
     "((((",
 ];
 
-/// The text with a few words changed as the bytes say.
+/// Copy of the text with a few words changed, controlled by the input bytes.
 fn mutated(text: &str, bytes: &mut &[u8]) -> String {
     let spaced = text.replace('(', " ( ").replace(')', " ) ");
     let mut words: Vec<&str> = spaced.split_whitespace().collect();

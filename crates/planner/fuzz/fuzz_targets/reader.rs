@@ -1,5 +1,5 @@
-//! Any bytes are a domain, a problem and a plan, or messages; what is read without errors prints and reads back as the
-//! same trees. The three files are separated by a byte that is in no text.
+//! Arbitrary bytes as a domain, a problem and a plan: the reader returns messages, or trees that
+//! print and read back as the same trees. A byte that occurs in no text separates the three files.
 
 #![no_main]
 
@@ -9,7 +9,7 @@ use pddl::{
 };
 use pddl::validate::PlanText;
 
-/// What a tree says, without the places of its parts.
+/// Debug text of a tree, without source positions.
 fn bare(tree: &impl std::fmt::Debug) -> String {
     let text = format!("{tree:?}");
     let mut parts = text.split("Span { start: ");

@@ -1,5 +1,5 @@
-//! Generated plans for generated tasks: the validator judges them as a naive interpreter does, also concurrently
-//! where the steps lie apart; and plan text with anything in it is judged or refused.
+//! Generated plans for generated tasks: the validator judges them as a naive interpreter does, also
+//! concurrently where the steps lie apart; arbitrary plan text is validated or rejected.
 
 #![no_main]
 

@@ -8,17 +8,19 @@ use task::task::{Argument, Task};
 
 /// Other cheapest plans of a task, and the choices that every cheapest plan makes.
 ///
-/// Idle actions are not counted: they cost nothing, and neither the goal, the metric nor an action that is not idle depends on their
-/// effects. Grounding removes them. A plan stays a plan with the same cost if they are removed from it.
+/// Idle actions are not counted: they cost nothing, and neither the goal, the metric nor an action
+/// that is not idle depends on their effects. Grounding removes them. A plan stays a plan with the
+/// same cost if they are removed from it.
 #[derive(Debug, Clone)]
 pub struct Alternatives {
     /// Plans with the cost of the first plan, without the first plan itself.
     pub plans: Vec<Plan>,
     /// Whether it is proved that there are no others, idle actions apart.
     pub complete: bool,
-    /// For each step of the first plan, the choices that every cheapest plan without idle actions makes at that step. `None` if a limit
-    /// was reached, if cheapest plans may be longer than the longest one that was searched for, if the task has
-    /// waits, or if only an external solver claims the result.
+    /// For each step of the first plan, the choices that every cheapest plan without idle actions
+    /// makes at that step. `None` if a limit was reached, if cheapest plans may be longer than the
+    /// longest one that was searched for, if the task has waits, or if only an external solver
+    /// claims the result.
     pub forced: Option<Vec<Forced>>,
 }
 
@@ -41,22 +43,22 @@ pub(super) struct Choice {
 impl Choice {
     /// All choices of a plan.
     pub(super) fn all(plan: &[GroundStep]) -> Vec<Self> {
-        let choices = plan.iter().enumerate().flat_map(|(step, own)| {
-            let slots = (0..dense(own.choice.len())).map(Some);
+        let choices = plan.iter().enumerate().flat_map(|(step, content)| {
+            let slots = (0..dense(content.choice.len())).map(Some);
             std::iter::once(None).chain(slots).map(move |slot| Self { step, slot })
         });
         choices.collect()
     }
 }
 
-/// Returns `true` if both steps have the same operator, or, with a slot, if `other` also uses the design that `one`
-/// has in that slot.
-pub(super) fn shares(task: &Task, one: &GroundStep, other: &GroundStep, slot: Option<u32>) -> bool {
+/// Returns `true` if both steps have the same operator, or, with a slot, if `other` also uses the
+/// design that `one` has in that slot.
+pub(super) fn shares(task: &Task, first: &GroundStep, second: &GroundStep, slot: Option<u32>) -> bool {
     match slot {
-        None => other.operator == one.operator,
+        None => second.operator == first.operator,
         Some(slot) => {
-            let own = design(task, one, slot as usize);
-            (0..other.choice.len()).any(|position| design(task, other, position) == own)
+            let first_design = design(task, first, slot as usize);
+            (0..second.choice.len()).any(|position| design(task, second, position) == first_design)
         }
     }
 }

@@ -3,10 +3,10 @@
 //! The formula "a plan that costs at most the optimum", with as many steps as such a plan can have, is solved
 //! repeatedly. Each time, the plans found before are excluded.
 //!
-//! The choices that every cheapest plan makes are the backbone of that formula \[1\]. The solver is queried for a plan
-//! that differs from the first one in at least one of the remaining candidates. Such a plan rules out the candidates
-//! in which it differs; unsatisfiability proves that all remaining candidates are shared. Equal designs or objects
-//! count as different here.
+//! The choices that every cheapest plan makes are the backbone of that formula \[1\]. The solver is
+//! queried for a plan that differs from the first one in at least one of the remaining candidates.
+//! Such a plan rules out the candidates in which it differs; unsatisfiability proves that all
+//! remaining candidates are shared. Equal designs or objects count as different here.
 //!
 //! \[1\] J. Marques-Silva, M. Janota, I. Lynce: On computing backbones of propositional theories, ECAI 2010.
 
@@ -21,13 +21,13 @@ use task::task::Task;
 use crate::alternatives::choices::{Alternatives, Choice, forced, shares};
 use crate::optimize::Config;
 
-/// Searches for at most `most` cheapest plans other than `first`. Returns `None` if the formula cannot be built
-/// within the limits.
+/// Searches for at most `most` cheapest plans other than `first`. Returns `None` if the formula
+/// cannot be built within the limits.
 pub(super) fn by_formula(
     context: Context<'_>,
     bounds: &Bounds,
     first: &GroundPlan,
-    most: usize,
+    max_plans: usize,
     config: &Config,
 ) -> Option<Alternatives> {
     let task = context.task;
@@ -55,22 +55,22 @@ pub(super) fn by_formula(
     let mut run = Run { task, encoding, solver };
     let plan =
         |steps: &[GroundStep]| decode(context, &GroundPlan { steps: steps.to_vec(), cost: first.cost });
-    let mut found = vec![first.steps.clone()];
+    let mut sequences = vec![first.steps.clone()];
     // Plans that differ only in waits are one plan for the reader.
     let mut plans = vec![plan(&first.steps)];
     let mut exhausted = false;
     // Literal that excludes the known plans while it is assumed.
-    let others = run.encoding.formula.fresh(VariableMeaning::Others);
-    while plans.len() <= most && !exhausted {
-        if let Some(known) = found.last() {
-            run.exclude(known, others);
+    let exclusion = run.encoding.formula.fresh(VariableMeaning::Others);
+    while plans.len() <= max_plans && !exhausted {
+        if let Some(last_plan) = sequences.last() {
+            run.exclude(last_plan, exclusion);
         }
-        match run.solve(&[others]) {
-            (Answer::Satisfiable, Some(other)) => {
-                let shown = plan(&other);
-                found.push(other);
-                if !plans.contains(&shown) {
-                    plans.push(shown);
+        match run.solve(&[exclusion]) {
+            (Answer::Satisfiable, Some(steps)) => {
+                let decoded = plan(&steps);
+                sequences.push(steps);
+                if !plans.contains(&decoded) {
+                    plans.push(decoded);
                 }
             }
             (Answer::Unsatisfiable, _) => exhausted = true,
@@ -79,7 +79,7 @@ pub(super) fn by_formula(
     }
     // Where there are waits, one action is several operators, at one place or another.
     let has_waits = task.operators.iter().any(|operator| operator.wait.is_some());
-    let choices = if complete && !has_waits { run.forced(&first.steps, &found) } else { None };
+    let choices = if complete && !has_waits { run.forced(&first.steps, &sequences) } else { None };
     let forced = choices.map(|choices| forced(task, &first.steps, &choices));
     plans.remove(0);
     Some(Alternatives { plans, complete: complete && exhausted, forced })
@@ -111,20 +111,20 @@ impl Run<'_> {
         (answer, is_plan.then_some(steps))
     }
 
-    /// Choices of the first plan that all cheapest plans make. The plans in `known` narrow the candidates before the
-    /// first query. Returns `None` if the solver gives no answer.
+    /// Choices of the first plan that all cheapest plans make. The plans in `known` narrow the
+    /// candidates before the first query. Returns `None` if the solver gives no answer.
     fn forced(&mut self, first: &[GroundStep], known: &[Vec<GroundStep>]) -> Option<Vec<Choice>> {
         let mut choices = Choice::all(first);
         for plan in known {
             choices.retain(|choice| self.shares(first, plan, *choice));
         }
         while !choices.is_empty() {
-            let other = self.encoding.formula.fresh(VariableMeaning::Others);
+            let selector = self.encoding.formula.fresh(VariableMeaning::Others);
             let differs =
                 choices.iter().map(|choice| !self.encoding.choice(first, (choice.step, choice.slot)));
-            let clause: Vec<_> = differs.chain([!other]).collect();
+            let clause: Vec<_> = differs.chain([!selector]).collect();
             self.solver.add_clause(&clause);
-            match self.solve(&[other]) {
+            match self.solve(&[selector]) {
                 (Answer::Satisfiable, Some(plan)) => {
                     choices.retain(|choice| self.shares(first, &plan, *choice));
                 }

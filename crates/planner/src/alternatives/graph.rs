@@ -1,17 +1,19 @@
 //! Graph of all cheapest plans: the states that such plans pass through, and the steps between them.
 //!
-//! A cheapest plan reaches each of its states at the least cost at which that state can be reached. So each state is
-//! expanded once, and every path from the initial state to a goal is a cheapest plan. K\* and its successors
-//! represent top-k plans in this way \[1\].
+//! A cheapest plan reaches each of its states at the least cost at which that state can be reached.
+//! So each state is expanded once, and every path from the initial state to a goal is a cheapest
+//! plan. K\* and its successors represent top-k plans in this way \[1\].
 //!
-//! If resources distinguish many states, expanding every state whose estimate admits a cheapest plan is too much
-//! work. So a label-setting search comes first. Each of its labels represents all states that cost no less and have
-//! no more of any resource. If no path in *its* graph leads from a label to the goal, no cheapest plan passes through
-//! a state that the label represents. The second search distinguishes all states, and expands only those that the
-//! first search has not ruled out.
+//! If resources distinguish many states, expanding every state whose estimate admits a cheapest
+//! plan is too much work. So a label-setting search comes first. Each of its labels represents all
+//! states that cost no less and have no more of any resource. If no path in *its* graph leads from
+//! a label to the goal, no cheapest plan passes through a state that the label represents. The
+//! second search distinguishes all states, and expands only those that the first search has not
+//! ruled out.
 //!
-//! \[1\] J. Lee, M. Katz, S. Sohrabi: On K* search for top-k planning, 2023; H. Aljazzar, S. Leue: K*: a heuristic search algorithm for
-//! finding the k shortest paths, Artificial Intelligence 175, 2011.
+//! \[1\] J. Lee, M. Katz, S. Sohrabi: On K* search for top-k planning, 2023; H. Aljazzar, S. Leue:
+//! K*: a heuristic search algorithm for finding the k shortest paths, Artificial Intelligence 175,
+//! 2011.
 
 use std::cell::OnceCell;
 use std::cmp::Reverse;
@@ -64,8 +66,8 @@ pub(super) const ROOT: u32 = 0;
 /// Predicate on an unfinished graph: returns `true` if it contains enough plans.
 pub(super) type IsEnough<'e> = dyn FnMut(&Graph) -> bool + 'e;
 
-/// Graph of the plans that cost `cost`, which must be the cost of a cheapest plan. Returns `None` if an operator has too
-/// many combinations of designs, or a negative cost.
+/// Graph of the plans that cost `cost`, which must be the cost of a cheapest plan. Returns `None`
+/// if an operator has too many combinations of designs, or a negative cost.
 pub(super) fn cheapest(
     context: Context<'_>,
     bounds: &Bounds,
@@ -123,15 +125,15 @@ impl Labels {
     }
 
     fn place(&self, state: &State) -> Place {
-        let is_compared = |position: usize| self.compared.iter().any(|(own, _)| *own == position);
+        let is_compared = |position: usize| self.compared.iter().any(|(compared, _)| *compared == position);
         let numbers = state.numbers.iter().enumerate().filter(|(position, _)| !is_compared(*position));
         (state.values[..self.basic].into(), numbers.map(|(_, number)| *number).collect())
     }
 
-    fn is_no_worse(&self, one: &State, other: &State) -> bool {
+    fn is_no_worse(&self, first: &State, second: &State) -> bool {
         self.compared.iter().all(|(position, asked)| {
-            let (one, other) = (one.numbers[*position], other.numbers[*position]);
-            (!asked.up || one >= other) && (!asked.down || one <= other)
+            let (first, second) = (first.numbers[*position], second.numbers[*position]);
+            (!asked.up || first >= second) && (!asked.down || first <= second)
         })
     }
 
@@ -144,20 +146,20 @@ impl Labels {
     ) -> impl Iterator<Item = (u32, bool)> + 'l {
         let labels = self.places.get(place).into_iter().flatten();
         labels.filter_map(move |id| {
-            let (own, paid) = &self.all[*id as usize];
-            (*paid <= cost && self.is_no_worse(own, state)).then_some((*id, *paid < cost))
+            let (label, paid) = &self.all[*id as usize];
+            (*paid <= cost && self.is_no_worse(label, state)).then_some((*id, *paid < cost))
         })
     }
 
     fn known(&self, place: &Place, state: &State, cost: Int) -> Known {
-        let mut known = Known::New;
+        let mut relation = Known::New;
         for (id, is_cheaper) in self.no_worse(place, state, cost) {
             if is_cheaper {
                 return Known::Beaten;
             }
-            known = Known::Covered(id);
+            relation = Known::Covered(id);
         }
-        known
+        relation
     }
 
     fn add(&mut self, place: Place, state: State, cost: Int) -> u32 {
@@ -203,8 +205,8 @@ struct Growth {
     steps: Vec<GroundStep>,
     numbers: FxHashMap<GroundStep, u32>,
     goals: Vec<bool>,
-    /// Open list: the estimate for the whole plan (0 in the second search), the cost (the highest first), and the
-    /// label.
+    /// Open list: the estimate for the whole plan (0 in the second search), the cost (the highest
+    /// first), and the label.
     open: BinaryHeap<Reverse<(Int, Reverse<Int>, u32)>>,
     is_complete: bool,
 }
@@ -247,8 +249,8 @@ fn alive(edges: &[Edge], goals: &[bool]) -> Vec<bool> {
     let mut before: Vec<u32> = (0..dense(edges.len())).collect();
     before.sort_by_key(|position| edges[*position as usize].to);
     let mut alive = goals.to_vec();
-    let all = (0..).zip(goals);
-    let mut open: Vec<u32> = all.filter(|(_, is_goal)| **is_goal).map(|(id, _)| id).collect();
+    let labels = (0..).zip(goals);
+    let mut open: Vec<u32> = labels.filter(|(_, is_goal)| **is_goal).map(|(id, _)| id).collect();
     while let Some(to) = open.pop() {
         let first = before.partition_point(|position| edges[*position as usize].to < to);
         let into = before[first..].iter().map(|position| edges[*position as usize]);
@@ -272,10 +274,11 @@ impl<'a> Search<'a> {
         Some(Self { context, bounds, cost, index, monotone, best: choices(), all: choices() })
     }
 
-    /// Grows a graph from the initial state until it is complete, a limit is reached, or `is_enough` returns `true`.
-    /// Returns `None` if an operator has too many combinations of designs. With a guide (the labels of the first
-    /// search, and whether a goal can be reached from each of them), every label is a single state, and the states
-    /// that a dead label of the guide represents are omitted.
+    /// Grows a graph from the initial state until it is complete, a limit is reached, or
+    /// `is_enough` returns `true`. Returns `None` if an operator has too many combinations of
+    /// designs. With a guide (the labels of the first search, and whether a goal can be reached
+    /// from each of them), every label is a single state, and the states that a dead label of the
+    /// guide represents are omitted.
     fn explore(
         &self,
         labels: Labels,
@@ -297,9 +300,9 @@ impl<'a> Search<'a> {
         let mut pulse = limits.pulse();
         let mut next_look = self.context.limits.thresholds().alternatives;
         while let Some(Reverse((_, _, id))) = growth.open.pop() {
-            let ended =
+            let expanded =
                 pulse.beat().map_err(Stopped::from).and_then(|()| self.expand(&mut growth, id, guide));
-            match ended {
+            match expanded {
                 Ok(()) => {}
                 Err(Stopped::TooMany) => return None,
                 Err(Stopped::AtLimit) => {
@@ -328,20 +331,20 @@ impl<'a> Search<'a> {
         let operator = &task.operators[id.index()];
         let cell = if is_exact { &self.all[id.index()] } else { &self.best[id.index()] };
         if cell.get().is_none() {
-            let own = if is_exact {
+            let combinations = if is_exact {
                 let count = operator.sizes().into_iter().try_fold(1_usize, usize::checked_mul);
                 let priced = |choice: Vec<u32>| (operator.cost_of(&choice), choice);
                 count.filter(|count| *count <= MAX_CHOICES).map(|_| {
-                    let mut all: Vec<(Int, Vec<u32>)> =
+                    let mut priced_choices: Vec<(Int, Vec<u32>)> =
                         operator.admitted_combinations().map(priced).collect();
-                    all.sort();
-                    all.into_iter().map(|(cost, choice)| (choice, cost)).collect()
+                    priced_choices.sort();
+                    priced_choices.into_iter().map(|(cost, choice)| (choice, cost)).collect()
                 })
             } else {
                 pareto_optimal_combinations(operator, self.monotone, false, limits)?
             };
-            // The cell is empty, so that this does not fail.
-            let _ = cell.set(own);
+            // The cell is empty, so this cannot fail.
+            let _ = cell.set(combinations);
         }
         cell.get().and_then(Option::as_ref).ok_or(Stopped::TooMany)
     }
@@ -353,9 +356,11 @@ impl<'a> Search<'a> {
         for operator_id in self.index.applicable(task, &state) {
             let operator = &task.operators[operator_id.index()];
             let sizes = operator.sizes();
-            for (choice, more) in self.choices(operator_id, guide.is_some())? {
+            for (choice, step_cost) in self.choices(operator_id, guide.is_some())? {
                 pulse.beat()?;
-                let Some(cost) = cost.checked_add(*more).filter(|cost| *cost <= self.cost) else { continue };
+                let Some(cost) = cost.checked_add(*step_cost).filter(|cost| *cost <= self.cost) else {
+                    continue;
+                };
                 if !operator.condition.holds_numerically(&state.numbers, choice, &sizes) {
                     continue;
                 }
@@ -373,8 +378,8 @@ impl<'a> Search<'a> {
         Ok(())
     }
 
-    /// Label of a state that was reached at some cost, added if necessary. Returns `None` if no cheapest plan reaches
-    /// the state at this cost.
+    /// Label of a state that was reached at some cost, added if necessary. Returns `None` if no
+    /// cheapest plan reaches the state at this cost.
     fn reach(
         &self,
         growth: &mut Growth,

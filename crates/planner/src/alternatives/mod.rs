@@ -1,8 +1,9 @@
 //! Further cheapest plans, and the choices that all of them share.
 //!
-//! `graph` searches for all states that cheapest plans pass through, and the steps between them. `paths` lists the
-//! plans of that graph. Where search does not apply or is disabled, `formula` queries the SAT solver for one plan
-//! after the other. Equal designs or objects count as different here.
+//! `graph` searches for all states that cheapest plans pass through, and the steps between them.
+//! `paths` lists the plans of that graph. Where search does not apply or is disabled, `formula`
+//! queries the SAT solver for one plan after the other. Equal designs or objects count as different
+//! here.
 
 mod choices;
 mod formula;
@@ -27,8 +28,9 @@ use paths::{End, Paths};
 
 pub use choices::{Alternatives, Forced};
 
-/// Searches for at most `most` cheapest plans other than that of an optimal solution, those with the fewest steps
-/// first. At a limit, returns the plans found until then. Returns `None` if the solution is not optimal.
+/// Searches for at most `most` cheapest plans other than that of an optimal solution, those with
+/// the fewest steps first. At a limit, returns the plans found until then. Returns `None` if the
+/// solution is not optimal.
 pub fn alternatives(task: &Task, solution: &Solution, most: usize, config: &Config) -> Option<Alternatives> {
     let first = solution.ground.as_ref().filter(|_| solution.status == Status::Optimal)?;
     let context = Context::new(task, &config.limits);
@@ -66,14 +68,14 @@ impl List {
     /// Lists the plans of a graph, and returns whether there may be others.
     fn new(context: Context<'_>, first: &GroundPlan, most: usize, graph: &Graph) -> (Self, End) {
         let mut list = Self { plans: Vec::new(), most };
-        let own = decode(context, first);
+        let first_plan = decode(context, first);
         let end = Paths::new(graph).each(&mut |steps| {
             // If a label represents several states, some paths need more of a resource than is available.
             if !graph.is_exact && replay(context.task, &steps).is_none_or(|(_, cost)| cost != first.cost) {
                 return true;
             }
             let plan = decode(context, &GroundPlan { steps, cost: first.cost });
-            let is_new = plan != own && !list.plans.contains(&plan);
+            let is_new = plan != first_plan && !list.plans.contains(&plan);
             if is_new && list.is_full() {
                 return false;
             }
@@ -94,7 +96,7 @@ fn shared(task: &Task, first: &[GroundStep], graph: &Graph) -> Vec<Choice> {
     let mut choices = Choice::all(first);
     choices.retain(|choice| {
         layers[choice.step].as_ref().is_some_and(|steps| {
-            steps.iter().all(|other| shares(task, &first[choice.step], other, choice.slot))
+            steps.iter().all(|step| shares(task, &first[choice.step], step, choice.slot))
         })
     });
     choices

@@ -1,4 +1,5 @@
-//! Paths in the graph of all cheapest plans: those with the fewest steps first, and of these in the order of the model.
+//! Paths in the graph of all cheapest plans: those with the fewest steps first, and of these in the
+//! order of the model.
 
 use rustc_hash::FxHashSet;
 use task::plan::ground::GroundStep;
@@ -76,10 +77,10 @@ impl<'g> Paths<'g> {
         // For each branch: whether a goal was reached below it.
         let mut fruitful = vec![false];
         while let Some(branch) = branches.last_mut() {
-            let left = length.saturating_sub(path.len());
+            let steps_left = length.saturating_sub(path.len());
             let end = self.first[(branch.label as usize).saturating_add(1)];
-            if left == 0 || branch.next == end {
-                let is_goal = left == 0 && self.graph.goals[branch.label as usize];
+            if steps_left == 0 || branch.next == end {
+                let is_goal = steps_left == 0 && self.graph.goals[branch.label as usize];
                 if is_goal {
                     let step = |step: &u32| self.graph.steps[*step as usize].clone();
                     if !visit(path.iter().map(step).collect()) {
@@ -95,7 +96,7 @@ impl<'g> Paths<'g> {
                     _ => {}
                 }
                 if !is_fruitful {
-                    self.dead.insert((label, left));
+                    self.dead.insert((label, steps_left));
                 }
                 continue;
             }
@@ -104,7 +105,7 @@ impl<'g> Paths<'g> {
             let Some(work) = self.work.checked_sub(1) else { return End::Stopped };
             self.work = work;
             let to = edge.to;
-            if self.graph.alive[to as usize] && !self.dead.contains(&(to, left.saturating_sub(1))) {
+            if self.graph.alive[to as usize] && !self.dead.contains(&(to, steps_left.saturating_sub(1))) {
                 path.push(edge.step);
                 branches.push(Branch { label: to, next: self.first[to as usize] });
                 fruitful.push(false);
@@ -129,11 +130,11 @@ impl<'g> Paths<'g> {
             }
         }
         // Topological order [A. Kahn: Topological sorting of large networks, CACM 5(11), 1962].
-        let mut left = reached.iter().filter(|is_reached| **is_reached).count();
+        let mut unsorted = reached.iter().filter(|is_reached| **is_reached).count();
         let mut depth = vec![0_usize; labels];
         open.extend((into[ROOT as usize] == 0).then_some(ROOT));
         while let Some(label) = open.pop() {
-            left = left.saturating_sub(1);
+            unsorted = unsorted.saturating_sub(1);
             let below = depth[label as usize].saturating_add(1);
             for edge in self.edges(label) {
                 let to = edge.to as usize;
@@ -145,11 +146,11 @@ impl<'g> Paths<'g> {
             }
         }
         let ends = depth.iter().zip(&self.graph.goals).filter(|(_, is_goal)| **is_goal);
-        (left == 0).then(|| ends.map(|(depth, _)| *depth).max().unwrap_or(0))
+        (unsorted == 0).then(|| ends.map(|(depth, _)| *depth).max().unwrap_or(0))
     }
 
-    /// For each of the first `length` positions, the steps that cheapest plans make there. The entries are `None`
-    /// from the position on at which a cheapest plan has ended.
+    /// For each of the first `length` positions, the steps that cheapest plans make there. The
+    /// entries are `None` from the position on at which a cheapest plan has ended.
     pub(super) fn layers(&self, length: usize) -> Vec<Option<Vec<&'g GroundStep>>> {
         let mut layer: Vec<u32> = vec![ROOT];
         let mut layers = Vec::new();

@@ -1,4 +1,4 @@
-//! All cheapest plans of small missions, enumerated: the same ones, and the same common choices.
+//! Enumerates all cheapest plans of small missions, and compares them and their common choices.
 
 use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
@@ -17,7 +17,7 @@ use super::{Forced, alternatives};
 use crate::optimize::{Config, Engine, optimize};
 use pddl::{Source, read};
 
-/// All plans that cost exactly so much, from a state on.
+/// All plans from a state that cost exactly `left`.
 fn all(task: &Task, state: &State, left: Int, path: &mut Vec<GroundStep>, found: &mut Vec<Vec<GroundStep>>) {
     if left == 0 && task.is_goal(state) {
         found.push(path.clone());
@@ -35,7 +35,7 @@ fn all(task: &Task, state: &State, left: Int, path: &mut Vec<GroundStep>, found:
     }
 }
 
-/// What a plan does, as text.
+/// Steps of a plan as text.
 fn steps(plan: &Plan) -> Vec<String> {
     plan.steps
         .iter()
@@ -51,24 +51,26 @@ fn forced(first: &Plan, plans: &[Plan]) -> Vec<Forced> {
         (step.action.clone(), plain.cloned().collect::<Vec<_>>())
     };
     let at = |position: usize, step: &task::plan::Step| {
-        let all = |same: &dyn Fn(&task::plan::Step) -> bool| {
+        let in_all_plans = |same: &dyn Fn(&task::plan::Step) -> bool| {
             plans.iter().all(|plan| plan.steps.get(position).is_some_and(same))
         };
-        let functions =
-            step.configuration.iter().filter(|pair| all(&|other| other.configuration.contains(pair)));
+        let functions = step
+            .configuration
+            .iter()
+            .filter(|pair| in_all_plans(&|other| other.configuration.contains(pair)));
         Forced {
-            action: all(&|other| route(other) == route(step)),
+            action: in_all_plans(&|other| route(other) == route(step)),
             functions: functions.map(|(function, _)| function.clone()).collect(),
         }
     };
     first.steps.iter().enumerate().map(|(position, step)| at(position, step)).collect()
 }
 
-/// Returns how many cheapest plans there are.
+/// Compares alternatives with enumeration. Returns the number of cheapest plans.
 fn check(seed: u64) -> usize {
     let mission = Mission::random(seed);
     if mission.weights.0 == 0 {
-        // Recharging is free then, and there are infinitely many cheapest plans.
+        // Recharging is free, so there are infinitely many cheapest plans.
         return 0;
     }
     let (domain, problem) = (Source::new("d", mission.domain()), Source::new("p", mission.problem()));
@@ -91,21 +93,21 @@ fn check(seed: u64) -> usize {
     // By search, and by formulas.
     for config in [config, Config::default().with_engine(Engine::Sat)] {
         let context = format!("seed {seed}, {:?}: {mission:?}", config.engine);
-        let found = alternatives(&task, &solution, 1_000, &config).expect("alternatives");
-        let texts: BTreeSet<_> = found.plans.iter().chain([first]).map(steps).collect();
+        let result = alternatives(&task, &solution, 1_000, &config).expect("alternatives");
+        let texts: BTreeSet<_> = result.plans.iter().chain([first]).map(steps).collect();
         assert_eq!(texts, plans.iter().map(steps).collect(), "{context}");
-        assert_eq!(found.plans.len() + 1, plans.len(), "a plan is listed twice: {context}");
-        assert!(found.complete, "{context}");
-        assert_eq!(found.forced, Some(forced(first, &plans)), "{context}");
+        assert_eq!(result.plans.len() + 1, plans.len(), "a plan is listed twice: {context}");
+        assert!(result.complete, "{context}");
+        assert_eq!(result.forced, Some(forced(first, &plans)), "{context}");
         let fewer = alternatives(&task, &solution, 1, &config).expect("alternatives");
         assert_eq!(
             (fewer.plans.len(), &fewer.forced),
-            (1.min(found.plans.len()), &found.forced),
+            (1.min(result.plans.len()), &result.forced),
             "{context}"
         );
-        // Formulas are not asked for one plan more.
-        let most = if config.engine == Engine::Sat { 1 } else { 2 };
-        assert_eq!(fewer.complete, plans.len() <= most, "{context}");
+        // Formulas are not queried for one more plan.
+        let max_complete = if config.engine == Engine::Sat { 1 } else { 2 };
+        assert_eq!(fewer.complete, plans.len() <= max_complete, "{context}");
     }
     let limits = Limits::none();
     limits.interrupt().store(true, Ordering::Relaxed);
@@ -115,7 +117,7 @@ fn check(seed: u64) -> usize {
 }
 
 #[test]
-fn all_cheapest_plans_are_found_and_what_they_share() {
+fn all_cheapest_plans_and_their_common_choices_are_found() {
     let several = (0..300).filter(|seed| check(*seed) > 1).count();
     assert!(several > 8, "only {several} missions have several cheapest plans");
 }

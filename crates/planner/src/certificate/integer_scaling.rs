@@ -11,27 +11,27 @@ use task::task::common_denominator::CommonDenominator;
 use task::task::number::TaskNumber;
 use task::task::quantity::Linear;
 
-/// A common denominator with more bits is none.
+/// Maximum number of bits of a common denominator.
 const MOST_BITS: u64 = 1 << 20;
 
-/// A factor for each kind of numbers.
+/// Scaling factor for each kind of numbers.
 pub(super) struct Scales {
     pub(super) numbers: Integer,
     pub(super) costs: Integer,
     pub(super) times: Integer,
-    /// For bounds on costs: what they are worth, in costs.
+    /// Value of one unit of the cost bounds, in scaled costs.
     pub(super) bounds: Integer,
 }
 
 impl Scales {
-    /// For a task in integers.
+    /// Scales of a task in integers.
     pub(super) fn one() -> Self {
-        let one = || Integer::from(1);
-        Self { numbers: one(), costs: one(), times: one(), bounds: one() }
+        let unit = || Integer::from(1);
+        Self { numbers: unit(), costs: unit(), times: unit(), bounds: unit() }
     }
 
-    /// For a task in rationals, with bounds on costs in multiples of `unit`. None if a number is multiplied by a fraction, so that its
-    /// values have no common denominator.
+    /// Scales of a task in rationals, with cost bounds in multiples of `unit`. Returns `None` if a
+    /// number is multiplied by a fraction, so that its values have no common denominator.
     pub(super) fn of(task: &Task<Rational>, unit: &Rational) -> Option<Self> {
         let mut numbers = CommonDenominator::of_at_most(MOST_BITS);
         let mut times = CommonDenominator::of_at_most(MOST_BITS);
@@ -61,7 +61,7 @@ impl Scales {
     }
 }
 
-/// A number times a factor of which its denominator is a divisor.
+/// Product of a number and a scale that is a multiple of its denominator.
 pub(super) fn scaled<N: TaskNumber>(number: &N, scale: &Integer) -> Integer {
     let number = number.to_rational();
     if let Some(integer) = number.to_int() {
@@ -72,7 +72,7 @@ pub(super) fn scaled<N: TaskNumber>(number: &N, scale: &Integer) -> Integer {
     product.to_integer().into()
 }
 
-/// What a comparison is multiplied by, so that its factors are integers.
+/// Factor that makes the coefficients of a comparison integers.
 pub(super) fn whole<N: TaskNumber>(linear: &Linear<N>) -> Integer {
     let denominators = linear.coefficients.iter().map(|(_, factor)| factor.to_rational());
     let denominators = denominators.filter(|factor| !factor.is_integer());

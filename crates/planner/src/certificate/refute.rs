@@ -1,4 +1,4 @@
-//! The checker's formula, refuted by a SAT solver.
+//! Refutes the checker's formula with a SAT solver.
 
 use std::io::{BufRead, Write};
 
@@ -9,32 +9,34 @@ use task::limits::Limits;
 
 use crate::certificate::trim;
 
-/// After learning so many clauses, a solver gives up on a formula…
+/// Conflict limit for formulas whose numbers have at most [`REFERENCE_WIDTH`] bits.
 const CONFLICT_LIMIT: u64 = 20_000;
-/// … whose numbers have at most so many bits; after fewer in proportion if they have more, as each costs more.
+/// Width up to which the full conflict limit applies. Beyond it the limit shrinks in proportion,
+/// because each conflict costs more.
 const REFERENCE_WIDTH: usize = 32;
 
-/// Where the parts of a refutation go.
+/// Destinations of the parts of a refutation.
 pub struct Outputs<'o> {
-    /// The formula, in DIMACS.
+    /// Formula in DIMACS.
     pub formula: &'o mut dyn Write,
-    /// A line for each variable: its number and what it stands for.
+    /// Legend: one line per variable with its number and meaning.
     pub legend: &'o mut dyn Write,
-    /// For the refutation as the solver writes it.
+    /// Refutation as written by the solver.
     pub draft: Box<dyn Write>,
-    /// Opens what was written to `draft`.
+    /// Opens the written `draft` for reading.
     pub written_draft: &'o dyn Fn() -> std::io::Result<Box<dyn BufRead>>,
-    /// What matters of the refutation, in DRAT: clauses that follow by unit propagation, and no deletions.
+    /// Trimmed refutation in DRAT: clauses that follow by unit propagation, without deletions.
     pub proof: &'o mut dyn Write,
-    /// For each line of the proof the numbers of the clauses that it follows from: the formula's from 1, then the proof's.
+    /// Hints: per line of the proof the numbers of the clauses that it follows from. Clauses of the
+    /// formula count from 1, followed by those of the proof.
     pub hints: &'o mut dyn Write,
 }
 
-/// Writes the formula "a plan that is cheaper than the claim has at most so many steps" and its refutation; returns the
-/// number of steps. The claim is as for [`certificate::check`].
+/// Writes the formula "some plan is cheaper than the claim and within the step bound" and its
+/// refutation. Returns the number of steps. The claim is as for [`certificate::check`].
 ///
 /// # Errors
-/// Why there is none: a construct that the formula does not cover, no bound on the number of steps, a limit.
+/// Fails if the formula does not cover a construct, there is no step bound, or a limit is reached.
 #[expect(clippy::arithmetic_side_effects, reason = "two constants, divided by a number that is not 0")]
 pub fn refute(
     documents: (&str, &str),
@@ -44,9 +46,9 @@ pub fn refute(
     limits: &Limits,
 ) -> Result<usize, String> {
     let (formula, steps) = certificate::formula(documents, claim, by)?;
-    let failed = |error: std::io::Error| format!("it cannot be written: {error}");
-    formula.write_dimacs(outputs.formula).map_err(failed)?;
-    formula.write_legend(outputs.legend).map_err(failed)?;
+    let io_error = |error: std::io::Error| format!("it cannot be written: {error}");
+    formula.write_dimacs(outputs.formula).map_err(io_error)?;
+    formula.write_legend(outputs.legend).map_err(io_error)?;
     let conflicts = CONFLICT_LIMIT * REFERENCE_WIDTH as u64 / formula.widest().max(REFERENCE_WIDTH) as u64;
     let numbers = formula.clauses().map(|clause| clause.iter().map(|literal| literal.number()));
     match refute_with_proof(numbers, outputs.draft, limits, conflicts) {
@@ -56,7 +58,7 @@ pub fn refute(
             return Err(format!("not refuted within the limits ({conflicts} conflicts)"));
         }
     }
-    let mut draft = (outputs.written_draft)().map_err(failed)?;
+    let mut draft = (outputs.written_draft)().map_err(io_error)?;
     let files = (outputs.proof, outputs.hints);
     trim::trim(formula.clauses(), formula.variables(), &mut draft, files, limits)?;
     Ok(steps)

@@ -1,12 +1,13 @@
 //! Trims a DRAT proof of a solver to a short proof with hints.
 //!
-//! Each clause of the solver follows from the clauses before by unit propagation \[1\]; the clauses used in the
-//! propagation become its hints. Literals that are implied permanently become unit clauses, which keeps hints
-//! short. Only the clauses on which the empty clause depends are kept.
+//! Each clause of the solver follows from the clauses before by unit propagation \[1\]; the clauses
+//! used in the propagation become its hints. Literals that are implied permanently become unit
+//! clauses, which keeps hints short. Only the clauses on which the empty clause depends are kept.
 //!
 //! Crate `certificate`, which shares no code with this file, checks the result again.
 //!
-//! \[1\] L. Cruz-Filipe, M. Heule, W. Hunt, M. Kaufmann, P. Schneider-Kamp: Efficient certified RAT verification, CADE 2017.
+//! \[1\] L. Cruz-Filipe, M. Heule, W. Hunt, M. Kaufmann, P. Schneider-Kamp: Efficient certified RAT
+//! verification, CADE 2017.
 
 use std::io::{BufRead, Write};
 
@@ -15,15 +16,15 @@ use rustc_hash::FxHashMap;
 
 use task::limits::Limits;
 
-/// All clauses together have at most so many literals.
+/// Maximum number of literals of all clauses together.
 const LITERAL_LIMIT: usize = 1 << 26;
-/// Stands for a clause that is not there.
+/// Marks a missing clause.
 const NONE: u32 = u32::MAX;
 
-/// Writes proof and hints, line by line.
+/// Writes the trimmed proof and its hints, line by line.
 ///
 /// # Errors
-/// The draft is not a proof, a limit, or a file that cannot be written.
+/// Fails if the draft is not a proof, a limit is reached, or a file cannot be written.
 #[expect(clippy::arithmetic_side_effects, reason = "places of clauses that are held in memory")]
 pub(super) fn trim<'c>(
     clauses: impl Iterator<Item = &'c [Literal]>,
@@ -44,7 +45,8 @@ pub(super) fn trim<'c>(
         let failed = |error: std::io::Error| format!("the solver's proof cannot be read: {error}");
         let text = lines::read(draft, &mut line).map_err(failed)?;
         let text = text.ok_or("the solver's proof ends before the empty clause")?;
-        let (deletes, text) = text.strip_prefix(b"d ").map_or((false, text), |rest| (true, rest));
+        let (deletes, text) =
+            text.strip_prefix(b"d ").map_or((false, text), |clause_text| (true, clause_text));
         lines::literals(text, variables, &mut clause).ok_or("the solver's proof has no clause in a line")?;
         clause.sort_unstable();
         clause.dedup();
@@ -61,11 +63,11 @@ pub(super) fn trim<'c>(
 }
 
 struct Trimmer {
-    /// The first two literals of each are watched.
+    /// Clauses; the first two literals of each are watched.
     clauses: Vec<Vec<Literal>>,
-    /// So many of them are the formula's.
+    /// Number of clauses that belong to the formula.
     given: usize,
-    /// For each of the others.
+    /// Hints of each further clause.
     hints: Vec<Vec<u32>>,
     /// Whether the solver has deleted a clause.
     is_gone: Vec<bool>,
@@ -74,20 +76,20 @@ struct Trimmer {
     positions: FxHashMap<Vec<Literal>, Vec<u32>>,
     /// Whether a literal is true.
     is_true: Vec<bool>,
-    /// Literals that are true, in the order in which they became so.
+    /// True literals in the order of assignment.
     trail: Vec<Literal>,
-    /// How many of them have been propagated.
+    /// Number of propagated literals of the trail.
     done: usize,
-    /// By variable: the clause that settles it, for now.
+    /// Per variable: clause that implies its current value.
     reasons: Vec<u32>,
-    /// By variable: the clause that says how it is settled for good, and has no other literal.
+    /// Per variable: unit clause that fixes its value permanently.
     units: Vec<u32>,
     is_seen: Vec<bool>,
-    /// A clause without a literal that can be true.
+    /// A falsified clause.
     conflict: Option<u32>,
-    /// Whether the empty clause has been concluded.
+    /// Whether the empty clause has been derived.
     is_done: bool,
-    /// Literals of all clauses.
+    /// Number of literals of all clauses.
     size: usize,
 }
 
@@ -144,7 +146,7 @@ impl Trimmer {
         }
     }
 
-    /// Watches a new clause, and settles what it settles.
+    /// Watches a new clause, and assigns its literal if it is a unit clause.
     fn watch(&mut self, position: u32) {
         let mut clause = std::mem::take(&mut self.clauses[position as usize]);
         clause.sort_unstable();
@@ -167,17 +169,18 @@ impl Trimmer {
         self.clauses[position as usize] = clause;
     }
 
-    /// Propagates for good: what is settled becomes clauses of one literal, and a contradiction the empty clause.
+    /// Propagates permanently. Implied literals become unit clauses, and a conflict the empty
+    /// clause.
     fn settle_all(&mut self) {
         let conflict = self.conflict.or_else(|| self.propagate());
         for at in 0..self.trail.len() {
-            let own = self.trail[at].variable();
-            if self.units[own] == NONE {
-                let reason = self.reasons[own];
-                self.units[own] = if self.clauses[reason as usize].len() == 1 {
+            let variable = self.trail[at].variable();
+            if self.units[variable] == NONE {
+                let reason = self.reasons[variable];
+                self.units[variable] = if self.clauses[reason as usize].len() == 1 {
                     reason
                 } else {
-                    let hints = self.by_units(reason, own);
+                    let hints = self.by_units(reason, variable);
                     self.push_concluded(vec![self.trail[at]], hints)
                 };
             }
@@ -188,14 +191,15 @@ impl Trimmer {
         }
     }
 
-    /// The clauses by which all literals of a clause but one are false for good, and the clause.
+    /// Unit clauses that falsify all literals of a clause except one variable, followed by the
+    /// clause itself.
     fn by_units(&self, position: u32, except: usize) -> Vec<u32> {
-        let others = self.clauses[position as usize].iter().map(|literal| literal.variable());
-        let units = others.filter(|own| *own != except).map(|own| self.units[own]);
+        let variables = self.clauses[position as usize].iter().map(|literal| literal.variable());
+        let units = variables.filter(|variable| *variable != except).map(|variable| self.units[variable]);
         units.chain([position]).collect()
     }
 
-    /// Adds a clause of the solver, with its hints.
+    /// Adds a clause of the solver with its hints.
     fn conclude(&mut self, clause: &[Literal]) -> Result<(), String> {
         if clause.iter().any(|literal| clause.binary_search(&-*literal).is_ok()) {
             return Ok(());
@@ -209,7 +213,7 @@ impl Trimmer {
         Ok(())
     }
 
-    /// Takes a clause away, if it is there. What it has settled stays so.
+    /// Deletes a clause if it exists. Literals that it has fixed stay fixed.
     fn forget(&mut self, clause: &[Literal]) {
         let Some(positions) = self.positions.get_mut(clause) else { return };
         if let Some(position) = positions.pop() {
@@ -220,7 +224,8 @@ impl Trimmer {
         }
     }
 
-    /// The clauses by which another one follows, in the order in which they are gone through; none if it does not follow.
+    /// Hints by which a clause follows, in the order of propagation. Returns `None` if it does not
+    /// follow by unit propagation.
     fn follows(&mut self, clause: &[Literal]) -> Option<Vec<u32>> {
         if let Some(literal) = clause.iter().find(|literal| self.is_true[literal.index()]) {
             return Some(vec![self.units[literal.variable()]]);
@@ -238,17 +243,17 @@ impl Trimmer {
         hints
     }
 
-    /// The clauses that have led to a contradiction, last the one in which it is met.
+    /// Antecedents of a conflict in order; the falsified clause is last.
     fn antecedents(&mut self, conflict: u32, settled: usize) -> Vec<u32> {
         let mut hints = vec![conflict];
         let mut units = Vec::new();
-        let mut seen = Vec::new();
+        let mut visited = Vec::new();
         let mut look = |position: u32, is_seen: &mut Vec<bool>| {
             for literal in &self.clauses[position as usize] {
-                let own = literal.variable();
-                if !std::mem::replace(&mut is_seen[own], true) {
-                    seen.push(own);
-                    units.extend((self.units[own] != NONE).then_some(self.units[own]));
+                let variable = literal.variable();
+                if !std::mem::replace(&mut is_seen[variable], true) {
+                    visited.push(variable);
+                    units.extend((self.units[variable] != NONE).then_some(self.units[variable]));
                 }
             }
         };
@@ -260,15 +265,15 @@ impl Trimmer {
                 look(reason, &mut self.is_seen);
             }
         }
-        for own in seen {
-            self.is_seen[own] = false;
+        for variable in visited {
+            self.is_seen[variable] = false;
         }
         hints.extend(units);
         hints.reverse();
         hints
     }
 
-    /// The clause in which a contradiction is met.
+    /// Propagates the trail. Returns a falsified clause, if any.
     #[expect(clippy::arithmetic_side_effects, reason = "places of clauses that are held in memory")]
     fn propagate(&mut self) -> Option<u32> {
         while let Some(literal) = self.trail.get(self.done).copied() {
@@ -285,7 +290,8 @@ impl Trimmer {
         None
     }
 
-    /// Looks at a clause one of whose watched literals has become false; whether that stays watched.
+    /// Visits a clause after one of its watched literals has become false. Returns `true` if that
+    /// literal stays watched.
     fn visit(&mut self, position: u32, falsified: Literal, conflict: &mut Option<u32>) -> bool {
         if self.is_gone[position as usize] {
             return false;
@@ -311,7 +317,7 @@ impl Trimmer {
         true
     }
 
-    /// Writes what the empty clause, which is the last, rests on.
+    /// Writes the clauses that the empty clause (the last one) depends on.
     #[expect(clippy::arithmetic_side_effects, reason = "places of clauses that are held in memory")]
     fn write(&self, proof: &mut dyn Write, hints: &mut dyn Write) -> std::io::Result<()> {
         let mut is_needed = vec![false; self.clauses.len()];
@@ -323,7 +329,7 @@ impl Trimmer {
                 }
             }
         }
-        // Of those that are needed.
+        // Numbers of the clauses that are needed.
         let mut numbers = 1..;
         let mut places: Vec<i32> = numbers.by_ref().take(self.given).collect();
         let mut line = Vec::new();

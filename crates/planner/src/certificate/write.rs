@@ -1,4 +1,4 @@
-//! A ground task and an exhausted search to a certificate.
+//! Derives a certificate from a ground task and an exhausted search.
 
 use std::hash::Hash;
 use std::sync::Arc;
@@ -22,19 +22,21 @@ use search::search::{Heuristic, closed_labels};
 use crate::certificate::integer_scaling::{Scales, scaled, whole};
 use crate::exact::{ExactTask, RoundedBounds};
 
-/// A certificate of an optimal plan, or of there being none: two JSON documents.
+/// Certificate of an optimal plan or of unsolvability: two JSON documents.
 #[derive(Debug, Clone)]
 pub struct Certificate {
     /// The ground task.
     pub task: String,
-    /// Why no plan is cheaper.
+    /// Argument that no plan is cheaper.
     pub argument: String,
 }
 
-/// Makes the certificate of a solution. Nothing if the solution is not proved for plans of any length, if the task has several
-/// objectives or one that plans improve without bound, or if the search does not end within the limits.
+/// Creates the certificate of a solution. Returns `None` if the solution is not proved for plans of
+/// any length, if the task has several objectives or one that plans improve without bound, or if
+/// the search does not end within the limits.
 pub fn certify(task: &Task, solution: &Solution, limits: &Limits) -> Option<Certificate> {
-    // The format knows one scale for all numbers, and no metric of the end.
+    // The format has one scale for all numbers, and no terms of the metric that are evaluated at
+    // the end.
     if !(task.number_multiples.is_empty() && task.objective.rest.is_empty()) {
         return None;
     }
@@ -44,7 +46,8 @@ pub fn certify(task: &Task, solution: &Solution, limits: &Limits) -> Option<Cert
     certified(context, (solution, cost), &Scales::one(), bounds, |bounds| bounds)
 }
 
-/// The same for a task in rationals. Nothing either if its numbers have no common denominator.
+/// As [`certify`], for a task in rationals. Also returns `None` if its numbers have no common
+/// denominator.
 pub fn certify_exact(task: &ExactTask, solution: &Solution, limits: &Limits) -> Option<Certificate> {
     let task = &task.0;
     let context = Context::new(task, limits);
@@ -60,7 +63,7 @@ pub fn certify_exact(task: &ExactTask, solution: &Solution, limits: &Limits) -> 
     certified(context, (solution, cost), &scales, bounds, |rounded| &rounded.bounds)
 }
 
-/// Makes a certificate with some bounds, and the factors that go with them; `plain` are those of them in integers.
+/// Creates a certificate from bounds and their scales; `plain` returns the bounds in integers.
 fn certified<N: TaskNumber, E: Heuristic<N>>(
     context: Context<'_, N>,
     (solution, cost): (&Solution, Option<N>),
@@ -115,7 +118,7 @@ fn written(task: &Model, argument: &Argument) -> Option<Certificate> {
     Some(Certificate { task, argument: serde_json::to_string(argument).ok()? })
 }
 
-/// Lists things once.
+/// Table of distinct entries.
 struct Pool<K, V> {
     positions: FxHashMap<K, u32>,
     all: Vec<V>,
@@ -138,7 +141,7 @@ impl<K: Hash + Eq + Clone, V> Pool<K, V> {
     }
 }
 
-/// Slots, each with the designs that suit.
+/// Slots, each with its suitable designs.
 type Uses = Vec<(u32, Vec<u32>)>;
 
 struct Writer<'w, N> {
@@ -216,7 +219,7 @@ impl<N: TaskNumber> Writer<'_, N> {
             schema: operator.schema,
             arguments: operator.arguments.iter().map(parameter).collect(),
             uses: self.uses.position(&operator.slots, |uses| {
-                uses.iter().map(|own| (own.slot.0, own.designs.clone())).collect()
+                uses.iter().map(|usage| (usage.slot.0, usage.designs.clone())).collect()
             }),
             exclusions: self
                 .exclusions
@@ -251,12 +254,12 @@ impl<N: TaskNumber> Writer<'_, N> {
         }
     }
 
-    /// A linear expression, multiplied by a factor besides.
+    /// Linear expression, multiplied by an additional factor.
     fn linear(&mut self, linear: &task::quantity::Linear<N>, factor: &Integer) -> Linear {
         let factors = linear.coefficients.iter();
         let scale = &self.scales.numbers * factor;
         Linear {
-            factors: factors.map(|(number, own)| (number.0, scaled(own, factor))).collect(),
+            factors: factors.map(|(number, coefficient)| (number.0, scaled(coefficient, factor))).collect(),
             quantity: self.quantity(&linear.quantity, &scale),
         }
     }

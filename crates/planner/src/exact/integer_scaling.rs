@@ -13,10 +13,10 @@ use task::task::quantity::{Linear, Quantity};
 use task::task::table_map::TableMap;
 use task::task::{Condition, Task};
 
-/// Common denominators of more bits are not looked for.
+/// Maximum number of bits of a common denominator.
 const MOST_BITS: u64 = 200;
 
-/// A task whose costs are this many times those of the task that it was made from.
+/// A scaled task. Its costs are `cost_scale` times the original costs.
 pub struct Integral {
     pub(crate) task: Task<Rational>,
     pub(crate) cost_scale: Rational,
@@ -36,13 +36,13 @@ fn linears(task: &mut Task<Rational>) -> impl Iterator<Item = &mut Linear<Ration
     bodies.chain([&mut task.goal]).flat_map(compared).chain(operators)
 }
 
-/// What numbers are multiplied by; they stay as they are if their common denominator is too long.
+/// Factor that makes numbers integers; 1 if their common denominator is too long.
 fn scale(denominator: CommonDenominator) -> Rational {
     let scale = |common| Rational::from_big(BigRational::from_integer(common));
     denominator.get().map_or_else(Rational::one, scale)
 }
 
-/// All numbers of a quantity times another one.
+/// Multiplies all numbers of a quantity.
 fn multiply(quantity: &mut Quantity<Rational>, scale: &Rational, tables: &mut TableMap<Rational>) {
     let product = |number: &Rational| Ok::<_, Infallible>(number.clone() * scale);
     let Ok(scaled) = tables.map(quantity, &product);
@@ -50,7 +50,7 @@ fn multiply(quantity: &mut Quantity<Rational>, scale: &Rational, tables: &mut Ta
 }
 
 impl Integral {
-    /// What a search goes by is scaled: conditions, effects, costs, and the initial state.
+    /// Scales everything that the search uses: conditions, effects, costs, and the initial state.
     pub(crate) fn of(context: Context<'_, Rational>) -> Result<Self, Interrupted> {
         let mut task = context.task.clone();
         let mut costs = CommonDenominator::of_at_most(MOST_BITS);

@@ -1,8 +1,9 @@
 //! Tasks whose numbers do not fit integers of a fixed size: search in exact rationals.
 //!
-//! No scale makes the numbers integers if an action multiplies by one half, and a common denominator of many
-//! measured numbers can exceed any machine integer. The search needs only addition and comparison. Its heuristic
-//! values come from the task without numeric variables, with costs rounded down to integers, and stay admissible.
+//! No scale makes the numbers integers if an action multiplies by one half, and a common
+//! denominator of many measured numbers can exceed any machine integer. The search needs only
+//! addition and comparison. Its heuristic values come from the task without numeric variables, with
+//! costs rounded down to integers, and stay admissible.
 
 mod integer_scaling;
 
@@ -30,35 +31,38 @@ use crate::exact::integer_scaling::Integral;
 use crate::optimize::{Config, can_repeat_reward};
 use pddl::ast::{Domain, Problem};
 
-/// How many states are stored at most.
+/// Maximum number of stored states.
 const STATE_LIMIT: usize = 2_000_000;
-/// Costs of the task that estimates are made from take at most so many bits.
+/// Maximum number of bits of the integer costs that heuristics are computed from.
 const COST_BITS: u64 = 90;
 
 /// A ground task in rationals of any size.
 #[derive(Debug, Clone)]
 pub struct ExactTask(pub Task<Rational>);
 
-/// Grounds a domain and a problem that have passed `pddl::check`, whatever the size of their numbers. Such a task is planned by
-/// [`optimize_exact`]; a task that [`task::ground`] accepts is planned faster and with more proofs.
+/// Grounds a domain and a problem that have passed `pddl::check`, for numbers of any size. Plan
+/// such a task with [`optimize_exact`]. If [`task::ground`] accepts the task, planning is faster
+/// and has more kinds of proofs.
 ///
 /// # Errors
-/// Every construct that the planner does not handle, with its place.
+/// Fails with every unsupported construct and its place.
 pub fn ground_exact(domain: &Domain, problem: &Problem, config: &GroundConfig) -> Result<ExactTask, Errors> {
     ground_for(domain, problem, config, &Generality::default()).map(ExactTask)
 }
 
 impl ExactTask {
-    /// Where the problem has no metric: whether plans are measured by their time, and not by the number of their steps.
+    /// Returns `true` if the problem has no metric and plans are measured by their time, not by the
+    /// number of their steps.
     pub fn is_timed(&self) -> bool {
         self.0.is_measured_by_time(&Rational::one())
     }
 }
 
-/// Finds a cheapest plan by search. Of the configuration it heeds the horizon and the limits.
+/// Finds a cheapest plan by search. Uses only the horizon and the limits of the configuration.
 ///
-/// With a horizon, a cheapest plan that is longer is not an answer: then a best plan within it is looked for, which is not called
-/// optimal. Where actions improve the metric, plans with fewest steps count, and of those the best by the metric.
+/// If a cheapest plan exceeds the horizon, a best plan within the horizon is searched for, which is
+/// not called optimal. If actions improve the metric, the result is the best by the metric among
+/// plans with the fewest steps.
 pub fn optimize_exact(task: &ExactTask, config: &Config) -> Solution {
     let started = Instant::now();
     let task = &task.0;
@@ -74,14 +78,14 @@ pub fn optimize_exact(task: &ExactTask, config: &Config) -> Solution {
     solution
 }
 
-/// For a task whose operators all cost at least 0.
+/// Solves a task without negative costs.
 fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
     let context = Context::new(task, &config.limits);
-    let any = explore(context);
+    let outcome = explore(context);
     let show = |plan: &GroundPlan<Rational>| decode(context, plan);
     let too_long =
         |plan: &GroundPlan<Rational>| config.horizon.is_some_and(|horizon| plan.steps.len() > horizon);
-    match (any, config.horizon) {
+    match (outcome, config.horizon) {
         (ExactOutcome::Known(solution), _) => *solution,
         (ExactOutcome::Optimal(plan), _) if !too_long(&plan) => {
             let lower = Some(metric(task, &plan.cost));
@@ -99,7 +103,7 @@ fn cheapest(task: &Task<Rational>, config: &Config) -> Solution {
     }
 }
 
-/// The best plan with at most `horizon` steps, where no plan at all costs less than `lower`.
+/// Finds the best plan with at most `horizon` steps, given a lower bound on the cost of every plan.
 fn within(context: Context<'_, Rational>, horizon: usize, lower: &Rational) -> Solution {
     let shorter = with_horizon(context.task, horizon);
     let (status, plan, proof) = match explore(Context { task: &shorter, ..context }) {
@@ -114,7 +118,8 @@ fn within(context: Context<'_, Rational>, horizon: usize, lower: &Rational) -> S
     Solution { lower_bound: Some(metric(context.task, lower)), horizon, ..solution }
 }
 
-/// For a metric that actions improve: fewest steps first, then the best metric among those plans.
+/// For a metric that actions improve: minimises the number of steps first, then the metric among
+/// those plans.
 fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
     let nothing = |solution: Solution| Solution { lower_bound: None, ..solution };
     let unknown = || nothing(answer(Status::Unknown, None, None));
@@ -129,7 +134,8 @@ fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
         let solution = answer(Status::UnsolvableWithinHorizon, None, Some(Proof::Search));
         return Solution { horizon: config.horizon.unwrap_or(steps), ..nothing(solution) };
     }
-    // No plan has fewer steps, so a constant for each step changes nothing but the sign of the costs.
+    // No plan has fewer steps, so adding a constant to each step only changes the sign of the
+    // costs.
     let least = task.operators.iter().map(|operator| operator.cost.minimum()).min().unwrap_or_default();
     let shifted = with_costs(with_horizon(task, steps), |operator| {
         let mut cost = operator.cost.clone();
@@ -151,12 +157,12 @@ fn fewest_steps(task: &Task<Rational>, config: &Config) -> Solution {
     }
 }
 
-/// What a search came to.
+/// Outcome of an exact search.
 enum ExactOutcome {
     Optimal(GroundPlan<Rational>),
     /// There is no plan.
     Known(Box<Solution>),
-    /// A limit was reached; the best plan so far, and what no plan costs less than.
+    /// A limit was reached: the best plan found, and the lower bound.
     Unknown(Option<GroundPlan<Rational>>, Rational),
 }
 
@@ -169,14 +175,14 @@ fn explore(context: Context<'_, Rational>) -> ExactOutcome {
     };
     let unscaled = |cost: Rational| cost / cost_scale.clone();
     let original = |plan: GroundPlan<Rational>| GroundPlan { cost: unscaled(plan.cost), ..plan };
-    let none = |proof| ExactOutcome::Known(Box::new(answer(Status::Unsolvable, None, Some(proof))));
+    let unsolvable = |proof| ExactOutcome::Known(Box::new(answer(Status::Unsolvable, None, Some(proof))));
     let Some(lower) = bounds.estimate(&task.initial) else {
         let reason = "no path leads to the goal in a projection of the task to one or two of its variables";
-        return none(Proof::Relaxation(reason.into()));
+        return unsolvable(Proof::Relaxation(reason.into()));
     };
     match search_states(Context::new(&task, limits), &bounds, STATE_LIMIT) {
         SearchOutcome::Optimal(plan) => ExactOutcome::Optimal(original(plan)),
-        SearchOutcome::None => none(Proof::Search),
+        SearchOutcome::None => unsolvable(Proof::Search),
         SearchOutcome::Unknown(plan) => ExactOutcome::Unknown(plan.map(original), unscaled(lower)),
     }
 }
@@ -194,7 +200,7 @@ fn answer(status: Status, plan: Option<Plan>, proof: Option<Proof>) -> Solution 
     }
 }
 
-/// The same task with other costs, and a metric of their plain sum.
+/// Copy of the task with other costs and their sum as the metric.
 fn with_costs(
     mut task: Task<Rational>,
     cost: impl Fn(&Operator<Rational>) -> Quantity<Rational>,
@@ -206,25 +212,26 @@ fn with_costs(
     task
 }
 
-/// The same task for plans with at most so many steps: each uses up one of a number of them. As in formulas, waits are steps.
+/// Copy of the task for plans with at most `horizon` steps: each step consumes one unit of a
+/// counter. As in formulas, waits are steps.
 fn with_horizon(task: &Task<Rational>, horizon: usize) -> Task<Rational> {
     let mut task = task.clone();
-    let left = NumericId(dense(task.initial.numbers.len()));
+    let steps_left = NumericId(dense(task.initial.numbers.len()));
     task.number_names.push("steps left".to_owned());
     task.initial.numbers.push(Rational::from_big(BigRational::from_integer(horizon.into())));
-    let mut after = Linear::variable(left);
+    let mut after = Linear::variable(steps_left);
     after.quantity.constant = -Rational::one();
     for operator in &mut task.operators {
         operator.condition.comparisons.push(after.clone());
-        operator.numeric_effects.push(NumericEffect { variable: left, value: after.clone() });
+        operator.numeric_effects.push(NumericEffect { variable: steps_left, value: after.clone() });
     }
     task
 }
 
-/// Bounds of a task without numbers, whose costs are those of the task times a factor, rounded down.
+/// Heuristics of the task without numbers, with costs scaled and rounded down.
 pub struct RoundedBounds {
     pub(crate) bounds: Bounds,
-    /// What an integer of the bounds is worth.
+    /// Value of one unit of the integer costs.
     pub(crate) unit: Rational,
 }
 
@@ -233,7 +240,7 @@ impl RoundedBounds {
         Self::of(context, Bounds::new)
     }
 
-    /// Bounds that each rest on one projection.
+    /// Computes projections only, without cost partitioning.
     pub(crate) fn of_projections(context: Context<'_, Rational>) -> Result<Self, Interrupted> {
         Self::of(context, Bounds::of_projections)
     }
@@ -284,33 +291,34 @@ impl Heuristic<Rational> for RoundedBounds {
     }
 }
 
-/// A factor for costs: one that makes integers of them if these are short enough, else a power of two after which the largest
-/// one is as long as admitted.
+/// Scaling factor for costs: their common denominator if the products are short enough, otherwise a
+/// power of two that gives the greatest cost the maximal length.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "numbers have fewer than 2^63 bits, and the greater length is what the smaller one is taken from"
 )]
 fn factor(costs: &[BigRational]) -> BigRational {
     let largest = costs.iter().max().cloned().unwrap_or_default();
-    let most = BigInt::one() << COST_BITS;
+    let max_cost = BigInt::one() << COST_BITS;
     let mut common = BigInt::one();
     for cost in costs {
         common = common.lcm(cost.denom());
-        if common > most {
+        if common > max_cost {
             break;
         }
     }
     let common = BigRational::from_integer(common);
-    if &largest * &common <= BigRational::from_integer(most.clone()) {
+    if &largest * &common <= BigRational::from_integer(max_cost.clone()) {
         return common;
     }
-    // At most this long: a number below 2^a divided by one of at least 2^(b - 1) is below 2^(a - b + 1).
+    // A number below 2^a divided by one of at least 2^(b - 1) is below 2^(a - b + 1), so the
+    // product has at most this length.
     let (numerator, denominator) = (largest.numer().bits(), largest.denom().bits());
-    let one = BigInt::one();
+    let unit = BigInt::one();
     if denominator + COST_BITS > numerator {
-        BigRational::from_integer(one << (denominator + COST_BITS - numerator - 1))
+        BigRational::from_integer(unit << (denominator + COST_BITS - numerator - 1))
     } else {
-        BigRational::new(one.clone(), one << (numerator + 1 - denominator - COST_BITS))
+        BigRational::new(unit.clone(), unit << (numerator + 1 - denominator - COST_BITS))
     }
 }
 
@@ -318,13 +326,13 @@ fn without_numbers(state: &State<Rational>) -> State {
     State { values: state.values.clone(), numbers: Vec::new() }
 }
 
-/// A condition without its numbers.
+/// Copy of a condition without its numeric part.
 fn bare_condition(condition: &Condition<Rational>) -> Condition {
     let (facts, clauses) = (condition.facts.clone(), condition.clauses.clone());
     Condition { facts, clauses, ..Condition::default() }
 }
 
-/// What estimates need to know of an operator.
+/// Part of an operator that heuristics need.
 fn bare_operator(operator: &Operator<Rational>, cost: Int) -> Operator {
     Operator {
         schema: operator.schema,

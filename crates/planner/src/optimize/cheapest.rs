@@ -9,9 +9,10 @@ use crate::optimize::optimizer_run::Run;
 use crate::optimize::solve::solve;
 use crate::optimize::unbounded_metric::shortest_then_best;
 
-/// Finds a cheapest plan; `report` hears of every improvement.
+/// Finds a cheapest plan. Calls `report` for every improvement.
 ///
-/// Of a metric over fluents whose changes depend on the state no plan is called the best, and nothing is reported before the end.
+/// If the metric contains fluents with state-dependent changes, no plan is called optimal, and
+/// nothing is reported before the end.
 ///
 /// ```
 /// use metaplan_planner::{Config, Engine, GroundConfig, Status, ground, optimize};
@@ -39,7 +40,7 @@ pub fn optimize(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement
         return cheapest(task, config, report);
     }
     let mut solution = cheapest(task, config, &mut |_| {});
-    // What was compared is a part of the metric.
+    // The search compared plans by a part of the metric only.
     (solution.lower_bound, solution.unbounded) = (None, None);
     solution.statistics.history.clear();
     if solution.status == Status::Optimal {

@@ -5,59 +5,59 @@ use encodings::sat::Backend;
 use task::limits::Limits;
 use task::words;
 
-/// How the SAT solver is made to find a cheapest plan.
+/// Strategy by which the SAT solver finds a cheapest plan.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Strategy {
-    /// The one that is faster in general.
+    /// The strategy that is faster in general.
     #[default]
     Auto,
-    /// Cheaper and cheaper plans, until there is none.
+    /// Linear search: cheaper and cheaper plans until the formula is unsatisfiable.
     Tighten,
-    /// A lower bound that rises with each contradiction among assumptions about what a plan does not pay, until a plan costs as
-    /// much. Where the number of steps of a cheapest plan has no bound, it is as `Tighten`.
+    /// Core-guided search: unsatisfiable cores raise the lower bound until a plan meets it. Without
+    /// a bound on the number of steps of a cheapest plan, this strategy behaves like `Tighten`.
     Cores,
 }
 
 words! { Strategy, "strategy": Auto = "auto", Tighten = "tighten", Cores = "cores" }
 
-/// What finds plans, and proves that there is none better.
+/// Algorithms that find plans and prove optimality.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Engine {
-    /// Search in the space of states first, then the SAT solver.
+    /// Heuristic search first, then the SAT solver.
     #[default]
     Auto,
-    /// The SAT solver alone, with the bounds that its formulas rest on.
+    /// The SAT solver only, with the bounds that its formulas need.
     Sat,
-    /// Search alone.
+    /// Heuristic search only.
     Search,
 }
 
 words! { Engine, "engine": Auto = "auto", Sat = "sat", Search = "search" }
 
-/// What the user asks of the optimizer. It begins with what is so unless said otherwise, and each `with_` changes one thing.
+/// Options of the optimizer. Starts with the defaults; each `with_` method changes one option.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Config {
-    /// Only plans with at most this many steps count.
+    /// Maximum number of steps of a plan.
     pub horizon: Option<usize>,
-    /// What finds plans, and proves that there is none better.
+    /// Algorithms that find plans and prove optimality.
     pub engine: Engine,
-    /// How many states A\* stores before the other parts of the planner have their turn. What they may do in the first round grows
-    /// with it.
+    /// Number of states that A\* stores before the other parts of the planner start. Scales their
+    /// budgets in the first round.
     pub head_start: usize,
-    /// Whether the SAT solver has to confirm what is proved without it, however long it takes; otherwise it gets about as
-    /// long as a small proof took.
+    /// Whether the SAT solver must confirm proofs of other engines, without a time limit. Otherwise
+    /// it gets about the time of a small proof.
     pub confirm: bool,
-    /// How many operators stand at a step of the formulas; with a horizon, which counts actions, always one. If not
-    /// given, several while a first plan is looked for, and one for the proof that there is no cheaper one.
+    /// Step semantics of formulas. Always sequential with a horizon, which counts actions. By
+    /// default parallel for a first plan and sequential for the optimality proof.
     pub semantics: Option<StepSemantics>,
-    /// How the SAT solver is made to find a cheapest plan.
+    /// Strategy by which the SAT solver finds a cheapest plan.
     pub strategy: Strategy,
     /// The SAT solver.
     pub backend: Backend,
-    /// When to stop.
+    /// Time and memory limits.
     pub limits: Limits,
 }
 
@@ -77,49 +77,49 @@ impl Default for Config {
 }
 
 impl Config {
-    /// Only plans with at most this many steps count; `None` for all.
+    /// Limits the number of steps of a plan; `None` for no limit.
     #[must_use]
     pub fn with_horizon(self, steps: impl Into<Option<usize>>) -> Self {
         Self { horizon: steps.into(), ..self }
     }
 
-    /// What finds plans, and proves that there is none better.
+    /// Sets the algorithms that find plans and prove optimality.
     #[must_use]
     pub fn with_engine(self, engine: Engine) -> Self {
         Self { engine, ..self }
     }
 
-    /// How many states A\* stores before the other parts have their turn.
+    /// Sets the number of states that A\* stores before the other parts start.
     #[must_use]
     pub fn with_head_start(self, head_start: usize) -> Self {
         Self { head_start, ..self }
     }
 
-    /// Whether the SAT solver has to confirm what is proved without it, however long it takes.
+    /// Sets whether the SAT solver must confirm proofs of other engines, without a time limit.
     #[must_use]
     pub fn with_confirmation(self, confirm: bool) -> Self {
         Self { confirm, ..self }
     }
 
-    /// How many operators stand at a step of the formulas; `None` for what suits.
+    /// Sets the step semantics of formulas; `None` for the default.
     #[must_use]
     pub fn with_semantics(self, semantics: impl Into<Option<StepSemantics>>) -> Self {
         Self { semantics: semantics.into(), ..self }
     }
 
-    /// How the SAT solver is made to find a cheapest plan.
+    /// Sets the strategy by which the SAT solver finds a cheapest plan.
     #[must_use]
     pub fn with_strategy(self, strategy: Strategy) -> Self {
         Self { strategy, ..self }
     }
 
-    /// The SAT solver.
+    /// Sets the SAT solver.
     #[must_use]
     pub fn with_backend(self, backend: Backend) -> Self {
         Self { backend, ..self }
     }
 
-    /// When to stop.
+    /// Sets the time and memory limits.
     #[must_use]
     pub fn with_limits(self, limits: Limits) -> Self {
         Self { limits, ..self }

@@ -1,16 +1,19 @@
 //! Core-guided optimisation: unsatisfiable cores raise the lower bound until a plan meets it (OLL \[1, 2\]).
 //!
-//! The cost of a plan above the lower bound is a weighted sum of literals, all of which are assumed to be false.
-//! The solver returns either a plan, which is then a cheapest one, or a core: at least one of its literals is
-//! true in every plan. So the lower bound rises by the least weight in the core, which is subtracted from each of
-//! its weights. The remaining cost, that more than one of them is true, more than two, and so on, is expressed by
-//! the literals of a totalizer with that weight, added one by one. Heavy literals come first (stratification
-//! \[3\]), so that plans are found early. A literal whose weight alone reaches the incumbent's cost is fixed to
-//! false \[3\].
+//! The cost of a plan above the lower bound is a weighted sum of literals, all of which are assumed
+//! to be false. The solver returns either a plan, which is then a cheapest one, or a core: at least
+//! one of its literals is true in every plan. So the lower bound rises by the least weight in the
+//! core, which is subtracted from each of its weights. The remaining cost, that more than one of
+//! them is true, more than two, and so on, is expressed by the literals of a totalizer with that
+//! weight, added one by one. Heavy literals come first (stratification \[3\]), so that plans are
+//! found early. A literal whose weight alone reaches the incumbent's cost is fixed to false \[3\].
 //!
-//! \[1\] B. Andres, B. Kaufmann, O. Matheis, T. Schaub: Unsatisfiability-based optimization in clasp, ICLP 2012.
-//! \[2\] A. Morgado, C. Dodaro, J. Marques-Silva: Core-guided `MaxSAT` with soft cardinality constraints, CP 2014.
-//! \[3\] C. Ansótegui, M. L. Bonet, J. Gabàs, J. Levy: Improving SAT-based weighted `MaxSAT` solvers, CP 2012.
+//! \[1\] B. Andres, B. Kaufmann, O. Matheis, T. Schaub: Unsatisfiability-based optimization in
+//! clasp, ICLP 2012.
+//! \[2\] A. Morgado, C. Dodaro, J. Marques-Silva: Core-guided `MaxSAT` with soft cardinality
+//! constraints, CP 2014.
+//! \[3\] C. Ansótegui, M. L. Bonet, J. Gabàs, J. Levy: Improving SAT-based weighted `MaxSAT`
+//! solvers, CP 2012.
 
 use std::collections::BTreeMap;
 
@@ -21,17 +24,18 @@ use task::number::{Int, dense};
 
 use crate::optimize::optimizer_run::{Best, IncrementalSolver, Run, StrategyOutcome};
 
-/// A core is given to the solver again this often, as long as a smaller one comes back.
+/// Maximum number of calls that try to make a core smaller.
 const CORE_TRIM_ROUNDS: usize = 4;
 
-/// What plans pay.
+/// Core-guided search: lower bound, soft literals and totalizers.
 struct Search {
-    /// Every plan of the formula pays this much.
+    /// Lower bound on the cost of every plan of the formula.
     lower: Int,
-    /// What a literal adds if it is true: all of them at least 1.
+    /// Weight of each soft literal, at least 1; it is added to the cost if the literal is true.
     weights: BTreeMap<Lit, Int>,
     totalizers: Vec<Totalizer>,
-    /// For the literals of totalizers: which one's, and more than how many it says there are.
+    /// Totalizer outputs among the soft literals: index of the totalizer, and the count that the
+    /// literal exceeds.
     outputs: FxHashMap<Lit, (usize, usize)>,
 }
 
@@ -49,19 +53,20 @@ impl Search {
         Self { lower, weights, totalizers: Vec::new(), outputs: FxHashMap::default() }
     }
 
-    /// The literals that weigh at least so much, negated.
+    /// Negations of the soft literals with at least this weight.
     fn assumptions(&self, least: Int) -> Vec<Lit> {
         self.weights.iter().filter(|(_, weight)| **weight >= least).map(|(literal, _)| !*literal).collect()
     }
 
-    /// The next lighter weight to begin assumptions with: at most half of it, if there is one.
+    /// Next stratum: the greatest weight of at most half of `than`, otherwise the least weight
+    /// below it.
     fn lighter(&self, than: Int) -> Option<Int> {
         let below = self.weights.values().copied().filter(|weight| *weight < than);
         let lightest = below.clone().min()?;
         Some(below.filter(|weight| *weight <= than / 2).max().unwrap_or(lightest))
     }
 
-    /// Takes note of a core: literals of which one at least is true.
+    /// Processes a core: a set of literals of which at least one is true.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "a core has weights that are at most what the limit leaves, and the least of them is taken off each"
@@ -70,9 +75,9 @@ impl Search {
         let weight = core.iter().filter_map(|literal| self.weights.get(literal)).copied().min().unwrap_or(0);
         self.lower += weight;
         for literal in core {
-            if let Some(own) = self.weights.get_mut(literal) {
-                *own -= weight;
-                if *own == 0 {
+            if let Some(literal_weight) = self.weights.get_mut(literal) {
+                *literal_weight -= weight;
+                if *literal_weight == 0 {
                     self.weights.remove(literal);
                 }
             }
@@ -88,7 +93,7 @@ impl Search {
         }
     }
 
-    /// More than so many of a totalizer's literals cost so much more.
+    /// Adds a soft literal: more than `count` literals of a totalizer cost `weight` more.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "weights are at most what the limit on the cost leaves, and each core has its own literals"
@@ -108,7 +113,7 @@ impl Search {
         self.outputs.insert(literal, (totalizer, count));
     }
 
-    /// What would make a plan dearer than the limit is false.
+    /// Fixes literals to false whose weight alone exceeds the limit (hardening).
     fn harden(&mut self, limit: Int, formula: &mut Formula) {
         let lower = self.lower;
         let heavy: Vec<Lit> = self
@@ -124,7 +129,7 @@ impl Search {
     }
 }
 
-/// Raises the lower bound of a formula's plans until it is above their limit, or a plan is as cheap.
+/// Raises the lower bound of a formula's plans until it exceeds the limit or a plan meets it.
 pub(super) fn raise(
     run: &mut Run<'_>,
     mut encoding: Encoding<'_>,
@@ -168,13 +173,14 @@ pub(super) fn raise(
     }
 }
 
-/// The core that the solver has found, or a part of it that is one, too; none if a limit was reached.
+/// Core of the last call, reduced by repeated calls. Returns `None` if a limit is reached.
 fn trimmed(run: &mut Run<'_>, live: &mut IncrementalSolver, encoding: &Encoding<'_>) -> Option<Vec<Lit>> {
     let mut core = live.solver.core().to_vec();
     for _ in 0..CORE_TRIM_ROUNDS {
         if core.len() < 2 {
             break;
         }
+        // A call that assumes only the core often returns a smaller one.
         match run.call(live, encoding, &core) {
             (Answer::Unsatisfiable, _) if live.solver.core().len() < core.len() => {
                 core = live.solver.core().to_vec();

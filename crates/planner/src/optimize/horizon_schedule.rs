@@ -12,27 +12,27 @@ use task::task::Task;
 use crate::optimize::optimizer_run::Run;
 use crate::optimize::sat_budget::{FORMULA_LIMIT, SatBudget};
 
-/// Longer and longer formulas without a cost limit, several of them open at a time \[1\].
+/// Formulas with growing horizons and without a cost limit, several of them open at a time \[1\].
 ///
-/// \[1\] J. Rintanen, K. Heljanko, I. Niemelä: Planning as satisfiability: parallel plans and algorithms for plan search,
-/// Artificial Intelligence 170, 2006, section 6.
+/// \[1\] J. Rintanen, K. Heljanko, I. Niemelä: Planning as satisfiability: parallel plans and
+/// algorithms for plan search, Artificial Intelligence 170, 2006, section 6.
 pub(super) struct HorizonSchedule {
-    /// Horizons that are not decided.
+    /// Undecided horizons.
     open: Vec<usize>,
-    /// The next longer one; none if there is no further one.
+    /// Next longer horizon; `None` if all have been tried.
     next: Option<usize>,
-    /// No plan has more steps than these, if it is a shortest one or is not to have more.
+    /// Upper bound on the number of steps: of a shortest plan, or the configured horizon.
     most: usize,
-    /// Up to here there is no plan.
+    /// Greatest refuted horizon.
     refuted: usize,
 }
 
-/// What became of longer and longer formulas.
+/// Outcome of one turn.
 pub(super) enum FirstPlanOutcome {
     Plan(GroundPlan),
-    /// There is none, of any length or within the horizon.
+    /// There is no plan, of any length or within the horizon.
     Refuted(Box<Solution>),
-    /// The allowance is used up.
+    /// The budget is spent.
     Paused,
     /// A limit was reached, or formulas become too large.
     Over,
@@ -41,11 +41,11 @@ pub(super) enum FirstPlanOutcome {
 impl HorizonSchedule {
     pub(super) fn new(run: &Run<'_>) -> Self {
         let states = states(run.task).map_or(usize::MAX, |n| n.saturating_sub(1));
-        let most = run.config.horizon.unwrap_or(usize::MAX).min(states);
-        Self { open: Vec::new(), next: Some(0), most, refuted: 0 }
+        let max_horizon = run.config.horizon.unwrap_or(usize::MAX).min(states);
+        Self { open: Vec::new(), next: Some(0), most: max_horizon, refuted: 0 }
     }
 
-    /// Goes on with all open horizons and one more, each with this allowance.
+    /// Resumes all open horizons and one more, each with this budget.
     pub(super) fn advance(
         &mut self,
         run: &mut Run<'_>,
@@ -63,10 +63,11 @@ impl HorizonSchedule {
             match decide(run, bounds, horizon, allowance) {
                 (_, Some(plan)) => return FirstPlanOutcome::Plan(plan),
                 (Answer::Unsatisfiable, None) => self.refuted = self.refuted.max(horizon),
-                // A plan whose cost does not fit is none, and longer ones cost no less.
+                // A plan whose cost overflows is unusable, and longer plans cost no less.
                 (Answer::Satisfiable, None) => return FirstPlanOutcome::Over,
                 (Answer::Interrupted, None) => {
-                    // Without an allowance that could be used up, numbers are too large for a formula.
+                    // With an unlimited budget, an interruption means that numbers are too large
+                    // for a formula.
                     if run.config.limits.reached() || allowance.conflicts == u64::MAX {
                         return FirstPlanOutcome::Over;
                     }
@@ -94,7 +95,7 @@ impl HorizonSchedule {
     }
 }
 
-/// Longer and longer formulas, however long each takes.
+/// Finds a first plan by growing horizons without a budget.
 pub(super) fn first_plan(run: &mut Run<'_>, bounds: &Bounds) -> Result<GroundPlan, Box<Solution>> {
     let mut first = HorizonSchedule::new(run);
     loop {
@@ -127,7 +128,7 @@ fn decide(
     })
 }
 
-/// How many states the task has at most, if that is few: a shortest plan visits none twice.
+/// Number of states of the task, if it is finite and fits. A shortest plan visits no state twice.
 fn states(task: &Task) -> Option<usize> {
     if !task.initial.numbers.is_empty() {
         return None;

@@ -5,8 +5,8 @@ use encodings::sat::Answer;
 
 use crate::optimize::optimizer_run::{Best, Run, StrategyOutcome};
 
-/// Asks for cheaper and cheaper plans of a formula until there is none. The solver keeps what it has learnt: a lower limit is
-/// one more clause. It gives up after learning `budget` clauses.
+/// Solves a formula repeatedly with decreasing cost limits until it is unsatisfiable. Lower limits
+/// only add clauses, so learnt clauses stay valid. Stops after `budget` learnt clauses.
 pub(super) fn linear_search_down(
     run: &mut Run<'_>,
     mut encoding: Encoding<'_>,

@@ -1,8 +1,9 @@
 //! Several objectives: lexicographic, or as a Pareto front.
 //!
-//! The value of an earlier objective becomes a budget for the later ones: a numeric variable that each operator
-//! reduces by its cost. Each query is then a task with one objective and an ordinary proof. The Pareto front is
-//! enumerated by the ε-constraint method \[1\]: best by A, then best by B among those, then strictly better by B.
+//! The value of an earlier objective becomes a budget for the later ones: a numeric variable that
+//! each operator reduces by its cost. Each query is then a task with one objective and an ordinary
+//! proof. The Pareto front is enumerated by the ε-constraint method \[1\]: best by A, then best by
+//! B among those, then strictly better by B.
 //!
 //! \[1\] Y. Haimes, L. Lasdon, D. Wismer: On a bicriterion formulation of the problems of integrated system
 //! identification and system optimization, IEEE Trans. SMC 1(3), 1971.
@@ -18,12 +19,12 @@ use task::task::{NumericEffect, Operator, Task};
 use crate::optimize::cheapest::optimize;
 use crate::optimize::config::Config;
 
-/// A point of the Pareto front, or what is known in place of one.
+/// A point of the Pareto front, or the result of an unfinished query.
 #[derive(Debug, Clone)]
 pub struct Point {
-    /// The plan; its cost is that of the first objective.
+    /// The plan; its cost is by the first objective.
     pub solution: Solution,
-    /// What the plan comes to by each objective; empty if there is no plan.
+    /// Value of the plan by each objective; empty if there is no plan.
     pub values: Vec<Exact>,
 }
 
@@ -31,14 +32,14 @@ pub struct Point {
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Front {
-    /// Best by the first objective to best by the second.
+    /// Points from best by the first objective to best by the second.
     pub points: Vec<Point>,
-    /// Whether it is proved that there are no other points: `Optimal`, or `Unsolvable` if there is no plan at all.
+    /// `Optimal` if the front is proved complete, `Unsolvable` if there is no plan at all.
     pub status: Status,
 }
 
-/// Finds a plan that is best by the first objective of the task, among those best by the second, and so on.
-/// The values by all objectives come with it; they are empty if there is no plan.
+/// Finds a plan that is optimal by the first objective of the task, among those by the second, and
+/// so on. Also returns its values by all objectives, which are empty if there is no plan.
 ///
 /// ```
 /// use metaplan_planner::pddl::{ast::Direction, read_objective};
@@ -67,8 +68,7 @@ pub fn lexicographic(task: &Task, config: &Config, report: &mut dyn FnMut(Improv
     in_order(task, &order, &[], config, report)
 }
 
-/// Enumerates the plans of which no other one is better by one of the first two objectives and not worse by
-/// the other, one plan for each pair of values.
+/// Enumerates the Pareto front of the first two objectives, with one plan for each pair of values.
 ///
 /// ```
 /// use metaplan_planner::pddl::{ast::Direction, read_objective};
@@ -101,7 +101,7 @@ pub fn pareto(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement))
             (Status::Optimal, Some(plan)) => {
                 let by_second = cost_by(task, 1, plan).and_then(|cost| cost.checked_sub(1));
                 points.push(point);
-                // A sum that does not fit is not a budget: there may be other points.
+                // A sum that overflows cannot be a budget, so other points may be missed.
                 let Some(budget) = by_second else { return Front { points, status: Status::Feasible } };
                 budgets = vec![(1, budget)];
             }
@@ -122,7 +122,7 @@ pub fn pareto(task: &Task, config: &Config, report: &mut dyn FnMut(Improvement))
     }
 }
 
-/// Optimizes by some objectives in order, within budgets for some.
+/// Optimises objectives in the given order, within budgets.
 fn in_order(
     task: &Task,
     order: &[usize],
@@ -135,19 +135,20 @@ fn in_order(
     let mut best: Option<Solution> = None;
     for objective in order {
         let mut narrowed = task.clone();
-        for (other, budget) in &budgets {
-            limit(&mut narrowed, *other, *budget);
+        for (limited, budget) in &budgets {
+            limit(&mut narrowed, *limited, *budget);
         }
         swap_objective(&mut narrowed, *objective);
         let solution = optimize(&narrowed, config, report);
         let Some(plan) = &solution.ground else {
-            // The plan that was best so far stays a plan; that nothing better was found for the rest is not proved.
-            let known = best.map(|known| Solution { status: Status::Feasible, proof: None, ..known });
-            return finish(context, known.unwrap_or(solution));
+            // The incumbent remains valid, but its optimality by the remaining objectives is
+            // not proved.
+            let partial = best.map(|solution| Solution { status: Status::Feasible, proof: None, ..solution });
+            return finish(context, partial.unwrap_or(solution));
         };
         let spent = cost_by(task, *objective, plan);
         budgets.extend(spent.map(|spent| (*objective, spent)));
-        // A sum that does not fit is not a budget for what comes next.
+        // A sum that overflows cannot be a budget for later objectives.
         let proved = solution.status == Status::Optimal && spent.is_some();
         best = Some(match best {
             None => solution,
@@ -166,7 +167,7 @@ fn in_order(
     finish(context, best.unwrap_or_else(|| optimize(task, config, report)))
 }
 
-/// Shows the plan by the task's own objectives.
+/// Decodes the plan with the original objectives of the task.
 fn finish(context: Context<'_>, mut solution: Solution) -> Point {
     let task = context.task;
     let mut values = Vec::new();
@@ -179,21 +180,21 @@ fn finish(context: Context<'_>, mut solution: Solution) -> Point {
         );
         if let Some(cost) = cost_by(task, 0, plan) {
             let plan = GroundPlan { steps: plan.steps.clone(), cost };
-            let shown = decode(context, &plan);
-            // Some fluents of a metric may only be measured in the end.
-            values[0] = shown.cost.clone();
-            (solution.plan, solution.ground) = (Some(shown), Some(plan));
+            let decoded = decode(context, &plan);
+            // Some fluents of a metric are only evaluated at the end.
+            values[0] = decoded.cost.clone();
+            (solution.plan, solution.ground) = (Some(decoded), Some(plan));
         }
     }
     Point { solution, values }
 }
 
-/// What an operator costs by an objective, by its position.
+/// Cost of an operator by the objective with this index.
 fn cost(operator: &Operator, objective: usize) -> &Quantity<Int> {
     objective.checked_sub(1).map_or(&operator.cost, |other| &operator.others[other])
 }
 
-/// What the steps of a plan cost by an objective, by its position.
+/// Costs of the steps of a plan by the objective with this index.
 fn costs_by(task: &Task, objective: usize, plan: &GroundPlan) -> impl Iterator<Item = Int> {
     plan.steps.iter().map(move |step| {
         let operator = &task.operators[step.operator.index()];
@@ -201,17 +202,17 @@ fn costs_by(task: &Task, objective: usize, plan: &GroundPlan) -> impl Iterator<I
     })
 }
 
-/// What a plan costs by an objective; none if that does not fit.
+/// Cost of a plan by an objective. Returns `None` if it overflows.
 fn cost_by(task: &Task, objective: usize, plan: &GroundPlan) -> Option<Int> {
     costs_by(task, objective, plan).try_fold(0, Int::checked_add)
 }
 
-/// What a plan costs by an objective, however much that is.
+/// Exact cost of a plan by an objective.
 fn exact_cost_by(task: &Task, objective: usize, plan: &GroundPlan) -> Rational {
     costs_by(task, objective, plan).map(Rational::from_integer).sum()
 }
 
-/// Admits only plans that cost at most so much by an objective.
+/// Limits the cost of plans by an objective.
 fn limit(task: &mut Task, objective: usize, budget: Int) {
     let variable = NumericId::of(task.initial.numbers.len());
     task.initial.numbers.push(budget);
@@ -222,23 +223,23 @@ fn limit(task: &mut Task, objective: usize, budget: Int) {
         if cost.is_zero() {
             continue;
         }
-        let mut left = Linear::constant(0);
-        left.quantity = cost;
-        let mut left = left.negated();
-        left.add(&Linear::variable(variable));
+        let mut remaining = Linear::constant(0);
+        remaining.quantity = cost;
+        let mut remaining = remaining.negated();
+        remaining.add(&Linear::variable(variable));
         if always {
-            operator.condition.comparisons.push(left.clone());
+            operator.condition.comparisons.push(remaining.clone());
         }
-        operator.numeric_effects.push(NumericEffect { variable, value: left });
+        operator.numeric_effects.push(NumericEffect { variable, value: remaining });
     }
     task.goal.comparisons.push(Linear::variable(variable));
 }
 
-/// Makes an objective the first one.
+/// Swaps an objective with the first one.
 fn swap_objective(task: &mut Task, objective: usize) {
-    let Some(other) = objective.checked_sub(1) else { return };
-    std::mem::swap(&mut task.objective, &mut task.others[other]);
+    let Some(index) = objective.checked_sub(1) else { return };
+    std::mem::swap(&mut task.objective, &mut task.others[index]);
     for operator in &mut task.operators {
-        std::mem::swap(&mut operator.cost, &mut operator.others[other]);
+        std::mem::swap(&mut operator.cost, &mut operator.others[index]);
     }
 }

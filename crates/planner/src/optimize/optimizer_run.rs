@@ -18,56 +18,56 @@ use tracing::info_span;
 
 use crate::optimize::config::Config;
 
-/// Bounds are noted that are this part higher than the one before.
+/// Bounds are reported if they rise by at least one part in this number.
 const REPORT_STEP: Int = 100;
 
-/// A task with what has come of it so far.
+/// State of one optimizer run.
 pub(super) struct Run<'a> {
     pub(super) task: &'a Task,
     pub(super) config: &'a Config,
     pub(super) report: &'a mut dyn FnMut(Improvement),
     pub(super) statistics: Statistics,
     started: Instant,
-    /// What was noted last.
+    /// Incumbent cost and lower bound, as reported last.
     noted: Option<(Option<Int>, Int)>,
-    /// Found out when it is first needed.
+    /// Symmetries, computed on first use.
     symmetry: OnceCell<Symmetry>,
 }
 
-/// What is known of the cheapest plan.
+/// Incumbent and lower bound.
 pub(super) struct Best {
-    /// The cheapest so far.
+    /// The cheapest known plan.
     pub(super) plan: GroundPlan,
-    /// No plan is cheaper than this.
+    /// Lower bound on the cost of every plan.
     pub(super) lower: Int,
 }
 
-/// What a formula covers.
+/// Extent of a formula: cost limit, operators per step, and step bound.
 pub(super) struct FormulaScope {
-    /// Plans that cost at most so much.
+    /// Cost limit of the plans.
     pub(super) limit: Int,
-    /// For each step, whether each operator can be there.
+    /// Per step: whether each operator may occur.
     pub(super) allowed: Vec<Vec<bool>>,
-    /// That no such plan has more steps is known.
+    /// Proved upper bound on the number of steps of such plans, if the formula covers it.
     pub(super) step_bound: Option<usize>,
 }
 
 impl FormulaScope {
-    /// How many operator variables the formula has.
+    /// Number of operator variables of the formula.
     pub(super) fn size(&self) -> usize {
         self.allowed.iter().map(|row| row.iter().filter(|flag| **flag).count()).sum()
     }
 }
 
-/// What a strategy came to within a formula.
+/// Outcome of a strategy on one formula.
 pub(super) enum StrategyOutcome {
-    /// None of its plans within its limit is cheaper than the best one.
+    /// No plan of the formula within its limit is cheaper than the incumbent.
     Exhausted,
     /// A limit was reached.
     Interrupted,
 }
 
-/// A solver that has the clauses of a formula, up to some position.
+/// A solver that has received the clauses of a formula up to some index.
 pub(super) struct IncrementalSolver {
     pub(super) solver: Box<dyn Solver>,
     known: usize,
@@ -92,17 +92,17 @@ impl<'a> Run<'a> {
         Context::new(self.task, &self.config.limits)
     }
 
-    /// Notes that two parts of the planner contradict each other. It fails loudly where that is tested.
+    /// Records that two parts of the planner contradict each other. Panics in debug builds.
     pub(super) fn report_internal_contradiction(&mut self, what: &str) {
         debug_assert!(false, "{what}");
         self.statistics.contradiction = Some(what.to_owned());
     }
 
-    /// Notes what the best plan costs, if there is one, and what none costs less than.
+    /// Records the cost of the incumbent, if any, and the lower bound.
     pub(super) fn note(&mut self, cost: Option<Int>, lower: Int) {
-        let is_news = self.noted.is_none_or(|(known, bound)| {
-            let more = lower.saturating_sub(bound);
-            known != cost || more > bound / REPORT_STEP || more > 0 && cost == Some(lower)
+        let is_news = self.noted.is_none_or(|(previous, bound)| {
+            let rise = lower.saturating_sub(bound);
+            previous != cost || rise > bound / REPORT_STEP || rise > 0 && cost == Some(lower)
         });
         if !is_news {
             return;
@@ -125,7 +125,7 @@ impl<'a> Run<'a> {
         (self.report)(improvement);
     }
 
-    /// How many operators stand at a step.
+    /// Step semantics for a formula.
     pub(super) fn semantics(&self, unless_given: StepSemantics) -> StepSemantics {
         match self.config.horizon {
             Some(_) => StepSemantics::Sequential,
@@ -133,23 +133,24 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// None if a limit was reached, or if there are more clauses than `most`.
+    /// Encodes plans. Returns `None` if a limit is reached or there are more clauses than
+    /// `max_clauses`.
     pub(super) fn encoding(
         &self,
         allowed: &[Vec<bool>],
         cost: Option<CostLimit<'_>>,
         semantics: StepSemantics,
-        most: usize,
+        max_clauses: usize,
     ) -> Option<Encoding<'a>> {
         let span = info_span!("encode", steps = allowed.len(), variables = Empty, clauses = Empty).entered();
-        let plans = PlanConstraints { allowed, cost, semantics, max_clauses: most };
+        let plans = PlanConstraints { allowed, cost, semantics, max_clauses };
         let encoding = Encoding::new(self.context(), plans, &self.symmetry)?;
         let formula = &encoding.formula;
         span.record("variables", formula.variables()).record("clauses", formula.clause_count());
         Some(encoding)
     }
 
-    /// What plans that cost at most so much can look like.
+    /// Extent of a formula for plans with cost at most `limit`.
     pub(super) fn extent(
         &self,
         bounds: &Bounds,
@@ -162,7 +163,7 @@ impl<'a> Run<'a> {
         let allowed = if window.steps.is_some() {
             window.allowed
         } else {
-            // Without a step bound longer plans are worth a try, though they prove nothing.
+            // Without a step bound, longer plans may be found but prove nothing.
             let longer = self
                 .config
                 .horizon
@@ -172,7 +173,7 @@ impl<'a> Run<'a> {
         Ok(FormulaScope { limit, allowed, step_bound })
     }
 
-    /// A solver without clauses that gives up at a limit, or after learning `budget` clauses.
+    /// Creates a solver without clauses that stops at a limit or after `budget` learnt clauses.
     pub(super) fn live(&self, budget: u64) -> IncrementalSolver {
         IncrementalSolver {
             solver: self.config.backend.start(&self.config.limits, budget),
@@ -181,8 +182,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Decides a formula under assumptions, by a solver that may know a part of it; a plan comes with the answer that it is
-    /// satisfiable.
+    /// Decides a formula under assumptions with a solver that may already have a part of its
+    /// clauses. Returns the decoded plan if it is satisfiable.
     pub(super) fn call(
         &mut self,
         live: &mut IncrementalSolver,
@@ -205,14 +206,15 @@ impl<'a> Run<'a> {
         }
         let answer = live.solver.solve(assumptions);
         let conflicts = live.solver.conflicts();
-        let more = conflicts.saturating_sub(live.conflicts);
+        let new_conflicts = conflicts.saturating_sub(live.conflicts);
         self.statistics.calls = self.statistics.calls.saturating_add(1);
-        self.statistics.conflicts = self.statistics.conflicts.saturating_add(more);
+        self.statistics.conflicts = self.statistics.conflicts.saturating_add(new_conflicts);
         live.conflicts = conflicts;
-        span.record("conflicts", more).record("answer", debug(answer));
+        span.record("conflicts", new_conflicts).record("answer", debug(answer));
         if let Some(reason) = live.solver.failure() {
             self.statistics.failure = Some(reason.to_owned());
         }
+        // A model of an external program is checked by replaying the plan; its refutation is not.
         if let (Answer::Unsatisfiable, Backend::Program { command, arguments }) =
             (answer, &self.config.backend)
         {
@@ -228,17 +230,18 @@ impl<'a> Run<'a> {
         (answer, plan)
     }
 
-    /// A plan of the solver, replayed. That it is applicable is what the encoding is for; that it is, is checked.
+    /// Replays a decoded plan. The encoding should only admit plans; this check guards against its
+    /// errors.
     fn check(&mut self, steps: Vec<GroundStep>) -> Option<GroundPlan> {
         if pass(self.task, &self.task.initial, &steps).is_none() {
             self.report_internal_contradiction("a formula admits a sequence of actions that is not a plan");
             return None;
         }
-        // A plan whose cost does not fit is none that the rest can reckon with.
+        // A plan whose cost overflows cannot be compared with others.
         cost(self.task, &steps).map(|cost| GroundPlan { steps, cost })
     }
 
-    /// The answer; nothing is proved where parts of the planner contradict each other.
+    /// Builds the solution. After an internal contradiction nothing counts as proved.
     pub(super) fn finish(
         self,
         status: Status,

@@ -21,18 +21,19 @@ use crate::optimize::prover::{Prover, ProverOutcome};
 use crate::optimize::sat_budget::SatBudget;
 use crate::optimize::sat_confirmation::{into_solution, proved_by_bound, proved_by_search};
 
-/// For each state that the exact search stores in a round: how many nodes and propositions the search for some plan goes through, and how
-/// many clauses a formula has at most.
+/// Work units of the satisficing search, and maximum number of clauses of a formula, per state that
+/// A\* stores in a round.
 const RELAXATION_WORK_PER_STATE: usize = 200;
 const CLAUSES_PER_STATE: usize = 50;
-/// For each conflict of the SAT solver, how many states the exact search stores.
+/// Stored states that correspond to one conflict of the SAT solver.
 const STATES_PER_CONFLICT: u64 = 4;
-/// The allowances of formulas and of the search for some plan are halved so often at most.
+/// Maximum number of times the budget of an unsuccessful component is halved.
 const MAX_BACKOFF: u32 = 3;
-/// A plan that costs more than this ratio times the lower bound is likely to have better ones that are easier to find than a proof.
+/// A plan that costs more than this ratio times the lower bound probably has better plans that are
+/// easier to find than a proof.
 const NEAR_OPTIMAL_RATIO: (Int, Int) = (3, 2);
 
-/// What is left to be tried, and what is known.
+/// The portfolio: the remaining components, the incumbent and the bounds.
 struct Portfolio<'r, 'a> {
     run: Run<'a>,
     bounds: &'r Bounds,
@@ -42,28 +43,28 @@ struct Portfolio<'r, 'a> {
     prover: Option<Prover>,
     best: Option<GroundPlan>,
     lower: Int,
-    /// Why no plan costs less than that.
+    /// Proof of the lower bound.
     reason: Proof,
-    /// How often the allowance of formulas is halved, and that of the search for some plan.
+    /// Number of times the budgets are halved: of formulas, and of the satisficing search.
     share: u32,
     satisficer_share: u32,
 }
 
-/// An answer, or that the next one has its turn.
+/// Result of a turn: an ending, or `None` to continue with the next component.
 type Turn = Option<Ending>;
 
 enum Ending {
-    /// The exact search has ended with this plan.
+    /// The exact search has finished with this plan.
     Exact(GroundPlan),
     Unsolvable,
-    /// The best plan costs no more than the lower bound, for a reason.
+    /// The incumbent meets the lower bound, with its proof.
     Proved(Proof),
     Refuted(Box<Solution>),
-    /// A limit was reached, or nothing is left.
+    /// A limit was reached, or no component can continue.
     Over,
 }
 
-/// Finds a cheapest plan by all means.
+/// Finds a cheapest plan with all components in turns.
 pub(super) fn solve(run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
     let started = Instant::now();
     let context = run.context();
@@ -94,7 +95,7 @@ pub(super) fn solve(run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
 
 impl<'r, 'a: 'r> Portfolio<'r, 'a> {
     fn rounds(&mut self) -> Ending {
-        // Most tasks are done here.
+        // Most tasks are solved in this first turn.
         let unit = self.run.config.head_start.max(1);
         if let Some(ending) = self.search_exactly(unit) {
             return ending;
@@ -104,10 +105,11 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         }
         let mut stored = unit;
         for round in 0..u32::MAX {
+            // The work doubles in each round, up to a factor of 2^20.
             let work = unit.saturating_mul(1_usize.checked_shl(round.min(20)).unwrap_or(1));
             stored = stored.saturating_add(work);
             let turns: [fn(&mut Self, usize, usize) -> Turn; 3] =
-                [Self::satisfice, |own, _, stored| own.search_exactly(stored), Self::sat_turn];
+                [Self::satisfice, |portfolio, _, stored| portfolio.search_exactly(stored), Self::sat_turn];
             for turn in turns {
                 if self.run.config.limits.reached() {
                     return Ending::Over;
@@ -133,7 +135,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
             exact.set_upper_bound(&cost);
         }
         let before = exact.figures();
-        let found = exact.run(stored, &mut |_, bound| {
+        let outcome = exact.run(stored, &mut |_, bound| {
             if *bound > *lower {
                 (*lower, *reason) = (*bound, Proof::Search);
                 run.note(cost, *bound);
@@ -141,7 +143,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         });
         exact.figures().add_to(before, &mut run.statistics);
         record(&span, &run.statistics);
-        match found {
+        match outcome {
             Some(SearchOutcome::Optimal(plan)) => Some(Ending::Exact(plan)),
             Some(SearchOutcome::None) if self.best.is_none() => Some(Ending::Unsolvable),
             Some(SearchOutcome::None) => Some(Ending::Over),
@@ -161,7 +163,8 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         let span = info_span!("satisfice", expanded = Empty, generated = Empty).entered();
         let nodes = work.saturating_mul(RELAXATION_WORK_PER_STATE) as u64;
         let limit = self.best.as_ref().map(|plan| plan.cost);
-        // A plan is worth more than a better one, and who finds none has less the next time, as long as there is hope for a proof.
+        // A first plan is worth more than a better one. An unsuccessful satisficing search gets a
+        // smaller budget next time, as long as a proof is in reach.
         let has_hope = self.exact.as_ref().is_some_and(InterleavedSearch::may_finish);
         let is_near = |cost: Int| {
             cost.saturating_mul(NEAR_OPTIMAL_RATIO.1) <= self.lower.saturating_mul(NEAR_OPTIMAL_RATIO.0)
@@ -201,7 +204,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         };
         let allowance = if alone { SatBudget::UNLIMITED } else { allowance };
         let turn = self.ask_for(allowance);
-        // Who achieves nothing has less the next time, and who does has more.
+        // Unsuccessful turns halve the next budget, successful ones double it.
         let achieved = before != (self.lower, self.best.as_ref().map(|plan| plan.cost));
         self.share =
             if achieved { share.saturating_sub(1) } else { share.saturating_add(1).min(MAX_BACKOFF) };
@@ -242,7 +245,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         }
     }
 
-    /// Takes note of a plan if it is better than what is known.
+    /// Adopts a plan if it is better than the incumbent.
     fn improve(&mut self, plan: GroundPlan, part: PlannerPart) -> Turn {
         if self.best.as_ref().is_none_or(|best| plan.cost < best.cost) {
             self.run.statistics.found_by = Some(part);
@@ -254,7 +257,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
         self.meets()
     }
 
-    /// Whether the best plan costs no more than the lower bound.
+    /// Ends the run if the incumbent meets the lower bound.
     fn meets(&self) -> Turn {
         let best = self.best.as_ref()?;
         (best.cost <= self.lower).then(|| Ending::Proved(self.reason.clone()))
@@ -296,7 +299,7 @@ impl<'r, 'a: 'r> Portfolio<'r, 'a> {
     }
 }
 
-/// So many states have been looked at until now, by all searches.
+/// Records the numbers of states of all searches in the span.
 fn record(span: &Span, statistics: &Statistics) {
     span.record("expanded", statistics.expanded).record("generated", statistics.generated);
 }

@@ -13,32 +13,32 @@ use crate::optimize::linear_search::linear_search_down;
 use crate::optimize::optimizer_run::{Best, FormulaScope, Run, StrategyOutcome};
 use crate::optimize::sat_budget::{FORMULA_LIMIT, SatBudget};
 
-/// The first formula is for plans within this part of the gap between the lower bound and the best plan known; each further one
-/// for twice as much of it.
+/// The first formula covers this fraction of the gap between the lower bound and the incumbent;
+/// each further one covers twice as much.
 const STAGES: Int = 8;
 
-/// Formulas for plans that are cheaper than the best one, the first for those within a part of the gap to the lower bound.
+/// Optimality prover: formulas for plans cheaper than the incumbent, in stages of growing cost.
 #[derive(Default)]
 pub(super) struct Prover {
     stage: Option<Int>,
-    /// Steps up to which plans were considered.
+    /// Greatest horizon of a formula that was built.
     pub(super) horizon: usize,
-    /// The step bound of the formula that has raised the lower bound last.
+    /// Step bound of the formula that raised the lower bound last.
     pub(super) step_bound: usize,
 }
 
-/// What formulas have come to.
+/// Outcome of one turn.
 pub(super) enum ProverOutcome {
-    /// The best plan is a cheapest one.
+    /// The incumbent is optimal.
     Proved(Proof),
-    /// The allowance is used up.
+    /// The budget is spent.
     Paused,
-    /// More would prove nothing, or a limit was reached.
+    /// Further formulas would prove nothing, or a limit was reached.
     Over,
 }
 
 impl Prover {
-    /// Decides formulas, each within an allowance; the plan, the lower bound and the reason for it become better on the way.
+    /// Decides formulas, each within a budget. Improves the incumbent and the lower bound.
     pub(super) fn advance(
         &mut self,
         run: &mut Run<'_>,
@@ -57,7 +57,7 @@ impl Prover {
             let Ok(extent) = run.extent(bounds, limit, best) else { return ProverOutcome::Over };
             self.horizon = self.horizon.max(extent.allowed.len());
             if extent.step_bound.is_none() && stage < Int::MAX {
-                // That there is no such plan would prove nothing.
+                // Without a step bound, refuting a stage would prove nothing.
                 self.stage = Some(Int::MAX);
                 continue;
             }
@@ -87,7 +87,7 @@ impl Prover {
     }
 }
 
-/// Decides whether there is a plan that costs at most the limit of an extent, and finds a cheapest one.
+/// Decides whether there is a plan within the cost limit of an extent, and finds a cheapest one.
 pub(super) fn within(
     run: &mut Run<'_>,
     bounds: &Bounds,

@@ -1,18 +1,18 @@
 //! Conflict budgets of the SAT solver.
 
-/// In a formula with so many clauses a conflict takes twice as long as in a small one, about.
+/// Number of clauses beyond which conflicts become noticeably slower.
 const LARGE: usize = 50_000;
 
-/// What the SAT solver may spend on a formula.
+/// Budget of the SAT solver for one formula.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SatBudget {
     pub(super) clauses: usize,
-    /// In a formula that is not large.
+    /// Number of conflicts for a formula that is not large.
     pub(super) conflicts: u64,
 }
 
 impl SatBudget {
-    /// So many conflicts: each takes longer in a large formula.
+    /// Number of conflicts for a formula with this many clauses: fewer for large formulas.
     pub(super) fn conflicts(self, clauses: usize) -> u64 {
         let factor = (clauses / LARGE).saturating_add(1);
         if self.conflicts == u64::MAX {
@@ -21,9 +21,9 @@ impl SatBudget {
         self.conflicts.checked_div(factor as u64).unwrap_or(self.conflicts)
     }
 
-    /// As much as it takes.
+    /// No limit.
     pub(super) const UNLIMITED: Self = Self { clauses: usize::MAX, conflicts: u64::MAX };
 }
 
-/// Formulas with more operator variables than this are not built.
+/// Maximum number of operator variables of a formula.
 pub(super) const FORMULA_LIMIT: usize = 30_000_000;

@@ -14,57 +14,58 @@ use crate::optimize::optimizer_run::{Best, Run, StrategyOutcome};
 use crate::optimize::prover::within;
 use crate::optimize::sat_budget::{FORMULA_LIMIT, SatBudget};
 
-/// What is proved already, the SAT solver may spend on proving again: so many clauses and so many conflicts. Both take about five
-/// milliseconds.
+/// Budget for confirming a proof of another engine: numbers of clauses and conflicts that each take
+/// about five milliseconds.
 const CONFIRM_BUDGET: SatBudget = SatBudget { clauses: 50_000, conflicts: 60 };
-/// The formula has at most this many operator variables then.
+/// Maximum number of operator variables of a formula for confirmation.
 const CONFIRM_SIZE: usize = 5_000;
-/// With so many operators times steps it is not even looked at which of them are left.
+/// Maximum product of operators and steps for which reachable operators are computed.
 const CONFIRM_PRODUCT: usize = 1_500;
-/// Formulas with at most this many operator variables are solved once more without the help of bounds.
+/// Maximum number of operator variables of a formula without bounds for confirmation.
 const CONFIRM_LIMIT: usize = 400;
-/// Costs from here on, as products of decimals have them once they are integers, make no formula small.
+/// Cost limits from here on make formulas large; they arise from scaled products of decimals.
 const CONFIRM_COST: Int = 1 << 64;
 
-/// A plan whose cost is a lower bound.
+/// Solution for a plan whose cost meets the lower bound.
 pub(super) fn proved_by_bound(mut run: Run<'_>, best: &Best) -> Solution {
     let proof = confirm(&mut run, &best.plan).unwrap_or(Proof::Bound);
     into_solution(run, best, 0, Some(proof))
 }
 
-/// A plan that the search calls cheapest: the SAT solver says the same if that does not take long.
+/// Solution for a plan that search proved optimal. The SAT solver confirms the proof if that is
+/// quick.
 pub(super) fn proved_by_search(mut run: Run<'_>, bounds: &Bounds, plan: GroundPlan, lower: Int) -> Solution {
     let mut best = Best { plan, lower };
     run.announce(&best, best.plan.steps.len());
-    // What the search itself has raised is not what it is measured by.
+    // Compares with the initial lower bound, not with the bound that the search itself has raised.
     let floor = bounds.estimate(&run.task.initial);
     if floor.is_some_and(|floor| best.plan.cost <= floor) {
         return proved_by_bound(run, &best);
     }
     let by_search = Some(Proof::Search);
     let is_large = run.task.operators.len().saturating_mul(best.plan.steps.len()) > CONFIRM_PRODUCT;
-    let confirmed = run.config.confirm;
-    if run.config.engine == Engine::Search || is_large && !confirmed {
+    let must_confirm = run.config.confirm;
+    if run.config.engine == Engine::Search || is_large && !must_confirm {
         return into_solution(run, &best, 0, by_search);
     }
-    let allowance = if confirmed { SatBudget::UNLIMITED } else { CONFIRM_BUDGET };
+    let allowance = if must_confirm { SatBudget::UNLIMITED } else { CONFIRM_BUDGET };
     let limit = best.plan.below();
     let Ok(extent) = run.extent(bounds, limit, &best) else {
         return into_solution(run, &best, 0, by_search);
     };
     let horizon = extent.allowed.len();
-    let is_small = confirmed || extent.size() <= CONFIRM_SIZE && limit < CONFIRM_COST;
+    let is_small = must_confirm || extent.size() <= CONFIRM_SIZE && limit < CONFIRM_COST;
     if !is_small || extent.size() > FORMULA_LIMIT {
         return into_solution(run, &best, horizon, by_search);
     }
-    let tightened = within(&mut run, bounds, &extent, &mut best, allowance);
+    let sat_outcome = within(&mut run, bounds, &extent, &mut best, allowance);
     if best.plan.cost <= limit {
         run.report_internal_contradiction(
             "a formula has a cheaper plan than the one that the search calls cheapest",
         );
     }
-    // What the search has proved does not come to rest on the word of a program.
-    let proof = match (tightened, extent.step_bound) {
+    // An unverified claim of an external program does not replace the proof by search.
+    let proof = match (sat_outcome, extent.step_bound) {
         (StrategyOutcome::Exhausted, Some(step_bound)) if run.statistics.unchecked.is_none() => {
             Some(Proof::Sat { step_bound })
         }
@@ -73,8 +74,8 @@ pub(super) fn proved_by_search(mut run: Run<'_>, bounds: &Bounds, plan: GroundPl
     into_solution(run, &best, horizon, proof)
 }
 
-/// That a plan's cost equals a lower bound is proof enough. On small tasks the SAT solver has to find the same on
-/// a formula that knows nothing of bounds, with as many steps as the cheapest operator allows.
+/// Confirms that a plan meeting the lower bound is optimal. On small tasks the SAT solver decides a
+/// formula that is independent of the bounds, with as many steps as the cheapest operator allows.
 fn confirm(run: &mut Run<'_>, incumbent: &GroundPlan) -> Option<Proof> {
     let cheapest =
         run.task.operators.iter().map(|operator| operator.cost.minimum()).min().filter(|c| *c > 0)?;
@@ -101,7 +102,7 @@ fn confirm(run: &mut Run<'_>, incumbent: &GroundPlan) -> Option<Proof> {
     is_confirmed.then_some(Proof::Sat { step_bound: steps })
 }
 
-/// The answer that a run comes to.
+/// Solution of a run.
 pub(super) fn into_solution(run: Run<'_>, best: &Best, horizon: usize, proof: Option<Proof>) -> Solution {
     let horizon = horizon.max(best.plan.steps.len());
     let plan = Some(&best.plan);

@@ -16,7 +16,7 @@ use crate::optimize::prover::{Prover, ProverOutcome};
 use crate::optimize::sat_budget::SatBudget;
 use crate::optimize::sat_confirmation::{into_solution, proved_by_bound, proved_by_search};
 
-/// A cheapest plan where no action earns anything.
+/// Solves a task without negative costs.
 pub(super) fn solve(mut run: Run<'_>) -> Solution {
     let started = Instant::now();
     let Ok(bounds) = Bounds::new(run.context()) else {
@@ -34,12 +34,12 @@ pub(super) fn solve(mut run: Run<'_>) -> Solution {
     }
 }
 
-/// A search that knows nothing of horizons, then formulas, which do.
+/// Runs search, which ignores horizons, then formulas if its plan is too long.
 fn solve_within(mut run: Run<'_>, bounds: &Bounds, lower: Int, horizon: usize) -> Solution {
     let started = Instant::now();
-    let found = search(run.context(), bounds);
+    let outcome = search(run.context(), bounds);
     run.statistics.search = run.statistics.search.saturating_add(started.elapsed());
-    match found {
+    match outcome {
         SearchOutcome::None => run.finish(Status::Unsolvable, None, None, 0, Some(Proof::Search)),
         SearchOutcome::Optimal(plan) if plan.steps.len() <= horizon => {
             let plan = plan_tiebreak::select_canonical_plan(run.context(), bounds, plan);
@@ -52,7 +52,7 @@ fn solve_within(mut run: Run<'_>, bounds: &Bounds, lower: Int, horizon: usize) -
     }
 }
 
-/// Formulas for a first plan, then for cheaper ones.
+/// Finds a first plan by formulas, then cheaper ones.
 fn solve_by_formulas(mut run: Run<'_>, bounds: &Bounds, lower: Int) -> Solution {
     match first_plan(&mut run, bounds) {
         Ok(plan) => {

@@ -1,4 +1,4 @@
-//! Strategies against an oracle that goes through all states, and what they say before the end.
+//! Strategies against exhaustive search, and the bounds that they report on the way.
 
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -17,7 +17,7 @@ use crate::optimize::{Config, Engine, Strategy, optimize};
 
 const STRATEGIES: [Strategy; 3] = [Strategy::Auto, Strategy::Tighten, Strategy::Cores];
 
-/// Fleets and depots that have a plan, with its least cost.
+/// Fleets and depots that are solvable, with their optimal costs.
 fn tasks(seeds: std::ops::Range<u64>) -> impl Iterator<Item = (String, Task, Int)> {
     seeds.flat_map(|seed| [fleet(seed), depot(seed)]).filter_map(|text| {
         let problem = text.1.clone();
@@ -31,7 +31,7 @@ fn config(backend: &Backend, strategy: Strategy, limits: Limits) -> Config {
     Config { engine: Engine::Sat, strategy, backend: backend.clone(), limits, ..Config::default() }
 }
 
-/// A plan, and what is claimed of it: a proof wherever plans have a step bound.
+/// Checks a solution against the optimum: it must be proved optimal if plans have a step bound.
 fn check_optimum(context: &str, (task, best): (&Task, Int), config: &Config) -> bool {
     let solution = optimize(task, config, &mut |_| {});
     let best = metric(task, &best);
@@ -68,8 +68,9 @@ fn every_strategy_finds_the_optimum_of_many() {
     check_optima(6..1_100);
 }
 
-/// Every report and the answer hold the optimum between them, and reports only get better. The run is stopped after some of
-/// them; returns whether it had come further than that.
+/// Checks that the optimum lies between bound and cost in every report and in the solution, and
+/// that reports only improve. Stops the run after `stop_after` reports. Returns `true` if there
+/// were that many.
 fn check_reports(context: &str, (task, best): (&Task, Int), config: &Config, stop_after: usize) -> bool {
     let interrupt = config.limits.interrupt();
     let best = metric(task, &best);
@@ -103,9 +104,10 @@ fn check_reports(context: &str, (task, best): (&Task, Int), config: &Config, sto
     reports >= stop_after
 }
 
-/// What is said of a proof is what has proved it: a bound is that of the initial state, before anything was searched.
+/// Checks the reported reasons: `Proof::Bound` only if the initial lower bound was met before any
+/// search.
 fn check_reasons(seeds: std::ops::Range<u64>) {
-    let (mut by_bound, mut by_others) = (0, 0);
+    let (mut by_bound, mut by_search) = (0, 0);
     for (text, task, best) in tasks(seeds) {
         let bounds = Bounds::new(Context::new(&task, &Limits::none())).expect("no limit");
         let floor = bounds.estimate(&task.initial);
@@ -114,16 +116,16 @@ fn check_reasons(seeds: std::ops::Range<u64>) {
             let solution = optimize(&task, &config, &mut |_| {});
             let is_met = floor == Some(best);
             by_bound += usize::from(is_met);
-            by_others += usize::from(!is_met);
+            by_search += usize::from(!is_met);
             let expected = if is_met { Proof::Bound } else { Proof::Search };
             assert_eq!(solution.proof, Some(expected), "{head_start}: {text:?}");
         }
     }
-    assert!(by_bound > 0 && by_others > 0, "{by_bound} by bound, {by_others} by search");
+    assert!(by_bound > 0 && by_search > 0, "{by_bound} by bound, {by_search} by search");
 }
 
 #[test]
-fn proofs_say_what_has_proved_it() {
+fn the_reported_proof_is_the_one_that_was_found() {
     check_reasons(0..12);
 }
 

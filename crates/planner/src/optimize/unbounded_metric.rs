@@ -18,31 +18,34 @@ use crate::optimize::prover::within;
 use crate::optimize::sat_budget::SatBudget;
 use crate::optimize::solve::solve;
 
-/// For a metric that actions improve: fewest steps first, then the best metric among those plans.
-pub(super) fn shortest_then_best(asked: Run<'_>) -> Solution {
-    let lowest = asked.task.operators.iter().map(|operator| operator.cost.minimum()).min().unwrap_or(0);
-    let by_steps = with_costs(asked.task, |_| Quantity::constant(1));
-    let context = asked.context();
+/// For a metric that actions improve: minimises the number of steps first, then the metric among
+/// those plans.
+pub(super) fn shortest_then_best(original: Run<'_>) -> Solution {
+    let lowest = original.task.operators.iter().map(|operator| operator.cost.minimum()).min().unwrap_or(0);
+    let by_steps = with_costs(original.task, |_| Quantity::constant(1));
+    let context = original.context();
     let mut silent = |_: Improvement| {};
-    let shortest = solve(Run::new(&by_steps, asked.config, &mut silent));
-    // Waits are steps, too, which a plan in names does not show.
+    let shortest = solve(Run::new(&by_steps, original.config, &mut silent));
+    // Waits count as steps, although decoded plans do not show them.
     let steps = match (&shortest.ground, shortest.status) {
         (Some(plan), Status::Optimal) => plan.steps.len(),
-        // The plan that there may be is measured by its steps, not by the metric: of no use to the user.
+        // A plan found by then would be optimised for its steps, not for the metric, so it is
+        // useless to the user.
         (Some(_), _) => return unknown(shortest),
         (None, _) => return Solution { lower_bound: None, ..shortest },
     };
-    // Every plan of the task with this horizon has exactly this many steps, so a constant for each step
-    // changes nothing but the sign of the costs.
-    let shifted = with_costs(asked.task, |operator| {
+    // All plans of the task within this horizon have exactly this many steps, so adding a constant
+    // to each step only changes the sign of the costs.
+    let shifted = with_costs(original.task, |operator| {
         let mut cost = operator.cost.clone();
-        // The numbers of a quantity, and so its least value, stay below `QUANTITY_LIMIT`: nothing is cut off.
+        // Numbers of a quantity, and so its minimum, stay below `QUANTITY_LIMIT`, so nothing
+        // saturates.
         cost.constant = cost.constant.saturating_sub(lowest);
         cost
     });
-    let config = Config { horizon: Some(steps), ..asked.config.clone() };
+    let config = Config { horizon: Some(steps), ..original.config.clone() };
     let mut run = Run::new(&shifted, &config, &mut silent);
-    run.statistics = asked.statistics;
+    run.statistics = original.statistics;
     let Ok(bounds) = Bounds::new(run.context()) else {
         return unknown(shortest);
     };
@@ -51,18 +54,18 @@ pub(super) fn shortest_then_best(asked: Run<'_>) -> Solution {
         Err(solution) => return *solution,
     };
     let mut best = Best { plan, lower: 0 };
-    let tightened = match run.extent(&bounds, best.plan.below(), &best) {
+    let outcome = match run.extent(&bounds, best.plan.below(), &best) {
         Ok(mut extent) => {
             extent.allowed.truncate(steps);
             within(&mut run, &bounds, &extent, &mut best, SatBudget::UNLIMITED)
         }
         Err(Interrupted) => StrategyOutcome::Interrupted,
     };
-    let is_proved = matches!(tightened, StrategyOutcome::Exhausted) && run.statistics.unchecked.is_none();
+    let is_proved = matches!(outcome, StrategyOutcome::Exhausted) && run.statistics.unchecked.is_none();
     let proof = is_proved.then_some(Proof::Sat { step_bound: steps });
     let mut plan = best.plan;
     let statistics = run.statistics;
-    let Some(by_metric) = cost(asked.task, &plan.steps) else { return unknown(shortest) };
+    let Some(by_metric) = cost(original.task, &plan.steps) else { return unknown(shortest) };
     plan.cost = by_metric;
     let unbounded = if can_repeat_reward(context, &plan.steps) {
         MetricUnbounded::Proved
@@ -81,12 +84,12 @@ pub(super) fn shortest_then_best(asked: Run<'_>) -> Solution {
     }
 }
 
-/// What is left of an answer by the number of steps where nothing is known by the metric.
+/// Solution without a result by the metric, given the solution by the number of steps.
 fn unknown(by_steps: Solution) -> Solution {
     Solution { status: Status::Unknown, plan: None, ground: None, lower_bound: None, proof: None, ..by_steps }
 }
 
-/// The same task with other costs, and a metric of their plain sum.
+/// Copy of the task with other costs and their sum as the metric.
 fn with_costs(task: &Task, cost: impl Fn(&Operator) -> Quantity<Int>) -> Task {
     let mut task = task.clone();
     for operator in &mut task.operators {
@@ -96,8 +99,9 @@ fn with_costs(task: &Task, cost: impl Fn(&Operator) -> Quantity<Int>) -> Task {
     task
 }
 
-/// Whether some action that improves the metric is applicable in a state on the way, and leaves it as it is; no if a
-/// limit is reached before one is found.
+/// Returns `true` if some action that improves the metric is applicable in a state of the plan and
+/// leaves that state unchanged, so it can be repeated without bound. Returns `false` if a limit is
+/// reached first.
 pub fn can_repeat_reward<N: TaskNumber>(context: Context<'_, N>, plan: &[GroundStep]) -> bool {
     let Context { task, limits } = context;
     let Some(states) = pass(task, &task.initial, plan) else { return false };

@@ -1,17 +1,19 @@
 //! Incremental replanning for one mission: the planner of an adaptation loop.
 //!
-//! Availability and state are assumptions, not facts \[1\]. The mission is grounded once, with every design
-//! available and without conclusions from numbers. A problem is then a state of that task (see
-//! [`state_mapping`]), and a set of available designs restricts its operators (see [`restrict_designs`]). Data
-//! that depend on that set alone (operators, pattern databases, undominated designs) are cached for recent sets,
-//! since failed components often recover. The remaining work per problem is the search, whose heuristic is exact
-//! in the projections, and the tie-breaking. The answers equal those of grounding and optimising from scratch,
-//! except that SAT does not prove them a second time.
+//! Availability and state are assumptions, not facts \[1\]. The mission is grounded once, with
+//! every design available and without conclusions from numbers. A problem is then a state of that
+//! task (see [`state_mapping`]), and a set of available designs restricts its operators (see
+//! [`restrict_designs`]). Data that depend on that set alone (operators, pattern databases,
+//! undominated designs) are cached for recent sets, since failed components often recover. The
+//! remaining work per problem is the search, whose heuristic is exact in the projections, and the
+//! tie-breaking. The answers equal those of grounding and optimising from scratch, except that SAT
+//! does not prove them a second time.
 //!
 //! The previous plan, if it is still valid, is an upper bound, and the answer if time runs out first.
 //!
-//! No SAT solver is kept with assumptions: on maps of 50 to 200 places the search takes milliseconds and a SAT
-//! proof seconds, and clauses learnt for one cost limit do not help with the next.
+//! No SAT solver is kept with assumptions: on maps of 50 to 200 places the search takes
+//! milliseconds and a SAT proof seconds, and clauses learnt for one cost limit do not help with the
+//! next.
 //!
 //! - \[1\] N. Eén, N. Sörensson: Temporal induction by incremental SAT solving, ENTCS 89(4), 2003.
 
@@ -39,27 +41,28 @@ use usage::Usage;
 
 pub use query::{FirstStep, Progress, Query, ReplanOutcome};
 
-/// Numbers of the initial state have at most so many decimals, as a power of ten.
+/// Precision of numbers of the initial state, as a power of ten.
 const PRECISION: Int = 1_000_000;
-/// For so many sets of available designs what was found out about them is kept.
+/// Number of sets of available designs whose derived data are cached.
 const MAX_CACHED_SETS: usize = 8;
 
-/// The search for what blocks a mission stores at most so many states each time: its answer is a help, and should not take longer
-/// than the plan.
+/// State limit of each search for blocking objects. Its answer is only a hint, so it must not take
+/// longer than planning.
 const BLOCKING_STATES: usize = 5_000;
 
-/// Plans for problems of one domain that differ in their state and in what is available.
+/// Incremental planner for problems of one domain that differ in state and availability.
 #[derive(Clone)]
 pub struct Replanner {
     base: Arc<GroundBase>,
-    /// The sets of available designs met last, the latest at the end.
+    /// Cached sets of available designs, least recently used first.
     sets: Vec<(Vec<Vec<ObjectId>>, Arc<AvailabilityContext>)>,
 }
 
 impl Replanner {
-    /// Grounds a problem with all that `available` says of some object taken for available. None if the domain does not lend
-    /// itself to that: where availability is asked for otherwise than as a condition of actions on their parameters, where
-    /// facts change by themselves, where there are preferences or constraints on trajectories, where actions earn something, or where the problem cannot be ground at all.
+    /// Grounds a problem with everything available that `available` can mention. Returns `None` if
+    /// the domain is unsuitable: availability is used other than as a condition of actions on their
+    /// parameters, there are timed literals, preferences or trajectory constraints, actions have
+    /// negative costs, or the problem cannot be ground.
     pub fn new(
         domain: &Domain,
         problem: &Problem,
@@ -85,12 +88,12 @@ impl Replanner {
         Some(Self { base: Arc::new(GroundBase { task, layout, requirements }), sets: Vec::new() })
     }
 
-    /// A best plan for a problem.
+    /// Computes a best plan for a problem.
     pub fn plan(&mut self, query: &Query<'_>) -> ReplanOutcome {
         self.plan_aloud(query, &mut |_| {})
     }
 
-    /// As [`Replanner::plan`], telling on the way how far the search is.
+    /// As [`Replanner::plan`], and reports the progress of the search.
     pub fn plan_aloud(&mut self, query: &Query<'_>, report: &mut dyn FnMut(Progress)) -> ReplanOutcome {
         let base = self.base.clone();
         let Some(situation) = base.layout.situation(&base.task, query.problem) else {
@@ -105,26 +108,27 @@ impl Replanner {
         solve::solve(&base, &set, &situation, query, STATE_LIMIT, report)
     }
 
-    /// The smallest part of what is not available that alone leaves no plan for an unsolvable problem: with any one of these objects
-    /// there would be one, were all others available, too. Nothing if other things are the reason; none if that could not be
-    /// found out. The deletion-based search for a minimal unsatisfiable core \[1\].
+    /// Minimal set of unavailable objects that makes an unsolvable problem unsolvable: with any one
+    /// of them available, and all objects outside the set available, there would be a plan. Empty
+    /// if availability is not the reason, and `None` if that could not be determined.
+    /// Deletion-based search for a minimal unsatisfiable core \[1\].
     ///
     /// - \[1\] J. Marques-Silva, I. Lynce: On improving MUS extraction algorithms, SAT 2011.
     pub fn blocking(&mut self, query: &Query<'_>) -> Option<Vec<String>> {
         let base = self.base.clone();
         let situation = base.layout.situation(&base.task, query.problem)?;
-        let all = base.possible();
-        let missing: Vec<(usize, ObjectId)> = (0..all.len())
-            .flat_map(|predicate| all[predicate].iter().map(move |object| (predicate, *object)))
+        let possible = base.possible();
+        let missing: Vec<(usize, ObjectId)> = (0..possible.len())
+            .flat_map(|predicate| possible[predicate].iter().map(move |object| (predicate, *object)))
             .filter(|(predicate, object)| situation.available[*predicate].binary_search(object).is_err())
             .collect();
         let mut blocking = missing.clone();
         let is_solvable = |blocked: &[(usize, ObjectId)]| {
             let open = |predicate: usize| {
                 let is_open = |object: &&ObjectId| !blocked.contains(&(predicate, **object));
-                all[predicate].iter().filter(is_open).copied().collect()
+                possible[predicate].iter().filter(is_open).copied().collect()
             };
-            let available: Vec<Vec<ObjectId>> = (0..all.len()).map(open).collect();
+            let available: Vec<Vec<ObjectId>> = (0..possible.len()).map(open).collect();
             let situation = ReplanState { available, ..situation.clone() };
             let set = base.restrict(&situation.available, query.limits).ok()?;
             match solve::solve(&base, &set, &situation, query, BLOCKING_STATES, &mut |_| {}) {
@@ -136,10 +140,11 @@ impl Replanner {
         if !is_solvable(&[])? {
             return Some(Vec::new());
         }
-        for one in &missing {
-            let rest: Vec<_> = blocking.iter().copied().filter(|other| other != one).collect();
-            if !is_solvable(&rest)? {
-                blocking = rest;
+        // An object can be dropped if the others alone still make the mission unsolvable.
+        for candidate in &missing {
+            let reduced: Vec<_> = blocking.iter().copied().filter(|object| object != candidate).collect();
+            if !is_solvable(&reduced)? {
+                blocking = reduced;
             }
         }
         let name = |(_, object): &(usize, ObjectId)| base.task.object_names[object.index()].clone();
@@ -149,25 +154,26 @@ impl Replanner {
         Some(names)
     }
 
-    /// What is known of a set of available designs, or is found out now. What was cut short by a limit is not kept.
+    /// Data for a set of available designs, cached or computed. Interrupted computations are not
+    /// cached.
     fn set(
         &mut self,
         available: &[Vec<ObjectId>],
         limits: &Limits,
     ) -> Result<Arc<AvailabilityContext>, Interrupted> {
-        let found = match self.sets.iter().position(|(known, _)| known == available) {
+        let context = match self.sets.iter().position(|(cached, _)| cached == available) {
             Some(position) => self.sets.remove(position).1,
             None => Arc::new(self.base.restrict(available, limits)?),
         };
         if self.sets.len() >= MAX_CACHED_SETS {
             self.sets.remove(0);
         }
-        self.sets.push((available.to_vec(), found.clone()));
-        Ok(found)
+        self.sets.push((available.to_vec(), context.clone()));
+        Ok(context)
     }
 }
 
-/// The problem with everything available that can be.
+/// Copy of the problem with every object available that can be.
 fn with_all(domain: &Domain, problem: &Problem, available: &[Name]) -> Problem {
     let hierarchy = TypeHierarchy::of(domain);
     let mut full = problem.clone();

@@ -7,71 +7,73 @@ use pddl::validate::Advance;
 use task::limits::Limits;
 use task::plan::Step;
 
-/// A step that a plan may begin with, whatever the operators of the task are: what is left of an action under way, with one
-/// of the configurations that it can go on with.
+/// A step that a plan may begin with, independent of the task's operators: the remaining part of a
+/// running action, with one of the configurations in which it can continue.
 #[derive(Debug, Clone)]
 pub struct FirstStep {
-    /// The function and the design chosen for it.
+    /// Functions with the designs chosen for them.
     pub configuration: Vec<(String, String)>,
-    /// All arguments; of plans that are as good the one whose arguments are declared first is chosen.
+    /// All arguments. Among equally good plans, the one whose arguments are declared first is
+    /// chosen.
     pub arguments: Vec<String>,
-    /// What the step changes.
+    /// Effects of the step.
     pub change: Advance,
-    /// The metric of the mission if it ended with the step; without a metric, 1.
+    /// Metric of the mission if it ended with this step; 1 without a metric.
     pub metric: BigRational,
 }
 
-/// What is asked for.
+/// A replanning query.
 #[derive(Debug)]
 pub struct Query<'a> {
-    /// With what is available now; of the same domain, and checked.
+    /// Problem with the current state and availability; of the same domain, and checked.
     pub problem: &'a Problem,
-    /// If there are any, plans begin with one of them.
+    /// First steps. If there are any, plans begin with one of them.
     pub first: &'a [FirstStep],
-    /// The metric of the mission if it ended now; without a metric, 0.
+    /// Metric of the mission if it ended now; 0 without a metric.
     pub metric: BigRational,
-    /// The plan at hand: names and arguments of its actions after the first step. If it is one still, nothing dearer is looked at.
+    /// Current plan: names and arguments of its actions after the first step. If it is still valid,
+    /// more expensive plans are pruned.
     pub old: Option<&'a [(String, Vec<String>)]>,
-    /// Whether of plans that are as good one with most of these actions is chosen.
+    /// Whether, among equally good plans, one with most of these actions is chosen.
     pub stay_close: bool,
-    /// When to stop.
+    /// Time and memory limits.
     pub limits: &'a Limits,
 }
 
-/// What planning has come to.
+/// Result of replanning.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ReplanOutcome {
-    /// A plan; none has a better metric: proved.
+    /// A plan that is proved optimal.
     Optimal {
-        /// Which of the first steps it begins with, if there were any.
+        /// Index of the first step, if there were any.
         first: Option<usize>,
-        /// The steps after that.
+        /// Steps after the first step.
         steps: Vec<Step>,
-        /// The metric of the whole mission.
+        /// Metric of the whole mission.
         metric: BigRational,
     },
-    /// A limit came first; the best plan known so far, which may be the old one.
+    /// A limit was reached; the best plan found, which may be the old one.
     Feasible {
-        /// Which of the first steps it begins with, if there were any.
+        /// Index of the first step, if there were any.
         first: Option<usize>,
-        /// The steps after that.
+        /// Steps after the first step.
         steps: Vec<Step>,
-        /// The metric of the whole mission.
+        /// Metric of the whole mission.
         metric: BigRational,
     },
-    /// There is no plan of any length: proved.
+    /// Proof that there is no plan of any length.
     Unsolvable,
     /// The problem differs in more than state and availability.
     Misfit,
-    /// A limit came before any plan.
+    /// A limit was reached before any plan was found.
     Unknown,
 }
 
-/// How far a search for a plan is.
+/// Progress of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Progress {
-    /// The metric of the mission with the best plan so far, if there is one.
+    /// Metric of the mission with the incumbent, if any.
     pub metric: Option<BigRational>,
-    /// No plan gives the mission a better metric.
+    /// Bound on the metric of every plan.
     pub bound: BigRational,
 }

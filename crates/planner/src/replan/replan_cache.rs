@@ -11,16 +11,16 @@ use task::task::{Argument, Task};
 use crate::replan::restrict_designs;
 use crate::replan::state_mapping::Layout;
 
-/// What holds for all problems.
+/// Data shared by all queries.
 pub(super) struct GroundBase {
-    /// With everything available.
+    /// Ground task with everything available.
     pub(super) task: Task,
     pub(super) layout: Layout,
-    /// For each schema the parameters that must be available, each with the predicate that says so.
+    /// Per schema: parameters that must be available, each with the predicate that states it.
     pub(super) requirements: Vec<Vec<(usize, usize)>>,
 }
 
-/// What holds for all states in which the same is available.
+/// Data shared by all states with the same availability.
 pub(super) struct AvailabilityContext {
     pub(super) task: Task,
     pub(super) bounds: Bounds,
@@ -29,16 +29,17 @@ pub(super) struct AvailabilityContext {
 }
 
 impl GroundBase {
-    /// The task with what is available.
+    /// Ground task restricted to the available objects.
     pub(super) fn masked(&self, available: &[Vec<ObjectId>], limits: &Limits) -> Result<Task, Interrupted> {
         let is_allowed = |schema: u32, position: usize, object: ObjectId| {
-            let mut needed = self.requirements[schema as usize].iter().filter(|(own, _)| *own == position);
-            needed.all(|(_, predicate)| available[*predicate].binary_search(&object).is_ok())
+            let mut predicates_needed =
+                self.requirements[schema as usize].iter().filter(|(parameter, _)| *parameter == position);
+            predicates_needed.all(|(_, predicate)| available[*predicate].binary_search(&object).is_ok())
         };
         restrict_designs::restrict(&self.task, &is_allowed, limits)
     }
 
-    /// What holds for all states in which this is available.
+    /// Computes the data for a set of available objects.
     pub(super) fn restrict(
         &self,
         available: &[Vec<ObjectId>],
@@ -52,27 +53,28 @@ impl GroundBase {
         Ok(AvailabilityContext { task, bounds, prepared, ties })
     }
 
-    /// For each predicate the objects that some operator needs to be available, sorted.
+    /// Per predicate: objects that some operator needs to be available, sorted.
     #[expect(clippy::arithmetic_side_effects, reason = "predicates are held in memory")]
     pub(super) fn possible(&self) -> Vec<Vec<ObjectId>> {
         let count = self.requirements.iter().flatten().map(|(_, predicate)| predicate + 1).max().unwrap_or(0);
-        let mut found = vec![Vec::new(); count];
+        let mut objects_by_predicate = vec![Vec::new(); count];
         for operator in &self.task.operators {
             for (position, predicate) in &self.requirements[operator.schema as usize] {
                 match operator.arguments[*position] {
-                    Argument::Object(object) => found[*predicate].push(object),
+                    Argument::Object(object) => objects_by_predicate[*predicate].push(object),
                     Argument::Slot(slot) => {
                         let slot = &operator.slots[slot as usize];
                         let designs = &self.task.slots[slot.slot.index()].designs;
-                        found[*predicate].extend(slot.designs.iter().map(|index| designs[*index as usize]));
+                        objects_by_predicate[*predicate]
+                            .extend(slot.designs.iter().map(|index| designs[*index as usize]));
                     }
                 }
             }
         }
-        for objects in &mut found {
+        for objects in &mut objects_by_predicate {
             objects.sort_unstable();
             objects.dedup();
         }
-        found
+        objects_by_predicate
     }
 }

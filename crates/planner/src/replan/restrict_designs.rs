@@ -1,8 +1,8 @@
 //! Restricts a task with all designs to the available ones.
 //!
-//! Operators that require an unavailable design are removed. In tables and exclusions of open slots only the
-//! rows of available designs remain. The result is the task that grounding would make of the problem with these
-//! designs, apart from operators that become unreachable.
+//! Operators that require an unavailable design are removed. In tables and exclusions of open slots
+//! only the rows of available designs remain. The result is the task that grounding would make of
+//! the problem with these designs, apart from operators that become unreachable.
 
 use std::sync::Arc;
 
@@ -14,13 +14,14 @@ use task::number::{Int, dense};
 use task::task::quantity::{Linear, Quantity, SlotSet, Table};
 use task::task::{Argument, ForbiddenCombinations, NumericEffect, Operator, SlotUse, Task};
 
-/// For each slot of an operator the positions of its designs that are left.
+/// Per slot of an operator: indices of the designs that remain.
 type KeptDesigns = Arc<[Vec<u32>]>;
 
-/// What is left of an operator's slots: which positions of the designs before, and the uses that they make.
+/// Remaining designs of an operator's slots, and the restricted slots.
 type RestrictedSlots = (KeptDesigns, Arc<[SlotUse]>);
 
-/// What operators share is made once; by where it lies, which is held by the whole task meanwhile.
+/// Cache of restricted data that operators share. Keys are addresses within the original task,
+/// which outlives the cache.
 #[derive(Default)]
 struct SharedTables {
     slots: FxHashMap<(*const SlotUse, u32), RestrictedSlots>,
@@ -28,8 +29,8 @@ struct SharedTables {
     forbidden: FxHashMap<(*const ForbiddenCombinations, *const Vec<u32>), Arc<[ForbiddenCombinations]>>,
 }
 
-/// The task with the operators for which `is_allowed` answers with yes, asked with their schema, a position among its parameters, and
-/// the object there.
+/// Copy of the task restricted to the operators whose arguments `is_allowed` accepts. It receives
+/// the schema, an index among the parameters, and the object.
 pub(super) fn restrict(
     task: &Task,
     is_allowed: &dyn Fn(u32, usize, ObjectId) -> bool,
@@ -48,7 +49,7 @@ pub(super) fn restrict(
             operators.extend(shared.operator(task, operator, &allowed));
         }
     }
-    // Everything but the operators is the same.
+    // All parts except the operators are unchanged.
     Ok(Task {
         operators,
         object_names: task.object_names.clone(),
@@ -69,7 +70,7 @@ pub(super) fn restrict(
 }
 
 impl SharedTables {
-    /// None if a slot has no design left.
+    /// Restricts an operator. Returns `None` if a slot has no remaining design.
     fn operator(
         &mut self,
         task: &Task,
@@ -80,25 +81,34 @@ impl SharedTables {
             return Some(operator.clone());
         }
         let entry = self.slots.entry((operator.slots.as_ptr(), operator.schema));
-        let (kept, slots) = entry.or_insert_with(|| left(task, operator, allowed)).clone();
-        if kept.iter().any(Vec::is_empty) {
+        let (remaining, slots) = entry.or_insert_with(|| left(task, operator, allowed)).clone();
+        if remaining.iter().any(Vec::is_empty) {
             return None;
         }
-        if kept.iter().zip(operator.slots.iter()).all(|(kept, slot)| kept.len() == slot.designs.len()) {
+        if remaining
+            .iter()
+            .zip(operator.slots.iter())
+            .all(|(designs, slot)| designs.len() == slot.designs.len())
+        {
             return Some(operator.clone());
         }
         let sizes = operator.sizes();
         let mut copy = operator.clone();
         copy.slots = slots;
-        copy.forbidden = self.forbidden(&operator.forbidden, &kept);
-        copy.cost = self.quantity(&operator.cost, &kept, &sizes);
-        copy.duration = self.quantity(&operator.duration, &kept, &sizes);
-        copy.others = operator.others.iter().map(|other| self.quantity(other, &kept, &sizes)).collect();
-        copy.condition.comparisons =
-            operator.condition.comparisons.iter().map(|linear| self.linear(linear, &kept, &sizes)).collect();
+        copy.forbidden = self.forbidden(&operator.forbidden, &remaining);
+        copy.cost = self.quantity(&operator.cost, &remaining, &sizes);
+        copy.duration = self.quantity(&operator.duration, &remaining, &sizes);
+        copy.others =
+            operator.others.iter().map(|objective| self.quantity(objective, &remaining, &sizes)).collect();
+        copy.condition.comparisons = operator
+            .condition
+            .comparisons
+            .iter()
+            .map(|linear| self.linear(linear, &remaining, &sizes))
+            .collect();
         let effects = operator.numeric_effects.iter().map(|effect| NumericEffect {
             variable: effect.variable,
-            value: self.linear(&effect.value, &kept, &sizes),
+            value: self.linear(&effect.value, &remaining, &sizes),
         });
         copy.numeric_effects = effects.collect();
         Some(copy)
@@ -130,13 +140,18 @@ impl SharedTables {
     }
 }
 
-/// What is left of an operator's slots.
+/// Remaining designs of an operator's slots.
 fn left(task: &Task, operator: &Operator, allowed: &dyn Fn(usize, ObjectId) -> bool) -> RestrictedSlots {
     let arguments = |slot: usize| {
-        let own = move |argument: &Argument| *argument == Argument::Slot(dense(slot));
-        operator.arguments.iter().enumerate().filter(move |(_, argument)| own(argument)).map(|(at, _)| at)
+        let is_in_slot = move |argument: &Argument| *argument == Argument::Slot(dense(slot));
+        operator
+            .arguments
+            .iter()
+            .enumerate()
+            .filter(move |(_, argument)| is_in_slot(argument))
+            .map(|(at, _)| at)
     };
-    let kept: KeptDesigns = operator
+    let remaining: KeptDesigns = operator
         .slots
         .iter()
         .enumerate()
@@ -148,15 +163,15 @@ fn left(task: &Task, operator: &Operator, allowed: &dyn Fn(usize, ObjectId) -> b
             (0..dense(slot.designs.len())).filter(fits).collect()
         })
         .collect();
-    let uses = operator.slots.iter().zip(kept.iter()).map(|(slot, kept)| SlotUse {
+    let uses = operator.slots.iter().zip(remaining.iter()).map(|(slot, indices)| SlotUse {
         slot: slot.slot,
-        designs: kept.iter().map(|index| slot.designs[*index as usize]).collect(),
+        designs: indices.iter().map(|index| slot.designs[*index as usize]).collect(),
     });
     let uses = uses.collect();
-    (kept, uses)
+    (remaining, uses)
 }
 
-/// The rows of a table that are left.
+/// Remaining rows of a table.
 #[expect(clippy::arithmetic_side_effects, reason = "a position in the table, which is in memory")]
 fn rows(table: &Table<Int>, kept: &KeptDesigns, sizes: &[usize]) -> Arc<[Int]> {
     let mut positions = vec![0_usize];
@@ -170,10 +185,11 @@ fn rows(table: &Table<Int>, kept: &KeptDesigns, sizes: &[usize]) -> Arc<[Int]> {
     positions.into_iter().map(|position| table.values[position]).collect()
 }
 
-/// The combinations of a rule that are still possible.
+/// Combinations of a rule that are still possible.
 fn exclusions(rule: &ForbiddenCombinations, kept: &KeptDesigns) -> ForbiddenCombinations {
-    let moved =
-        |(slot, index): (&u32, &u32)| kept[*slot as usize].iter().position(|known| known == index).map(dense);
+    let moved = |(slot, index): (&u32, &u32)| {
+        kept[*slot as usize].iter().position(|candidate| candidate == index).map(dense)
+    };
     let combination = |bad: &SlotSet| rule.slots.iter().zip(bad).map(moved).collect::<Option<SlotSet>>();
     ForbiddenCombinations {
         slots: rule.slots.clone(),

@@ -1,9 +1,9 @@
 //! Optimal replanning from a situation: one search per possible first step, then tie-breaking.
 //!
-//! The most promising first step is searched first; a step whose lower bound exceeds the best metric is skipped.
-//! Ties are broken as without first steps: fewest steps, fewest reconfigurations, model order. A plan to stay
-//! close to is kept if it is optimal; otherwise, among plans with the fewest steps, one that shares most of its
-//! steps is chosen.
+//! The most promising first step is searched first; a step whose lower bound exceeds the best
+//! metric is skipped. Ties are broken as without first steps: fewest steps, fewest
+//! reconfigurations, model order. A plan to stay close to is kept if it is optimal; otherwise,
+//! among plans with the fewest steps, one that shares most of its steps is chosen.
 
 use num_rational::BigRational;
 use rustc_hash::FxHashSet;
@@ -20,25 +20,25 @@ use crate::replan::query::{FirstStep, Progress, Query, ReplanOutcome};
 use crate::replan::replan_cache::{AvailabilityContext, GroundBase};
 use crate::replan::state_mapping::ReplanState;
 
-/// Where a plan may begin.
+/// Possible start of a plan.
 struct Start {
     first: Option<usize>,
     state: State,
-    /// The function and the design of the first step.
+    /// Functions and designs of the first step.
     designs: Vec<(ObjectId, ObjectId)>,
-    /// By the order of declaration.
+    /// Arguments of the first step, which are ordered by declaration.
     arguments: Vec<ObjectId>,
-    /// What counts for it already, less being better.
+    /// Metric before the plan begins; lower is better.
     own: BigRational,
 }
 
-/// Plans for a situation; no search stores more than so many states.
+/// Finds a best plan. Each search stores at most `max_states` states.
 pub(super) fn solve(
     base: &GroundBase,
     set: &AvailabilityContext,
     situation: &ReplanState,
     query: &Query<'_>,
-    most: usize,
+    max_states: usize,
     report: &mut dyn FnMut(Progress),
 ) -> ReplanOutcome {
     if base.task.unreachable.is_some() {
@@ -51,23 +51,28 @@ pub(super) fn solve(
     let promise = |start: Start| Some((&start.own + scale(set.bounds.estimate(&start.state)?), start));
     let mut open: Vec<(BigRational, Start)> = starts.into_iter().filter_map(promise).collect();
     open.sort_by(|left, right| left.0.cmp(&right.0).then_with(|| left.1.arguments.cmp(&right.1.arguments)));
-    let old: Vec<Option<GroundStep>> =
+    let old_steps: Vec<Option<GroundStep>> =
         query.old.iter().copied().flatten().map(|step| find(&set.task, step)).collect();
     let incumbent = |start: &Start| {
-        Some(Candidate::new(&set.task, start, old_plan(&set.task, &start.state, query, &old)?))
+        Some(Candidate::new(&set.task, start, old_plan(&set.task, &start.state, query, &old_steps)?))
     };
     let incumbents: Vec<Option<Candidate>> = open.iter().map(|(_, start)| incumbent(start)).collect();
-    let known = incumbents.iter().flatten().min_by(|left, right| left.value.cmp(&right.value)).cloned();
+    let old_candidate =
+        incumbents.iter().flatten().min_by(|left, right| left.value.cmp(&right.value)).cloned();
     let mut best: Option<(BigRational, usize)> = None;
     let mut winners: Vec<(Start, GroundPlan)> = Vec::new();
     let next = open.iter().skip(1).map(|(bound, _)| Some(bound.clone())).chain([None]);
     let next: Vec<Option<BigRational>> = next.collect();
     for (((bound, start), incumbent), next) in open.into_iter().zip(incumbents).zip(next) {
-        let least = best.iter().chain(known.iter().map(|known| &known.value)).map(|(value, _)| value).min();
+        let least = best
+            .iter()
+            .chain(old_candidate.iter().map(|candidate| &candidate.value))
+            .map(|(value, _)| value)
+            .min();
         if least.is_some_and(|least| bound > *least) {
             break;
         }
-        let limit = incumbent.map_or(Int::MAX, |known| known.plan.cost);
+        let limit = incumbent.map_or(Int::MAX, |candidate| candidate.plan.cost);
         let signed = |value: BigRational| if set.task.objective.maximize { -value } else { value };
         let least = least.cloned();
         let mut hear = |cost: Option<&Int>, bound: &Int| {
@@ -78,23 +83,24 @@ pub(super) fn solve(
             }
         };
         let space = SearchProblem { context, bounds: &set.bounds, prepared, orbits: None };
-        let found = search_from(&space, &start.state, limit, most, &mut hear);
-        let plan = match found {
+        let outcome = search_from(&space, &start.state, limit, max_states, &mut hear);
+        let plan = match outcome {
             SearchOutcome::Optimal(plan) => plan,
             SearchOutcome::None => continue,
             SearchOutcome::Unknown(plan) if query.limits.reached() => {
                 let cut_short = plan.map(|plan| Candidate::new(&set.task, &start, plan));
-                let ended = winners.into_iter().map(|(start, plan)| Candidate::new(&set.task, &start, plan));
-                let all = known.into_iter().chain(cut_short).chain(ended);
-                let least = all.min_by(|left, right| left.value.cmp(&right.value));
+                let finished =
+                    winners.into_iter().map(|(start, plan)| Candidate::new(&set.task, &start, plan));
+                let candidates = old_candidate.into_iter().chain(cut_short).chain(finished);
+                let least = candidates.min_by(|left, right| left.value.cmp(&right.value));
                 return least.map_or(ReplanOutcome::Unknown, |least| least.feasible(context));
             }
             SearchOutcome::Unknown(_) => return ReplanOutcome::Unknown,
         };
         let value = (&start.own + scale(plan.cost), plan.steps.len());
         match &best {
-            Some(known) if value > *known => continue,
-            Some(known) if value == *known => {}
+            Some(best_value) if value > *best_value => continue,
+            Some(best_value) if value == *best_value => {}
             _ => {
                 best = Some(value);
                 winners.clear();
@@ -104,12 +110,13 @@ pub(super) fn solve(
     }
     let Some((value, _)) = best else { return ReplanOutcome::Unsolvable };
     let metric = if set.task.objective.maximize { -value } else { value };
-    let close_to = if query.stay_close { old.into_iter().flatten().collect() } else { FxHashSet::default() };
+    let close_to =
+        if query.stay_close { old_steps.into_iter().flatten().collect() } else { FxHashSet::default() };
     let (first, plan) = choose(set, query, &close_to, winners);
     ReplanOutcome::Optimal { first, steps: decode(context, &plan).steps, metric }
 }
 
-/// The old plan, where it still is one: all that can be said without time to search.
+/// The old plan, if it is still valid. Used if there is no time to search.
 pub(super) fn reuse_previous_plan(
     base: &GroundBase,
     task: &Task,
@@ -117,16 +124,16 @@ pub(super) fn reuse_previous_plan(
     query: &Query<'_>,
 ) -> ReplanOutcome {
     let Some(starts) = starts(base, situation, query) else { return ReplanOutcome::Misfit };
-    let old: Vec<Option<GroundStep>> =
+    let old_steps: Vec<Option<GroundStep>> =
         query.old.iter().copied().flatten().map(|step| find(task, step)).collect();
-    let known = starts.iter().filter_map(|start| {
-        old_plan(task, &start.state, query, &old).map(|plan| Candidate::new(task, start, plan))
+    let candidates = starts.iter().filter_map(|start| {
+        old_plan(task, &start.state, query, &old_steps).map(|plan| Candidate::new(task, start, plan))
     });
-    let least = known.min_by(|left, right| left.value.cmp(&right.value));
+    let least = candidates.min_by(|left, right| left.value.cmp(&right.value));
     least.map_or(ReplanOutcome::Unknown, |least| least.feasible(Context::new(task, query.limits)))
 }
 
-/// The old plan, if it is one from a state on.
+/// The old plan, if it is valid from a state.
 fn old_plan(task: &Task, state: &State, query: &Query<'_>, old: &[Option<GroundStep>]) -> Option<GroundPlan> {
     query.old?;
     let steps: Vec<GroundStep> = old.iter().cloned().collect::<Option<_>>()?;
@@ -134,11 +141,11 @@ fn old_plan(task: &Task, state: &State, query: &Query<'_>, old: &[Option<GroundS
     Some(GroundPlan { steps, cost })
 }
 
-/// A plan that need not be the best.
+/// A plan that need not be optimal.
 #[derive(Clone)]
 struct Candidate {
     first: Option<usize>,
-    /// The metric of the mission, less being better, and its steps.
+    /// Metric of the mission (lower is better), and number of steps.
     value: (BigRational, usize),
     plan: GroundPlan,
 }
@@ -155,13 +162,13 @@ impl Candidate {
     }
 }
 
-/// Where plans may begin; none if the task is not good for that.
+/// Possible starts of plans. Returns `None` if the task is unsuitable for the query.
 fn starts(base: &GroundBase, situation: &ReplanState, query: &Query<'_>) -> Option<Vec<Start>> {
     let sign = |metric: &BigRational| if base.task.objective.maximize { -metric } else { metric.clone() };
     if query.first.is_empty() {
         let (designs, arguments) = (Vec::new(), Vec::new());
-        let (state, own) = (situation.state.clone(), sign(&query.metric));
-        return Some(vec![Start { first: None, state, designs, arguments, own }]);
+        let (state, metric) = (situation.state.clone(), sign(&query.metric));
+        return Some(vec![Start { first: None, state, designs, arguments, own: metric }]);
     }
     let start = |(index, first): (usize, &FirstStep)| {
         let pair = |(function, design): &(String, String)| {
@@ -178,7 +185,7 @@ fn starts(base: &GroundBase, situation: &ReplanState, query: &Query<'_>) -> Opti
     query.first.iter().enumerate().map(start).collect()
 }
 
-/// The chosen one among equal plans, and the first step that it begins with.
+/// Selects one of the optimal plans, and returns the first step that it begins with.
 fn choose(
     set: &AvailabilityContext,
     query: &Query<'_>,
@@ -188,16 +195,16 @@ fn choose(
     winners.sort_by(|left, right| left.0.arguments.cmp(&right.0.arguments));
     let context = Context::new(&set.task, query.limits);
     let mut chosen = None;
-    let mut most = Some((usize::MAX, usize::MAX));
+    let mut max_changes = Some((usize::MAX, usize::MAX));
     for (start, plan) in winners {
-        // One that comes later in order has to have fewer changes.
-        let Some(limit) = most else { break };
+        // A later candidate is chosen only if it has fewer changes.
+        let Some(limit) = max_changes else { break };
         let beginning = plan_tiebreak::PlanPrefix { state: &start.state, designs: &start.designs, close_to };
         let (plan, changes) =
             plan_tiebreak::choose_from((context, &set.bounds, &set.ties), plan, limit, &beginning);
-        most = match changes {
+        max_changes = match changes {
             Some(changes) => fewer(changes),
-            None => most,
+            None => max_changes,
         };
         if chosen.is_none() || changes.is_some() {
             chosen = Some((start.first, plan));
@@ -206,7 +213,7 @@ fn choose(
     chosen.unwrap_or((None, GroundPlan { steps: Vec::new(), cost: 0 }))
 }
 
-/// The most changes that are fewer than these.
+/// Greatest value below the given number of changes.
 #[expect(clippy::arithmetic_side_effects, reason = "those that are 0 are told apart")]
 fn fewer((departures, reconfigurations): plan_tiebreak::Changes) -> Option<plan_tiebreak::Changes> {
     match (departures, reconfigurations) {
@@ -216,7 +223,7 @@ fn fewer((departures, reconfigurations): plan_tiebreak::Changes) -> Option<plan_
     }
 }
 
-/// A step of a plan in names, if the task still has it.
+/// Step of the task for an action given by names, if it still exists.
 fn find(task: &Task, (action, arguments): &(String, Vec<String>)) -> Option<GroundStep> {
     let same = |object: ObjectId, name: &String| task.object_names[object.index()].eq_ignore_ascii_case(name);
     for (operator, id) in task.operators.iter().zip((0..).map(task::task::OperatorId)) {

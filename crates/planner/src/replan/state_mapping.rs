@@ -1,4 +1,5 @@
-//! Maps a problem to a state of a task that was grounded for another problem, if both have the same operators.
+//! Maps a problem to a state of a task that was grounded for another problem, if both have the same
+//! operators.
 //!
 //! Two problems of one domain have the same operators if they differ in three respects only: availability,
 //! numbers that actions change, and facts that actions change and for which the task has variables. The facts
@@ -16,37 +17,38 @@ use crate::replan::usage::{Usage, key};
 use pddl::ast::{Atom, InitialElement, Name, Problem};
 use pddl::validate::Advance;
 
-/// What facts and values of problems are in a task.
+/// Mapping of the facts and values of problems to the task.
 #[derive(Debug)]
 pub(super) struct Layout {
     usage: Usage,
-    /// The predicates that say what is available, all with one argument.
+    /// Predicates that state availability, all with one parameter.
     assumed: Vec<Name>,
     objects: FxHashMap<String, ObjectId>,
-    /// What the problem was beside its initial state.
+    /// The problem without its initial state, as text.
     frame: String,
-    /// Facts with a variable; the flag says whether relaxed reachability has met it.
+    /// Facts with a variable, and whether relaxed reachability has reached them.
     facts: FxHashMap<String, (Fact, bool)>,
     numbers: FxHashMap<String, usize>,
     scale: BigRational,
-    /// Facts that must hold, by position.
+    /// Static facts that must hold, with dense indices.
     fixed: FxHashMap<String, usize>,
-    /// Values that must be the same, by position.
+    /// Static values that must be unchanged, with dense indices.
     values: FxHashMap<String, (usize, BigRational)>,
     /// A state in which no fact holds.
     nothing: Vec<u32>,
 }
 
-/// A state of the task, and what is available.
+/// A state of the task, and the available objects.
 #[derive(Debug, Clone)]
 pub(super) struct ReplanState {
     pub(super) state: State,
-    /// For each predicate the objects that are available, sorted.
+    /// Per predicate: available objects, sorted.
     pub(super) available: Vec<Vec<ObjectId>>,
 }
 
 impl Layout {
-    /// What a problem is in the task that was made of it with everything available.
+    /// Computes the mapping from a problem to the task that was grounded from it with everything
+    /// available.
     #[expect(clippy::arithmetic_side_effects, reason = "every variable has a value")]
     pub(super) fn new(usage: Usage, assumed: &[Name], problem: &Problem, task: &Task) -> Self {
         let names = task.object_names.iter().map(|name| name.to_ascii_lowercase());
@@ -85,20 +87,20 @@ impl Layout {
         layout
     }
 
-    /// Whether a fact without a variable must be as it was.
+    /// Returns `true` if a fact without a variable must be unchanged.
     fn matters(&self, atom: &Atom, key: &str) -> bool {
         let predicate = &atom.predicate.name;
         !self.assumed.contains(predicate)
             && (!self.usage.is_changed(predicate) || self.usage.is_read(predicate, key))
     }
 
-    /// Whether a value without a variable must be as it was.
+    /// Returns `true` if a value without a variable must be unchanged.
     fn value_matters(&self, function: &Atom) -> bool {
         let name = &function.predicate.name;
         !self.usage.is_changed(name) || self.usage.is_function_read(name)
     }
 
-    /// The situation that a problem describes; none if the task is not good for it.
+    /// State that a problem describes. Returns `None` if the task is unsuitable for it.
     pub(super) fn situation(&self, task: &Task, problem: &Problem) -> Option<ReplanState> {
         if frame(problem) != self.frame {
             return None;
@@ -114,7 +116,7 @@ impl Layout {
         for element in &problem.init {
             self.read(element, &mut reading)?;
         }
-        let is_complete = reading.fixed.iter().chain(&reading.fixed_values).all(|seen| *seen);
+        let is_complete = reading.fixed.iter().chain(&reading.fixed_values).all(|is_present| *is_present);
         let numbers = reading.numbers.into_iter().collect::<Option<Vec<Int>>>()?;
         let mut state = State { values: reading.values, numbers };
         if !respects_exclusion(task, &state) {
@@ -147,9 +149,9 @@ impl Layout {
                 let key = key(function);
                 if let Some(position) = self.numbers.get(&key) {
                     reading.numbers[*position] = Some(self.integer(value)?);
-                } else if let Some((position, known)) = self.values.get(&key) {
+                } else if let Some((position, expected)) = self.values.get(&key) {
                     reading.fixed_values[*position] = true;
-                    return (known == value).then_some(());
+                    return (expected == value).then_some(());
                 } else if self.value_matters(function) {
                     return None;
                 }
@@ -160,7 +162,8 @@ impl Layout {
         Some(())
     }
 
-    /// A fact holds; two that exclude each other do not.
+    /// Sets a fact. Returns `None` if it contradicts another fact of its variable or is
+    /// unreachable.
     fn set(&self, values: &mut [u32], fact: Fact, is_reached: bool) -> Option<()> {
         let value = &mut values[fact.variable.index()];
         let is_free = *value == self.nothing[fact.variable.index()] || *value == fact.value;
@@ -173,7 +176,7 @@ impl Layout {
         scaled.is_integer().then(|| scaled.to_integer().to_i128()).flatten()
     }
 
-    /// The state after a step; none if it changes what must be as it was.
+    /// State after a step. Returns `None` if the step changes parts that must be unchanged.
     pub(super) fn advance(&self, task: &Task, state: &State, step: &Advance) -> Option<State> {
         let mut next = state.clone();
         for atom in &step.deleted {
@@ -211,28 +214,28 @@ impl Layout {
         Some(next)
     }
 
-    /// Objects by their names in small letters.
+    /// Object with this name, ignoring case.
     pub(super) fn object(&self, name: &str) -> Option<ObjectId> {
         self.objects.get(&name.to_ascii_lowercase()).copied()
     }
 }
 
-/// Whether no two facts hold of which the operators take for granted that at most one does.
+/// Returns `true` if the state satisfies the mutex groups that the operators rely on.
 fn respects_exclusion(task: &Task, state: &State) -> bool {
     task.exclusive.iter().all(|group| group.iter().filter(|fact| fact.holds(&state.values)).count() <= 1)
 }
 
-/// What is read of a problem.
+/// Contents of an initial state while it is read.
 struct Reading {
     values: Vec<u32>,
     numbers: Vec<Option<Int>>,
     available: Vec<Vec<ObjectId>>,
-    /// By position, whether it holds.
+    /// Per static fact: whether it holds.
     fixed: Vec<bool>,
     fixed_values: Vec<bool>,
 }
 
-/// All of a problem but its initial state, as text.
+/// All parts of a problem except its initial state, as text.
 fn frame(problem: &Problem) -> String {
     use std::fmt::Write as _;
     let mut text = String::new();
@@ -244,12 +247,13 @@ fn frame(problem: &Problem) -> String {
         }
         text.push(' ');
     }
-    // Places belong to it: a text that stands elsewhere counts as another one, which costs time and is not a mistake.
+    // Source positions are included. A text with other positions counts as different, which costs
+    // time but is harmless.
     let _ = write!(text, "{:?} {:?}", problem.goal, problem.metric);
     text
 }
 
-/// The facts that basic variables stand for, and whether they hold initially or are an effect of some operator.
+/// Facts of basic variables, and whether they hold initially or are effects of some operator.
 fn facts(task: &Task) -> FxHashMap<String, (Fact, bool)> {
     let mut reached: FxHashSet<Fact> = FxHashSet::default();
     for operator in &task.operators {

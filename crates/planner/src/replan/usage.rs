@@ -6,7 +6,7 @@ use rustc_hash::FxHashSet;
 
 use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Effect, Expression, Name, Problem, Term};
 
-/// What symbols are used for.
+/// Uses of symbols.
 #[derive(Debug, Default)]
 pub(super) struct Usage {
     /// Predicates that conditions of actions and effects, axioms, or quantifiers of the goal read.
@@ -33,17 +33,17 @@ impl Usage {
         usage
     }
 
-    /// Whether effects or axioms change a predicate or function.
+    /// Returns `true` if effects or axioms change a predicate or function.
     pub(super) fn is_changed(&self, name: &Name) -> bool {
         self.changed.contains(name)
     }
 
-    /// Whether anything asks for an atom.
+    /// Returns `true` if a condition reads an atom.
     pub(super) fn is_read(&self, predicate: &Name, key: &str) -> bool {
         self.read.contains(predicate) || self.goal.contains(key)
     }
 
-    /// Whether anything but the metric asks for a function.
+    /// Returns `true` if any part other than the metric reads a function.
     pub(super) fn is_function_read(&self, function: &Name) -> bool {
         self.functions.contains(function)
     }
@@ -68,7 +68,8 @@ impl Usage {
         }
     }
 
-    /// `is_ground`: of atoms without variables only these very atoms are read.
+    /// Collects the symbols of a condition. If `is_ground`, only the very atoms that occur without
+    /// variables count as read.
     fn condition(&mut self, condition: &Condition, is_ground: bool) {
         match condition {
             Condition::And(parts) | Condition::Or(parts) => {
@@ -125,7 +126,7 @@ impl Usage {
     }
 }
 
-/// An atom as text, however it is spelt: `(robot_at wp1)`.
+/// Canonical text of an atom in lower case: `(robot_at wp1)`.
 pub(super) fn key(atom: &Atom) -> String {
     let mut text = String::with_capacity(32);
     text.push('(');
@@ -139,22 +140,22 @@ pub(super) fn key(atom: &Atom) -> String {
     text
 }
 
-/// The name of a variable or constant.
+/// Name of a variable or constant.
 pub(super) fn identifier(term: &Term) -> &Name {
     match term {
         Term::Variable(identifier) | Term::Constant(identifier) => &identifier.name,
     }
 }
 
-/// For each action the parameters that must be available, by position, each with the predicate that says so, by position
-/// among `predicates`. None if one of the predicates is used otherwise: then a task in which more is available has
-/// not all operators of one in which less is.
+/// Per action: indices of the parameters that must be available, each with the index of the
+/// predicate that states it. Returns `None` if a predicate is used in another way, because then
+/// more availability need not mean more operators.
 #[expect(clippy::arithmetic_side_effects, reason = "occurrences in a text in memory")]
 pub(super) fn requirements(domain: &Domain, predicates: &[Name]) -> Option<Vec<Vec<(usize, usize)>>> {
-    let mut found = Vec::new();
+    let mut requirements = Vec::new();
     let mut mentions = 0;
     for action in &domain.actions {
-        let mut own = Vec::new();
+        let mut parameters = Vec::new();
         let conditions: Vec<&Condition> = match &action.body {
             ActionBody::Instantaneous { precondition, .. } => vec![precondition],
             ActionBody::Durative { conditions, .. } => conditions.iter().map(|(_, part)| part).collect(),
@@ -164,17 +165,17 @@ pub(super) fn requirements(domain: &Domain, predicates: &[Name]) -> Option<Vec<V
                 continue;
             };
             let [Term::Variable(variable)] = atom.arguments.as_slice() else { return None };
-            let is_own = |parameter: &pddl::ast::TypedName| parameter.identifier.name == variable.name;
-            own.push((action.parameters.iter().position(is_own)?, predicate));
+            let is_variable = |parameter: &pddl::ast::TypedName| parameter.identifier.name == variable.name;
+            parameters.push((action.parameters.iter().position(is_variable)?, predicate));
             mentions += 1;
         }
-        found.push(own);
+        requirements.push(parameters);
     }
-    let all: usize = predicates.iter().map(|predicate| occurrences(domain, predicate)).sum();
-    (all == mentions).then_some(found)
+    let total: usize = predicates.iter().map(|predicate| occurrences(domain, predicate)).sum();
+    (total == mentions).then_some(requirements)
 }
 
-/// The atoms of a conjunction.
+/// Atoms of a conjunction.
 fn conjuncts(condition: &Condition) -> Vec<&Atom> {
     match condition {
         Condition::And(parts) => parts.iter().flat_map(conjuncts).collect(),
@@ -183,7 +184,7 @@ fn conjuncts(condition: &Condition) -> Vec<&Atom> {
     }
 }
 
-/// How often conditions and effects of a domain mention a predicate.
+/// Number of occurrences of a predicate in conditions and effects of a domain.
 #[expect(clippy::arithmetic_side_effects, reason = "occurrences in a text in memory")]
 fn occurrences(domain: &Domain, predicate: &Name) -> usize {
     let bodies = domain.actions.iter().map(|action| match &action.body {
@@ -201,7 +202,7 @@ fn occurrences(domain: &Domain, predicate: &Name) -> usize {
     bodies.chain(derived).sum()
 }
 
-/// How often a condition mentions a predicate.
+/// Number of occurrences of a predicate in a condition.
 #[expect(clippy::arithmetic_side_effects, reason = "occurrences in a text in memory")]
 pub(super) fn in_condition(condition: &Condition, predicate: &Name) -> usize {
     match condition {

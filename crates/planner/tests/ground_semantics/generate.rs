@@ -1,4 +1,4 @@
-//! Bytes to a lifted task, so that whatever produces bytes (a property test, a fuzzer) produces tasks.
+//! Decodes bytes into a lifted task, so that every source of bytes (property test, fuzzer) generates tasks.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,7 +10,7 @@ use crate::ground_semantics::model::{
     Range, STATICS, Sign, TOTAL_COST, Task, Term, UPPER, Way,
 };
 
-/// What generated tasks may contain.
+/// Constructs that generated tasks may contain.
 #[expect(clippy::struct_excessive_bools, reason = "switches that have nothing to do with each other")]
 #[derive(Debug, Clone, Copy)]
 pub struct Features {
@@ -41,7 +41,7 @@ pub const ALL: Features = Features {
     nonlinear: true,
 };
 
-/// What the planner takes.
+/// Constructs that the planner supports.
 pub const PLANNED: Features = Features {
     conditional: true,
     derived: true,
@@ -57,11 +57,11 @@ pub const PLANNED: Features = Features {
 pub struct Draw<'b> {
     bytes: &'b [u8],
     features: Features,
-    /// Whether expressions over what never changes may be undefined.
+    /// Whether static expressions may be undefined.
     partial: bool,
 }
 
-/// Which derived predicates a condition may use.
+/// Derived predicates that a condition may use.
 #[derive(Debug, Clone, Copy)]
 struct Allowed {
     /// Anywhere.
@@ -265,7 +265,7 @@ impl<'b> Draw<'b> {
         match self.below(3) {
             0 => Effect::And(self.some(0, 2, |this| this.effect(depth, nesting - 1, duration))),
             1 if self.features.conditional => {
-                // Nobody executes an action for which it is undefined what it does.
+                // An action with an undefined effect is not applicable.
                 let numeric = self.features.undefined || !self.partial;
                 let condition = self.condition_over(depth, 2, duration, numeric);
                 Effect::When(condition, Box::new(self.effect(depth, nesting - 1, duration)))
@@ -393,7 +393,7 @@ impl<'b> Draw<'b> {
                 (Number::new(this.below(12) as i128, 2), this.atom(&basic), this.chance(50))
             });
             timed.sort_by_key(|(time, ..)| *time);
-            // Which of two opposite literals of one time wins is nobody's business.
+            // The language does not define which of two opposite literals at one time wins.
             timed.dedup_by_key(|(time, ..)| *time);
         }
         Task {

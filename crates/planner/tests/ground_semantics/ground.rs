@@ -1,5 +1,5 @@
-//! The ground task beside the interpreter: from state to state, the same actions can be executed, the same atoms hold,
-//! the goal is reached in the same states, and the metric is the same.
+//! The ground task against the interpreter: from state to state, the same actions can be executed,
+//! the same atoms hold, the goal is reached in the same states, and the metric is the same.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,13 +9,13 @@ use pddl::ast::{Domain, Problem};
 use crate::ground_semantics::interpret::{State, choices};
 use crate::ground_semantics::model::{Action, Expression, Number, OBJECTS, Sign, Task, fact_text};
 
-/// How many pairs of states are compared.
+/// Number of pairs of states that are compared.
 const LIMIT: usize = 60;
 
 /// States with numbers beyond are not followed: exact integers end somewhere.
 const LARGE: i128 = 100_000;
 
-/// The codes of what the planner may refuse: a construct, a product of fluents, numbers that are too large.
+/// Codes of admitted rejections: a construct, a product of fluents, numbers that are too large.
 const REFUSALS: [&str; 3] = ["E301", "E303", "E304"];
 
 /// Whether the metric rewards time.
@@ -33,7 +33,8 @@ fn rewards_time(task: &Task) -> bool {
     if *maximize { sum > zero } else { sum < zero }
 }
 
-/// How long an action takes: what the only equation says, and otherwise the only bound that the metric makes it take.
+/// Duration of an action: the value of its only equation, or else the only bound that is optimal
+/// for the metric.
 fn duration(task: &Task, action: &Action, scope: &[usize], state: &State) -> Option<Number> {
     let bounds = action.duration.as_ref()?;
     let among = |signs: &[Sign]| {
@@ -55,7 +56,7 @@ fn after(task: &Task, state: &State, index: usize, objects: Vec<usize>) -> Optio
     state.after(task, &(index, objects, duration))
 }
 
-/// Looks for a state of the lifted task in which the goal holds.
+/// Searches for a state of the lifted task in which the goal holds.
 fn goal_is_out_of_reach(task: &Task) {
     let mut open = vec![State::initial(task)];
     let mut next = 0;
@@ -79,11 +80,12 @@ fn is_small(state: &State) -> bool {
 struct Pair {
     lifted: State,
     ground: TaskState,
-    /// How many actions led here; nothing where some of them are not in the ground task, so that their costs are unknown.
+    /// Number of actions from the initial state. `None` if some of them are not in the ground task,
+    /// so that their costs are unknown.
     steps: Option<usize>,
 }
 
-/// Compares as many states as the limit allows; nothing if the task is refused.
+/// Compares states up to the limit. Returns `None` if the task is rejected.
 pub fn check(task: &Task, (domain, problem): &(Domain, Problem)) -> Option<usize> {
     let context = || format!("{}\n{}", task.domain(), task.problem());
     let ground = match ground(domain, problem, &GroundConfig::default()) {
@@ -134,7 +136,8 @@ pub fn check(task: &Task, (domain, problem): &(Domain, Problem)) -> Option<usize
                 let after = after(task, &lifted, index, objects);
                 let pair = match (after, transitions.remove(&key)) {
                     (Some(after), Some(ground)) => (after, ground, steps.map(|steps| steps + 1)),
-                    // Left out where it changes nothing that matters; of one with conditional effects, such a case.
+                    // Left out where it changes nothing that matters; of one with conditional
+                    // effects, such a case.
                     (Some(after), None) if !actions.contains(&key) || action.is_conditional() => {
                         (after, state.clone(), None)
                     }

@@ -1,11 +1,12 @@
-//! When two happenings interfere: one writes what the other reads, or both write the same in ways that do not go together.
+//! Interference of happenings: one writes an atom or number that the other reads, or both write it
+//! and do not commute.
 
 use std::collections::BTreeSet;
 
 use crate::ground_semantics::interpret::{Change, Changes, objects, with};
 use crate::ground_semantics::model::{Atom, DERIVED, Effect, Expression, Formula, PREDICATES, Task, UPPER};
 
-/// What a happening reads and writes.
+/// Read and write sets of a happening.
 #[derive(Debug, Default)]
 pub struct Touch {
     facts: BTreeSet<Atom>,
@@ -16,7 +17,7 @@ pub struct Touch {
     functions: BTreeSet<usize>,
     pub added: BTreeSet<Atom>,
     pub deleted: BTreeSet<Atom>,
-    /// How each number changes: assigned, added to, or scaled.
+    /// Changed numbers with the kind of change: assign, add, or scale.
     changed: BTreeSet<(Atom, u8)>,
 }
 
@@ -94,14 +95,14 @@ impl Touch {
         }
     }
 
-    /// Everything that a derived predicate depends on, whatever the objects are.
+    /// Everything that a derived predicate depends on, for all objects.
     fn below(&mut self, task: &Task, predicate: usize) {
         if !self.predicates.insert(predicate) {
             return;
         }
         for (_, body) in task.axioms.iter().filter(|(head, _)| *head == predicate) {
             let mut inner = Self { predicates: self.predicates.clone(), ..Self::default() };
-            // Its variables stand for any objects: the predicates and functions are all that matters.
+            // Variables may denote any object, so only the predicates and functions matter.
             inner.reads_of_formula(task, body, &vec![0; PREDICATES[predicate].1]);
             self.functions.extend(inner.values.iter().map(|(function, _)| *function));
             self.functions.extend(inner.functions);
@@ -125,7 +126,8 @@ impl Touch {
         }));
     }
 
-    /// Whether this writes what the other one reads, or both write in ways that do not go together.
+    /// Returns `true` if this happening writes an atom or number that `other` reads, or both write
+    /// it and do not commute.
     pub fn disturbs(&self, other: &Self) -> bool {
         let is_read = |atom: &Atom| other.facts.contains(atom) || other.predicates.contains(&atom.0);
         let is_read_number = |atom: &Atom| other.values.contains(atom) || other.functions.contains(&atom.0);

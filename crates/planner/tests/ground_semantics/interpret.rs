@@ -1,4 +1,4 @@
-//! The meaning of a lifted task, as plainly as it can be said: nothing is compiled, indexed or remembered.
+//! Reference interpreter of lifted tasks: direct evaluation without compilation, indices or caches.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,13 +9,13 @@ use crate::ground_semantics::model::{
     Action, Atom, DERIVED, Effect, Expression, Formula, Number, PREDICATES, Task, Term, UPPER, Way,
 };
 
-/// What holds, what functions are worth, and how much time has passed.
+/// A state: true atoms, values of functions, and elapsed time.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct State {
     pub facts: BTreeSet<Atom>,
     pub values: BTreeMap<Atom, Number>,
     pub time: Number,
-    /// How many timed literals have taken place.
+    /// Number of timed literals that have taken place.
     timed: usize,
 }
 
@@ -41,7 +41,7 @@ fn disjunction(parts: impl Iterator<Item = Truth>) -> Truth {
     negation(conjunction(parts.map(negation)))
 }
 
-/// A state with what follows in it, and the variables around a condition.
+/// A state with its derived atoms, and the variables in scope of a condition.
 struct View<'a> {
     state: &'a State,
     derived: BTreeSet<Atom>,
@@ -142,7 +142,7 @@ impl<'a> View<'a> {
         })
     }
 
-    /// Notes what an effect changes; nothing where that is undefined or contradicts another change.
+    /// Collects the changes of an effect. Returns `None` if they are undefined or contradict another change.
     fn collect(&self, effect: &Effect, scope: &[usize], changes: &mut Changes) -> Option<()> {
         match effect {
             Effect::And(parts) => parts.iter().try_for_each(|part| self.collect(part, scope, changes))?,
@@ -207,7 +207,7 @@ impl Changes {
     }
 }
 
-/// The start or the end of an action: its condition, its effects, and what bounds its duration.
+/// The start or the end of an action: its condition, its effects, and the bounds of its duration.
 type Half<'a> = (&'a Formula, &'a [Effect], Vec<&'a Expression>);
 
 impl State {
@@ -279,12 +279,13 @@ impl State {
         exact.or(stated).filter(|duration| *duration >= Ratio::from_integer(0))
     }
 
-    /// What an expression over functions is worth here.
+    /// Value of an expression over functions in this state.
     pub fn value(&self, task: &Task, expression: &Expression, scope: &[usize]) -> Option<Number> {
         View::new(task, self, None).value(expression, scope)
     }
 
-    /// The state after a happening: all its effects read this state, and neither its halves nor an event of its time interfere with it.
+    /// The state after a happening: all its effects read this state, and neither its halves nor an
+    /// event of its time interfere with it.
     fn happen(
         &self,
         task: &Task,
@@ -378,7 +379,7 @@ impl State {
         Some(state)
     }
 
-    /// What holds and what follows from it.
+    /// True atoms, including derived ones.
     pub fn all_facts(&self, task: &Task) -> BTreeSet<Atom> {
         let derived = View::new(task, self, None).derived;
         self.facts.iter().cloned().chain(derived).collect()
@@ -388,7 +389,7 @@ impl State {
         View::new(task, self, None).holds(&task.goal, &[])
     }
 
-    /// What the metric is worth in this state; without a metric nothing.
+    /// Value of the metric in this state. Returns `None` without a metric.
     pub fn metric(&self, task: &Task) -> Option<Number> {
         let (_, value) = task.metric.as_ref()?;
         View::new(task, self, None).value(value, &[])

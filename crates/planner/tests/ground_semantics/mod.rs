@@ -1,5 +1,5 @@
-//! Random lifted tasks with all that the language has, against an interpreter that shares nothing with the library:
-//! printing and reading, the validator, and the ground task.
+//! Random lifted tasks with all that the language has, against an interpreter that shares nothing
+//! with the library: printing and reading, the validator, and the ground task.
 
 mod generate;
 mod ground;
@@ -74,7 +74,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 100, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn the_ground_task_does_what_the_lifted_task_does(bytes in bytes()) {
+    fn the_ground_task_behaves_like_the_lifted_task(bytes in bytes()) {
         check_ground(&bytes);
     }
 }
@@ -84,7 +84,7 @@ proptest! {
 
     #[test]
     #[ignore = "takes minutes"]
-    fn many_ground_tasks_do_what_the_lifted_tasks_do(bytes in bytes()) {
+    fn many_ground_tasks_behave_like_the_lifted_tasks(bytes in bytes()) {
         check_ground(&bytes);
     }
 }

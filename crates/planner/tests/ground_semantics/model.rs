@@ -1,7 +1,8 @@
-//! A small lifted task as plain data, and the PDDL text that says the same.
+//! A small lifted task as plain data, and its PDDL text.
 //!
-//! Three objects, a few predicates and functions of fixed names; whatever varies is in the actions, axioms, goal and
-//! initial state. A variable is the number of quantifiers and parameters around the one that binds it.
+//! Three objects, a few predicates and functions of fixed names; whatever varies is in the actions,
+//! axioms, goal and initial state. A variable is the number of quantifiers and parameters around
+//! the one that binds it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -24,7 +25,7 @@ pub const FLUENTS: [usize; 3] = [0, 1, 2];
 pub const STATICS: [usize; 2] = [3, 4];
 /// The predicates that follow, positively, from fluents and from each other.
 pub const DERIVED: [usize; 2] = [5, 6];
-/// A predicate that follows from all others, also from what is not.
+/// A derived predicate that may depend on all others, also negatively.
 pub const UPPER: usize = 7;
 
 /// A function: its name and its number of arguments.
@@ -36,7 +37,7 @@ pub const TOTAL_COST: usize = 2;
 /// The functions that only the initial state sets.
 pub const CONSTANT: [usize; 2] = [3, 4];
 
-/// What a variable ranges over.
+/// Range of a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Range {
     Object,
@@ -327,7 +328,7 @@ pub fn function_text((function, arguments): &Atom) -> String {
     ground_text(FUNCTIONS[*function].0, arguments)
 }
 
-/// So many variables of any type.
+/// Declaration of `arity` variables of any type.
 fn objects_of(arity: usize) -> String {
     join(&(0..arity).collect::<Vec<_>>(), |at| format!("?v{at} - object"))
 }

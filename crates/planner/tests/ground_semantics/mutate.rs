@@ -1,12 +1,12 @@
-//! A task to a plan that is valid, because the goal is made of what it achieves, and to plans that differ from it in
-//! one place. The validator has to reject those that the interpreter rejects.
+//! Generates a valid plan of a task, by deriving the goal from its final state, and plans that
+//! differ from it in one place. The validator must reject the plans that the interpreter rejects.
 
 use crate::ground_semantics::generate::Draw;
 use crate::ground_semantics::interpret::{State, Step, choices};
 use crate::ground_semantics::model::{Action, Atom, Expression, Formula, Number, Sign, Task, Term};
 use crate::ground_semantics::text;
 
-/// How many changed plans there are for each valid one.
+/// Number of changed plans per valid plan.
 const CHANGES: usize = 8;
 
 fn needs_duration(action: &Action) -> bool {
@@ -41,7 +41,7 @@ fn walk(draw: &mut Draw<'_>, task: &Task) -> (Vec<Step>, State) {
     for _ in 0..=draw.below(4) {
         let executable = steps.iter().filter_map(|step| Some((step, state.after(task, step)?)));
         let mut executable: Vec<_> = executable.collect();
-        // Most instances change nothing; a plan of those stays valid whatever is changed in it.
+        // Most instances have no effect; a plan of such instances stays valid after any change.
         if executable.iter().any(|(_, after)| after.facts != state.facts) {
             executable.retain(|(_, after)| after.facts != state.facts);
         }

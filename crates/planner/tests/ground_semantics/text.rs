@@ -1,5 +1,5 @@
-//! What is generated reads without errors, and printing and reading it gives the same tree; a plan is judged by the
-//! validator as the interpreter judges it.
+//! Generated files are read without errors, and printing and reading them gives the same tree; a
+//! plan is judged by the validator as the interpreter judges it.
 
 use pddl::ast::{Domain, Problem};
 use pddl::validate::{Options, PlanText, validate};
@@ -50,7 +50,7 @@ fn step_text((action, objects, duration): &Step) -> String {
     format!("(a{action} {}){duration}\n", objects.join(" "))
 }
 
-/// The number of the first step that cannot be executed, 0 for the goal, and otherwise the last state.
+/// Number of the first inapplicable step (0 for the goal), or the final state of a valid plan.
 fn interpret(task: &Task, plan: &[Step]) -> Result<State, usize> {
     let mut state = State::initial(task);
     for (number, step) in plan.iter().enumerate() {

@@ -1,8 +1,10 @@
-//! Certificates as a faulty grounder would write them: operators, effects, conditions and numbers of the ground task are changed,
-//! the witness with them. Whatever the comparison with the files still accepts proves nothing that is false of them.
+//! Certificates as a faulty grounder would write them: operators, effects, conditions and numbers
+//! of the ground task are changed, the witness with them. Whatever the comparison with the files
+//! still accepts proves nothing that is false of them.
 //!
-//! The judge is a search of its own over the written task, from what `metaplan-task/1` says of it: a task that has no plan, or a dearer
-//! one, although the files have one for the known least cost, must not be accepted.
+//! The judge is a search of its own over the written task, from what `metaplan-task/1` says of it:
+//! a task that has no plan, or a more expensive one, although the files have one for the known
+//! least cost, must not be accepted.
 
 mod search;
 mod tasks;
@@ -17,7 +19,7 @@ use serde_json::{Value, json};
 use search::{Best, optimum};
 use tasks::{Example, TASKS};
 
-/// Of the changes of one task about so many are tried, and all that leave out an operator or change a cost.
+/// Approximate number of mutants tried per task, in addition to all that omit an operator or change a cost.
 const MUTANTS: usize = 300;
 
 fn files(example: &Example) -> (Domain, Problem) {
@@ -71,7 +73,7 @@ fn true_certificates_are_accepted() {
     }
 }
 
-/// Every place in a document at which something can be changed, with what it becomes.
+/// All changes that can be made in a document: place and new value.
 fn changes(value: &Value, path: &str, found: &mut Vec<(String, Option<Value>)>) {
     match value {
         Value::Array(elements) => {
@@ -124,7 +126,7 @@ fn lies(example: &Example, task: &str) -> bool {
         Some(Best::Cost(cost)) if example.problem.contains("maximize") => cost < truth,
         Some(Best::Cost(cost)) => cost > truth,
         Some(Best::NoPlan) => true,
-        // It is none, or too large to tell.
+        // The mutant is no valid task, or too large to decide.
         None => false,
     }
 }
@@ -165,7 +167,8 @@ fn no_change_of_the_task_makes_a_false_claim_verified() {
     assert!(count.lies >= 200 && count.harmless >= 100, "{count:?}");
 }
 
-/// Borders and starts that are a moment, half a unit or a unit of time early or late, and events that are forgotten in part.
+/// Borders and starts that are a moment, half a unit or a unit of time early or late, and events
+/// that are forgotten in part.
 #[test]
 fn no_shift_of_a_time_makes_a_false_claim_verified() {
     let mut count = Count::default();
@@ -224,9 +227,9 @@ fn no_change_of_the_witness_hides_that_an_operator_is_missing() {
     assert!(count.lies >= 200, "{count:?}");
 }
 
-/// What goes wrong has a cause of its own, and is not read from a text.
+/// Each difference is reported by its own cause, not only by a text.
 #[test]
-fn differences_are_told_apart() {
+fn each_difference_has_its_own_cause() {
     let example = TASKS.iter().find(|example| example.name == "ways").expect("the example");
     let (certificate, witness) = certified(example);
     let task: Value = serde_json::from_str(&certificate.task).expect("JSON");
@@ -252,8 +255,8 @@ fn differences_are_told_apart() {
     assert!(matches!(found, Faithful::No(Difference::Form { .. })), "{found:?}");
 }
 
-/// What grounders have lost in the field: an instance one of whose cases contradicts itself, and one whose condition is a product of
-/// decimals.
+/// Instances that grounders have lost in practice: one of whose cases contradicts itself, and one
+/// whose condition is a product of decimals.
 const FIELD: [(&str, &str, &str); 4] = [
     (
         "a",
@@ -291,7 +294,7 @@ const FIELD: [(&str, &str, &str); 4] = [
 ];
 
 #[test]
-fn what_grounders_have_lost_is_missed() {
+fn omitted_instances_are_detected() {
     for (action, domain, problem) in FIELD {
         let example = Example { name: action, domain, problem, optimum: None };
         let (domain, problem) = files(&example);
@@ -340,9 +343,9 @@ fn contradictions_are_no_steps() {
     assert!(matches!(found, Faithful::Yes { .. }), "{found:?}");
 }
 
-/// What is not covered is named.
+/// Unsupported constructs are named in the result.
 #[test]
-fn what_is_not_covered_is_named() {
+fn unsupported_constructs_are_named() {
     let domain = "(define (domain d) (:predicates (p) (q) (r)) (:functions (p) (total-cost))
       (:derived (r) (not (p)))
       (:action a :parameters () :precondition (not (r)) :effect (and (q) (increase (total-cost) (p)))))";

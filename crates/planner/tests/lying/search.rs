@@ -1,4 +1,4 @@
-//! The least cost of a written task, by visiting its states in the order of what they cost.
+//! Least cost of a written task by uniform-cost search over its states.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -25,7 +25,7 @@ fn index(value: &Value) -> Option<usize> {
 
 struct Task<'t>(&'t Value);
 
-/// What the best plan of a task costs.
+/// Cost of the best plan of a task.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Best {
     /// In units of the metric.
@@ -33,7 +33,7 @@ pub enum Best {
     NoPlan,
 }
 
-/// The best plan of a written task; nothing if the task is none, or too large.
+/// Best plan of a written task. Returns `None` if the text is no valid task, or the task is too large.
 pub fn optimum(text: &str) -> Option<Best> {
     let document: Value = serde_json::from_str(text).ok()?;
     let task = Task(&document);
@@ -179,7 +179,7 @@ impl Task<'_> {
         self.derived(next)
     }
 
-    /// Derived variables are none of their atoms, unless a rule says so; one layer after the other.
+    /// Evaluates derived variables layer by layer; they are false unless a rule derives them.
     fn derived(&self, mut state: State) -> Option<State> {
         let basic = index(&self.0["basic"])?;
         for (variable, values) in list(&self.0["variables"]).iter().enumerate().skip(basic) {

@@ -4,7 +4,7 @@ pub struct Example {
     pub name: &'static str,
     pub domain: &'static str,
     pub problem: &'static str,
-    /// None if there is no plan.
+    /// Least cost; `None` if there is no plan.
     pub optimum: Option<&'static str>,
 }
 
@@ -36,7 +36,7 @@ pub const TASKS: &[Example] = &[
           (:goal (at c)) (:metric minimize (total-cost)))",
         optimum: Some("7"),
     },
-    // `lift` takes 4, and needs the hand in between; `carry` takes 2 and puts it down for ever.
+    // `lift` takes 4, and needs the hand in between; `carry` takes 2 and never gives it back.
     Example {
         name: "durative",
         domain: "(define (domain d) (:predicates (free) (up) (done) (sure))
@@ -74,7 +74,7 @@ pub const TASKS: &[Example] = &[
           (:metric minimize (total-cost)))",
         optimum: Some("9"),
     },
-    // The door opens with one of two keys, or if nobody is at home.
+    // The door opens with one of two keys, or if the house is empty.
     Example {
         name: "door",
         domain: "(define (domain d) (:types key room) (:predicates (have ?k - key) (fits ?k - key) (home ?r - room) (in))
@@ -242,7 +242,7 @@ pub const TASKS: &[Example] = &[
         problem: "(define (problem p) (:domain d) (:init (key) (at 0 (up)) (at 2.001 (not (key)))) (:goal (out)))",
         optimum: Some("2"),
     },
-    // What is left is to be as much as possible: the way round takes less of it.
+    // The remaining amount is maximised: the detour consumes less.
     Example {
         name: "left",
         domain: "(define (domain d) (:predicates (at ?p) (way ?a ?b)) (:functions (fuel) (use ?a ?b))
@@ -254,7 +254,8 @@ pub const TASKS: &[Example] = &[
           (:goal (at d)) (:metric maximize (* 2 (fuel))))",
         optimum: Some("25"),
     },
-    // Work takes as little as it may; the shorter of two kinds may not take less than the longer of its bounds.
+    // Work takes as little as it may; the shorter of two kinds may not take less than the longer of
+    // its bounds.
     Example {
         name: "as little",
         domain: "(define (domain d) (:predicates (p ?x) (q)) (:functions (least ?x))

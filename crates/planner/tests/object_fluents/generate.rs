@@ -89,7 +89,7 @@ impl Generator {
         task
     }
 
-    /// What holds after some random steps and not before them, if that is found soon.
+    /// A formula that holds after some random steps but not initially, if one is found soon.
     fn goal(&mut self, task: &Task) -> Formula {
         let (steps, mut end) = (task.steps(), task.init);
         for _ in 0..20 {

@@ -1,5 +1,6 @@
-//! Functions with objects as values: random tasks against a search through all states, executed with functions as they are defined.
-//! Planner and validator have to agree with that, though they only see what the functions are compiled to.
+//! Functions with objects as values: random tasks against a search through all states, executed
+//! with functions as they are defined. Planner and validator have to agree with that, though they
+//! only see what the functions are compiled to.
 
 #![expect(clippy::print_stdout, reason = "a skipped test says so")]
 
@@ -31,7 +32,7 @@ fn compiled(domain: &str, problem: &str) -> (pddl::ast::Domain, pddl::ast::Probl
     (tree, task)
 }
 
-/// None where an effect at start or on a number depends on too many values.
+/// Solves a task. Returns `None` if an effect at start or on a number depends on too many values.
 fn solve(domain: &str, problem: &str) -> Option<Solution> {
     let (tree, task) = compiled(domain, problem);
     tally::solve(&tree, &task, "with more than 64 cases")

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
-/// The cost up to which plans are looked for.
+/// Maximum cost of enumerated plans.
 pub(crate) const REACH: u32 = 7;
 
 /// Objects are 0, 1 and 2; the values of g are 0 and 1.
@@ -57,7 +57,7 @@ pub(crate) struct Effect {
 pub(crate) struct Action {
     pub(crate) parameters: usize,
     pub(crate) condition: Formula,
-    /// At start; none of an instantaneous action.
+    /// Effects at start; `None` for an instantaneous action.
     pub(crate) start: Option<Vec<Effect>>,
     pub(crate) end: Vec<Effect>,
 }
@@ -91,7 +91,7 @@ impl Term {
 }
 
 impl Formula {
-    /// What is said of a term without a value is false, but for that it has none.
+    /// Truth of a formula. Atoms about undefined terms are false, except the test for undefinedness.
     pub(crate) fn holds(&self, state: &State, binding: &[usize]) -> bool {
         let with = |object| [binding, &[object]].concat();
         match self {
@@ -110,7 +110,7 @@ impl Formula {
         }
     }
 
-    /// With so many variables in the binding.
+    /// PDDL text, given the number of bound variables.
     pub(crate) fn text(&self, bound: usize) -> String {
         match self {
             Self::Equal(left, right) => format!("(= {} {})", left.text(), right.text()),
@@ -146,7 +146,8 @@ impl Effect {
     }
 }
 
-/// The state after some effects and what they cost; none if they read what has no value, or give one term two values.
+/// State after some effects, and their cost. Returns `None` if they read an undefined term or
+/// assign two values to one term.
 pub(crate) fn after(state: &State, effects: &[Effect], arguments: &[usize]) -> Option<(State, u32)> {
     let mut assigned: BTreeMap<(usize, usize), Option<usize>> = BTreeMap::new();
     let (mut added, mut deleted, mut cost) = (BTreeSet::new(), BTreeSet::new(), 0);
@@ -204,7 +205,7 @@ impl Task {
         Some((end, first + second + 1))
     }
 
-    /// What a plan costs, if it is one.
+    /// Cost of a plan. Returns `None` if it is invalid.
     pub(crate) fn cost(&self, plan: &[Step]) -> Option<u32> {
         let start = (self.init, 0);
         let (end, cost) = plan.iter().try_fold(start, |(state, cost), step| {

@@ -2,7 +2,7 @@
 
 use testing::random::Random;
 
-/// Plans up to this length are looked at.
+/// Maximum length of enumerated plans.
 pub(crate) const DEPTH: usize = 5;
 
 /// Whether r and s hold, and the values of a and b.
@@ -124,7 +124,7 @@ impl Effect {
     }
 }
 
-/// The state after some effects; none if a value is needed that there is not.
+/// State after some effects. Returns `None` if they read an undefined value.
 fn after(state: State, effects: &[Effect]) -> Option<State> {
     let mut next = state;
     let mut added = Vec::new();

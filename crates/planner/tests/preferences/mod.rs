@@ -1,5 +1,6 @@
-//! Preferences and constraints on trajectories: random tasks against all plans up to a length, executed and judged by the definition
-//! of PDDL 3 on the whole sequence of states. Planner and validator have to agree with that.
+//! Preferences and constraints on trajectories: random tasks against all plans up to a length,
+//! executed and judged by the definition of PDDL 3 on the whole sequence of states. Planner and
+//! validator have to agree with that.
 
 mod generate;
 mod model;
@@ -12,7 +13,7 @@ use pddl::validate::{Options, PlanText, validate};
 use pddl::{Source, read};
 use testing::random::Random;
 
-/// None where an instance has too many cases.
+/// Solves a task. Returns `None` if an instance has too many cases.
 fn solve(domain: &str, problem: &str, engine: Engine) -> Option<Solution> {
     let (domain, problem, _) = read(&Source::new("domain", domain), &Source::new("problem", problem))
         .unwrap_or_else(|errors| panic!("{errors:?}\n{domain}\n{problem}"));
@@ -106,7 +107,8 @@ fn the_validator_judges_random_plans_by_the_definition() {
     assert!(valid > 50 && invalid > 50, "{valid} valid and {invalid} invalid plans");
 }
 
-/// A comparison with an undefined number is neither true nor false, so that a plan without it would be no plan at all.
+/// A comparison with an undefined number is neither true nor false, so that a plan without it would
+/// be no plan at all.
 #[test]
 fn numbers_without_an_initial_value_are_refused() {
     let domain = "(define (domain d) (:predicates (done)) (:functions (f) (g) (total-cost))

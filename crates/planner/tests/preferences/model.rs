@@ -1,18 +1,19 @@
-//! Small tasks with preferences and constraints on trajectories, executed and judged by the definition; and as PDDL.
+//! Small tasks with preferences and constraints on trajectories, executed and judged by the
+//! definition; and as PDDL.
 
 use std::fmt::Write as _;
 
 /// Plans up to this length are enumerated.
 const DEPTH: usize = 4;
 
-/// Which of p(o0), p(o1), r and s hold, and the number n.
+/// Truth of p(o0), p(o1), r and s, and the number n.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct State {
     pub facts: [bool; 4],
     pub n: i64,
 }
 
-/// An object, or what stands for a variable: the parameter ?x, or ?z of a quantifier.
+/// An object or a variable: the parameter ?x, or ?z of a quantifier.
 #[derive(Debug, Clone, Copy)]
 pub enum Term {
     Object(usize),
@@ -71,7 +72,7 @@ pub struct Constraint {
     pub first: Formula,
     pub second: Formula,
     pub for_all: bool,
-    /// None if it has to hold.
+    /// Index of the preference; `None` for a hard condition.
     pub preference: Option<usize>,
 }
 
@@ -221,7 +222,8 @@ pub fn follows(constraint: &Constraint, states: &[State], bound: Bound) -> bool 
 }
 
 impl Task {
-    /// All states that a plan goes through, its cost and how often it violates the preference of actions; none if an action cannot start.
+    /// States of a plan, its cost, and its number of violations of the action preference. Returns
+    /// `None` if an action is not applicable.
     pub fn execute(&self, plan: &[(usize, usize)]) -> Option<(Vec<State>, i64, i64)> {
         let mut states = vec![self.init.clone()];
         let (mut cost, mut violated) = (0, 0);
@@ -244,7 +246,7 @@ impl Task {
         Some((states, cost, violated))
     }
 
-    /// The metric of a plan; none if it is none.
+    /// Metric of a plan. Returns `None` if it is invalid.
     pub fn judge(&self, plan: &[(usize, usize)]) -> Option<i64> {
         let (states, mut cost, violated) = self.execute(plan)?;
         if !self.goal.holds(states.last()?, Bound::default()) {

@@ -1,11 +1,13 @@
 //! Saturated cost partitioning \[1\] over projections.
 //!
-//! Projections take their share of the operators' costs one after another: as much as their heuristic values
-//! need. The remaining costs go to the next projection. The result depends on the order, so several orders are
-//! tried. The sum of the values is consistent, since each of them is for its own costs. It counts costs that a
-//! single projection cannot see, such as goals of another robot or design changes outside its pattern.
+//! Projections take their share of the operators' costs one after another: as much as their
+//! heuristic values need. The remaining costs go to the next projection. The result depends on the
+//! order, so several orders are tried. The sum of the values is consistent, since each of them is
+//! for its own costs. It counts costs that a single projection cannot see, such as goals of another
+//! robot or design changes outside its pattern.
 //!
-//! \[1\] J. Seipp, T. Keller, M. Helmert: Saturated cost partitioning for optimal classical planning, JAIR 67, 2020.
+//! \[1\] J. Seipp, T. Keller, M. Helmert: Saturated cost partitioning for optimal classical
+//! planning, JAIR 67, 2020.
 
 use std::cmp::Reverse;
 
@@ -16,22 +18,24 @@ use task::number::{GROWTH_LIMIT, Int};
 
 use crate::bounds::pattern_database::Projection;
 
-/// How many sums are kept.
+/// Maximum number of cost partitionings that are kept.
 const MAX_PARTITIONINGS: usize = 4;
-/// How many orders are tried at most, and how many transitions may be looked at in all.
+/// Maximum number of orders that are tried, and of transitions visited over all orders.
 const MAX_ORDERS: usize = 60;
 const MAX_TRANSITIONS: usize = 6_000_000;
 
-/// Estimates that may be added up: positions of projections, and the share of the cost to go from each abstract state.
+/// One cost partitioning: indices of projections, and goal distances under each one's share of the
+/// costs.
 pub(super) struct CostPartitioning {
     parts: Vec<(usize, Vec<Option<Int>>)>,
 }
 
 impl CostPartitioning {
-    /// The sum for a state, of which the abstract states are given by position.
+    /// Heuristic value of a state, given its abstract state in each projection.
     pub(super) fn estimate(&self, states: &[u32]) -> Int {
         let shares = self.parts.iter().map(|(position, to_go)| to_go[states[*position] as usize]);
-        // Dead ends are noticed by the projections themselves. A sum that is cut off stays a lower bound, and consistent.
+        // The projections detect dead ends themselves. A capped sum remains a consistent lower
+        // bound.
         let sum = shares.fold(0, |sum: Int, share| sum.saturating_add(share.unwrap_or(0)));
         sum.min(GROWTH_LIMIT)
     }
@@ -42,13 +46,13 @@ impl CostPartitioning {
         order: &[usize],
         limits: &Limits,
     ) -> Result<Self, Interrupted> {
-        let mut left = costs.to_vec();
+        let mut remaining = costs.to_vec();
         let mut parts = Vec::new();
         for position in order {
-            let to_go = projections[*position].goal_distances(&left, limits)?;
+            let to_go = projections[*position].goal_distances(&remaining, limits)?;
             if to_go.iter().any(|cost| cost.is_some_and(|cost| cost > 0)) {
-                for (left, taken) in left.iter_mut().zip(projections[*position].saturated(&to_go)) {
-                    *left = (*left).saturating_sub(taken);
+                for (cost, used) in remaining.iter_mut().zip(projections[*position].saturated(&to_go)) {
+                    *cost = (*cost).saturating_sub(used);
                 }
                 parts.push((*position, to_go));
             }
@@ -57,7 +61,7 @@ impl CostPartitioning {
     }
 }
 
-/// Sums of shares for the projections of a task, the one with the highest estimate of the initial state first; none where one
+/// Saturated cost partitionings, sorted by decreasing value of the initial state. Empty if the best
 /// projection alone is as good.
 pub(super) fn saturated_cost_partitionings(
     context: Context<'_>,
@@ -71,8 +75,9 @@ pub(super) fn saturated_cost_partitionings(
     let mut positions: Vec<usize> = (0..projections.len()).filter(|position| alone(*position) > 0).collect();
     positions.sort_by_key(|position| projections[*position].pattern.len());
     for position in positions {
-        // What another one says with fewer variables is not divided between both.
-        let is_coarser = |known: &usize| projections[position].is_dominated_by(&projections[*known]);
+        // If a projection to fewer variables has the same values, the costs are not shared with the
+        // finer one.
+        let is_coarser = |coarser: &usize| projections[position].is_dominated_by(&projections[*coarser]);
         if !useful.iter().any(is_coarser) {
             useful.push(position);
         }
@@ -85,23 +90,23 @@ pub(super) fn saturated_cost_partitionings(
     let mut budget = MAX_TRANSITIONS.checked_div(transitions).unwrap_or(MAX_TRANSITIONS).clamp(1, MAX_ORDERS);
     let mut tried: Vec<(Int, Vec<usize>, CostPartitioning)> = Vec::new();
     let mut attempt = |order: Vec<usize>, tried: &mut Vec<(Int, Vec<usize>, CostPartitioning)>| {
-        if budget == 0 || tried.iter().any(|(_, known, _)| *known == order) {
+        if budget == 0 || tried.iter().any(|(_, previous, _)| *previous == order) {
             return Ok(());
         }
         budget = budget.saturating_sub(1);
         let partition = CostPartitioning::new(projections, &costs, &order, limits)?;
         tried.push((partition.estimate(&initial), order, partition));
-        // Stable: of equal ones the earlier stays first.
+        // The sort is stable: of equal orders the earlier one stays first.
         tried.sort_by_key(|(estimate, ..)| Reverse(*estimate));
         Ok(())
     };
     let greedy = by_yield(projections, &useful, alone);
     attempt(greedy.clone(), &mut tried)?;
     for first in &useful {
-        let rest = greedy.iter().filter(|position| *position != first);
-        attempt(std::iter::once(first).chain(rest).copied().collect(), &mut tried)?;
+        let successors = greedy.iter().filter(|position| *position != first);
+        attempt(std::iter::once(first).chain(successors).copied().collect(), &mut tried)?;
     }
-    // Then the best order, with two neighbours exchanged.
+    // Then local search from the best order: exchange two neighbours.
     for (before, place) in (1..useful.len()).enumerate() {
         let mut order = tried[0].1.clone();
         order.swap(before, place);
@@ -115,15 +120,15 @@ pub(super) fn saturated_cost_partitionings(
     Ok(tried.into_iter().map(|(.., partition)| partition).collect())
 }
 
-/// Projections that give much and take little come first.
+/// Orders projections by value of the initial state per unit of cost that they use, highest first.
 fn by_yield(projections: &[Projection], useful: &[usize], alone: impl Fn(usize) -> Int) -> Vec<usize> {
-    let taken = |position: usize| {
+    let used_cost = |position: usize| {
         let projection = &projections[position];
-        // What is more is no less in the order below.
+        // Saturation of the sum is harmless: it only affects the order.
         projection.saturated(projection.costs()).fold(0, Int::saturating_add).max(1)
     };
     let mut order: Vec<(usize, Int, Int)> =
-        useful.iter().map(|position| (*position, alone(*position), taken(*position))).collect();
+        useful.iter().map(|position| (*position, alone(*position), used_cost(*position))).collect();
     let product = |a: &Int, b: &Int| BigInt::from(*a) * b;
     order.sort_by(|(_, a, s), (_, b, t)| product(b, s).cmp(&product(a, t)));
     order.into_iter().map(|(position, ..)| position).collect()

@@ -1,9 +1,9 @@
 //! Delete relaxation \[1\] of a task: rules that derive facts from facts, each at the cost of an operator.
 //!
-//! An operator becomes one rule for its unconditional effects and one rule per conditional effect. All of them
-//! have the operator's least cost, which is paid once. Axioms and the literals of clauses are rules without
-//! cost. Numbers are ignored, and derived variables may be false at any time, so the relaxation admits every
-//! plan of the task.
+//! An operator becomes one rule for its unconditional effects and one rule per conditional effect.
+//! All of them have the operator's least cost, which is paid once. Axioms and the literals of
+//! clauses are rules without cost. Numbers are ignored, and derived variables may be false at any
+//! time, so the relaxation admits every plan of the task.
 //!
 //! \[1\] B. Bonet, H. Geffner: Planning as heuristic search, Artificial Intelligence 129, 2001.
 
@@ -12,14 +12,14 @@ use rustc_hash::FxHashMap;
 use task::number::{Int, dense};
 use task::task::{Condition, Fact, Literal, Task};
 
-/// Costs may be at most so much, so that sums fit.
+/// Maximum operator cost, so that sums do not overflow.
 const COST_LIMIT: Int = 1 << 40;
-/// The fact that always holds.
+/// Fact that always holds.
 pub(super) const ALWAYS: u32 = 0;
-/// The fact that stands for the goal.
+/// Artificial fact that represents the goal.
 pub(super) const GOAL: u32 = 1;
 
-/// Lists one after the other.
+/// Lists stored one after the other in one vector.
 #[derive(Default)]
 pub(super) struct Lists {
     ends: Vec<u32>,
@@ -32,12 +32,12 @@ impl Lists {
         self.ends.push(dense(self.all.len()));
     }
 
-    /// For each of so many things the positions of the lists that it is in.
+    /// Inverse index: for each value below `count`, the positions of the lists that contain it.
     fn inverse(&self, count: usize) -> Self {
         let mut positions: Vec<Vec<u32>> = vec![Vec::new(); count];
         for list in 0..dense(self.ends.len()) {
-            for thing in self.list(list) {
-                positions[*thing as usize].push(list);
+            for item in self.list(list) {
+                positions[*item as usize].push(list);
             }
         }
         let mut inverse = Self::default();
@@ -57,20 +57,20 @@ impl Lists {
     }
 }
 
-/// A task without what is deleted.
+/// A task without delete effects, as rules between facts.
 pub(super) struct DeleteRelaxation {
-    /// What each payer pays: the operators, then one that pays nothing.
+    /// Cost of each payer: the operators, then a payer without cost.
     pub(super) costs: Vec<u64>,
-    /// For each rule who pays, what it requires (never nothing), and what follows.
+    /// Per rule: the operator that pays for it, its condition (never empty), and its effects.
     pub(super) payers: Vec<u32>,
     pub(super) required: Lists,
     pub(super) given: Lists,
-    /// The rules of each payer.
+    /// Rules of each payer.
     pub(super) rules_of: Lists,
-    /// For each fact the rules that require it, and those from which it follows.
+    /// By fact: rules that require it, and rules that add it.
     pub(super) required_by: Lists,
     pub(super) given_by: Lists,
-    /// The number of each variable's first fact.
+    /// Number of each variable's first fact.
     first: Vec<u32>,
     basic: usize,
 }
@@ -87,7 +87,7 @@ struct Builder<'a> {
 }
 
 impl DeleteRelaxation {
-    /// None if costs are too large.
+    /// Returns `None` if an operator costs more than `COST_LIMIT`.
     pub(super) fn new(task: &Task) -> Option<Self> {
         let costs = task.operators.iter().map(|operator| operator.cost.minimum().max(0));
         let costs = costs.map(|cost| u64::try_from(cost).ok().filter(|_| cost <= COST_LIMIT));
@@ -108,12 +108,13 @@ impl DeleteRelaxation {
             builder.rule(builder.free, &rule.body, &[], vec![head]);
         }
         let Builder { first, facts, payers, required, given, .. } = builder;
-        let mut of: Vec<Vec<u32>> = vec![Vec::new(); costs.len()];
+        // Rules of one operator are updated together when its cost changes.
+        let mut rules_by_payer: Vec<Vec<u32>> = vec![Vec::new(); costs.len()];
         for (payer, rule) in payers.iter().zip(0..) {
-            of[*payer as usize].push(rule);
+            rules_by_payer[*payer as usize].push(rule);
         }
         let mut rules_of = Lists::default();
-        for rules in of {
+        for rules in rules_by_payer {
             rules_of.push(rules);
         }
         let (required_by, given_by) = (required.inverse(facts as usize), given.inverse(facts as usize));
@@ -134,7 +135,7 @@ impl DeleteRelaxation {
         self.required_by.len()
     }
 
-    /// The facts of a state.
+    /// Facts of a state.
     #[expect(clippy::arithmetic_side_effects, reason = "facts are numbered")]
     pub(super) fn state<'s>(&'s self, values: &'s [u32]) -> impl Iterator<Item = u32> + 's {
         let values = values[..self.basic].iter().zip(&self.first);
@@ -157,7 +158,7 @@ impl<'a> Builder<'a> {
         Self { task, first, facts, payers, required, given, clauses: FxHashMap::default(), free }
     }
 
-    /// A derived variable may be false at any time.
+    /// Number of a fact. A derived variable may be false at any time, so its falsity is `ALWAYS`.
     #[expect(clippy::arithmetic_side_effects, reason = "facts are numbered")]
     fn fact(&self, fact: Fact) -> u32 {
         let variable = fact.variable.index();
@@ -168,17 +169,17 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// The facts of which each makes a literal hold.
+    /// Facts each of which makes a literal true.
     fn literal(&self, literal: Literal) -> Vec<u32> {
         if literal.positive {
             return vec![self.fact(literal.fact)];
         }
         let values = 0..dense(self.task.variables[literal.fact.variable.index()].values.len());
-        let others = values.filter(|value| *value != literal.fact.value);
-        others.map(|value| self.fact(Fact { value, ..literal.fact })).collect()
+        let values = values.filter(|value| *value != literal.fact.value);
+        values.map(|value| self.fact(Fact { value, ..literal.fact })).collect()
     }
 
-    /// A fact that stands for one of some.
+    /// Fact that represents a disjunction of facts.
     #[expect(clippy::arithmetic_side_effects, reason = "facts are held in memory")]
     fn any(&mut self, mut facts: Vec<u32>) -> u32 {
         facts.sort_unstable();
@@ -189,13 +190,13 @@ impl<'a> Builder<'a> {
         if facts.contains(&ALWAYS) {
             return ALWAYS;
         }
-        if let Some(known) = self.clauses.get(&facts) {
-            return *known;
+        if let Some(fact) = self.clauses.get(&facts) {
+            return *fact;
         }
         let fact = self.facts;
         self.facts += 1;
-        for one in &facts {
-            self.add(self.free, vec![*one], vec![fact]);
+        for disjunct in &facts {
+            self.add(self.free, vec![*disjunct], vec![fact]);
         }
         self.clauses.insert(facts, fact);
         fact

@@ -1,11 +1,13 @@
 //! LM-cut \[1\]: an admissible heuristic that sums the costs of disjunctive action landmarks.
 //!
-//! h^max selects the supporting fact of each rule of the delete relaxation. The rules that lead from the facts
-//! before the cut into the zone from which the goal costs nothing form a landmark: every plan uses one of their
-//! operators. The least of their costs is counted and subtracted from all of them, until the goal costs
-//! nothing. The rules of an operator with conditional effects share one cost, so nothing is counted twice.
+//! h^max selects the supporting fact of each rule of the delete relaxation. The rules that lead
+//! from the facts before the cut into the zone from which the goal costs nothing form a landmark:
+//! every plan uses one of their operators. The least of their costs is counted and subtracted from
+//! all of them, until the goal costs nothing. The rules of an operator with conditional effects
+//! share one cost, so nothing is counted twice.
 //!
-//! \[1\] M. Helmert, C. Domshlak: Landmarks, critical paths and abstractions: what's the difference anyway?, ICAPS 2009.
+//! \[1\] M. Helmert, C. Domshlak: Landmarks, critical paths and abstractions: what's the difference
+//! anyway?, ICAPS 2009.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -15,37 +17,38 @@ use task::task::Task;
 
 use crate::bounds::delete_relaxation::{ALWAYS, DeleteRelaxation, GOAL};
 
-/// Steps of a computer for each thing that is looked at.
+/// Work units per visited fact or rule.
 const WORK_PER_VISIT: u64 = 8;
-/// What is not reached.
+/// Value of an unreached fact.
 const UNREACHABLE: u64 = u64::MAX;
-/// No fact.
+/// Marks a missing fact.
 const NONE: u32 = u32::MAX;
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum CutSide {
     Open,
-    /// From here the goal costs nothing more.
+    /// The goal is reachable from here at no cost.
     Goal,
-    /// Reached from the state without entering the zone of the goal.
+    /// Reachable from the state without entering the goal zone.
     Before,
 }
 
-/// The bound for any state of a task.
+/// The LM-cut heuristic of a task, with scratch buffers for evaluating states.
 pub struct LandmarkCut {
     relaxed: DeleteRelaxation,
     costs: Vec<u64>,
-    /// For each fact what h^max says, and where it lies.
+    /// Per fact: its h^max value and its side of the cut.
     values: Vec<u64>,
     zones: Vec<CutSide>,
-    /// For each rule how many facts are required, how many of them are not reached, the dearest one, and what it costs.
+    /// Per rule: number of its conditions, number of unreached ones, its supporter (the condition
+    /// with the greatest h^max value), and the value of the supporter.
     lengths: Vec<u32>,
     left: Vec<u32>,
     supporters: Vec<u32>,
     supports: Vec<u64>,
     queue: BinaryHeap<Reverse<(u64, u32)>>,
     stack: Vec<u32>,
-    /// Payers in the cut, and whether each payer is.
+    /// Payers in the cut, and a flag for each payer.
     cut: Vec<u32>,
     in_cut: Vec<bool>,
     work: u64,
@@ -56,7 +59,7 @@ pub struct LandmarkCut {
     reason = "costs are below 2^40, and cuts are fewer than steps of a computer"
 )]
 impl LandmarkCut {
-    /// None if costs are too large.
+    /// Returns `None` if an operator costs too much.
     pub(crate) fn new(task: &Task) -> Option<Self> {
         let relaxed = DeleteRelaxation::new(task)?;
         let (facts, rules) = (relaxed.facts(), relaxed.payers.len());
@@ -79,12 +82,13 @@ impl LandmarkCut {
         })
     }
 
-    /// What it took so far, in steps of a computer.
+    /// Work units done up to now.
     pub(crate) fn work(&self) -> u64 {
         self.work.saturating_mul(WORK_PER_VISIT)
     }
 
-    /// What the cuts come to, a lower bound on the cost to the goal; none if the goal cannot be reached.
+    /// LM-cut value of a state given by its values: an admissible estimate of its goal distance.
+    /// Returns `None` if the goal is unreachable.
     pub(crate) fn lm_cut_value(&mut self, values: &[u32]) -> Option<u64> {
         self.costs.clone_from(&self.relaxed.costs);
         self.reach(values);
@@ -101,7 +105,7 @@ impl LandmarkCut {
         Some(sum)
     }
 
-    /// The values of h^max from a state.
+    /// Computes the h^max values from a state.
     fn reach(&mut self, values: &[u32]) {
         self.values.fill(UNREACHABLE);
         self.supporters.fill(NONE);
@@ -118,10 +122,11 @@ impl LandmarkCut {
             let rules = self.relaxed.required_by.list(fact);
             self.work += 2 + rules.len() as u64;
             for rule in rules {
-                let left = &mut self.left[*rule as usize];
-                *left -= 1;
-                if *left == 0 {
-                    // Facts come in the order of their values, so that this one is the dearest.
+                let unreached = &mut self.left[*rule as usize];
+                *unreached -= 1;
+                if *unreached == 0 {
+                    // Facts are popped by increasing value, so the last condition is the most
+                    // expensive one.
                     self.supporters[*rule as usize] = fact;
                     self.supports[*rule as usize] = value;
                     let total = value + self.costs[self.relaxed.payers[*rule as usize] as usize];
@@ -131,7 +136,7 @@ impl LandmarkCut {
         }
     }
 
-    /// The facts from which the goal costs nothing more.
+    /// Marks the goal zone: the facts from which the goal is reachable at no cost.
     fn mark_goal_zone(&mut self) {
         self.zones[GOAL as usize] = CutSide::Goal;
         self.stack.push(GOAL);
@@ -151,7 +156,8 @@ impl LandmarkCut {
         }
     }
 
-    /// Finds the payers that cross into the goal's zone, and takes the least of their costs off all of them.
+    /// Finds the payers of the rules that lead into the goal zone, and subtracts the least of their
+    /// costs from each.
     fn cross(&mut self, values: &[u32]) -> u64 {
         for payer in self.cut.drain(..) {
             self.in_cut[payer as usize] = false;
@@ -184,14 +190,14 @@ impl LandmarkCut {
             }
         }
         let costs = &mut self.costs;
-        let least = self.cut.iter().map(|payer| costs[*payer as usize]).min().unwrap_or(0);
+        let cut_cost = self.cut.iter().map(|payer| costs[*payer as usize]).min().unwrap_or(0);
         for payer in &self.cut {
-            costs[*payer as usize] -= least;
+            costs[*payer as usize] -= cut_cost;
         }
-        least
+        cut_cost
     }
 
-    /// The values of h^max, once the payers of the cut pay less.
+    /// Updates the h^max values incrementally after the costs of the cut have decreased.
     fn lower(&mut self) {
         for payer in &self.cut {
             for rule in self.relaxed.rules_of.list(*payer) {
@@ -208,13 +214,14 @@ impl LandmarkCut {
             let rules = self.relaxed.required_by.list(fact);
             self.work += 2 + rules.len() as u64;
             for rule in rules {
+                // Only rules whose supporter became cheaper can change.
                 if self.supporters[*rule as usize] != fact || self.supports[*rule as usize] <= value {
                     continue;
                 }
                 let required = self.relaxed.required.list(*rule);
                 let values = &self.values;
-                let dearest = required.iter().copied().max_by_key(|fact| values[*fact as usize]);
-                let supporter = dearest.unwrap_or(ALWAYS);
+                let costliest = required.iter().copied().max_by_key(|fact| values[*fact as usize]);
+                let supporter = costliest.unwrap_or(ALWAYS);
                 let before =
                     std::mem::replace(&mut self.supports[*rule as usize], values[supporter as usize]);
                 self.supporters[*rule as usize] = supporter;
@@ -228,7 +235,7 @@ impl LandmarkCut {
     }
 }
 
-/// Lowers the values of facts.
+/// Lowers the values of facts to at most `total`, and queues the facts that changed.
 fn offer(facts: &[u32], total: u64, values: &mut [u64], queue: &mut BinaryHeap<Reverse<(u64, u32)>>) {
     for fact in facts {
         let value = &mut values[*fact as usize];

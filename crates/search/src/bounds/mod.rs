@@ -1,9 +1,10 @@
 //! Admissible heuristics, and upper bounds on the number of steps of a cheaper plan.
 //!
-//! A projection to a few finite-domain variables is solved exactly. Dijkstra's algorithm from the abstract goal
-//! states gives a consistent, admissible heuristic: a pattern database \[1\]. Dynamic programming over steps and
-//! abstract states gives the operators that can occur at each step of a plan cheaper than the best known one,
-//! and the number of steps beyond which there is no such plan. Cost partitioning adds up several projections.
+//! A projection to a few finite-domain variables is solved exactly. Dijkstra's algorithm from the
+//! abstract goal states gives a consistent, admissible heuristic: a pattern database \[1\]. Dynamic
+//! programming over steps and abstract states gives the operators that can occur at each step of a
+//! plan cheaper than the best known one, and the number of steps beyond which there is no such
+//! plan. Cost partitioning adds up several projections.
 //!
 //! \[1\] S. Edelkamp: Planning with pattern databases, ECP 2001.
 
@@ -32,30 +33,32 @@ use task::task::{State, VariableId};
 const STEP_LIMIT: usize = 4_000;
 /// Largest number of states of a projection.
 const STATE_LIMIT: usize = 20_000;
-/// How many projections to pairs of variables are tried.
+/// Number of projections to pairs of variables that are tried.
 const PAIR_LIMIT: usize = 40;
-/// Beyond the best few, projections cost more time than they save steps.
+/// Number of projections that are used on their own. More of them cost more time than they save
+/// expansions.
 const MAX_PROJECTIONS: usize = 12;
 
-/// Projections of a task, the one with the highest estimate of the initial state first.
+/// Projections of a task, sorted by decreasing heuristic value of the initial state, and bounds
+/// derived from them.
 pub struct Bounds {
     pub projections: Vec<Projection>,
     resources: Vec<Resource>,
-    /// Sums of shares, and the projections that only these use.
+    /// Cost partitionings, and the projections that only these use.
     partitions: Vec<CostPartitioning>,
     further: Vec<Projection>,
 }
 
-/// What is known of plans whose cost stays below some limit.
+/// Facts about the plans whose cost and length stay within given limits.
 pub struct ReachableWindow {
-    /// No such plan has more steps; none if projections do not tell.
+    /// Upper bound on the number of steps of such a plan. `None` if no projection yields one.
     pub steps: Option<usize>,
-    /// For each step, whether each operator can be there.
+    /// For each step: whether each operator can occur at it.
     pub allowed: Vec<Vec<bool>>,
 }
 
 impl Bounds {
-    /// Lower bounds of a task, by projections and cost partitioning.
+    /// Computes projections and saturated cost partitionings.
     ///
     /// # Errors
     /// Fails when a limit is reached.
@@ -64,15 +67,15 @@ impl Bounds {
         let mut bounds = Self::of_projections(context)?;
         bounds.projections.append(&mut bounds.further);
         bounds.partitions = cost_partitioning::saturated_cost_partitionings(context, &bounds.projections)?;
-        let kept = bounds.projections.len().min(MAX_PROJECTIONS);
-        bounds.further = bounds.projections.split_off(kept);
+        let count = bounds.projections.len().min(MAX_PROJECTIONS);
+        bounds.further = bounds.projections.split_off(count);
         if bounds.partitions.is_empty() {
             bounds.further.clear();
         }
         Ok(bounds)
     }
 
-    /// Bounds that each rest on one projection.
+    /// Computes projections only, without cost partitioning.
     ///
     /// # Errors
     /// Fails when a limit is reached.
@@ -81,14 +84,17 @@ impl Bounds {
         let basic = |variable: &VariableId| variable.index() < task.basic;
         let goal_variables: Vec<_> = task.goal.facts.iter().map(|fact| fact.variable).filter(basic).collect();
         let mut patterns: Vec<Vec<_>> = goal_variables.iter().map(|variable| vec![*variable]).collect();
-        let mut others: Vec<_> = VariableId::all(task.basic).collect();
-        others.sort_by_key(|variable| std::cmp::Reverse(task.variables[variable.index()].values.len()));
-        for other in &others {
+        let mut variables: Vec<_> = VariableId::all(task.basic).collect();
+        variables.sort_by_key(|variable| std::cmp::Reverse(task.variables[variable.index()].values.len()));
+        for variable in &variables {
             for goal in &goal_variables {
-                let [one, two] = [goal, other].map(|variable| task.variables[variable.index()].values.len());
-                let most = goal_variables.len().saturating_add(PAIR_LIMIT);
-                if goal != other && one.saturating_mul(two) <= STATE_LIMIT && patterns.len() < most {
-                    patterns.push(vec![*goal.min(other), *goal.max(other)]);
+                let [goal_size, size] = [goal, variable].map(|id| task.variables[id.index()].values.len());
+                let max_patterns = goal_variables.len().saturating_add(PAIR_LIMIT);
+                if goal != variable
+                    && goal_size.saturating_mul(size) <= STATE_LIMIT
+                    && patterns.len() < max_patterns
+                {
+                    patterns.push(vec![*goal.min(variable), *goal.max(variable)]);
                 }
             }
         }
@@ -107,7 +113,7 @@ impl Bounds {
         Ok(Self { projections, resources, partitions: Vec::new(), further })
     }
 
-    /// Bounds that say nothing: the projection to no variable at all.
+    /// Heuristic that is 0 everywhere: the projection to no variable.
     ///
     /// # Errors
     /// Fails when a limit is reached.
@@ -116,7 +122,7 @@ impl Bounds {
         Ok(Self { projections, resources: Vec::new(), partitions: Vec::new(), further: Vec::new() })
     }
 
-    /// A lower bound on the cost from a state to the goal; none if the goal cannot be reached.
+    /// Lower bound on the cost from a state to the goal. Returns `None` if the goal is unreachable.
     pub fn estimate(&self, state: &State) -> Option<Int> {
         let mut best = 0;
         if self.partitions.is_empty() {
@@ -126,9 +132,9 @@ impl Bounds {
         } else {
             let mut states: SmallVec<[u32; 16]> = SmallVec::new();
             for projection in self.projections.iter().chain(&self.further) {
-                let own = projection.state(state);
-                best = best.max(projection.goal_distance(own)?);
-                states.push(own);
+                let abstract_state = projection.state(state);
+                best = best.max(projection.goal_distance(abstract_state)?);
+                states.push(abstract_state);
             }
             best = self.partitions.iter().map(|partition| partition.estimate(&states)).fold(best, Int::max);
         }
@@ -136,7 +142,8 @@ impl Bounds {
         self.resources.iter().all(enough).then_some(best)
     }
 
-    /// What must be left of resources: the number, the projection, and a value for each of its abstract states.
+    /// Lower bounds on the resources that must remain: the number, the projection, and a value for
+    /// each of its abstract states.
     pub fn needs(&self) -> impl Iterator<Item = (NumericId, &Projection, &[Option<Int>])> {
         let projection = |position: &usize| &self.projections[*position];
         self.resources.iter().flat_map(move |resource| {
@@ -145,7 +152,8 @@ impl Bounds {
         })
     }
 
-    /// What is known of plans with cost at most `limit` and at most `horizon` steps, where either is given.
+    /// Facts about plans with cost at most `limit` and at most `horizon` steps, where these are
+    /// given.
     ///
     /// # Errors
     /// Fails when a limit is reached.
@@ -159,7 +167,7 @@ impl Bounds {
         if let Some(limit) = limit {
             for projection in &self.projections {
                 if let Some(bound) = projection.step_bound(limit, STEP_LIMIT, context.limits)? {
-                    steps = Some(steps.map_or(bound, |known| known.min(bound)));
+                    steps = Some(steps.map_or(bound, |least| least.min(bound)));
                 }
             }
         }

@@ -8,30 +8,30 @@ use task::limits::{Interrupted, Limits};
 use task::number::{GROWTH_LIMIT, Int, dense};
 use task::task::{ConditionalEffect, Literal, OperatorId, State, VariableId};
 
-/// An operator leads from one abstract state to another.
+/// Transition of an operator between abstract states.
 #[derive(Debug, Clone, Copy)]
 pub struct Transition {
     pub source: u32,
     pub target: u32,
 }
 
-/// A projection with its abstract state space and the cost to go from each abstract state.
+/// A projection: its abstract state space and the goal distance of each abstract state.
 pub struct Projection {
     pub pattern: Vec<VariableId>,
     sizes: Vec<usize>,
     initial: u32,
     goals: Vec<u32>,
-    /// For each operator its cost with the cheapest designs and where it leads; empty if it reads and changes
-    /// nothing of the pattern.
+    /// Per operator: cost with the cheapest designs, and its transitions. Empty if the operator
+    /// neither reads nor changes the pattern.
     operators: Vec<(Int, Vec<Transition>)>,
-    /// The least cost of an operator that touches nothing of the pattern.
+    /// Least cost of an operator that neither reads nor changes the pattern.
     idle_cost: Option<Int>,
-    /// Cost to the nearest goal state.
+    /// Goal distance of each abstract state.
     to_go: Vec<Option<Int>>,
 }
 
-/// The sum of two amounts from 0 to the limit of growth, at most that limit: what is known to cost so much may cost more. Sums that are
-/// cut off stay lower bounds, and consistent ones.
+/// Sum of two amounts between 0 and `GROWTH_LIMIT`, capped at `GROWTH_LIMIT`. Capped sums remain
+/// consistent lower bounds.
 fn sum(a: Int, b: Int) -> Int {
     a.saturating_add(b).min(GROWTH_LIMIT)
 }
@@ -55,7 +55,8 @@ impl Projection {
         projection.goals = projection.matching(&goal);
         for operator in limits.watch(&task.operators) {
             let operator = operator?;
-            // Rewards (negative costs) have no place in Dijkstra's algorithm; counting them as 0 serves reachability.
+            // Dijkstra's algorithm requires non-negative costs. Counting rewards as 0 preserves
+            // reachability.
             let cost = operator.cost.minimum().max(0);
             let before = projection.required(&operator.condition.facts);
             let after = projection.required(&operator.effects);
@@ -74,7 +75,7 @@ impl Projection {
                     }
                 }
             } else {
-                projection.idle_cost = Some(projection.idle_cost.map_or(cost, |known: Int| known.min(cost)));
+                projection.idle_cost = Some(projection.idle_cost.map_or(cost, |least: Int| least.min(cost)));
             }
             projection.operators.push((cost, transitions));
         }
@@ -87,7 +88,7 @@ impl Projection {
         self.sizes.iter().product()
     }
 
-    /// The abstract state of a state.
+    /// Abstract state of a state.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "an abstract state is below the number of them, which are in memory"
@@ -97,17 +98,17 @@ impl Projection {
         dense(self.sizes.iter().zip(values).fold(0, |index, (size, value)| index * size + value))
     }
 
-    /// The value of each pattern variable in an abstract state.
+    /// Values of the pattern variables in an abstract state.
     #[expect(clippy::arithmetic_side_effects, reason = "every variable has a value, so that no size is 0")]
     pub fn values(&self, state: u32) -> Vec<u32> {
-        let mut rest = state as usize;
+        let mut index = state as usize;
         let mut values: Vec<_> = self
             .sizes
             .iter()
             .rev()
             .map(|size| {
-                let value = rest % size;
-                rest /= size;
+                let value = index % size;
+                index /= size;
                 dense(value)
             })
             .collect();
@@ -136,8 +137,8 @@ impl Projection {
         states
     }
 
-    /// Where an operator can lead: a conditional effect whose condition the abstract state leaves open may take
-    /// place or not.
+    /// Abstract states that an operator can lead to. A conditional effect whose condition mentions
+    /// variables outside the pattern may fire or not.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "abstract states are below the number of them, which are in memory"
@@ -177,7 +178,7 @@ impl Projection {
         reached.into_iter().map(index).collect()
     }
 
-    /// The cost to go from each abstract state, if operators cost so much.
+    /// Goal distance of each abstract state under the given operator costs.
     pub(crate) fn goal_distances(
         &self,
         costs: &[Int],
@@ -186,7 +187,7 @@ impl Projection {
         self.distances(|operator| costs[operator], self.goals.iter().map(|goal| (*goal, 0)), limits)
     }
 
-    /// The least costs of operators with which the cost to go is as given.
+    /// Saturated costs: the least operator costs that preserve the given goal distances.
     #[expect(clippy::arithmetic_side_effects, reason = "costs to go are between 0 and GROWTH_LIMIT")]
     pub(crate) fn saturated(&self, to_go: &[Option<Int>]) -> impl Iterator<Item = Int> {
         self.operators.iter().map(|(_, transitions)| {
@@ -197,10 +198,13 @@ impl Projection {
         })
     }
 
-    /// Whether the estimates are those of a projection to a part of the pattern: the other variables add nothing.
+    /// Returns `true` if `other` projects to a part of the pattern and yields the same values.
     pub(crate) fn is_dominated_by(&self, other: &Self) -> bool {
-        let places: Option<Vec<usize>> =
-            other.pattern.iter().map(|own| self.pattern.iter().position(|known| known == own)).collect();
+        let places: Option<Vec<usize>> = other
+            .pattern
+            .iter()
+            .map(|variable| self.pattern.iter().position(|candidate| candidate == variable))
+            .collect();
         let Some(places) = places else { return false };
         (0..).zip(&self.to_go).all(|(state, cost)| {
             let values = self.values(state);
@@ -212,19 +216,21 @@ impl Projection {
         })
     }
 
-    /// How much has to be looked at to compute costs to go.
+    /// Size of the abstract state space: abstract states and transitions. Measures the work of a
+    /// goal distance computation.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(crate) fn transition_count(&self) -> usize {
         self.size() + self.operators.iter().map(|(_, transitions)| transitions.len()).sum::<usize>()
     }
 
-    /// The least number of steps from each abstract state to the goal.
+    /// Least number of steps from each abstract state to the goal.
     pub(crate) fn steps_to_go(&self, limits: &Limits) -> Result<Vec<Option<Int>>, Interrupted> {
         self.distances(|_| 1, self.goals.iter().map(|goal| (*goal, 0)), limits)
     }
 
-    /// What of a resource is used up at least until it is replenished or a goal state is reached. `used` is what
-    /// each operator uses, none if it may replenish; `left` is what a goal state must have left.
+    /// Lower bound on the consumption of a resource, from each abstract state, until it is
+    /// replenished or a goal state is reached. `used` is the consumption of each operator, `None`
+    /// if it may replenish. `left` is the amount that must remain in a goal state.
     pub(crate) fn needs(
         &self,
         used: &[Option<Int>],
@@ -237,12 +243,13 @@ impl Projection {
         self.distances(|operator| used[operator].unwrap_or(0).max(0), goals.chain(free), limits)
     }
 
-    /// Whether an operator changes or reads the pattern.
+    /// Returns `true` if an operator changes or reads the pattern.
     pub(crate) fn affects_pattern(&self, operator: usize) -> bool {
         !self.operators[operator].1.is_empty()
     }
 
-    /// The least sum of costs from each abstract state to one of the targets, each of which adds its own.
+    /// Least cost from each abstract state to a target, plus the initial value of that target.
+    /// Backward Dijkstra search.
     fn distances(
         &self,
         cost: impl Fn(usize) -> Int,
@@ -257,7 +264,7 @@ impl Projection {
             }
         }
         let mut to_go = vec![None; self.size()];
-        let mut heap: BinaryHeap<_> = targets.map(|(target, own)| Reverse((own, target))).collect();
+        let mut heap: BinaryHeap<_> = targets.map(|(target, value)| Reverse((value, target))).collect();
         let mut pulse = limits.pulse();
         while let Some(Reverse((cost, state))) = heap.pop() {
             pulse.beat()?;
@@ -274,12 +281,12 @@ impl Projection {
         Ok(to_go)
     }
 
-    /// The cost to go from the abstract state of a state; none if the goal is out of reach.
+    /// Goal distance of a state's abstract state. Returns `None` if the goal is unreachable.
     pub fn estimate(&self, state: &State) -> Option<Int> {
         self.to_go[self.state(state) as usize]
     }
 
-    /// The cost to go from each abstract state.
+    /// Goal distances of all abstract states.
     pub fn costs(&self) -> &[Option<Int>] {
         &self.to_go
     }
@@ -288,7 +295,7 @@ impl Projection {
         self.to_go[state as usize]
     }
 
-    /// Where an operator leads, and whether it touches the pattern at all.
+    /// Transitions of an operator; empty if it neither reads nor changes the pattern.
     pub fn transitions(&self, operator: OperatorId) -> &[Transition] {
         &self.operators[operator.index()].1
     }
@@ -296,7 +303,7 @@ impl Projection {
     /// Least cost of reaching each abstract state in exactly one more step.
     fn advance(&self, costs: &[Option<Int>]) -> Vec<Option<Int>> {
         let improve =
-            |slot: &mut Option<Int>, cost: Int| *slot = Some(slot.map_or(cost, |known| known.min(cost)));
+            |slot: &mut Option<Int>, cost: Int| *slot = Some(slot.map_or(cost, |least| least.min(cost)));
         let mut next = vec![None; costs.len()];
         if let Some(idle) = self.idle_cost {
             for (slot, cost) in next.iter_mut().zip(costs) {
@@ -321,11 +328,12 @@ impl Projection {
         costs
     }
 
-    /// The most steps that a plan with cost at most `limit` can have; none if there is no such bound, or one above `most`.
+    /// Upper bound on the number of steps of a plan with cost at most `limit`. Returns `None` if
+    /// there is no bound up to `max_steps`.
     pub(crate) fn step_bound(
         &self,
         limit: Int,
-        most: usize,
+        max_steps: usize,
         limits: &Limits,
     ) -> Result<Option<usize>, Interrupted> {
         let fits = |costs: &[Option<Int>]| {
@@ -336,13 +344,14 @@ impl Projection {
         };
         let mut costs = self.start();
         let mut bound = 0;
-        for step in limits.watch(0..=most) {
+        for step in limits.watch(0..=max_steps) {
             let step = step?;
             if !fits(&costs) {
                 return Ok(Some(bound));
             }
             bound = step;
             let next = self.advance(&costs);
+            // At a fixpoint the bound would never be exceeded.
             if next == costs {
                 return Ok(None);
             }
@@ -351,7 +360,8 @@ impl Projection {
         Ok(None)
     }
 
-    /// Clears `allowed[step][operator]` wherever no plan with cost at most `limit` has the operator at that step.
+    /// Clears `allowed[step][operator]` if no plan with cost at most `limit` has the operator at
+    /// that step.
     pub(crate) fn restrict(
         &self,
         limit: Option<Int>,
@@ -367,7 +377,7 @@ impl Projection {
             for (flag, (cost, transitions)) in row.iter_mut().zip(&self.operators) {
                 *flag = *flag
                     && if transitions.is_empty() {
-                        cheapest.is_some_and(|known| within(sum(known, *cost)))
+                        cheapest.is_some_and(|least| within(sum(least, *cost)))
                     } else {
                         transitions.iter().any(|transition| {
                             let through =

@@ -1,8 +1,9 @@
 //! Lower bounds on the consumption of a resource before it is replenished.
 //!
-//! A numeric variable is a resource if every operator that may lower it requires that it does not fall below 0.
-//! The least consumption, in a projection, on the way to the goal or to a replenishing operator is what a state
-//! must have left: the resource-to-go of constrained shortest paths \[1\].
+//! A numeric variable is a resource if every operator that may lower it requires that it does not
+//! fall below 0. The least consumption, in a projection, on the way to the goal or to a
+//! replenishing operator is what a state must have left: the resource-to-go of constrained shortest
+//! paths \[1\].
 //!
 //! \[1\] I. Dumitrescu, N. Boland: Improved preprocessing, labeling and scaling algorithms for the
 //! weight-constrained shortest path problem, Networks 42(3), 2003.
@@ -15,25 +16,26 @@ use task::task::{Operator, State};
 
 use crate::bounds::pattern_database::Projection;
 
-/// A resource, and what each abstract state needs of it, by projection.
+/// A resource and the lower bound on its remaining amount, by projection and abstract state.
 pub(super) struct Resource {
     pub(super) variable: NumericId,
-    /// By position of the projection.
+    /// By index of the projection.
     pub(super) needs: Vec<(usize, Vec<Option<Int>>)>,
 }
 
 impl Resource {
-    /// Whether a state has enough to reach the goal or a replenishment, as far as projections tell. Where nothing is
-    /// needed, a value below 0 does no harm.
+    /// Returns `true` unless a projection proves that the state has too little to reach the goal or
+    /// a replenishment. A value below 0 is harmless if nothing is needed.
     pub(super) fn has_enough_resources(&self, state: &State, projections: &[Projection]) -> bool {
-        let own = state.numbers[self.variable.index()];
+        let amount = state.numbers[self.variable.index()];
         self.needs.iter().all(|(projection, needs)| {
-            needs[projections[*projection].state(state) as usize].is_some_and(|need| need == 0 || need <= own)
+            needs[projections[*projection].state(state) as usize]
+                .is_some_and(|need| need == 0 || need <= amount)
         })
     }
 }
 
-/// The resources of a task.
+/// Resources of a task.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "numbers of a task are above the least number of their type"
@@ -43,28 +45,30 @@ pub(super) fn resources(
     projections: &[Projection],
 ) -> Result<Vec<Resource>, Interrupted> {
     let Context { task, limits } = context;
-    let mut found = Vec::new();
+    let mut result = Vec::new();
     for variable in limits.watch(NumericId::all(task.initial.numbers.len())) {
         let variable = variable?;
         let Some(used) = task.operators.iter().map(|o| used(o, variable)).collect::<Option<Vec<_>>>() else {
             continue;
         };
-        let left = task.goal.comparisons.iter().filter(|c| c.coefficients[..] == [(variable, 1)]);
-        let left = left.map(|comparison| -comparison.quantity.constant).fold(0, Int::max);
+        let required = task.goal.comparisons.iter().filter(|c| c.coefficients[..] == [(variable, 1)]);
+        let required = required.map(|comparison| -comparison.quantity.constant).fold(0, Int::max);
         let mut needs = Vec::new();
         for (projection, position) in projections.iter().zip(0..) {
+            // An operator that replenishes from any abstract state makes every lower bound 0.
             let anywhere =
                 |operator: usize| used[operator].is_none() && !projection.affects_pattern(operator);
             if !(0..used.len()).any(anywhere) {
-                needs.push((position, projection.needs(&used, left, limits)?));
+                needs.push((position, projection.needs(&used, required, limits)?));
             }
         }
-        found.push(Resource { variable, needs });
+        result.push(Resource { variable, needs });
     }
-    Ok(found)
+    Ok(result)
 }
 
-/// What an operator uses at least (none if it may replenish); nothing if it may lower the variable below 0.
+/// Least consumption of an operator: `Some(None)` if it may replenish. Returns `None` if it may
+/// lower the variable below 0, so the variable is no resource.
 #[allow(clippy::option_option)]
 #[expect(
     clippy::arithmetic_side_effects,

@@ -1,16 +1,17 @@
 //! Bucket queue: numbers sorted by small integer costs.
 
-/// Costs from here on are kept together, in no order but that of their costs once it is their turn.
+/// Number of buckets. Items with higher costs are kept in a heap.
 const BUCKET_COUNT: usize = 1 << 16;
 
-/// Numbers in buckets by cost. What is put in while it is emptied costs no less than what was taken out last.
+/// Monotone bucket queue: an item that is added while the queue is emptied costs at least as much
+/// as the last one taken.
 #[derive(Debug, Default)]
 pub struct Queue {
     buckets: Vec<Vec<u32>>,
     at: usize,
-    /// How many of the cheapest bucket [`Queue::pop_first`] has taken.
+    /// Number of items of the cheapest bucket that [`Queue::pop_first`] has taken.
     taken: usize,
-    /// How many are in buckets.
+    /// Number of items in buckets.
     count: usize,
     dear: std::collections::BinaryHeap<std::cmp::Reverse<(u32, u32)>>,
 }
@@ -37,7 +38,7 @@ impl Queue {
         self.count = self.count.saturating_add(1);
     }
 
-    /// One of the cheapest, those that came last first.
+    /// Removes one of the cheapest items, last in, first out.
     pub(crate) fn pop(&mut self) -> Option<(u32, u32)> {
         if self.count == 0 {
             return self.dear.pop().map(|std::cmp::Reverse(least)| least);
@@ -51,7 +52,8 @@ impl Queue {
         }
     }
 
-    /// One of the cheapest, those that came first first. A queue is emptied by this or by `pop`, never by both.
+    /// Removes one of the cheapest items, first in, first out. A queue must be emptied by this
+    /// method or by `pop`, never by both.
     pub fn pop_first(&mut self) -> Option<(u32, u32)> {
         if self.count == 0 {
             return self.dear.pop().map(|std::cmp::Reverse(least)| least);

@@ -1,10 +1,10 @@
 //! Delete relaxation of a ground task as nodes with conditions and effects.
 //!
-//! Propositions are facts, disjunctions and numeric comparisons. A node is an operator, a conditional effect, a
-//! rule of a derived variable, or one way to make a disjunction true. A derived variable that is required to be
-//! false counts as false. The best designs are selected for each purpose separately. The number of repetitions
-//! until a comparison holds is estimated as by Scala et al. \[1\]; an operator that does not add a constant counts
-//! as achieving it at once.
+//! Propositions are facts, disjunctions and numeric comparisons. A node is an operator, a
+//! conditional effect, a rule of a derived variable, or one way to make a disjunction true. A
+//! derived variable that is required to be false counts as false. The best designs are selected for
+//! each purpose separately. The number of repetitions until a comparison holds is estimated as by
+//! Scala et al. \[1\]; an operator that does not add a constant counts as achieving it at once.
 //!
 //! \[1\] E. Scala, P. Haslum, S. Thiébaux: Heuristics for numeric planning via subgoaling, IJCAI 2016.
 
@@ -17,55 +17,56 @@ use task::task::number::{TaskNumber, sum_of_products};
 use task::task::quantity::{Linear, NumericId, Quantity};
 use task::task::{Condition, Fact, Literal, Operator, OperatorId, State, Task, VariableId};
 
-/// Something that may hold: by number.
+/// Number of a fact, disjunction or numeric comparison.
 pub(super) type Proposition = u32;
 
-/// A node that is not an operator's.
+/// Marks a node that does not belong to an operator.
 pub(super) const NO_OPERATOR: u32 = u32::MAX;
 
-/// A sum of numeric variables, and what it has to come to.
+/// A linear expression with the thresholds that conditions compare it with.
 pub(super) struct NumericCondition<N> {
     pub(super) sum: Vec<(NumericId, N)>,
-    /// What the sum has to be at least, or above if it says so, and the proposition that it is.
+    /// Threshold, whether the comparison is strict (greater than, not at least), and its
+    /// proposition.
     pub(super) thresholds: Vec<(N, bool, Proposition)>,
 }
 
 impl<N: TaskNumber> NumericCondition<N> {
-    /// What the sum comes to; none if that does not fit.
+    /// Value of the expression. Returns `None` if it overflows.
     pub(super) fn value(&self, numbers: &[N]) -> Option<N> {
         let terms = self.sum.iter().map(|(variable, factor)| (factor, &numbers[variable.index()]));
         sum_of_products(N::zero(), terms)
     }
 }
 
-/// How an operator helps with a direction.
+/// Contribution of an operator to a numeric condition.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Achiever {
     pub(super) direction: u32,
-    /// What it adds each time; infinite if once is enough.
+    /// Increase per application; infinite if one application is assumed to suffice.
     pub(super) gain: f64,
 }
 
-/// A task without its deletes.
+/// The delete relaxation of a task.
 pub(super) struct Relaxation<N> {
-    /// The proposition of each variable's first value.
+    /// Proposition of each variable's first value.
     first: Vec<Proposition>,
     pub(super) propositions: usize,
-    /// What is taken to hold always.
+    /// Propositions that are assumed to hold always.
     pub(super) always: Vec<Proposition>,
     pub(super) directions: Vec<NumericCondition<N>>,
-    /// The operator of each node.
+    /// Operator of each node.
     pub(super) operators: Vec<u32>,
     pub(super) conditions: Lists,
     pub(super) effects: Lists,
     pub(super) supports: Vec<Vec<Achiever>>,
-    /// For each proposition the nodes that have it as a condition.
+    /// Per proposition: the nodes that have it as a condition.
     pub(super) waiting: Lists,
-    /// Whether a node is an operator itself, and not one of its conditional effects.
+    /// Whether a node represents an operator itself, not one of its conditional effects.
     pub(super) is_base: Vec<bool>,
-    /// Holds where the goal does.
+    /// Artificial proposition that holds if the goal does.
     pub(super) goal: Proposition,
-    /// What the goal requires.
+    /// Conditions of the goal.
     pub(super) goals: Vec<Proposition>,
 }
 
@@ -78,7 +79,7 @@ impl<N: TaskNumber> Relaxation<N> {
         self.first[fact.variable.index()].saturating_add(fact.value)
     }
 
-    /// The fact of a proposition; none if it is a disjunction or a comparison.
+    /// Fact of a proposition. Returns `None` if it is a disjunction or a comparison.
     pub(super) fn fact_of(&self, proposition: Proposition) -> Option<Fact> {
         if proposition >= *self.first.last()? {
             return None;
@@ -88,25 +89,25 @@ impl<N: TaskNumber> Relaxation<N> {
         Some(Fact { variable: VariableId::of(variable), value })
     }
 
-    /// The propositions of facts in a state.
+    /// Propositions of the facts of a state.
     pub(super) fn facts<'s>(&'s self, values: &'s [u32]) -> impl Iterator<Item = Proposition> + 's {
         self.first.iter().zip(values).map(|(first, value)| first.saturating_add(*value))
     }
 }
 
 impl<N: TaskNumber> Relaxation<N> {
-    /// Whether a proposition that is a fact or a comparison holds in a state.
+    /// Returns `true` if a proposition that is a fact or a comparison holds in a state.
     pub(super) fn holds(&self, proposition: Proposition, state: &State<N>) -> bool {
         if let Some(fact) = self.fact_of(proposition) {
             return fact.holds(&state.values);
         }
-        let all = self.directions.iter().flat_map(|direction| {
+        let thresholds = self.directions.iter().flat_map(|direction| {
             direction
                 .thresholds
                 .iter()
-                .map(move |(threshold, strict, own)| (direction, threshold, *strict, *own))
+                .map(move |(threshold, strict, id)| (direction, threshold, *strict, *id))
         });
-        all.filter(|(.., own)| *own == proposition).any(|(direction, threshold, strict, _)| {
+        thresholds.filter(|(.., id)| *id == proposition).any(|(direction, threshold, strict, _)| {
             direction
                 .value(&state.numbers)
                 .is_some_and(|value| if strict { value > *threshold } else { value >= *threshold })
@@ -208,9 +209,9 @@ impl<'a, N: TaskNumber> Builder<'a, N> {
     }
 
     fn fresh(&mut self) -> Proposition {
-        let own = self.next;
+        let proposition = self.next;
         self.next = self.next.saturating_add(1);
-        own
+        proposition
     }
 
     fn holds_always(&mut self, proposition: Proposition) {
@@ -220,7 +221,7 @@ impl<'a, N: TaskNumber> Builder<'a, N> {
 
     fn node(&mut self, operator: u32, is_base: bool, conditions: &[Proposition], effects: &[Proposition]) {
         let mut conditions: Vec<Proposition> =
-            conditions.iter().copied().filter(|own| !self.is_always.contains(own)).collect();
+            conditions.iter().copied().filter(|proposition| !self.is_always.contains(proposition)).collect();
         conditions.sort_unstable();
         conditions.dedup();
         self.operators.push(operator);
@@ -234,19 +235,20 @@ impl<'a, N: TaskNumber> Builder<'a, N> {
     }
 
     fn condition(&mut self, condition: &Condition<N>) -> Vec<Proposition> {
-        let mut all: Vec<Proposition> = condition.facts.iter().map(|fact| self.fact(*fact)).collect();
+        let mut propositions: Vec<Proposition> =
+            condition.facts.iter().map(|fact| self.fact(*fact)).collect();
         for clause in &condition.clauses {
-            all.extend(self.clause(clause));
+            propositions.extend(self.clause(clause));
         }
         for (linears, strict) in [(&condition.comparisons, false), (&condition.above, true)] {
             for linear in linears {
-                all.extend(self.comparison(linear, strict));
+                propositions.extend(self.comparison(linear, strict));
             }
         }
-        all
+        propositions
     }
 
-    /// The proposition of a comparison at its best; none if it always holds.
+    /// Proposition of a comparison with the best designs. Returns `None` if it always holds.
     fn comparison(&mut self, linear: &Linear<N>, strict: bool) -> Option<Proposition> {
         let threshold = negated(maximum(&linear.quantity));
         if linear.coefficients.is_empty() {
@@ -261,13 +263,13 @@ impl<'a, N: TaskNumber> Builder<'a, N> {
             self.directions.len().saturating_sub(1)
         });
         let key = (direction, threshold, strict);
-        if let Some(known) = self.by_threshold.get(&key) {
-            return Some(*known);
+        if let Some(proposition) = self.by_threshold.get(&key) {
+            return Some(*proposition);
         }
-        let own = self.fresh();
-        self.directions[direction].thresholds.push((key.1.clone(), strict, own));
-        self.by_threshold.insert(key, own);
-        Some(own)
+        let proposition = self.fresh();
+        self.directions[direction].thresholds.push((key.1.clone(), strict, proposition));
+        self.by_threshold.insert(key, proposition);
+        Some(proposition)
     }
 
     fn clause(&mut self, clause: &[Literal]) -> Option<Proposition> {
@@ -280,68 +282,72 @@ impl<'a, N: TaskNumber> Builder<'a, N> {
         }
         let mut key = clause.to_vec();
         key.sort_unstable();
-        if let Some(known) = self.disjunctions.get(&key) {
-            return Some(*known);
+        if let Some(proposition) = self.disjunctions.get(&key) {
+            return Some(*proposition);
         }
-        let own = self.fresh();
-        self.disjunctions.insert(key, own);
+        let proposition = self.fresh();
+        self.disjunctions.insert(key, proposition);
         for part in parts {
-            self.node(NO_OPERATOR, false, &[part], &[own]);
+            self.node(NO_OPERATOR, false, &[part], &[proposition]);
         }
-        Some(own)
+        Some(proposition)
     }
 
-    /// The proposition of a literal; none if it is taken to hold always.
+    /// Proposition of a literal. Returns `None` if it is assumed to hold always.
     fn literal(&mut self, literal: Literal) -> Option<Proposition> {
         let Literal { fact, positive } = literal;
-        let own = self.fact(fact);
+        let proposition = self.fact(fact);
         if positive {
-            return (!self.is_always.contains(&own)).then_some(own);
+            return (!self.is_always.contains(&proposition)).then_some(proposition);
         }
         let values = dense(self.task.variables[fact.variable.index()].values.len());
         if fact.variable.index() >= self.task.basic {
-            // A derived variable has the other value, which is true, if its rules say so.
+            // A derived variable is true only if its rules derive it; its falsity is always
+            // assumed.
             return (fact.value != 0).then(|| self.fact(Fact { value: 0, ..fact }));
         }
         if values == 2 {
             return Some(self.fact(Fact { value: 1_u32.saturating_sub(fact.value), ..fact }));
         }
         let key = vec![literal];
-        if let Some(known) = self.disjunctions.get(&key) {
-            return Some(*known);
+        if let Some(proposition) = self.disjunctions.get(&key) {
+            return Some(*proposition);
         }
-        let own = self.fresh();
-        self.disjunctions.insert(key, own);
+        let proposition = self.fresh();
+        self.disjunctions.insert(key, proposition);
         for value in (0..values).filter(|value| *value != fact.value) {
-            let other = self.fact(Fact { value, ..fact });
-            self.node(NO_OPERATOR, false, &[other], &[own]);
+            let value_proposition = self.fact(Fact { value, ..fact });
+            self.node(NO_OPERATOR, false, &[value_proposition], &[proposition]);
         }
-        Some(own)
+        Some(proposition)
     }
 
-    /// How the base node of each operator helps with numbers.
+    /// Contributions of each operator's base node to the numeric conditions.
     fn supports(&self, limits: &Limits) -> Result<Vec<Vec<Achiever>>, Interrupted> {
-        let mut of: FxHashMap<NumericId, Vec<usize>> = FxHashMap::default();
+        let mut conditions_by_variable: FxHashMap<NumericId, Vec<usize>> = FxHashMap::default();
         for (index, direction) in self.directions.iter().enumerate() {
             for (variable, _) in &direction.sum {
-                of.entry(*variable).or_default().push(index);
+                conditions_by_variable.entry(*variable).or_default().push(index);
             }
         }
         let mut supports = vec![Vec::new(); self.operators.len()];
         let nodes = self.operators.iter().zip(&self.is_base).zip(&mut supports);
         for item in limits.watch(nodes) {
-            let ((operator, is_base), own) = item?;
+            let ((operator, is_base), achievers) = item?;
             if !*is_base {
                 continue;
             }
             let operator = &self.task.operators[*operator as usize];
-            let changed = operator.numeric_effects.iter().filter_map(|effect| of.get(&effect.variable));
-            let mut touched: Vec<usize> = changed.flatten().copied().collect();
-            touched.sort_unstable();
-            touched.dedup();
-            for index in touched {
+            let affected = operator
+                .numeric_effects
+                .iter()
+                .filter_map(|effect| conditions_by_variable.get(&effect.variable));
+            let mut indices: Vec<usize> = affected.flatten().copied().collect();
+            indices.sort_unstable();
+            indices.dedup();
+            for index in indices {
                 if let Some(gain) = gain(operator, &self.directions[index].sum) {
-                    own.push(Achiever { direction: dense(index), gain });
+                    achievers.push(Achiever { direction: dense(index), gain });
                 }
             }
         }
@@ -349,8 +355,9 @@ impl<'a, N: TaskNumber> Builder<'a, N> {
     }
 }
 
-/// What an operator adds to a sum at its best; none if it adds nothing, infinite if that is not a constant or does not fit. Whether it is
-/// above 0 is decided exactly: what nothing adds to is out of reach.
+/// Greatest increase of an expression by an operator. Returns `None` if it is not positive, and
+/// infinity if it is not constant or overflows. The sign is decided exactly, because a condition
+/// that no operator increases is unreachable.
 fn gain<N: TaskNumber>(operator: &Operator<N>, sum: &[(NumericId, N)]) -> Option<f64> {
     let mut gain = N::zero();
     for (variable, factor) in sum {
@@ -359,7 +366,7 @@ fn gain<N: TaskNumber>(operator: &Operator<N>, sum: &[(NumericId, N)]) -> Option
         };
         let quantity = &effect.value.quantity;
         let amount = match &effect.value.coefficients[..] {
-            [(own, one)] if own == variable && one.is_one() => {
+            [(changed_variable, factor_one)] if changed_variable == variable && factor_one.is_one() => {
                 if *factor < N::zero() {
                     quantity.minimum()
                 } else {
@@ -373,7 +380,7 @@ fn gain<N: TaskNumber>(operator: &Operator<N>, sum: &[(NumericId, N)]) -> Option
         };
         gain = next;
     }
-    // What is above 0 may be too little for a double.
+    // A positive increase may round to 0 as a double.
     (gain > N::zero()).then(|| gain.approximate().max(f64::MIN_POSITIVE))
 }
 
@@ -382,12 +389,12 @@ fn negated<N: TaskNumber>(number: N) -> N {
     -number
 }
 
-/// An upper bound on what designs contribute, as `Quantity::minimum` is a lower one.
+/// Upper bound on a quantity over all designs, the counterpart of `Quantity::minimum`.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
 )]
 fn maximum<N: TaskNumber>(quantity: &Quantity<N>) -> N {
-    let most = quantity.tables.iter().filter_map(|table| table.values.iter().max());
-    most.fold(quantity.constant.clone(), |sum, value| sum + value.clone())
+    let maxima = quantity.tables.iter().filter_map(|table| table.values.iter().max());
+    maxima.fold(quantity.constant.clone(), |sum, value| sum + value.clone())
 }

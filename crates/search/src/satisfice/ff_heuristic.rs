@@ -1,7 +1,8 @@
-//! FF heuristic with additive costs: the cost of a relaxed plan, and its applicable operators as preferred operators.
+//! FF heuristic with additive costs: the cost of a relaxed plan, and its applicable operators as
+//! preferred operators.
 //!
-//! Costs of propositions are those of h^add \[1\], computed in the order of Dijkstra's algorithm. The relaxed plan
-//! consists of the cheapest supporters, followed back from the goal \[2\].
+//! Costs of propositions are those of h^add \[1\], computed in the order of Dijkstra's algorithm.
+//! The relaxed plan consists of the cheapest supporters, followed back from the goal \[2\].
 //!
 //! - \[1\] B. Bonet, H. Geffner: Planning as heuristic search, Artificial Intelligence 129, 2001.
 //! - \[2\] E. Keyder, H. Geffner: Heuristics for planning with action costs revisited, ECAI 2008.
@@ -14,33 +15,33 @@ use crate::satisfice::bucket_queue::Queue;
 use crate::satisfice::delete_relaxation::{NO_OPERATOR, Proposition, Relaxation};
 
 const UNREACHED: u32 = u32::MAX;
-/// Sums of costs do not grow beyond this.
+/// Cap on sums of costs.
 const MAX_COST: u32 = 1 << 30;
-/// An operator is not taken to be needed more often than this.
+/// Cap on the number of applications of an operator that a numeric condition is assumed to need.
 const MAX_REPETITIONS: f64 = 10_000.0;
 
-/// What brought a proposition about most cheaply.
+/// Cheapest achiever of a proposition, and its number of applications.
 #[derive(Debug, Clone, Copy)]
 struct Supporter {
     node: u32,
     times: u32,
 }
 
-/// Room for explorations, one after another.
+/// The FF heuristic, with scratch buffers for evaluating states.
 pub(super) struct FfHeuristic {
-    /// The cost of each proposition.
+    /// Cost (h^add) of each proposition.
     costs: Vec<u32>,
     supporters: Vec<Supporter>,
-    /// For each node how many of its conditions are not reached, and what the others cost.
+    /// Per node: number of its unreached conditions, and sum of the costs of the reached ones.
     left: Vec<u32>,
     sums: Vec<u32>,
     initially_left: Vec<u32>,
     queue: Queue,
-    /// For each direction what its sum is short of zero.
+    /// Per numeric expression: its value in the state.
     values: Vec<f64>,
-    /// Base nodes whose conditions cost nothing.
+    /// Operators whose conditions cost nothing.
     pub(super) applicable: Vec<u32>,
-    /// Operators of the relaxed plan that can be applied at once.
+    /// Operators of the relaxed plan that are applicable in the state.
     pub(super) preferred: Vec<u32>,
     marked: Vec<bool>,
     marks: Vec<Proposition>,
@@ -69,9 +70,9 @@ impl FfHeuristic {
         }
     }
 
-    /// What a relaxed plan costs, where `prices` has the price of each operator, at least 1; none if there is no relaxed plan.
-    /// Afterwards `applicable` has the nodes of operators that may be applicable, and `preferred` operators of the relaxed plan among
-    /// them.
+    /// Cost of a relaxed plan under the operator costs `prices`, each at least 1. Returns `None` if
+    /// there is no relaxed plan. Afterwards `applicable` contains the operators that may be
+    /// applicable, and `preferred` those of them that are in the relaxed plan.
     pub(super) fn estimate<N: TaskNumber>(
         &mut self,
         relaxation: &Relaxation<N>,
@@ -89,19 +90,19 @@ impl FfHeuristic {
         self.left.copy_from_slice(&self.initially_left);
         self.queue.clear();
         self.applicable.clear();
-        let none = Supporter { node: NO_OPERATOR, times: 0 };
+        let no_supporter = Supporter { node: NO_OPERATOR, times: 0 };
         for proposition in relaxation.facts(&state.values).chain(relaxation.always.iter().copied()) {
-            self.put(proposition, 0, none);
+            self.put(proposition, 0, no_supporter);
         }
         for (direction, index) in relaxation.directions.iter().zip(0..) {
             let value: Option<N> = direction.value(&state.numbers);
             for (threshold, strict, proposition) in &direction.thresholds {
-                // What does not fit is taken to hold.
+                // A value that overflows counts as satisfying the condition.
                 let holds = value
                     .as_ref()
                     .is_none_or(|value| if *strict { value > threshold } else { value >= threshold });
                 if holds {
-                    self.put(*proposition, 0, none);
+                    self.put(*proposition, 0, no_supporter);
                 }
             }
             let index: usize = index;
@@ -116,16 +117,17 @@ impl FfHeuristic {
             if self.costs[proposition as usize] != cost {
                 continue;
             }
-            // What costs nothing is gone through to its end: it says what is applicable.
+            // Propositions of cost 0 are always processed completely, because they determine the
+            // applicable operators.
             if cost > 0 && self.costs[relaxation.goal as usize] <= cost {
                 break;
             }
             for node in relaxation.waiting.of(proposition) {
-                let left = &mut self.left[*node as usize];
-                *left = left.saturating_sub(1);
+                let unreached = &mut self.left[*node as usize];
+                *unreached = unreached.saturating_sub(1);
                 let sum = &mut self.sums[*node as usize];
                 *sum = sum.saturating_add(cost).min(MAX_COST);
-                if *left == 0 {
+                if *unreached == 0 {
                     self.reached(relaxation, prices, *node);
                 }
             }
@@ -133,15 +135,15 @@ impl FfHeuristic {
     }
 
     fn put(&mut self, proposition: Proposition, cost: u32, supporter: Supporter) {
-        let known = &mut self.costs[proposition as usize];
-        if cost < *known {
-            *known = cost;
+        let current = &mut self.costs[proposition as usize];
+        if cost < *current {
+            *current = cost;
             self.supporters[proposition as usize] = supporter;
             self.queue.push(cost, proposition);
         }
     }
 
-    /// All conditions of a node are reached.
+    /// Processes a node whose conditions are all reached.
     fn reached<N: TaskNumber>(&mut self, relaxation: &Relaxation<N>, prices: &[u32], node: u32) {
         let sum = self.sums[node as usize];
         let operator = relaxation.operators[node as usize];
@@ -180,7 +182,7 @@ impl FfHeuristic {
             }
             let operator = relaxation.operators[node as usize];
             if operator != NO_OPERATOR {
-                // An operator that is needed for several purposes counts once, or as often as each comparison asks for.
+                // An operator counts once, or as many times as each numeric condition needs it.
                 if !self.in_plan[operator as usize] || times > 1 {
                     let price = prices[operator as usize];
                     total = total.saturating_add(price.saturating_mul(times)).min(MAX_COST);
@@ -210,7 +212,7 @@ impl FfHeuristic {
     }
 }
 
-/// How often so much has to be added until it is so much.
+/// Number of applications that add up to at least the missing amount.
 fn times(missing: f64, gain: f64) -> u32 {
     if gain.is_infinite() {
         return 1;

@@ -1,7 +1,8 @@
 //! Landmark status: the landmarks that were reached on the path to a state, and the number still required.
 //!
-//! A landmark is reached when it holds and its predecessors were reached. A reached landmark is required again
-//! if it is a goal that does not hold, or needed right before another landmark that was not reached \[1\].
+//! A landmark is reached when it holds and its predecessors were reached. A reached landmark is
+//! required again if it is a goal that does not hold, or needed right before another landmark that
+//! was not reached \[1\].
 //!
 //! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 5.
 
@@ -11,18 +12,18 @@ use task::task::{Fact, State};
 use crate::satisfice::delete_relaxation::{Proposition, Relaxation};
 use crate::satisfice::landmarks::Landmarks;
 
-/// Landmarks with room for looking at states.
+/// Landmarks of a task, with scratch buffers for evaluating states.
 pub(super) struct LandmarkStatus {
     landmarks: Landmarks,
-    /// The facts of each landmark, and those of its propositions that are none.
+    /// Per landmark: its propositions that are facts, and its other propositions.
     facts: Vec<(Vec<Fact>, Vec<Proposition>)>,
-    /// For each proposition whether it is one that the state at hand lacks to come further.
+    /// Per proposition: whether it would achieve a landmark that is due next.
     wanted: Vec<bool>,
     marks: Vec<Proposition>,
     holds: Vec<bool>,
 }
 
-/// How many words hold a bit for each landmark.
+/// Number of words of a bitset with one bit per landmark.
 fn words(count: usize) -> usize {
     count.div_ceil(64)
 }
@@ -39,9 +40,14 @@ impl LandmarkStatus {
     pub(super) fn new<N: TaskNumber>(landmarks: Landmarks, relaxation: &Relaxation<N>) -> Self {
         let count = landmarks.all.len();
         let facts = landmarks.all.iter().map(|landmark| {
-            let facts = landmark.any_of.iter().filter_map(|own| relaxation.fact_of(*own)).collect();
-            let others = landmark.any_of.iter().copied().filter(|own| relaxation.fact_of(*own).is_none());
-            (facts, others.collect())
+            let facts =
+                landmark.any_of.iter().filter_map(|proposition| relaxation.fact_of(*proposition)).collect();
+            let non_facts = landmark
+                .any_of
+                .iter()
+                .copied()
+                .filter(|proposition| relaxation.fact_of(*proposition).is_none());
+            (facts, non_facts.collect())
         });
         Self {
             facts: facts.collect(),
@@ -56,14 +62,14 @@ impl LandmarkStatus {
         words(self.landmarks.all.len())
     }
 
-    /// What is reached in the initial state.
+    /// Landmarks that are reached in the initial state.
     pub(super) fn initially<N: TaskNumber>(
         &mut self,
         relaxation: &Relaxation<N>,
         state: &State<N>,
     ) -> Vec<u64> {
         let mut reached = vec![0; self.stride()];
-        // Those before one that holds may hold, too.
+        // A landmark is reached only after its predecessors, so reaching one may enable others.
         for _ in 0..self.landmarks.all.len() {
             let before = reached.clone();
             reached = self.progress(relaxation, &before, state);
@@ -74,7 +80,7 @@ impl LandmarkStatus {
         reached
     }
 
-    /// What is reached in a state after one in which `before` was reached.
+    /// Landmarks that are reached in `state` if `before` were reached in its predecessor.
     pub(super) fn progress<N: TaskNumber>(
         &mut self,
         relaxation: &Relaxation<N>,
@@ -82,10 +88,10 @@ impl LandmarkStatus {
         state: &State<N>,
     ) -> Vec<u64> {
         let mut reached = before.to_vec();
-        let all = self.landmarks.all.iter().zip(&self.facts);
-        for ((landmark, (facts, others)), index) in all.zip(0_u32..) {
+        let landmarks = self.landmarks.all.iter().zip(&self.facts);
+        for ((landmark, (facts, non_facts)), index) in landmarks.zip(0_u32..) {
             let holds = facts.iter().any(|fact| fact.holds(&state.values))
-                || others.iter().any(|own| relaxation.holds(*own, state));
+                || non_facts.iter().any(|proposition| relaxation.holds(*proposition, state));
             self.holds[index as usize] = holds;
             if holds && !bit(before, index) && landmark.after.iter().all(|sooner| bit(before, *sooner)) {
                 set(&mut reached, index);
@@ -94,22 +100,22 @@ impl LandmarkStatus {
         reached
     }
 
-    /// How many landmarks are still to come, by what holds in the state that was progressed to last.
+    /// Number of landmarks that are still required, given the state of the last call of `progress`.
     pub(super) fn remaining(&self, reached: &[u64]) -> u32 {
-        let mut left: u32 = 0;
+        let mut count: u32 = 0;
         for (landmark, index) in self.landmarks.all.iter().zip(0_u32..) {
             let again = || {
                 !self.holds[index as usize]
                     && (landmark.is_goal || landmark.needed_by.iter().any(|by| !bit(reached, *by)))
             };
             if !bit(reached, index) || again() {
-                left = left.saturating_add(1);
+                count = count.saturating_add(1);
             }
         }
-        left
+        count
     }
 
-    /// Notes what a next step should bring about.
+    /// Marks the propositions of the unreached landmarks whose predecessors were reached.
     pub(super) fn request_landmark(&mut self, reached: &[u64]) {
         for mark in self.marks.drain(..) {
             self.wanted[mark as usize] = false;

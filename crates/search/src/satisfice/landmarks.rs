@@ -1,9 +1,10 @@
 //! Landmarks and their orders, found backwards from the goal \[1\].
 //!
-//! Each condition that all possible first achievers of a landmark share is a landmark, ordered greedily-necessary
-//! before it. If each achiever requires a fact of one predicate, the disjunction of these facts is a landmark.
-//! Facts that are unreachable without a landmark come after it. Reasonable orders delay a landmark that would
-//! be deleted on the way to another one; they only guide the search.
+//! Each condition that all possible first achievers of a landmark share is a landmark, ordered
+//! greedily-necessary before it. If each achiever requires a fact of one predicate, the disjunction
+//! of these facts is a landmark. Facts that are unreachable without a landmark come after it.
+//! Reasonable orders delay a landmark that would be deleted on the way to another one; they only
+//! guide the search.
 //!
 //! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 4.
 
@@ -15,20 +16,20 @@ use task::task::{Fact, Task};
 
 use crate::satisfice::delete_relaxation::{NO_OPERATOR, Proposition, Relaxation};
 
-/// Disjunctions of more facts are not looked for.
+/// Maximum number of facts of a disjunctive landmark.
 const MAX_DISJUNCTION: usize = 4;
-/// No more landmarks than these.
+/// Maximum number of landmarks.
 const MAX_LANDMARKS: usize = 500;
-/// Propositions times landmarks, at most.
+/// Work limit: propositions and nodes of the relaxation times landmarks.
 const MAX_WORK: usize = 400_000_000;
 
-/// A landmark: one of its propositions.
+/// A landmark: every plan makes one of its propositions true.
 #[derive(Debug, Clone)]
 pub(super) struct Landmark {
     pub(super) any_of: Vec<Proposition>,
-    /// Landmarks that come before it, as orders that hold or only guide.
+    /// Landmarks ordered before it, by sound or reasonable orders.
     pub(super) after: Vec<u32>,
-    /// Landmarks that it has to hold right before.
+    /// Landmarks for which it must hold immediately before (greedy-necessary orders).
     pub(super) needed_by: Vec<u32>,
     pub(super) is_goal: bool,
 }
@@ -46,14 +47,15 @@ struct LandmarkFactory<'a, N> {
     initial: Vec<bool>,
     all: Vec<Landmark>,
     known: FxHashMap<Vec<Proposition>, u32>,
-    /// For each landmark which propositions are reached without it.
+    /// Orders between landmarks: (earlier, later).
     orders: FxHashSet<(u32, u32)>,
+    /// Greedy-necessary orders: (earlier, later).
     needed: FxHashSet<(u32, u32)>,
     exclusive: FxHashMap<Proposition, Vec<usize>>,
 }
 
 impl Landmarks {
-    /// Landmarks of a task from its initial state.
+    /// Finds the landmarks of a task from its initial state.
     pub(super) fn new<N: TaskNumber>(
         task: &Task<N>,
         relaxation: &Relaxation<N>,
@@ -97,13 +99,13 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         for goal in &self.relaxation.goals {
             self.add(vec![*goal], true);
         }
-        let most = MAX_WORK
+        let max_landmarks = MAX_WORK
             .checked_div(self.relaxation.propositions.saturating_add(self.relaxation.operators.len()));
-        let most = most.unwrap_or(MAX_LANDMARKS).min(MAX_LANDMARKS);
+        let max_landmarks = max_landmarks.unwrap_or(MAX_LANDMARKS).min(MAX_LANDMARKS);
         let mut next: u32 = 0;
         while (next as usize) < self.all.len() {
             limits.check()?;
-            if self.all.len() < most {
+            if self.all.len() < max_landmarks {
                 self.before(next);
             }
             next = next.saturating_add(1);
@@ -114,39 +116,41 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
     fn add(&mut self, mut any_of: Vec<Proposition>, is_goal: bool) -> u32 {
         any_of.sort_unstable();
         any_of.dedup();
-        if let Some(known) = self.known.get(&any_of) {
+        if let Some(landmark) = self.known.get(&any_of) {
             if is_goal {
-                self.all[*known as usize].is_goal = true;
+                self.all[*landmark as usize].is_goal = true;
             }
-            return *known;
+            return *landmark;
         }
-        let own = dense(self.all.len());
-        self.known.insert(any_of.clone(), own);
+        let index = dense(self.all.len());
+        self.known.insert(any_of.clone(), index);
         self.all.push(Landmark { any_of, after: Vec::new(), needed_by: Vec::new(), is_goal });
-        own
+        index
     }
 
-    /// Landmarks before a landmark.
+    /// Finds the landmarks that must hold before a landmark, and their orders.
     fn before(&mut self, landmark: u32) {
-        let own = self.all[landmark as usize].any_of.clone();
-        if own.iter().any(|proposition| self.initial[*proposition as usize]) {
+        let propositions = self.all[landmark as usize].any_of.clone();
+        // A landmark that holds initially needs no achiever.
+        if propositions.iter().any(|proposition| self.initial[*proposition as usize]) {
             return;
         }
-        let (reached, enabled) = self.reach_without(&own);
-        for (other, index) in self.all.iter().zip(0..) {
-            if index != landmark && other.any_of.iter().all(|proposition| !reached[*proposition as usize]) {
+        let (reached, enabled) = self.reach_without(&propositions);
+        for (candidate, index) in self.all.iter().zip(0..) {
+            if index != landmark && candidate.any_of.iter().all(|proposition| !reached[*proposition as usize])
+            {
                 self.orders.insert((landmark, index));
             }
         }
-        let achievers: Vec<u32> = own
+        let achievers: Vec<u32> = propositions
             .iter()
             .flat_map(|proposition| &self.adders[*proposition as usize])
             .copied()
             .filter(|node| enabled[*node as usize])
             .collect();
-        let Some((first, rest)) = achievers.split_first() else { return };
+        let Some((first, others)) = achievers.split_first() else { return };
         let mut shared: Vec<Proposition> = self.relaxation.conditions.of(*first).to_vec();
-        for node in rest {
+        for node in others {
             let conditions = self.relaxation.conditions.of(*node);
             shared.retain(|condition| conditions.binary_search(condition).is_ok());
         }
@@ -159,34 +163,35 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
     }
 
     fn order(&mut self, any_of: Vec<Proposition>, before: u32) {
-        let own = self.add(any_of, false);
-        if own != before {
-            self.orders.insert((own, before));
-            self.needed.insert((own, before));
+        let landmark = self.add(any_of, false);
+        if landmark != before {
+            self.orders.insert((landmark, before));
+            self.needed.insert((landmark, before));
         }
     }
 
-    /// Facts of one predicate of which each achiever requires one.
+    /// Finds disjunctive landmarks: facts of one predicate such that each achiever requires one of
+    /// them.
     fn disjunctive(&mut self, achievers: &[u32], shared: &[Proposition], landmark: u32) {
         if achievers.len() < 2 {
             return;
         }
         let mut sets: Option<FxHashMap<&str, Vec<Proposition>>> = None;
         for node in achievers {
-            let mut own: FxHashMap<&str, Vec<Proposition>> = FxHashMap::default();
+            let mut facts_by_predicate: FxHashMap<&str, Vec<Proposition>> = FxHashMap::default();
             for condition in self.relaxation.conditions.of(*node) {
                 if let Some(fact) = self.relaxation.fact_of(*condition)
                     && !shared.contains(condition)
                 {
-                    own.entry(predicate(self.task, fact)).or_default().push(*condition);
+                    facts_by_predicate.entry(predicate(self.task, fact)).or_default().push(*condition);
                 }
             }
             sets = Some(match sets.take() {
-                None => own,
-                Some(known) => known
+                None => facts_by_predicate,
+                Some(previous) => previous
                     .into_iter()
                     .filter_map(|(name, mut facts)| {
-                        facts.extend(own.get(name)?);
+                        facts.extend(facts_by_predicate.get(name)?);
                         facts.sort_unstable();
                         facts.dedup();
                         (facts.len() <= MAX_DISJUNCTION).then_some((name, facts))
@@ -205,27 +210,31 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         }
     }
 
-    /// What is reached without ever reaching some propositions, and which nodes are, their own effects apart.
+    /// Relaxed reachability without the propositions `excluded`: reached propositions, and nodes
+    /// whose conditions are reached.
     fn reach_without(&self, excluded: &[Proposition]) -> (Vec<bool>, Vec<bool>) {
         let relaxation = self.relaxation;
         let mut reached = vec![false; relaxation.propositions];
-        let mut left: Vec<u32> = relaxation.conditions.iter().map(|list| dense(list.len())).collect();
-        let mut enabled = vec![false; left.len()];
+        let mut unreached_conditions: Vec<u32> =
+            relaxation.conditions.iter().map(|list| dense(list.len())).collect();
+        let mut enabled = vec![false; unreached_conditions.len()];
         let mut open: Vec<Proposition> = Vec::new();
-        for (held, proposition) in self.initial.iter().zip(0..) {
-            if *held && !excluded.contains(&proposition) {
+        for (is_initial, proposition) in self.initial.iter().zip(0..) {
+            if *is_initial && !excluded.contains(&proposition) {
                 reached[proposition as usize] = true;
                 open.push(proposition);
             }
         }
-        // Numbers are taken for reached: landmarks of facts are no fewer for what they need besides.
+        // Numeric conditions count as reached. This can only lose landmarks, never add wrong ones.
         for (_, _, proposition) in relaxation.directions.iter().flat_map(|direction| &direction.thresholds) {
             if !excluded.contains(proposition) {
                 reached[*proposition as usize] = true;
                 open.push(*proposition);
             }
         }
-        let mut ready: Vec<u32> = (0..dense(left.len())).filter(|node| left[*node as usize] == 0).collect();
+        let mut ready: Vec<u32> = (0..dense(unreached_conditions.len()))
+            .filter(|node| unreached_conditions[*node as usize] == 0)
+            .collect();
         loop {
             while let Some(node) = ready.pop() {
                 enabled[node as usize] = true;
@@ -238,9 +247,9 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
             }
             let Some(proposition) = open.pop() else { break };
             for node in relaxation.waiting.of(proposition) {
-                let left = &mut left[*node as usize];
-                *left = left.saturating_sub(1);
-                if *left == 0 {
+                let count = &mut unreached_conditions[*node as usize];
+                *count = count.saturating_sub(1);
+                if *count == 0 {
                     ready.push(*node);
                 }
             }
@@ -248,35 +257,36 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         (reached, enabled)
     }
 
-    /// Orders that keep landmarks from being given up again.
+    /// Adds reasonable orders, which keep landmarks from being destroyed and achieved again.
     fn reasonable(&mut self, limits: &Limits) -> Result<(), Interrupted> {
-        let all = 0..dense(self.all.len());
-        let sides: Vec<Vec<Proposition>> = all.clone().map(|own| self.side(own)).collect();
-        let goals: Vec<u32> = all.filter(|own| self.all[*own as usize].is_goal).collect();
+        let indices = 0..dense(self.all.len());
+        let sides: Vec<Vec<Proposition>> = indices.clone().map(|landmark| self.side(landmark)).collect();
+        let goals: Vec<u32> = indices.filter(|landmark| self.all[*landmark as usize].is_goal).collect();
         let pairs = goals.iter().flat_map(|later| goals.iter().map(move |sooner| (*sooner, *later)));
         let mut needed: Vec<(u32, u32)> = self.needed.iter().copied().collect();
         needed.sort_unstable();
         let mut before: Vec<Vec<u32>> = vec![Vec::new(); self.all.len()];
-        for (one, other) in &self.orders {
-            before[*other as usize].push(*one);
+        for (sooner, later) in &self.orders {
+            before[*later as usize].push(*sooner);
         }
-        for own in &mut before {
-            own.sort_unstable();
+        for predecessors in &mut before {
+            predecessors.sort_unstable();
         }
-        let others = needed
+        let indirect = needed
             .iter()
             .flat_map(|(later, common)| before[*common as usize].iter().map(move |sooner| (*sooner, *later)));
         let mut reach = closure(self.all.len(), &self.orders);
-        for pair in limits.watch(pairs.chain(others)) {
+        for pair in limits.watch(pairs.chain(indirect)) {
             let (sooner, later) = pair?;
             if sooner == later
                 || has(&reach[later as usize], sooner)
+                // An order that would close a cycle is dropped.
                 || self.orders.contains(&(sooner, later))
             {
                 continue;
             }
-            let [other] = self.all[later as usize].any_of[..] else { continue };
-            if sides[sooner as usize].iter().any(|own| self.are_mutex(*own, other)) {
+            let [proposition] = self.all[later as usize].any_of[..] else { continue };
+            if sides[sooner as usize].iter().any(|effect| self.are_mutex(*effect, proposition)) {
                 self.orders.insert((sooner, later));
                 connect(&mut reach, sooner, later);
             }
@@ -284,17 +294,17 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         Ok(())
     }
 
-    /// What holds when a landmark is brought about: itself, what all of its achievers bring about besides, and what is needed right before. None
-    /// if it is a disjunction.
+    /// Propositions that hold when a landmark is achieved: the landmark itself, common effects of
+    /// all its achievers, and propositions needed immediately before. Empty for a disjunction.
     fn side(&self, landmark: u32) -> Vec<Proposition> {
-        let [one] = self.all[landmark as usize].any_of[..] else { return Vec::new() };
-        let mut achievers = self.adders[one as usize].iter();
+        let [proposition] = self.all[landmark as usize].any_of[..] else { return Vec::new() };
+        let mut achievers = self.adders[proposition as usize].iter();
         let mut side = achievers.next().map_or_else(Vec::new, |start| self.all_effects(*start));
         for node in achievers {
             let effects = self.all_effects(*node);
             side.retain(|effect| effects.contains(effect));
         }
-        side.push(one);
+        side.push(proposition);
         for (needed, by) in &self.needed {
             if *by == landmark && self.all[*needed as usize].any_of.len() == 1 {
                 side.extend(&self.all[*needed as usize].any_of);
@@ -305,7 +315,7 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
         side
     }
 
-    /// The effects of a node, with those of its operator.
+    /// Effects of a node, including the unconditional effects of its operator.
     fn all_effects(&self, node: u32) -> Vec<Proposition> {
         let mut effects = self.relaxation.effects.of(node).to_vec();
         let operator = self.relaxation.operators[node as usize];
@@ -321,9 +331,10 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
             return false;
         }
         let fact = |proposition| self.relaxation.fact_of(proposition);
-        let same = matches!((fact(one), fact(other)), (Some(a), Some(b)) if a.variable == b.variable);
+        let is_same_variable =
+            matches!((fact(one), fact(other)), (Some(a), Some(b)) if a.variable == b.variable);
         let groups = |proposition| self.exclusive.get(&proposition).map_or(&[][..], Vec::as_slice);
-        same || groups(one).iter().any(|group| groups(other).contains(group))
+        is_same_variable || groups(one).iter().any(|group| groups(other).contains(group))
     }
 
     fn finish(mut self) -> Landmarks {
@@ -341,11 +352,11 @@ impl<N: TaskNumber> LandmarkFactory<'_, N> {
     }
 }
 
-/// For each landmark a bit for each that comes after it, by any number of orders.
+/// Transitive closure: per landmark a bitset of the landmarks ordered after it.
 fn closure(count: usize, orders: &FxHashSet<(u32, u32)>) -> Vec<Vec<u64>> {
     let mut reach = vec![vec![0_u64; count.div_ceil(64)]; count];
-    for (one, other) in orders {
-        reach[*one as usize][(other >> 6) as usize] |= 1 << (other & 63);
+    for (sooner, later) in orders {
+        reach[*sooner as usize][(later >> 6) as usize] |= 1 << (later & 63);
     }
     for middle in 0..dense(count) {
         let further = reach[middle as usize].clone();
@@ -358,16 +369,16 @@ fn has(words: &[u64], landmark: u32) -> bool {
     words[(landmark >> 6) as usize] >> (landmark & 63) & 1 == 1
 }
 
-/// What leads to a landmark leads to these, too.
+/// Adds the successors `further` to everything that precedes a landmark.
 fn join(reach: &mut [Vec<u64>], landmark: u32, further: &[u64]) {
-    for own in reach.iter_mut().filter(|own| has(own, landmark)) {
-        for (word, more) in own.iter_mut().zip(further) {
+    for successors in reach.iter_mut().filter(|successors| has(successors, landmark)) {
+        for (word, more) in successors.iter_mut().zip(further) {
             *word |= more;
         }
     }
 }
 
-/// Adds an order, and all that follows.
+/// Adds an order and updates the transitive closure.
 fn connect(reach: &mut [Vec<u64>], sooner: u32, later: u32) {
     let mut further = reach[later as usize].clone();
     further[(later >> 6) as usize] |= 1 << (later & 63);
@@ -377,7 +388,7 @@ fn connect(reach: &mut [Vec<u64>], sooner: u32, later: u32) {
     join(reach, sooner, &further);
 }
 
-/// The predicate of a fact, as its value's name begins.
+/// Predicate name of a fact: the first word of its value's name.
 fn predicate<N>(task: &Task<N>, fact: Fact) -> &str {
     let name = &task.variables[fact.variable.index()].values[fact.value as usize];
     name.split([' ', '(', ')']).find(|word| !word.is_empty()).unwrap_or(name)

@@ -1,13 +1,15 @@
-//! Satisficing search: lazy greedy best-first search, then weighted A\*, guided by the FF heuristic and landmarks, as in LAMA \[1\].
+//! Satisficing search: lazy greedy best-first search, then weighted A\*, guided by the FF heuristic
+//! and landmarks, as in LAMA \[1\].
 //!
 //! `delete_relaxation` is the task without deletes, `ff_heuristic` computes relaxed plans, `landmarks` finds
 //! landmarks, and `landmark_status` tracks which of them a path has reached. `search` is the search with an
 //! `alternating_open_list` over the states of a `store`.
 //!
-//! Heuristic values never serve as proofs: callers execute each plan, and only an exhausted search reports that
-//! there is no plan.
+//! Heuristic values never serve as proofs: callers execute each plan, and only an exhausted search
+//! reports that there is no plan.
 //!
-//! \[1\] S. Richter, M. Westphal: The LAMA planner: guiding cost-based anytime planning with landmarks, JAIR 39, 2010.
+//! \[1\] S. Richter, M. Westphal: The LAMA planner: guiding cost-based anytime planning with
+//! landmarks, JAIR 39, 2010.
 
 pub mod alternating_open_list;
 pub mod bucket_queue;
@@ -30,7 +32,8 @@ use crate::search::{MutexPairs, SearchStatistics};
 use search::{HeuristicWeight, Outcome, Search};
 use search_context::{SearchContext, USELESS_OPERATOR_COST};
 
-/// The searches in their order: whether costs count, and how.
+/// Configurations of the successive searches: whether operator costs are used, and the weight of
+/// the heuristic.
 const SEARCH_SEQUENCE: [(bool, HeuristicWeight); 6] = [
     (false, HeuristicWeight::Greedy),
     (true, HeuristicWeight::Greedy),
@@ -40,7 +43,8 @@ const SEARCH_SEQUENCE: [(bool, HeuristicWeight); 6] = [
     (true, HeuristicWeight::Times(1)),
 ];
 
-/// One part in `MEMORY_SHARE` of the available memory is the limit of one search; beyond it the next search begins.
+/// One part in `MEMORY_SHARE` of the available memory is the limit of one search; beyond it the
+/// next search begins.
 const MEMORY_SHARE: usize = 16;
 
 /// Outcome of one turn of the satisficing search.
@@ -72,9 +76,9 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
     /// # Errors
     /// Fails when a limit is reached.
     pub fn new(context: Context<'a, N>) -> Result<Option<Self>, Interrupted> {
-        let Some(known) = SearchContext::new(context)? else { return Ok(None) };
+        let Some(context_data) = SearchContext::new(context)? else { return Ok(None) };
         Ok(Some(Self {
-            known,
+            known: context_data,
             limits: context.limits,
             phase: 0,
             search: None,
@@ -83,13 +87,13 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
         }))
     }
 
-    /// Number of searches that have ended so far.
+    /// Number of searches that have ended.
     pub fn restarts(&self) -> usize {
         self.phase
     }
 
-    /// Looks for a plan that costs less than `limit`, or for any, until so much work is done: in nodes and propositions of the relaxed
-    /// task.
+    /// Searches for a plan that costs less than `limit` (any plan if `None`) within `work` units. A
+    /// unit is a visit of one node or proposition of the relaxed task.
     ///
     /// # Errors
     /// Fails when a limit is reached.
@@ -100,26 +104,27 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
         if !self.knows_pairs && self.figures.evaluated >= self.limits.thresholds().pairs {
             self.knows_pairs = true;
             self.known.pairs = MutexPairs::new(self.known.task, self.limits)?;
-            // Estimates do not count on what is of no use any more.
+            // Preferred operators and costs change with the mutexes, so the current search
+            // restarts.
             self.search = None;
         }
         let search = match &mut self.search {
             Some(search) => search,
-            none => {
-                let mut prices = if priced {
+            vacant => {
+                let mut costs = if priced {
                     self.known.operator_costs()
                 } else {
                     vec![1; self.known.task.operators.len()]
                 };
                 if let Some(pairs) = &self.known.pairs {
-                    let ids = OperatorId::all(prices.len());
-                    prices
+                    let ids = OperatorId::all(costs.len());
+                    costs
                         .iter_mut()
                         .zip(ids)
                         .filter(|(_, id)| pairs.is_operator_useless(*id))
-                        .for_each(|(price, _)| *price = USELESS_OPERATOR_COST);
+                        .for_each(|(cost, _)| *cost = USELESS_OPERATOR_COST);
                 }
-                none.insert(Search::new(&mut self.known, weight, prices))
+                vacant.insert(Search::new(&mut self.known, weight, costs))
             }
         };
         let outcome = search.run(&mut self.known, limit, work, self.limits, &mut self.figures);
@@ -145,10 +150,10 @@ impl<'a, N: TaskNumber> Satisficer<'a, N> {
 
     fn next(&mut self) {
         self.phase = self.phase.saturating_add(1);
-        // A greedy search by costs is the one before where all cost the same.
+        // With uniform costs this search would repeat the previous one.
         let is_uniform = || {
-            let prices = self.known.operator_costs();
-            prices.iter().all(|price| Some(price) == prices.first())
+            let costs = self.known.operator_costs();
+            costs.iter().all(|cost| Some(cost) == costs.first())
         };
         if SEARCH_SEQUENCE.get(self.phase) == Some(&(true, HeuristicWeight::Greedy)) && is_uniform() {
             self.phase = self.phase.saturating_add(1);

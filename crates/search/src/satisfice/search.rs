@@ -1,9 +1,9 @@
 //! Lazy greedy best-first search with preferred operators, then weighted A\* with decreasing weights.
 //!
-//! A state is evaluated when it is expanded, and its successors are queued with its values \[1\]: the cost of the
-//! relaxed plan and the number of required landmarks, in turns. The first search counts steps, the next ones
-//! costs, with smaller and smaller weights \[2\]. A search that ends without a plan is exhaustive, except for
-//! states without a relaxed plan.
+//! A state is evaluated when it is expanded, and its successors are queued with its values \[1\]:
+//! the cost of the relaxed plan and the number of required landmarks, in turns. The first search
+//! counts steps, the next ones costs, with smaller and smaller weights \[2\]. A search that ends
+//! without a plan is exhaustive, except for states without a relaxed plan.
 //!
 //! - \[1\] M. Helmert: The Fast Downward planning system, JAIR 26, 2006, section 5.
 //! - \[2\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010, section 6.
@@ -18,57 +18,57 @@ use crate::satisfice::search_context::{SearchContext, USELESS_OPERATOR_COST};
 use crate::satisfice::store::Store;
 use crate::search::SearchStatistics;
 
-/// What it takes to make the next state and to see whether it is new, in nodes and propositions of a relaxed task.
+/// Work units charged for generating a successor and looking it up.
 const GENERATION_COST: u64 = 200;
 
-/// How states are ordered.
+/// Weight of the heuristic in the sort key of the open lists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum HeuristicWeight {
-    /// By estimates alone.
+    /// Heuristic value only (greedy best-first search).
     Greedy,
-    /// By the cost so far and so many times the estimate.
+    /// Path cost plus this multiple of the heuristic value (weighted A\*).
     Times(u64),
 }
 
 struct Node<N> {
     parent: u32,
-    /// The step from the parent, by number.
+    /// Number of the step from the parent.
     step: u32,
     cost: N,
-    /// The same in prices.
+    /// Path cost in scaled operator costs.
     price: u64,
 }
 
-/// What became of a search.
+/// Outcome of one run.
 pub(super) enum Outcome<N> {
-    /// A plan that is cheaper than the limit.
+    /// A plan that costs less than the limit.
     Plan(GroundPlan<N>),
-    /// Nothing is left: there is no such plan, unless something was left out.
+    /// The open lists are empty: no such plan exists, unless the search is incomplete.
     Exhausted,
-    /// It may go on.
+    /// The work is spent; the search can be resumed.
     Paused,
 }
 
-/// A search that can be gone on with.
+/// A resumable search.
 pub(super) struct Search<N> {
     weight: HeuristicWeight,
     prices: Vec<u32>,
-    /// What a step costs on average.
+    /// Mean operator cost; converts a number of landmarks into a cost.
     mean: u32,
     store: Store<N>,
     nodes: Vec<Node<N>>,
-    /// Which landmarks were reached, so many words for each state.
+    /// Reached landmarks: a bitset of `LandmarkStatus::stride` words per state.
     reached: Vec<u64>,
     open: AlternatingOpenList<u64>,
-    /// The best value by each estimate.
+    /// Best value of each heuristic up to now.
     best: [u32; 2],
-    /// Whether states were left out because their numbers do not fit, or because they are too dear.
+    /// Whether states were pruned because their numbers overflow or their cost reaches the limit.
     pub(super) incomplete: bool,
 }
 
 impl<N: TaskNumber> Search<N> {
-    pub(super) fn new(known: &mut SearchContext<'_, N>, weight: HeuristicWeight, prices: Vec<u32>) -> Self {
-        let estimates = if known.status.is_empty() { 1 } else { 2 };
+    pub(super) fn new(context: &mut SearchContext<'_, N>, weight: HeuristicWeight, prices: Vec<u32>) -> Self {
+        let estimates = if context.status.is_empty() { 1 } else { 2 };
         let useful = prices.iter().filter(|price| **price < USELESS_OPERATOR_COST);
         let sum: u64 = useful.clone().map(|price| u64::from(*price)).sum();
         let mean = sum.checked_div(useful.count() as u64).unwrap_or(1);
@@ -76,45 +76,45 @@ impl<N: TaskNumber> Search<N> {
             mean: u32::try_from(mean).unwrap_or(u32::MAX).max(1),
             weight,
             prices,
-            store: Store::new(known.task),
+            store: Store::new(context.task),
             nodes: Vec::new(),
             reached: Vec::new(),
             open: AlternatingOpenList::new([false, true].repeat(estimates)),
             best: [u32::MAX; 2],
             incomplete: false,
         };
-        let initial = known.task.initial.clone();
-        let reached = known.status.initially(&known.relaxation, &initial);
+        let initial = context.task.initial.clone();
+        let reached = context.status.initially(&context.relaxation, &initial);
         search.store.insert(&initial);
         search.nodes.push(Node { parent: 0, step: 0, cost: N::zero(), price: 0 });
         search.reached.extend(&reached);
-        search.look(known, 0, &initial, &reached);
+        search.look(context, 0, &initial, &reached);
         search
     }
 
-    /// Words that the search occupies, about.
+    /// Approximate memory use in words.
     pub(super) fn size(&self) -> usize {
         self.store.size().saturating_add(self.reached.len()).saturating_add(self.open.size())
     }
 
-    /// Looks for a plan that costs less than `limit` until so much work is done, in nodes and propositions.
+    /// Searches for a plan that costs less than `limit` within `work` units.
     pub(super) fn run(
         &mut self,
-        known: &mut SearchContext<'_, N>,
+        context: &mut SearchContext<'_, N>,
         limit: Option<&N>,
         mut work: u64,
         limits: &Limits,
         figures: &mut SearchStatistics,
     ) -> Result<Outcome<N>, Interrupted> {
         let mut pulse: LimitPoll<'_> = limits.pulse();
-        let look = known.size();
+        let evaluation_work = context.size();
         while work > 0 {
             pulse.beat()?;
             let Some((parent, step)) = self.open.pop() else { return Ok(Outcome::Exhausted) };
             work = work.saturating_sub(GENERATION_COST);
             figures.generated = figures.generated.saturating_add(1);
-            let (operator, choice, cost) = known.step(step);
-            if known.pairs.as_ref().is_some_and(|pairs| pairs.is_operator_useless(operator)) {
+            let (operator, choice, cost) = context.step(step);
+            if context.pairs.as_ref().is_some_and(|pairs| pairs.is_operator_useless(operator)) {
                 continue;
             }
             let (total, price) = {
@@ -130,22 +130,24 @@ impl<N: TaskNumber> Search<N> {
                 continue;
             }
             let before = self.store.get(parent);
-            let Some(state) = known.task.successor(&known.task.operators[operator.index()], &before, choice)
+            let Some(state) =
+                context.task.successor(&context.task.operators[operator.index()], &before, choice)
             else {
                 self.incomplete = true;
                 continue;
             };
-            if known.pairs.as_ref().is_some_and(|pairs| pairs.is_dead_end(&before.values, &state.values)) {
+            if context.pairs.as_ref().is_some_and(|pairs| pairs.is_dead_end(&before.values, &state.values)) {
                 continue;
             }
             let (id, is_new) = self.store.insert(&state);
+            // Greedy search ignores path costs, so reopening a state cannot improve it.
             if !is_new && (self.weight == HeuristicWeight::Greedy || total >= self.nodes[id as usize].cost) {
                 continue;
             }
-            let stride = known.status.stride();
+            let stride = context.status.stride();
             let start = (parent as usize).saturating_mul(stride);
             let before = self.reached[start..start.saturating_add(stride)].to_vec();
-            let mut reached = known.status.progress(&known.relaxation, &before, &state);
+            let mut reached = context.status.progress(&context.relaxation, &before, &state);
             let node = Node { parent, step, cost: total, price };
             if is_new {
                 self.nodes.push(node);
@@ -153,61 +155,65 @@ impl<N: TaskNumber> Search<N> {
             } else {
                 self.nodes[id as usize] = node;
                 let start = (id as usize).saturating_mul(stride);
+                // A landmark counts as reached only if every path to the state has reached it.
                 for (new, old) in reached.iter_mut().zip(&mut self.reached[start..]) {
                     *new &= *old;
                     *old = *new;
                 }
             }
-            work = work.saturating_sub(look);
+            work = work.saturating_sub(evaluation_work);
             figures.evaluated = figures.evaluated.saturating_add(1);
             figures.expanded = figures.expanded.saturating_add(1);
-            if known.task.is_goal(&state) {
-                return Ok(Outcome::Plan(self.plan(known, id)));
+            if context.task.is_goal(&state) {
+                return Ok(Outcome::Plan(self.plan(context, id)));
             }
-            self.look(known, id, &state, &reached);
+            self.look(context, id, &state, &reached);
         }
         Ok(Outcome::Paused)
     }
 
-    /// Estimates a state and notes its steps.
-    fn look(&mut self, known: &mut SearchContext<'_, N>, id: u32, state: &State<N>, reached: &[u64]) {
-        let Some(relaxed) = known.explorer.estimate(&known.relaxation, &self.prices, state) else { return };
-        let left = known.status.remaining(reached);
+    /// Evaluates a state and puts its successors on the open lists.
+    fn look(&mut self, context: &mut SearchContext<'_, N>, id: u32, state: &State<N>, reached: &[u64]) {
+        let Some(ff_value) = context.explorer.estimate(&context.relaxation, &self.prices, state) else {
+            return;
+        };
+        let landmark_count = context.status.remaining(reached);
         let mut progress = false;
-        for (best, value) in self.best.iter_mut().zip([relaxed, left]) {
+        for (best, value) in self.best.iter_mut().zip([ff_value, landmark_count]) {
             if value < *best {
                 *best = value;
                 progress = true;
             }
         }
+        // Progress gives preferred operators priority (boosting).
         if progress {
             self.open.boost();
         }
-        known.status.request_landmark(reached);
-        let (steps, preferred) = known.steps(state);
+        context.status.request_landmark(reached);
+        let (steps, preferred) = context.steps(state);
         let value = |estimate: u32| match self.weight {
             HeuristicWeight::Greedy => estimate.into(),
             HeuristicWeight::Times(weight) => {
                 weight.saturating_mul(estimate.into()).saturating_add(self.nodes[id as usize].price)
             }
         };
-        let landmarks = left.saturating_mul(self.mean);
-        let (relaxed, landmarks) = (value(relaxed), value(landmarks));
-        self.open.push(id, [relaxed, relaxed, landmarks, landmarks], &steps, &preferred);
+        let landmarks = landmark_count.saturating_mul(self.mean);
+        let (ff_value, landmarks) = (value(ff_value), value(landmarks));
+        self.open.push(id, [ff_value, ff_value, landmarks, landmarks], &steps, &preferred);
     }
 
-    fn plan(&self, known: &SearchContext<'_, N>, goal: u32) -> GroundPlan<N> {
+    fn plan(&self, context: &SearchContext<'_, N>, goal: u32) -> GroundPlan<N> {
         let mut steps = Vec::new();
         let mut at = goal;
         while at != 0 {
             let node = &self.nodes[at as usize];
-            let (operator, choice, _): (OperatorId, &[u32], &N) = known.step(node.step);
+            let (operator, choice, _): (OperatorId, &[u32], &N) = context.step(node.step);
             steps.push(GroundStep { operator, choice: choice.to_vec() });
             at = node.parent;
         }
         steps.reverse();
-        // States on the way may have become cheaper since.
-        let cost = cost(known.task, &steps).unwrap_or_else(|| self.nodes[goal as usize].cost.clone());
+        // A node on the path may have been reached more cheaply since the goal was found.
+        let cost = cost(context.task, &steps).unwrap_or_else(|| self.nodes[goal as usize].cost.clone());
         GroundPlan { steps, cost }
     }
 }

@@ -14,39 +14,39 @@ use crate::satisfice::landmarks::Landmarks;
 use crate::search::design_combinations::pareto_optimal_combinations;
 use crate::search::{MutexPairs, is_monotone};
 
-/// The price of an operator that no plan needs.
+/// Cost of an operator that no plan needs.
 pub(super) const USELESS_OPERATOR_COST: u32 = 1 << 20;
 
-/// An operator with a combination of its designs, and what it costs.
+/// An operator with a combination of its designs and its cost.
 struct Step<N> {
     operator: OperatorId,
     choice: Vec<u32>,
     cost: N,
 }
 
-/// What is known of a task, with room for looking at its states.
+/// Data that the searches share: relaxation, heuristics, mutexes and steps.
 pub(super) struct SearchContext<'a, N> {
     pub(super) task: &'a Task<N>,
     pub(super) relaxation: Relaxation<N>,
     pub(super) explorer: FfHeuristic,
     pub(super) status: LandmarkStatus,
-    /// What pairs of facts tell, once it was worked out.
+    /// The h² mutexes, once computed.
     pub(super) pairs: Option<MutexPairs>,
     steps: Vec<Step<N>>,
-    /// For each operator the number of its first step; then the number of all.
+    /// Number of each operator's first step; at the end the total number of steps.
     first: Vec<u32>,
 }
 
 impl<'a, N: TaskNumber> SearchContext<'a, N> {
-    /// None if an operator has too many combinations of designs.
+    /// Returns `None` if an operator has too many combinations of designs.
     pub(super) fn new(context: Context<'a, N>) -> Result<Option<Self>, Interrupted> {
         let Context { task, limits } = context;
         let monotone = is_monotone(task);
         let (mut steps, mut first) = (Vec::new(), Vec::new());
         for item in limits.watch(task.operators.iter().zip(OperatorId::all(task.operators.len()))) {
-            let (own, operator) = item?;
+            let (schema, operator) = item?;
             first.push(dense(steps.len()));
-            let Some(choices) = pareto_optimal_combinations(own, monotone, false, limits)? else {
+            let Some(choices) = pareto_optimal_combinations(schema, monotone, false, limits)? else {
                 return Ok(None);
             };
             steps.extend(choices.into_iter().map(|(choice, cost)| Step { operator, choice, cost }));
@@ -58,7 +58,7 @@ impl<'a, N: TaskNumber> SearchContext<'a, N> {
         Ok(Some(Self { task, relaxation, explorer, status, pairs: None, steps, first }))
     }
 
-    /// What it takes to look at a state, about, in nodes and propositions.
+    /// Work units charged for the evaluation of a state.
     pub(super) fn size(&self) -> u64 {
         self.relaxation.propositions.saturating_add(self.relaxation.operators.len()) as u64
     }
@@ -68,31 +68,36 @@ impl<'a, N: TaskNumber> SearchContext<'a, N> {
         (*operator, choice, cost)
     }
 
-    /// The steps that are applicable in the state that was explored last, and which of them are preferred.
+    /// Applicable steps of the state evaluated last, and the preferred ones among them.
     pub(super) fn steps(&mut self, state: &State<N>) -> (Vec<u32>, Vec<u32>) {
         self.explorer.applicable.sort_unstable();
         self.explorer.preferred.sort_unstable();
-        let (mut all, mut preferred) = (Vec::new(), Vec::new());
+        let (mut steps, mut preferred) = (Vec::new(), Vec::new());
         for operator in &self.explorer.applicable {
-            let own = &self.task.operators[*operator as usize];
-            if !own.condition.holds_propositionally(&state.values) {
+            let schema = &self.task.operators[*operator as usize];
+            // The relaxation ignores clauses and treats falsity of derived variables as true, so
+            // conditions are checked here.
+            if !schema.condition.holds_propositionally(&state.values) {
                 continue;
             }
             let is_preferred =
                 self.explorer.preferred.binary_search(operator).is_ok() || self.brings_landmark(*operator);
-            let sizes = own.sizes();
+            let sizes = schema.sizes();
             let next = (*operator as usize).saturating_add(1);
             for step in self.first[*operator as usize]..self.first[next] {
-                if own.condition.holds_numerically(&state.numbers, &self.steps[step as usize].choice, &sizes)
-                {
-                    all.push(step);
+                if schema.condition.holds_numerically(
+                    &state.numbers,
+                    &self.steps[step as usize].choice,
+                    &sizes,
+                ) {
+                    steps.push(step);
                     if is_preferred {
                         preferred.push(step);
                     }
                 }
             }
         }
-        (all, preferred)
+        (steps, preferred)
     }
 
     fn brings_landmark(&self, operator: u32) -> bool {
@@ -100,13 +105,14 @@ impl<'a, N: TaskNumber> SearchContext<'a, N> {
         effects.iter().any(|fact| self.status.is_wanted(self.relaxation.fact(*fact)))
     }
 
-    /// Each operator at its cost, in a unit of which operators that cost something cost ten on average, and 1 more.
+    /// Operator costs scaled to integers: positive costs have a mean of about 10, and 1 is added to
+    /// each.
     pub(super) fn operator_costs(&self) -> Vec<u32> {
         let costs: Vec<f64> =
-            self.task.operators.iter().map(|own| own.cost.minimum().approximate()).collect();
-        let paid: Vec<f64> = costs.iter().copied().filter(|cost| *cost > 0.0).collect();
-        let count = paid.len().to_f64().unwrap_or(1.0).max(1.0);
-        let mean = paid.iter().sum::<f64>() / count;
+            self.task.operators.iter().map(|operator| operator.cost.minimum().approximate()).collect();
+        let positive: Vec<f64> = costs.iter().copied().filter(|cost| *cost > 0.0).collect();
+        let count = positive.len().to_f64().unwrap_or(1.0).max(1.0);
+        let mean = positive.iter().sum::<f64>() / count;
         let price = |cost: &f64| {
             let scaled = if *cost > 0.0 { (10.0 * cost / mean).round().min(100_000.0) } else { 0.0 };
             scaled.to_u32().unwrap_or(0).saturating_add(1)

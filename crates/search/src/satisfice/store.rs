@@ -7,7 +7,7 @@ use rustc_hash::FxBuildHasher;
 
 use task::task::{State, Task};
 
-/// Where a variable lies.
+/// Bit field of a variable in a packed state.
 #[derive(Debug, Clone, Copy)]
 struct Field {
     word: usize,
@@ -15,7 +15,7 @@ struct Field {
     mask: u64,
 }
 
-/// All states that were met: values of variables in as few bits as they take, and numbers.
+/// Registry of all generated states: bit-packed values, and numbers.
 pub(super) struct Store<N> {
     fields: Vec<Field>,
     stride: usize,
@@ -30,8 +30,8 @@ impl<N: Clone + Eq + std::hash::Hash> Store<N> {
     pub(super) fn new(task: &Task<N>) -> Self {
         let (mut fields, mut word, mut used) = (Vec::with_capacity(task.variables.len()), 0_usize, 0_u32);
         for variable in &task.variables {
-            let most = variable.values.len().saturating_sub(1).max(1);
-            let bits = usize::BITS.saturating_sub(most.leading_zeros());
+            let max_value = variable.values.len().saturating_sub(1).max(1);
+            let bits = usize::BITS.saturating_sub(max_value.leading_zeros());
             if used.saturating_add(bits) > 64 {
                 (word, used) = (word.saturating_add(1), 0);
             }
@@ -50,23 +50,25 @@ impl<N: Clone + Eq + std::hash::Hash> Store<N> {
         }
     }
 
-    /// The number of a state, and whether it is new.
+    /// Index of a state, and whether it is new.
     pub(super) fn insert(&mut self, state: &State<N>) -> (u32, bool) {
-        let mut own = vec![0_u64; self.stride];
+        let mut key = vec![0_u64; self.stride];
         for (field, value) in self.fields.iter().zip(&state.values) {
-            own[field.word] |= u64::from(*value) << field.shift;
+            key[field.word] |= u64::from(*value) << field.shift;
         }
-        let hash = hash(&own, &state.numbers);
+        let hash = hash(&key, &state.numbers);
         let (stride, numbers) = (self.stride, self.numbers);
         let (packed, stored) = (&self.packed, &self.stored_numbers);
         let at = |id: u32| {
             let id = id as usize;
             let words = &packed[id.saturating_mul(stride)..id.saturating_add(1).saturating_mul(stride)];
-            let own = &stored[id.saturating_mul(numbers)..id.saturating_add(1).saturating_mul(numbers)];
-            (words, own)
+            let state_numbers =
+                &stored[id.saturating_mul(numbers)..id.saturating_add(1).saturating_mul(numbers)];
+            (words, state_numbers)
         };
-        if let Some(known) = self.table.find(hash, |id| at(*id) == (&own[..], &state.numbers[..])) {
-            return (*known, false);
+        if let Some(id) = self.table.find(hash, |candidate| at(*candidate) == (&key[..], &state.numbers[..]))
+        {
+            return (*id, false);
         }
         let id = self.count;
         let rehash = |id: &u32| {
@@ -74,7 +76,7 @@ impl<N: Clone + Eq + std::hash::Hash> Store<N> {
             self::hash(words, numbers)
         };
         self.table.insert_unique(hash, id, rehash);
-        self.packed.extend(own);
+        self.packed.extend(key);
         self.stored_numbers.extend(state.numbers.iter().cloned());
         self.count = self.count.checked_add(1).expect("invariant: fewer than 2^32 states are in memory");
         (id, true)
@@ -92,7 +94,7 @@ impl<N: Clone + Eq + std::hash::Hash> Store<N> {
         State { values: self.fields.iter().map(value).collect(), numbers }
     }
 
-    /// Words that the states occupy, about.
+    /// Approximate memory use in words.
     pub(super) fn size(&self) -> usize {
         self.packed.len().saturating_add(self.stored_numbers.len().saturating_mul(2))
     }

@@ -1,4 +1,4 @@
-//! A\* with Pareto dominance over numeric variables. Among the cheapest plans it returns one with the fewest steps.
+//! A\* with Pareto dominance over numeric variables; returns a cheapest plan with the fewest steps.
 //!
 //! States with equal finite-domain variables are compared by cost and by numeric variables. Where a higher
 //! value is never worse (a battery), a state is dominated by another one that costs no more and has at least
@@ -28,64 +28,65 @@ use crate::search::statistics::SearchStatistics;
 use crate::search::stubborn_sets::StubbornSetPruning;
 use crate::search::symmetry::Orbits;
 
-/// What it takes to take a state and to see what can be done in it, in steps of a computer…
+/// Work units of an expansion: open list and applicable operators.
 const EXPANSION_COST: u64 = 2_000;
-/// … and to make a state after it, and to look it up.
+/// Work units charged for one generated successor: applying the operator and looking the state up.
 const GENERATION_COST: u64 = 600;
-/// What it takes to see which other operators an operator makes worth looking at, too.
+/// Work units charged per operator that the stubborn-set closure visits.
 const STUBBORN_SET_COST: u64 = 10;
 
-/// What the search found.
+/// Outcome of a search.
 #[derive(Debug)]
 pub enum SearchOutcome<N = Int> {
-    /// A cheapest plan.
+    /// An optimal plan.
     Optimal(GroundPlan<N>),
-    /// There is no plan: every reachable state was visited, or is dominated by one that was.
+    /// Proof that no plan exists: all reachable states were expanded or dominated.
     None,
-    /// A limit was reached first; the best plan so far.
+    /// No proof: the best plan found. Returned if a limit was reached, or (with `None`) if the
+    /// search proved that no plan is cheaper than the external incumbent.
     Unknown(Option<GroundPlan<N>>),
 }
 
-/// What a search goes through, and by which estimates.
+/// A search problem: task, heuristic and preprocessed successor data.
 pub struct SearchProblem<'a, N, E> {
     pub context: Context<'a, N>,
     pub bounds: &'a E,
     pub prepared: &'a SearchTask<N>,
-    /// Set if states that interchangeable objects tell apart count as one.
+    /// Symmetries of interchangeable objects. If set, symmetric states are merged.
     pub orbits: Option<Arc<Orbits>>,
 }
 
-/// Which node comes first.
+/// Order of the open list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OpenListOrder {
-    /// That with the least sum of cost and estimate, then with the fewest steps in all: the plan has fewest steps of the cheapest.
+    /// By f value, then by lower bound on the plan length: fewest steps among the cheapest plans.
     Fewest,
-    /// Of equal sums that with the fewest steps to go: the plan is cheapest.
+    /// By f value, then by lower bound on the steps to the goal: a cheapest plan of any length.
     Nearest,
-    /// That with the least estimate, whatever was paid.
+    /// By heuristic value only, without the path cost (greedy best-first search).
     Greedy,
 }
 
-/// What becomes of a search that cannot come to the end with the memory that there is, if it goes on as it did.
+/// Reaction to a forecast that memory will run out before the search can finish.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum OutOfMemoryPolicy {
-    /// It ends.
+    /// Stop the search.
     None,
-    /// It would go on.
+    /// Ignore the forecast. The last one was favourable.
     Some,
-    /// It goes on.
+    /// Ignore the forecast. The last one was unfavourable.
     Needed,
 }
 
-/// The cost and the steps that count, and then what is further.
+/// Sort key of an open node: primary value, lower bound on steps, and depth (deepest first).
 type NodeKey<N> = (N, u32, u32);
 
-/// What is further comes first.
+/// Tie-breaker that decreases with the depth of a node.
 fn later(steps: u32) -> u32 {
     u32::MAX.saturating_sub(steps)
 }
 
-/// A search that can be gone on with.
+/// A resumable A\* search.
 pub struct AStar<'a, N, E> {
     task: &'a Task<N>,
     limits: &'a Limits,
@@ -93,40 +94,40 @@ pub struct AStar<'a, N, E> {
     prepared: &'a SearchTask<N>,
     pub(super) store: StateRegistry<N>,
     open: OpenList<NodeKey<N>>,
-    /// Whether states were left out because their numbers do not fit.
+    /// Whether states were dropped because their numbers overflow. The search then proves nothing.
     states_dropped: bool,
     order: OpenListOrder,
-    /// Looked at, too, when a state is to be expanded.
+    /// More accurate heuristic that is evaluated only when a node is expanded (lazy A\*).
     pub(super) lazy_heuristic: Option<Box<dyn LazyHeuristic<N>>>,
-    /// Set if not all operators are applied that can be.
+    /// Stubborn-set pruning, if enabled.
     pub(super) pruning: Option<StubbornSetPruning>,
-    /// What it took so far apart from that, in steps of a computer.
+    /// Work units done, without those of the lazy heuristic.
     own_work: u64,
-    /// Among how many searches memory is divided.
+    /// Number of searches that share the memory limit.
     sharing: usize,
-    /// The lower bound so far.
+    /// Current lower bound on the cost of every plan.
     bound: Option<N>,
     is_interrupted: bool,
     pub(super) patience: OutOfMemoryPolicy,
-    /// The best goal state so far.
+    /// Goal node of the best plan of this search.
     best: Option<u32>,
-    /// What a known plan costs, if there is one: nothing dearer is looked at.
+    /// Cost of the incumbent, if any. More expensive nodes are pruned.
     limit: Option<N>,
-    /// Whether that plan is none of this search.
+    /// Whether the incumbent was found by another component of the portfolio.
     incumbent_is_external: bool,
-    /// How many steps it has, if that counts: nothing as dear with as many is looked at.
+    /// Length of the incumbent, if ties are broken by length: nodes of equal cost must be shorter.
     fewest: Option<u32>,
     /// Number of stored states at which the search first compares its progress with its memory.
     first_look: usize,
-    /// How far the search was whenever the number of its states had doubled.
+    /// Lower bound at each doubling of the number of stored states.
     progress: Vec<N>,
     pub(crate) statistics: SearchStatistics,
-    /// The state that is expanded, and the one that it leads to.
+    /// Scratch buffers: the expanded state and its current successor.
     state: State<N>,
     next: State<N>,
 }
 
-/// Hears, while a search goes on, what the best plan so far costs, if there is one, and what none costs less than.
+/// Progress callback: receives the cost of the incumbent, if any, and the lower bound.
 pub type ProgressCallback<'a, N> = &'a mut dyn FnMut(Option<&N>, &N);
 
 impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
@@ -167,45 +168,52 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         search
     }
 
-    /// None if there are more states than `most` before anything is known; it may be called again.
+    /// Runs until more than `max_states` states are stored. `None` if unfinished; it can be resumed.
     pub(super) fn run_until_states(
         &mut self,
-        most: usize,
+        max_states: usize,
         hear: ProgressCallback<'_, N>,
     ) -> Option<SearchOutcome<N>> {
-        self.resume(most, u64::MAX, hear)
+        self.resume(max_states, u64::MAX, hear)
     }
 
-    /// None if there was more work than that before anything is known; it may be called again.
+    /// Runs until the total work exceeds `work` units. `None` if unfinished; it can be resumed.
     pub(super) fn run_for_work(
         &mut self,
         work: u64,
         hear: ProgressCallback<'_, N>,
     ) -> Option<SearchOutcome<N>> {
-        let found = self.resume(usize::MAX, work, hear);
-        if found.is_none() && !self.has_memory() {
+        let outcome = self.resume(usize::MAX, work, hear);
+        if outcome.is_none() && !self.has_memory() {
             Some(SearchOutcome::Unknown(self.best_plan()))
         } else {
-            found
+            outcome
         }
     }
 
-    fn resume(&mut self, most: usize, work: u64, hear: ProgressCallback<'_, N>) -> Option<SearchOutcome<N>> {
+    fn resume(
+        &mut self,
+        max_states: usize,
+        work: u64,
+        hear: ProgressCallback<'_, N>,
+    ) -> Option<SearchOutcome<N>> {
         let mut pulse = self.limits.pulse();
-        let mut told: Option<(Option<N>, N)> = None;
-        while self.store.len() <= most && self.has_memory() && self.work() <= work {
+        let mut reported: Option<(Option<N>, N)> = None;
+        while self.store.len() <= max_states && self.has_memory() && self.work() <= work {
             let Some((key, id)) = self.open.pop() else { return Some(self.outcome_when_exhausted()) };
             if self.store.is_dominated(id) {
                 continue;
             }
+            // Keys ascend, so the first node that cannot improve the incumbent ends the search.
             let (total, least, _) = &key;
             if self.can_stop_at(total, *least) {
                 return Some(self.outcome_when_exhausted());
             }
-            let is_told = |(limit, bound): &(Option<N>, N)| *limit == self.limit && *bound == *total;
-            if !self.states_dropped && !told.as_ref().is_some_and(is_told) {
+            // The callback is called only if a value has changed.
+            let is_reported = |(limit, bound): &(Option<N>, N)| *limit == self.limit && *bound == *total;
+            if !self.states_dropped && !reported.as_ref().is_some_and(is_reported) {
                 hear(self.limit.as_ref(), total);
-                told = Some((self.limit.clone(), total.clone()));
+                reported = Some((self.limit.clone(), total.clone()));
             }
             if self.bound.as_ref().is_none_or(|bound| bound < total) {
                 self.bound = Some(total.clone());
@@ -213,6 +221,7 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
             if self.proves_upper_bound() {
                 return Some(SearchOutcome::Unknown(None));
             }
+            // `len >> k` makes one sample per doubling of the number of states.
             if self.store.len() >> self.progress.len() >= self.first_look {
                 self.progress.extend(self.bound.clone());
                 let is_hopeful = self.expects_to_finish();
@@ -233,7 +242,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         None
     }
 
-    /// Looks closer at the state that is to be expanded; none if it has to wait, or to go.
+    /// Evaluates the lazy heuristic on a node that is about to be expanded. Returns `None` if the
+    /// node was reinserted with a higher key or pruned.
     fn reevaluate(&mut self, id: u32, key: NodeKey<N>) -> Option<NodeKey<N>> {
         let Some(sharper) = &mut self.lazy_heuristic else { return Some(key) };
         if !self.store.mark_reevaluated(id) {
@@ -254,12 +264,12 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         None
     }
 
-    /// What it took so far, in steps of a computer.
+    /// Work units done (deterministic, not wall time).
     pub(super) fn work(&self) -> u64 {
         self.own_work.saturating_add(self.lazy_heuristic.as_ref().map_or(0, |sharper| sharper.work()))
     }
 
-    /// Whether nothing that comes with such a cost and so many steps, or later, is better than the plan that is known.
+    /// Returns `true` if no node with this key or a later one can improve the incumbent.
     fn can_stop_at(&self, cost: &N, steps: u32) -> bool {
         if self.order == OpenListOrder::Greedy {
             return self.best.is_some();
@@ -268,19 +278,19 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         (limit, if self.order == OpenListOrder::Nearest { 0 } else { fewest }) <= (cost, steps)
     }
 
-    /// What a known plan costs.
+    /// Cost of the incumbent, if any.
     pub(super) fn upper_bound(&self) -> Option<&N> {
         self.limit.as_ref()
     }
 
-    /// A plan that costs this much is known; one as cheap is looked for all the same.
+    /// Sets the upper bound, but keeps searching for plans of the same cost.
     pub(super) fn set_upper_bound_inclusive(&mut self, cost: &N) {
         if self.limit.as_ref().is_none_or(|limit| cost < limit) {
             self.limit = Some(cost.clone());
         }
     }
 
-    /// A plan that costs this much is known: nothing dearer is looked at, and it ends once no plan can be cheaper.
+    /// Sets the cost of an external incumbent. The search ends once the lower bound reaches it.
     pub(crate) fn set_upper_bound(&mut self, cost: N) {
         if self.limit.as_ref().is_none_or(|limit| cost < *limit) {
             self.limit = Some(cost);
@@ -290,27 +300,28 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         }
     }
 
-    /// Whether no plan costs less than the one that it was told of.
+    /// Returns `true` if the lower bound has reached the cost of the external incumbent.
     pub(super) fn proves_upper_bound(&self) -> bool {
         self.incumbent_is_external && self.limit == self.bound
     }
 
-    /// Whether a limit of time ended it.
+    /// Returns `true` if the time limit or a cancellation ended the search.
     pub(super) fn is_interrupted(&self) -> bool {
         self.is_interrupted
     }
 
-    /// Memory is divided among so many searches.
+    /// Divides the memory limit among `count` searches.
     pub(super) fn set_memory_share(&mut self, count: usize) {
         self.sharing = count.max(1);
     }
 
-    /// What no plan costs less than.
+    /// Lower bound on the cost of every plan.
     pub(super) fn bound(&self) -> Option<&N> {
         self.bound.as_ref()
     }
 
-    /// What that may be once there are twice as many states so many times, if it goes on as it did.
+    /// Extrapolated lower bound after `times` more doublings of the number of states, assuming that
+    /// it rises as in the last doubling.
     #[expect(clippy::arithmetic_side_effects, reason = "sums of costs that fit")]
     pub(super) fn forecast_lower_bound(&self, times: u32) -> Option<N> {
         let [.., before, now] = &self.progress[..] else { return None };
@@ -322,31 +333,32 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.limits.room().checked_div(self.sharing).unwrap_or(0)
     }
 
-    /// Whether memory is left.
+    /// Returns `true` if the search is within its share of the memory limit.
     fn has_memory(&self) -> bool {
         self.store.bytes().saturating_add(self.open.bytes()) <= self.room()
     }
 
-    /// Whether the search can come to the cost of the best plan known before memory is full, if it goes on as it did while the number of its
-    /// states doubled last.
+    /// Returns `true` if the lower bound is expected to reach the cost of the incumbent before
+    /// memory is full. Assumes that each doubling of the number of states raises the bound as much
+    /// as the last one did.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "sums of costs that fit, and less than what is limited by memory"
     )]
     fn expects_to_finish(&self) -> bool {
         let (Some(limit), [.., before, now]) = (&self.limit, &self.progress[..]) else { return true };
-        let (step, left) = (now.clone() + -before.clone(), limit.clone() + -now.clone());
-        // Where costs do not grow, states say nothing of what is left.
-        if left <= N::zero() || step <= N::zero() {
+        let (step, remaining) = (now.clone() + -before.clone(), limit.clone() + -now.clone());
+        // If the bound does not rise, the number of states does not predict the remaining work.
+        if remaining <= N::zero() || step <= N::zero() {
             return true;
         }
         let bytes = self.store.bytes().saturating_add(self.open.bytes());
         let doublings = self.room().checked_div(bytes).map_or(0, usize::ilog2);
-        let enough = (0..=doublings).try_fold(N::zero(), |sum: N, _| sum.plus(&step));
-        enough.is_none_or(|enough| enough >= left)
+        let reachable_rise = (0..=doublings).try_fold(N::zero(), |sum: N, _| sum.plus(&step));
+        reachable_rise.is_none_or(|reachable_rise| reachable_rise >= remaining)
     }
 
-    /// The answer if nothing that is left can be better.
+    /// Outcome if no open node can improve the incumbent.
     fn outcome_when_exhausted(&self) -> SearchOutcome<N> {
         match self.best_plan() {
             plan if self.states_dropped || self.order == OpenListOrder::Greedy => {
@@ -361,12 +373,14 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.best.map(|goal| self.plan(goal))
     }
 
-    /// The operators whose propositional condition holds in the state, ascending; those that are enough.
+    /// Operators whose propositional condition holds in the current state, ascending and reduced by
+    /// stubborn sets.
     fn applicable(&mut self) -> Vec<OperatorId> {
         let mut applicable = self.prepared.index.applicable(self.task, &self.state);
         if let Some(choosing) = &mut self.pruning {
             let size = choosing.prune_operators(self.task, &self.state.values, &mut applicable);
             self.own_work = self.own_work.saturating_add(size.saturating_mul(STUBBORN_SET_COST));
+            // The closure costs time, so pruning ends if it removes too few operators.
             if choosing.prunes_too_little() {
                 self.pruning = None;
             }
@@ -374,8 +388,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         applicable
     }
 
-    /// Adds all that can be reached by one step from a node, whose state is unpacked. A node whose expansion is interrupted is not expanded, so that the
-    /// search must end there.
+    /// Generates all successors of a node whose state is unpacked. After an interruption the node
+    /// counts as not expanded, so the search must end.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "steps are fewer than nodes, combinations are numbered"
@@ -409,8 +423,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         Ok(())
     }
 
-    /// Adds the next state, whose derived variables have no values yet, unless it is no good. No plan through it costs less than
-    /// `through`, as one through the state before does.
+    /// Stores the successor in `self.next` unless it is dominated, pruned or a dead end. Its
+    /// derived variables have no values yet. `through` is the f value of the parent.
     fn push(&mut self, cost: N, through: &N, origin: ParentLink) {
         self.statistics.generated = self.statistics.generated.saturating_add(1);
         if self.exceeds_upper_bound(&cost) {
@@ -423,6 +437,8 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
             self.states_dropped = true;
             return;
         };
+        // Taking the maximum with the parent's f value keeps f monotone along a path (pathmax),
+        // even if the heuristic is inconsistent.
         let total = if self.order == OpenListOrder::Greedy { total } else { total.max(through.clone()) };
         let least = origin.steps.saturating_add(self.prepared.steps_at_least(&estimate));
         if self.exceeds_upper_bound(&total) || self.is_dominated_by_incumbent(&total, least) {
@@ -447,13 +463,14 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> AStar<'a, N, E> {
         self.limit.as_ref().is_some_and(|limit| cost > limit)
     }
 
-    /// Whether a known plan is no worse than one with this cost and so many steps.
+    /// Returns `true` if the incumbent is at least as good as any plan with this cost and this
+    /// number of steps.
     fn is_dominated_by_incumbent(&self, cost: &N, steps: u32) -> bool {
         let (Some(limit), Some(fewest)) = (&self.limit, self.fewest) else { return false };
         (limit, fewest) <= (cost, steps)
     }
 
-    /// Whether the next state satisfies the goal.
+    /// Returns `true` if the successor in `self.next` satisfies the goal.
     fn is_goal(&mut self) -> bool {
         let values = &self.next.values[..self.task.basic];
         let is_basic = |fact: &&Fact| fact.variable.index() < values.len();

@@ -10,12 +10,13 @@ use task::task::Operator;
 use task::task::number::TaskNumber;
 use task::task::quantity::{Quantity, SlotSet};
 
-/// As many combinations of designs are looked at for one operator at most…
+/// Maximum number of combinations of designs that are enumerated for one group of slots.
 const COMBINATION_LIMIT: usize = 2_000_000;
-/// … and as many of them are kept, none of which dominates another.
+/// Maximum number of Pareto-optimal combinations of one operator.
 const CHOICE_LIMIT: usize = 100_000;
 
-/// Designs for some slots of an operator, with what they add to its cost and to the numbers in its conditions and effects.
+/// Designs for some slots of an operator, with their contributions to its cost and to the numbers
+/// in its conditions and effects.
 struct Partial<N> {
     choice: Vec<u32>,
     cost: N,
@@ -25,12 +26,14 @@ struct Partial<N> {
 /// Combinations of designs, each with its cost.
 pub type CostedCombinations<N> = Vec<(Vec<u32>, N)>;
 
-/// The combinations of an operator's designs that no other one dominates, with their costs: none is cheaper or
-/// leaves more of the numeric variables. Of equal ones the first stands for all, unless `all` are asked for. None if there
-/// are too many: then nothing is known.
+/// Combinations of an operator's designs that no other combination dominates, with their costs. A
+/// combination dominates another one if it is at most as expensive and leaves at least as much of
+/// the numeric variables. Of equal combinations only the first is kept, unless `all` is set.
+/// Returns `None` if there are too many combinations.
 ///
-/// Slots that no table and no exclusion joins contribute by themselves, so what is dominated among the combinations of some of
-/// them is dominated in all combinations that extend it: k functions of m designs cost no m^k comparisons.
+/// Slots that no table and no exclusion joins contribute independently. A combination that is
+/// dominated within one group of slots is dominated in every extension, so k independent functions
+/// with m designs do not cost m^k comparisons.
 ///
 /// # Errors
 /// Fails when a limit is reached.
@@ -54,20 +57,21 @@ pub fn pareto_optimal_combinations<N: TaskNumber>(
     let mut front =
         vec![Partial { choice: vec![0; sizes.len()], cost: operator.cost.constant.clone(), profile }];
     for slots in independent(operator, &quantities) {
-        let Some(own) = own_front(operator, &quantities, &slots, (monotone, all), limits)? else {
+        let Some(group_front) = own_front(operator, &quantities, &slots, (monotone, all), limits)? else {
             return Ok(None);
         };
-        if own.len().checked_mul(front.len()).is_none_or(|pairs| pairs > CHOICE_LIMIT) {
+        if group_front.len().checked_mul(front.len()).is_none_or(|pairs| pairs > CHOICE_LIMIT) {
             return Ok(None);
         }
         let slots = &slots;
-        let pairs = front.iter().flat_map(|known| own.iter().map(move |own| known.with(own, slots)));
+        let pairs =
+            front.iter().flat_map(|prefix| group_front.iter().map(move |suffix| prefix.with(suffix, slots)));
         front = best(pairs.collect(), monotone, all, limits)?;
     }
     Ok(Some(front.into_iter().map(|Partial { choice, cost, .. }| (choice, cost)).collect()))
 }
 
-/// Those combinations of designs for some slots that no other one dominates; none if there are too many.
+/// Non-dominated combinations of designs for some slots. Returns `None` if there are too many.
 fn own_front<N: TaskNumber>(
     operator: &Operator<N>,
     quantities: &[&Quantity<N>],
@@ -84,7 +88,7 @@ fn own_front<N: TaskNumber>(
     let rules = operator.forbidden.iter().filter(|rule| rule.slots.iter().all(|slot| slots.contains(slot)));
     let rules: Vec<(&SlotSet, FxHashSet<&SlotSet>)> =
         rules.map(|rule| (&rule.slots, rule.combinations.iter().collect())).collect();
-    let mut own = Vec::new();
+    let mut combinations = Vec::new();
     for choice in limits.watch(Combinations::new(slots, &sizes)) {
         let choice = choice?;
         let part = |slots: &SlotSet| slots.iter().map(|slot| choice[*slot as usize]).collect::<SlotSet>();
@@ -94,15 +98,16 @@ fn own_front<N: TaskNumber>(
         let sum = |quantity: &Quantity<N>| quantity.part(slots, &choice, &sizes);
         let cost = sum(&operator.cost);
         let profile = quantities.iter().map(|quantity| sum(quantity)).collect();
-        own.push(Partial { choice, cost, profile });
-        if own.len() > 2 * CHOICE_LIMIT {
-            own = best(own, monotone, all, limits)?;
-            if own.len() > CHOICE_LIMIT {
+        combinations.push(Partial { choice, cost, profile });
+        // Pruning in between bounds the memory.
+        if combinations.len() > 2 * CHOICE_LIMIT {
+            combinations = best(combinations, monotone, all, limits)?;
+            if combinations.len() > CHOICE_LIMIT {
                 return Ok(None);
             }
         }
     }
-    best(own, monotone, all, limits).map(Some)
+    best(combinations, monotone, all, limits).map(Some)
 }
 
 impl<N: TaskNumber> Partial<N> {
@@ -120,29 +125,30 @@ impl<N: TaskNumber> Partial<N> {
     }
 }
 
-/// Those that none dominates, in lexicographic order of the designs.
+/// Non-dominated combinations, in lexicographic order of their designs.
 fn best<N: TaskNumber>(
-    mut all_of_them: Vec<Partial<N>>,
+    mut candidates: Vec<Partial<N>>,
     monotone: bool,
     all: bool,
     limits: &Limits,
 ) -> Result<Vec<Partial<N>>, Interrupted> {
     limits.check()?;
-    // What dominates comes before what it dominates.
-    all_of_them.sort_by(|a, b| {
+    // After sorting, a dominating combination comes before those that it dominates.
+    candidates.sort_by(|a, b| {
         a.cost.cmp(&b.cost).then_with(|| b.profile.cmp(&a.profile)).then_with(|| a.choice.cmp(&b.choice))
     });
     let mut front: Vec<Partial<N>> = Vec::new();
-    // Where profiles have to be equal, the first with each: none that comes later is cheaper.
+    // If profiles must be equal, the first combination with a profile is the cheapest one.
     let mut cheapest: FxHashMap<Vec<N>, N> = FxHashMap::default();
     let mut pulse = limits.pulse();
-    for new in all_of_them {
+    for new in candidates {
         let is_equal = |cost: &N, profile: &[N]| all && *cost == new.cost && profile == new.profile;
         let is_dominated = if monotone {
-            // In one dimension the last one has the most of all that are as cheap.
-            let candidates = if new.profile.len() > 1 { 0 } else { front.len().saturating_sub(1) };
+            // With one criterion the last entry of the front has the highest number of all cheaper
+            // ones.
+            let first_candidate = if new.profile.len() > 1 { 0 } else { front.len().saturating_sub(1) };
             let mut is_dominated = false;
-            for old in &front[candidates..] {
+            for old in &front[first_candidate..] {
                 pulse.beat()?;
                 let no_worse = old.profile.iter().zip(&new.profile).all(|(old, new)| old >= new);
                 if no_worse && !is_equal(&old.cost, &old.profile) {
@@ -154,7 +160,7 @@ fn best<N: TaskNumber>(
         } else {
             pulse.beat()?;
             match cheapest.entry(new.profile.clone()) {
-                Entry::Occupied(known) => !is_equal(known.get(), known.key()),
+                Entry::Occupied(entry) => !is_equal(entry.get(), entry.key()),
                 Entry::Vacant(entry) => {
                     entry.insert(new.cost.clone());
                     false
@@ -169,7 +175,7 @@ fn best<N: TaskNumber>(
     Ok(front)
 }
 
-/// The slots of an operator in groups that no table and no exclusion joins.
+/// Slots of an operator, grouped such that no table and no exclusion joins two groups.
 fn independent<N>(operator: &Operator<N>, quantities: &[&Quantity<N>]) -> Vec<Vec<u32>> {
     let tables = quantities.iter().copied().chain([&operator.cost]).flat_map(|quantity| &quantity.tables);
     let joined = tables.map(|table| &table.slots).chain(operator.forbidden.iter().map(|rule| &rule.slots));
@@ -187,7 +193,7 @@ fn independent<N>(operator: &Operator<N>, quantities: &[&Quantity<N>]) -> Vec<Ve
     groups
 }
 
-/// Every combination of designs for some slots, in lexicographic order; the other slots stay at 0.
+/// All combinations of designs for some slots, in lexicographic order. The other slots stay at 0.
 struct Combinations<'a> {
     slots: &'a [u32],
     sizes: &'a [usize],
@@ -231,7 +237,7 @@ mod tests {
 
     const SIZES: [usize; 4] = [2, 3, 2, 2];
 
-    /// A quantity with a table over each list of slots, filled with small numbers.
+    /// Quantity with a table over each list of slots, filled with small numbers.
     fn quantity(tables: &[Vec<u32>], numbers: &mut impl Iterator<Item = Int>) -> Quantity<Int> {
         let mut quantity = Quantity::constant(numbers.next().unwrap_or(0));
         for slots in tables {
@@ -251,7 +257,7 @@ mod tests {
             slot: SlotId(slot),
             designs: (0..*size as u32).collect(),
         };
-        // Slots 0 and 1 exclude each other's designs.
+        // Slots 0 and 1 exclude some pairs of designs.
         let combinations = excluded.iter().map(|(a, b)| [*a, *b].into()).collect();
         Operator {
             schema: 0,
@@ -271,29 +277,30 @@ mod tests {
         }
     }
 
-    /// By definition: every combination against every other one.
+    /// Definition of the result: compares every combination with every other one.
     fn expected(operator: &Operator, monotone: bool, all: bool) -> Vec<(Vec<u32>, Int)> {
         let sizes = operator.sizes();
         let value = |choice: &Vec<u32>| {
             (operator.cost.at(choice, &sizes), operator.numeric_effects[0].value.quantity.at(choice, &sizes))
         };
         let choices: Vec<Vec<u32>> = operator.admitted_combinations().collect();
-        let beaten = |choice: &Vec<u32>| {
-            let (cost, left) = value(choice);
+        let is_dominated = |choice: &Vec<u32>| {
+            let (cost, remaining) = value(choice);
             choices.iter().any(|other| {
-                let (own, more) = value(other);
-                let no_worse = own <= cost && if monotone { more >= left } else { more == left };
-                let equal = own == cost && more == left;
+                let (other_cost, more) = value(other);
+                let no_worse =
+                    other_cost <= cost && if monotone { more >= remaining } else { more == remaining };
+                let equal = other_cost == cost && more == remaining;
                 no_worse && if equal { !all && other < choice } else { true }
             })
         };
-        let best = choices.iter().filter(|choice| !beaten(choice));
+        let best = choices.iter().filter(|choice| !is_dominated(choice));
         best.map(|choice| (choice.clone(), value(choice).0)).collect()
     }
 
     proptest! {
         #[test]
-        fn independent_slots_lose_nothing(
+        fn grouping_independent_slots_loses_no_combination(
             costs in proptest::sample::subsequence(vec![vec![0], vec![1], vec![2], vec![3], vec![1, 2]], 0..=5),
             uses in proptest::sample::subsequence(vec![vec![0], vec![1], vec![2], vec![3], vec![0, 3]], 0..=5),
             excluded in proptest::collection::vec((0_u32..2, 0_u32..3), 0..4),
@@ -303,17 +310,17 @@ mod tests {
             let operator = operator(&costs, &uses, &excluded, &numbers);
             let limits = Limits::none();
             prop_assert_eq!(pareto_optimal_combinations(&operator, monotone, true, &limits), Ok(Some(expected(&operator, monotone, true))));
-            // Of equal ones one stands for all.
+            // Of equal combinations only one is kept, so values are compared.
             let values = |choices: Vec<(Vec<u32>, Int)>| {
                 let sizes = operator.sizes();
-                let left = |choice: &[u32]| operator.numeric_effects[0].value.quantity.at(choice, &sizes);
-                let mut values: Vec<_> = choices.iter().map(|(choice, cost)| (*cost, left(choice))).collect();
+                let remaining = |choice: &[u32]| operator.numeric_effects[0].value.quantity.at(choice, &sizes);
+                let mut values: Vec<_> = choices.iter().map(|(choice, cost)| (*cost, remaining(choice))).collect();
                 values.sort_unstable();
                 values
             };
-            let found = pareto_optimal_combinations(&operator, monotone, false, &limits).expect("no limit").unwrap_or_default();
-            prop_assert!(found.iter().all(|(choice, _)| operator.admits(choice)));
-            prop_assert_eq!(values(found), values(expected(&operator, monotone, false)));
+            let combinations = pareto_optimal_combinations(&operator, monotone, false, &limits).expect("no limit").unwrap_or_default();
+            prop_assert!(combinations.iter().all(|(choice, _)| operator.admits(choice)));
+            prop_assert_eq!(values(combinations), values(expected(&operator, monotone, false)));
         }
     }
 }

@@ -1,9 +1,10 @@
 //! h² mutexes: pairs of facts that no state on a path from the initial state to the goal contains.
 //!
-//! Forward h² \[1\] finds pairs that no reachable state contains. Backward h² \[2\] finds pairs that no state contains
-//! from which the goal is reachable, so it detects dead ends. An operator is useless if such a pair holds
-//! before or after it. Numeric conditions, clauses and derived facts are ignored, and conditional effects may
-//! fire or not. The analysis is therefore conservative: it may miss mutexes.
+//! Forward h² \[1\] finds pairs that no reachable state contains. Backward h² \[2\] finds pairs
+//! that no state contains from which the goal is reachable, so it detects dead ends. An operator is
+//! useless if such a pair holds before or after it. Numeric conditions, clauses and derived facts
+//! are ignored, and conditional effects may fire or not. The analysis is therefore conservative: it
+//! may miss mutexes.
 //!
 //! \[1\] P. Haslum, H. Geffner: Admissible heuristics for optimal planning, AIPS 2000.
 //! \[2\] V. Alcázar, Á. Torralba: A reminder about the importance of computing and exploiting invariants in
@@ -14,33 +15,34 @@ use task::number::dense;
 use task::task::number::TaskNumber;
 use task::task::{Fact, Operator, OperatorId, Task, VariableId};
 
-/// As many facts are paired, at most: bits for all pairs take 8 MB then.
+/// Upper limit on the number of facts; the pair table then takes 8 MB.
 const MAX_FACTS: usize = 8_000;
-/// As much work is done, at most, in words of bits that are looked at: about half a second.
+/// Work limit of the fixpoint, in bitset words visited (about 0.5 s).
 const MAX_WORK: usize = 400_000_000;
-/// How often both directions are gone through, at most; what one rules out, the other one does without.
+/// Maximum number of rounds of forward and backward analysis. Each direction prunes with the result
+/// of the other one.
 const MAX_ROUNDS: usize = 4;
 
-/// A set of facts by their numbers, or one such set for each fact.
+/// Bitset of facts, or one such bitset per fact.
 type Words = Vec<u64>;
 
-/// The operator with what matters here; facts are numbered.
+/// An operator in terms of numbered facts.
 struct Rule {
-    /// What holds before.
+    /// Facts that hold before it.
     before: Vec<u32>,
-    /// What holds after, of the facts that are known.
+    /// Facts that certainly hold after it, as far as they are known.
     after: Vec<u32>,
-    /// What may be brought about.
+    /// Facts that it may add.
     adds: Vec<u32>,
-    /// The facts of variables that have another value after, for sure, or the same that was set.
+    /// Facts of the variables that it certainly sets.
     set: Words,
-    /// The facts of variables that may change, and of which nothing is required.
+    /// Facts of the variables that it may change without requiring a value.
     open: Vec<u32>,
-    /// The facts of all variables that may change, or are required.
+    /// Facts of all variables that it may change or requires.
     touched: Words,
 }
 
-/// By fact, the facts that hold beside it in some state.
+/// Per fact: bitset of the facts that hold together with it in some state.
 struct Table {
     words: usize,
     bits: Words,
@@ -61,7 +63,7 @@ impl Table {
         has(self.row(one), other)
     }
 
-    /// Notes two facts beside each other, and whether that is new.
+    /// Adds a pair. Returns `true` if it is new.
     fn insert(&mut self, one: u32, other: u32) -> bool {
         let is_new = !self.has(one, other);
         for (row, fact) in [(one, other), (other, one)] {
@@ -71,7 +73,7 @@ impl Table {
         is_new
     }
 
-    /// Notes a fact beside all of a set, and whether anything is new.
+    /// Adds the pairs of a fact with all facts of a set. Returns `true` if any of them is new.
     fn join(&mut self, fact: u32, others: &[u64]) -> bool {
         let mut is_new = false;
         for (index, word) in others.iter().enumerate() {
@@ -79,15 +81,16 @@ impl Table {
             let mut news = word & !self.bits[start.saturating_add(index)];
             is_new |= news != 0;
             while news != 0 {
-                let other = dense(index).saturating_mul(64).saturating_add(news.trailing_zeros());
-                self.insert(fact, other);
+                let new_fact = dense(index).saturating_mul(64).saturating_add(news.trailing_zeros());
+                self.insert(fact, new_fact);
                 news &= news.saturating_sub(1);
             }
         }
         is_new
     }
 
-    /// The facts that hold beside each of some, where these hold beside each other.
+    /// Facts that are compatible with each of `facts`. Returns `None` if `facts` are not pairwise
+    /// compatible.
     fn beside(&self, facts: &[u32], all: &[u64]) -> Option<Words> {
         let mut common = all.to_vec();
         for fact in facts {
@@ -121,18 +124,18 @@ fn without(words: &[u64], others: &[u64]) -> Words {
     words.iter().zip(others).map(|(word, other)| word & !other).collect()
 }
 
-/// What can be told of a task by pairs of facts.
+/// The h² mutex pairs of a task, forwards and backwards.
 pub struct MutexPairs {
-    /// The number of each basic variable's first value.
+    /// Number of each basic variable's first fact.
     first: Vec<u32>,
-    /// The pairs that a state on the way to the goal may have.
+    /// Pairs that a state on a path from the initial state to the goal may contain.
     alive: Table,
-    /// By operator, whether no plan needs it.
+    /// Per operator: whether no plan needs it.
     useless: Vec<bool>,
 }
 
 impl MutexPairs {
-    /// None if it takes too long to find out, or if there is nothing to tell.
+    /// Returns `None` if there are too many facts or the work limit is reached.
     pub(crate) fn new<N: TaskNumber>(task: &Task<N>, limits: &Limits) -> Result<Option<Self>, Interrupted> {
         let mut first = Vec::with_capacity(task.basic);
         let mut variables = Vec::new();
@@ -144,22 +147,23 @@ impl MutexPairs {
         if facts as usize > MAX_FACTS {
             return Ok(None);
         }
-        let mut maker = H2Builder { task, first, variables, facts, left: MAX_WORK };
+        let mut builder = H2Builder { task, first, variables, facts, left: MAX_WORK };
         let mut rules = Vec::with_capacity(task.operators.len());
         for operator in limits.watch(&task.operators) {
             let operator = operator?;
-            maker.left = maker.left.saturating_sub(maker.words());
-            rules.push(maker.rule(operator));
+            builder.left = builder.left.saturating_sub(builder.words());
+            rules.push(builder.rule(operator));
         }
         let mut useless = vec![false; rules.len()];
         let mut alive = None;
         for _ in 0..MAX_ROUNDS {
-            let Some(forwards) = maker.forwards(&rules, &useless, limits)? else { break };
-            let Some(backwards) = maker.backwards(&rules, &useless, &forwards, limits)? else { break };
+            let Some(forwards) = builder.forwards(&rules, &useless, limits)? else { break };
+            let Some(backwards) = builder.backwards(&rules, &useless, &forwards, limits)? else { break };
             let mut is_over = true;
-            let all = vec![u64::MAX; maker.words()];
+            let all_facts = vec![u64::MAX; builder.words()];
             for (rule, useless) in rules.iter().zip(&mut useless) {
-                let is_alive = |facts| backwards.beside(facts, &all).is_some();
+                // An operator is useless if its precondition or its result contains a mutex pair.
+                let is_alive = |facts| backwards.beside(facts, &all_facts).is_some();
                 if !(*useless || is_alive(&rule.before) && is_alive(&rule.after)) {
                     *useless = true;
                     is_over = false;
@@ -170,16 +174,16 @@ impl MutexPairs {
                 break;
             }
         }
-        Ok(alive.map(|alive| Self { first: maker.first, alive, useless }))
+        Ok(alive.map(|alive| Self { first: builder.first, alive, useless }))
     }
 
-    /// Whether no plan needs an operator.
+    /// Returns `true` if no plan needs an operator.
     pub(crate) fn is_operator_useless(&self, operator: OperatorId) -> bool {
         self.useless[operator.index()]
     }
 
-    /// Whether the goal cannot be reached from a state, as far as pairs tell: those of the variables that have changed since a state of which that
-    /// is not so.
+    /// Returns `true` if a mutex pair proves that the goal is unreachable from `values`. Checks
+    /// only the variables that differ from `before`, a state without mutex pairs.
     pub(crate) fn is_dead_end(&self, before: &[u32], values: &[u32]) -> bool {
         let number = |variable: usize| self.first[variable].saturating_add(values[variable]);
         (0..self.first.len()).filter(|variable| before[*variable] != values[*variable]).any(|changed| {
@@ -192,10 +196,10 @@ impl MutexPairs {
 struct H2Builder<'a, N> {
     task: &'a Task<N>,
     first: Vec<u32>,
-    /// By fact.
+    /// Variable of each fact.
     variables: Vec<VariableId>,
     facts: u32,
-    /// How many words may still be looked at.
+    /// Remaining work, in bitset words.
     left: usize,
 }
 
@@ -212,7 +216,7 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         self.first[fact.variable.index()].saturating_add(fact.value)
     }
 
-    /// The numbers of a variable's values.
+    /// Numbers of a variable's facts.
     fn values(&self, variable: VariableId) -> std::ops::Range<u32> {
         let first = self.first[variable.index()];
         first..first.saturating_add(dense(self.task.variables[variable.index()].values.len()))
@@ -223,7 +227,7 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         let conditional: Vec<Fact> =
             operator.conditional.iter().flat_map(|effect| &effect.effects).copied().collect();
         let may_change = |variable| conditional.iter().any(|fact| fact.variable == variable);
-        let known = operator.effects.iter().filter(|fact| !may_change(fact.variable));
+        let unconditional = operator.effects.iter().filter(|fact| !may_change(fact.variable));
         let persists = |fact: &&Fact| {
             !may_change(fact.variable)
                 && operator.effects.iter().all(|effect| effect.variable != fact.variable)
@@ -242,7 +246,7 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         }
         Rule {
             before: required.clone().map(|fact| self.number(*fact)).collect(),
-            after: known.chain(required.filter(persists)).map(|fact| self.number(*fact)).collect(),
+            after: unconditional.chain(required.filter(persists)).map(|fact| self.number(*fact)).collect(),
             adds: operator.effects.iter().chain(&conditional).map(|fact| self.number(*fact)).collect(),
             set,
             open,
@@ -250,7 +254,7 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         }
     }
 
-    /// The pairs that a reachable state may have. None if that takes too long.
+    /// Pairs that a reachable state may contain. Returns `None` if the work limit is reached.
     fn forwards(
         &mut self,
         rules: &[Rule],
@@ -278,10 +282,10 @@ impl<N: TaskNumber> H2Builder<'_, N> {
             for item in limits.watch(rules.iter().zip(useless)) {
                 let (rule, useless) = item?;
                 let steps = rule.before.len().saturating_add(rule.adds.len()).saturating_add(2);
-                let Some(left) = self.left.checked_sub(steps.saturating_mul(table.words)) else {
+                let Some(remaining) = self.left.checked_sub(steps.saturating_mul(table.words)) else {
                     return Ok(None);
                 };
-                self.left = left;
+                self.left = remaining;
                 if *useless {
                     continue;
                 }
@@ -289,11 +293,14 @@ impl<N: TaskNumber> H2Builder<'_, N> {
                 let mut beside = without(&beside, &rule.set);
                 rule.adds.iter().for_each(|fact| insert(&mut beside, *fact));
                 for fact in &rule.adds {
-                    // Of one variable there is one value.
-                    let own = self.values(self.variables[*fact as usize]);
-                    let mut others = beside.clone();
-                    own.filter(|own| own != fact).for_each(|own| remove(&mut others, own));
-                    if table.join(*fact, &others) {
+                    // A variable has only one value, so an added fact excludes the variable's other
+                    // facts.
+                    let variable_facts = self.values(self.variables[*fact as usize]);
+                    let mut compatible = beside.clone();
+                    variable_facts
+                        .filter(|value| value != fact)
+                        .for_each(|value| remove(&mut compatible, value));
+                    if table.join(*fact, &compatible) {
                         is_over = false;
                         insert(&mut reached, *fact);
                     }
@@ -305,7 +312,8 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         }
     }
 
-    /// The pairs that a state may have from which the goal can be reached, of those that a reachable one may have. None if that takes too long.
+    /// Pairs, among those that a reachable state may contain, that a state may contain from which
+    /// the goal is reachable. Returns `None` if the work limit is reached.
     fn backwards(
         &mut self,
         rules: &[Rule],
@@ -315,11 +323,12 @@ impl<N: TaskNumber> H2Builder<'_, N> {
     ) -> Result<Option<Table>, Interrupted> {
         let mut table = Table::new(self.facts as usize);
         let mut reached = vec![0; self.words()];
-        // What holds beside all that the goal asks for; all other values of these variables do not.
+        // Facts that are compatible with all goal facts. This excludes the other values of the goal
+        // variables.
         let goal = self.task.goal.facts.iter().filter(|fact| self.is_basic(fact.variable));
         let goal: Vec<u32> = goal.map(|fact| self.number(*fact)).collect();
-        let all = self.facts_of(forwards);
-        let goal = forwards.beside(&goal, &all).unwrap_or_else(|| vec![0; self.words()]);
+        let reachable_facts = self.facts_of(forwards);
+        let goal = forwards.beside(&goal, &reachable_facts).unwrap_or_else(|| vec![0; self.words()]);
         for fact in (0..self.facts).filter(|fact| has(&goal, *fact) && forwards.has(*fact, *fact)) {
             insert(&mut reached, fact);
             table.join(fact, &common(forwards.row(fact), &goal));
@@ -331,13 +340,13 @@ impl<N: TaskNumber> H2Builder<'_, N> {
                 let news = rule.before.len().saturating_add(rule.open.len());
                 let steps = rule.before.len().saturating_add(rule.after.len()).saturating_add(news);
                 let steps = steps.saturating_add(3).saturating_mul(table.words);
-                let Some(left) = self.left.checked_sub(steps) else { return Ok(None) };
-                self.left = left;
+                let Some(remaining) = self.left.checked_sub(steps) else { return Ok(None) };
+                self.left = remaining;
                 if *useless {
                     continue;
                 }
                 let Some(beside) = table.beside(&rule.after, &reached) else { continue };
-                let Some(before) = forwards.beside(&rule.before, &all) else { continue };
+                let Some(before) = forwards.beside(&rule.before, &reachable_facts) else { continue };
                 let mut state = without(&beside, &rule.touched);
                 let news =
                     || rule.before.iter().chain(&rule.open).copied().filter(|fact| has(&before, *fact));
@@ -356,11 +365,11 @@ impl<N: TaskNumber> H2Builder<'_, N> {
         }
     }
 
-    /// The facts that hold in some state of a table.
+    /// Facts that hold in some state of a table.
     fn facts_of(&self, table: &Table) -> Words {
-        let mut all = vec![0; self.words()];
-        (0..self.facts).filter(|fact| table.has(*fact, *fact)).for_each(|fact| insert(&mut all, fact));
-        all
+        let mut facts = vec![0; self.words()];
+        (0..self.facts).filter(|fact| table.has(*fact, *fact)).for_each(|fact| insert(&mut facts, fact));
+        facts
     }
 }
 
@@ -373,60 +382,62 @@ mod tests {
     use testing::random::Random;
     use testing::{depot, ground_text};
 
-    /// Whatever is on a way to the goal is not called dead, nor is an operator on it useless. How many states and operators are.
+    /// Checks that no state on a path to the goal counts as a dead end and no operator on it as
+    /// useless. Returns the numbers of dead ends and of useless operators.
     fn check(text: &(String, String)) -> Option<[usize; 2]> {
         let task = ground_text(text.clone());
         let (states, steps) = reachable(&task).filter(|_| task.unreachable.is_none())?;
         let best = to_go(&task, &states, &steps);
         let pairs = MutexPairs::new(&task, &Limits::none()).expect("no limit")?;
-        // Pairs of all variables are looked at.
-        let other: Vec<u32> = vec![u32::MAX; task.variables.len()];
-        let mut told = [0, 0];
-        for ((state, own), known) in states.iter().zip(&steps).zip(&best) {
-            let is_dead = pairs.is_dead_end(&other, &state.values);
-            assert!(known.is_none() || !is_dead, "{state:?} {text:?}");
-            told[0] += usize::from(is_dead);
-            for (id, to, _) in own {
+        // With no equal value in the other state, the pairs of all variables are checked.
+        let differing_values: Vec<u32> = vec![u32::MAX; task.variables.len()];
+        let mut counts = [0, 0];
+        for ((state, successors), goal_distance) in states.iter().zip(&steps).zip(&best) {
+            let is_dead = pairs.is_dead_end(&differing_values, &state.values);
+            assert!(goal_distance.is_none() || !is_dead, "{state:?} {text:?}");
+            counts[0] += usize::from(is_dead);
+            for (id, to, _) in successors {
                 let is_useless = pairs.is_operator_useless(*id);
-                assert!(known.is_none() || best[*to].is_none() || !is_useless, "{id:?} {text:?}");
-                told[1] += usize::from(is_useless);
+                assert!(goal_distance.is_none() || best[*to].is_none() || !is_useless, "{id:?} {text:?}");
+                counts[1] += usize::from(is_useless);
             }
         }
-        Some(told)
+        Some(counts)
     }
 
     fn check_all(seeds: std::ops::Range<u64>) {
-        let (mut looked, mut dead, mut useless) = (0, 0, 0);
+        let (mut tasks, mut dead, mut useless) = (0, 0, 0);
         for seed in seeds {
             let mut random = Generator(Random(seed));
-            let others = [(random.domain(), random.problem()), depot(seed)];
-            for text in (0..40).map(|part| switches(40 * seed + part)).chain(others) {
-                let told = check(&text);
-                looked += usize::from(told.is_some());
-                dead += usize::from(told.is_some_and(|[dead, _]| dead > 0));
-                useless += usize::from(told.is_some_and(|[_, useless]| useless > 0));
+            let texts = [(random.domain(), random.problem()), depot(seed)];
+            for text in (0..40).map(|part| switches(40 * seed + part)).chain(texts) {
+                let counts = check(&text);
+                tasks += usize::from(counts.is_some());
+                dead += usize::from(counts.is_some_and(|[dead, _]| dead > 0));
+                useless += usize::from(counts.is_some_and(|[_, useless]| useless > 0));
             }
         }
         assert!(
-            looked > 1_000 && dead > 50 && useless > 50,
-            "{looked} tasks, {dead} with dead states, {useless} with useless operators"
+            tasks > 1_000 && dead > 50 && useless > 50,
+            "{tasks} tasks, {dead} with dead states, {useless} with useless operators"
         );
     }
 
     #[test]
-    fn what_is_on_a_way_to_the_goal_is_not_ruled_out() {
+    fn nothing_on_a_path_to_the_goal_is_pruned() {
         check_all(0..60);
     }
 
     #[test]
     #[ignore = "takes minutes"]
-    fn what_is_on_a_way_to_the_goal_is_not_ruled_out_of_many() {
+    fn nothing_on_a_path_to_the_goal_is_pruned_in_many_tasks() {
         check_all(60..2_000);
     }
 
-    /// Two tiles in a row above a robot, which paints the tile above it and does not come back to what is painted.
+    /// A robot below three tiles in a row. It paints the neighbouring tile and cannot enter painted
+    /// tiles.
     #[test]
-    fn who_paints_itself_in_is_dead() {
+    fn painting_oneself_in_is_a_dead_end() {
         let domain = "(define (domain tiles) (:predicates (at ?t) (clear ?t) (painted ?t) (above ?a ?b))
             (:action move :parameters (?a ?b) :precondition (and (at ?a) (clear ?b) (or (above ?a ?b) (above ?b ?a)))
               :effect (and (not (at ?a)) (clear ?a) (at ?b) (not (clear ?b))))

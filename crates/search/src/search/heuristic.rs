@@ -7,28 +7,28 @@ use task::task::{State, Task};
 use crate::bounds::{Bounds, LandmarkCut};
 use crate::search::symmetry::Orbits;
 
-/// A lower bound on the cost from a state to the goal.
+/// An admissible heuristic: a lower bound on the cost from a state to the goal.
 pub trait Heuristic<N> {
-    /// None if the goal cannot be reached.
+    /// Heuristic value of a state. Returns `None` if the goal is unreachable.
     fn estimate(&self, state: &State<N>) -> Option<N>;
 
-    /// A sharper one that takes longer, if there is one.
+    /// A more accurate but slower heuristic, if available.
     fn sharper(&self, _: &Task<N>) -> Option<Box<dyn LazyHeuristic<N>>> {
         None
     }
 
-    /// What is known of objects that are interchangeable.
+    /// Symmetries of interchangeable objects, if available.
     fn orbits(&self, _: Context<'_, N>) -> Option<Orbits> {
         None
     }
 }
 
-/// A lower bound that takes long, and is looked at only where a state is to be expanded.
+/// A slow admissible heuristic that is evaluated only when a node is expanded.
 pub trait LazyHeuristic<N> {
-    /// None if the goal cannot be reached.
+    /// Heuristic value of a state. Returns `None` if the goal is unreachable.
     fn estimate(&mut self, state: &State<N>) -> Option<N>;
 
-    /// What it took so far, in steps of a computer.
+    /// Work units done up to now.
     fn work(&self) -> u64;
 }
 

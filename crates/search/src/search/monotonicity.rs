@@ -13,7 +13,8 @@ use task::task::number::TaskNumber;
 use task::task::quantity::Linear;
 use task::task::{Condition, Fact, Task};
 
-/// What is asked of something: more of it (or its truth), less of it (or its falsity).
+/// Directions in which a quantity (or a fact) is needed: `up` for more (or true), `down` for less
+/// (or false).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Polarity {
     pub up: bool,
@@ -33,7 +34,7 @@ impl Polarity {
     }
 }
 
-/// What is asked of each numeric variable, and of each derived variable as far as it depends on them.
+/// Fixpoint computation of the polarity of each numeric variable and each derived variable.
 struct PolarityAnalysis<'a, N> {
     task: &'a Task<N>,
     numbers: Vec<Polarity>,
@@ -41,18 +42,18 @@ struct PolarityAnalysis<'a, N> {
     changed: bool,
 }
 
-/// What is asked of each numeric variable of a task.
+/// Polarity of each numeric variable of a task.
 pub fn directions<N: TaskNumber>(task: &Task<N>) -> Vec<Polarity> {
     let numbers = vec![Polarity::default(); task.initial.numbers.len()];
     let facts = vec![Polarity::default(); task.variables.len()];
-    let mut asking = PolarityAnalysis { task, numbers, facts, changed: true };
+    let mut analysis = PolarityAnalysis { task, numbers, facts, changed: true };
     if task.initial.numbers.is_empty() {
-        return asking.numbers;
+        return analysis.numbers;
     }
-    while std::mem::take(&mut asking.changed) {
-        asking.spread();
+    while std::mem::take(&mut analysis.changed) {
+        analysis.spread();
     }
-    asking.numbers
+    analysis.numbers
 }
 
 impl<N: TaskNumber> PolarityAnalysis<'_, N> {
@@ -61,54 +62,56 @@ impl<N: TaskNumber> PolarityAnalysis<'_, N> {
         self.condition(&task.goal, UP);
         for operator in &task.operators {
             self.condition(&operator.condition, UP);
+            // An effect may fire or not, so its condition is needed in both directions.
             for literal in operator.conditional.iter().flat_map(|effect| &effect.condition) {
                 self.fact(literal.fact, BOTH);
             }
             for effect in &operator.numeric_effects {
-                let asked = self.numbers[effect.variable.index()];
-                self.linear(&effect.value, asked);
+                let polarity = self.numbers[effect.variable.index()];
+                self.linear(&effect.value, polarity);
             }
         }
         for rule in task.axioms.iter().flat_map(|layer| &layer.rules) {
             let head = self.facts[rule.head.variable.index()];
-            let asked = if rule.head.value == 0 { head } else { head.flipped() };
-            self.condition(&rule.body, asked);
+            let polarity = if rule.head.value == 0 { head } else { head.flipped() };
+            self.condition(&rule.body, polarity);
         }
     }
 
-    fn condition(&mut self, condition: &Condition<N>, asked: Polarity) {
+    fn condition(&mut self, condition: &Condition<N>, polarity: Polarity) {
         for fact in &condition.facts {
-            self.fact(*fact, asked);
+            self.fact(*fact, polarity);
         }
         for literal in condition.clauses.iter().flatten() {
-            self.fact(literal.fact, if literal.positive { asked } else { asked.flipped() });
+            self.fact(literal.fact, if literal.positive { polarity } else { polarity.flipped() });
         }
         for linear in condition.linears() {
-            self.linear(linear, asked);
+            self.linear(linear, polarity);
         }
     }
 
-    /// The truth of a derived variable is its value 0.
-    fn fact(&mut self, fact: Fact, asked: Polarity) {
-        let asked = if fact.value == 0 { asked } else { asked.flipped() };
-        let known = &mut self.facts[fact.variable.index()];
-        let next = known.with(asked);
-        self.changed |= next != *known;
-        *known = next;
+    /// Adds a polarity to the variable of a fact. A derived variable is true if its value is 0.
+    fn fact(&mut self, fact: Fact, polarity: Polarity) {
+        let polarity = if fact.value == 0 { polarity } else { polarity.flipped() };
+        let current = &mut self.facts[fact.variable.index()];
+        let next = current.with(polarity);
+        self.changed |= next != *current;
+        *current = next;
     }
 
-    fn linear(&mut self, linear: &Linear<N>, asked: Polarity) {
+    fn linear(&mut self, linear: &Linear<N>, polarity: Polarity) {
         for (variable, factor) in &linear.coefficients {
-            let asked = if *factor >= N::zero() { asked } else { asked.flipped() };
-            let known = &mut self.numbers[variable.index()];
-            let next = known.with(asked);
-            self.changed |= next != *known;
-            *known = next;
+            // A negative coefficient swaps the directions.
+            let polarity = if *factor >= N::zero() { polarity } else { polarity.flipped() };
+            let current = &mut self.numbers[variable.index()];
+            let next = current.with(polarity);
+            self.changed |= next != *current;
+            *current = next;
         }
     }
 }
 
-/// Whether more of any numeric variable can only help.
+/// Returns `true` if a higher value of any numeric variable never hurts.
 pub fn is_monotone<N: TaskNumber>(task: &Task<N>) -> bool {
-    directions(task).iter().all(|asked| !asked.down)
+    directions(task).iter().all(|polarity| !polarity.down)
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-/// Less comes first.
+/// Open list. The smallest key is popped first.
 pub(super) struct OpenList<K> {
     buckets: BTreeMap<K, Vec<u32>>,
     length: usize,
@@ -31,7 +31,7 @@ impl<K: Ord + Clone> OpenList<K> {
         }
     }
 
-    /// About how much memory is taken.
+    /// Approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         let nodes = self.length.saturating_mul(size_of::<u32>());
         nodes.saturating_add(self.buckets.len().saturating_mul(size_of::<(K, Vec<u32>)>()))

@@ -1,28 +1,30 @@
 //! Pareto front of many labels, stored as a tree of boxes.
 //!
-//! Each box stores the best and the worst value of each criterion among its labels. Whole boxes are skipped in
-//! dominance queries, as in the ND-tree \[1\]. Boxes are split where their labels differ, as in a k-d tree.
+//! Each box stores the best and the worst value of each criterion among its labels. Whole boxes are
+//! skipped in dominance queries, as in the ND-tree \[1\]. Boxes are split where their labels
+//! differ, as in a k-d tree.
 //!
-//! \[1\] A. Jaszkiewicz, T. Lust: ND-Tree-Based Update: A Fast Algorithm for the Dynamic Nondominance Problem,
-//! IEEE Transactions on Evolutionary Computation 22(5), 2018.
+//! \[1\] A. Jaszkiewicz, T. Lust: ND-Tree-Based Update: A Fast Algorithm for the Dynamic
+//! Nondominance Problem, IEEE Transactions on Evolutionary Computation 22(5), 2018.
 
 use task::number::dense;
 
-/// What labels are compared by: positions of numbers, one for each criterion.
+/// Comparison of labels by several criteria. Each label has one number index per criterion.
 pub(super) trait Criteria {
-    /// Whether the first number is at least as good as the second by a criterion.
+    /// Returns `true` if number `one` is at least as good as number `other` by a criterion.
     fn is_as_good(&self, criterion: usize, one: u32, other: u32) -> bool;
 
-    /// Whether the first label is at least as good as the second.
+    /// Returns `true` if label `one` is at least as good as label `other` by all criteria.
     fn dominates(&self, one: u32, other: u32) -> bool;
 
-    /// The numbers of a label, one for each criterion.
+    /// Writes the number indices of a label to `to`, one per criterion.
     fn numbers(&self, label: u32, to: &mut Vec<u32>);
 }
 
 enum Content {
     Labels(Vec<u32>),
-    /// Labels with a number as good as this one by this criterion are in the first box.
+    /// Inner node. Labels whose number by `criterion` is at least as good as `number` are in
+    /// `first`, the others in `second`.
     Boxes {
         criterion: usize,
         number: u32,
@@ -37,11 +39,11 @@ struct Region {
     content: Content,
 }
 
-/// A front with many labels.
+/// A Pareto front with many labels.
 #[derive(Default)]
 pub(super) struct Front {
     regions: Vec<Region>,
-    /// As many labels stay in one box.
+    /// Maximum number of labels in a leaf.
     most: usize,
 }
 
@@ -52,14 +54,15 @@ impl Front {
         front
     }
 
-    /// About how much memory is taken.
+    /// Approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         let numbers = self.regions.first().map_or(0, |region| region.best.len());
         let region = numbers.saturating_add(self.most).saturating_mul(8);
         self.regions.len().saturating_mul(region.saturating_add(size_of::<Region>()))
     }
 
-    /// Whether a label dominates one with these numbers, as `dominates` has it.
+    /// Returns `true` if some label satisfies `dominates`. Boxes whose best values do not reach
+    /// `numbers` are skipped.
     pub(super) fn any(
         &self,
         numbers: &[u32],
@@ -70,7 +73,9 @@ impl Front {
         while let Some(region) = stack.pop() {
             let region = &self.regions[region as usize];
             let mut pairs = region.best.iter().zip(numbers).enumerate();
-            if !pairs.all(|(criterion, (best, own))| criteria.is_as_good(criterion, *best, *own)) {
+            // The best values bound all labels of the box, so a box that fails one criterion holds
+            // no dominating label.
+            if !pairs.all(|(criterion, (best, number))| criteria.is_as_good(criterion, *best, *number)) {
                 continue;
             }
             match &region.content {
@@ -85,7 +90,8 @@ impl Front {
         false
     }
 
-    /// Adds a label; what it dominates leaves the front.
+    /// Adds a label that is not dominated. Calls `leaves` for each label that it dominates and
+    /// removes that label.
     pub(super) fn insert(&mut self, label: u32, criteria: &impl Criteria, mut leaves: impl FnMut(u32)) {
         let mut numbers = Vec::new();
         criteria.numbers(label, &mut numbers);
@@ -93,14 +99,15 @@ impl Front {
         while let Some(region) = stack.pop() {
             let region = &mut self.regions[region as usize];
             let mut pairs = numbers.iter().zip(&region.worst).enumerate();
-            if !pairs.all(|(criterion, (own, worst))| criteria.is_as_good(criterion, *own, *worst)) {
+            // A label that is worse than the worst value by some criterion dominates nothing in the box.
+            if !pairs.all(|(criterion, (number, worst))| criteria.is_as_good(criterion, *number, *worst)) {
                 continue;
             }
             match &mut region.content {
-                Content::Labels(labels) => labels.retain(|known| {
-                    let leaving = criteria.dominates(label, *known);
+                Content::Labels(labels) => labels.retain(|stored| {
+                    let leaving = criteria.dominates(label, *stored);
                     if leaving {
-                        leaves(*known);
+                        leaves(*stored);
                     }
                     !leaving
                 }),
@@ -125,7 +132,8 @@ impl Front {
         self.split(at, criteria);
     }
 
-    /// Splits a box, and its parts, until they hold few labels.
+    /// Splits a leaf recursively until each part holds at most `most` labels or its labels do not
+    /// differ.
     fn split(&mut self, from: u32, criteria: &impl Criteria) {
         let mut stack = vec![from];
         while let Some(at) = stack.pop() {
@@ -138,10 +146,10 @@ impl Front {
                 self.regions[at as usize].content = Content::Labels(labels);
                 continue;
             };
-            let mut own = Vec::new();
+            let mut label_numbers = Vec::new();
             let (first, second): (Vec<u32>, Vec<u32>) = labels.into_iter().partition(|label| {
-                criteria.numbers(*label, &mut own);
-                criteria.is_as_good(criterion, own[criterion], number)
+                criteria.numbers(*label, &mut label_numbers);
+                criteria.is_as_good(criterion, label_numbers[criterion], number)
             });
             let [first, second] = [first, second].map(|labels| {
                 let id = dense(self.regions.len());
@@ -154,7 +162,7 @@ impl Front {
     }
 }
 
-/// A box around some labels.
+/// Leaf with these labels and their bounding values.
 fn region(labels: Vec<u32>, criteria: &impl Criteria) -> Region {
     let mut region = Region { best: Vec::new(), worst: Vec::new(), content: Content::Labels(Vec::new()) };
     let mut numbers = Vec::new();
@@ -171,30 +179,31 @@ fn widen(region: &mut Region, numbers: &[u32], criteria: &impl Criteria) {
         region.best.extend_from_slice(numbers);
         region.worst.extend_from_slice(numbers);
     }
-    for (criterion, own) in numbers.iter().enumerate() {
-        if !criteria.is_as_good(criterion, region.best[criterion], *own) {
-            region.best[criterion] = *own;
+    for (criterion, number) in numbers.iter().enumerate() {
+        if !criteria.is_as_good(criterion, region.best[criterion], *number) {
+            region.best[criterion] = *number;
         }
-        if !criteria.is_as_good(criterion, *own, region.worst[criterion]) {
-            region.worst[criterion] = *own;
+        if !criteria.is_as_good(criterion, *number, region.worst[criterion]) {
+            region.worst[criterion] = *number;
         }
     }
 }
 
-/// Where to split labels so that the parts are most alike in size; none if they do not differ.
+/// Criterion and number that split the labels most evenly. Returns `None` if the labels do not
+/// differ.
 fn middle(labels: &[u32], criteria: &impl Criteria) -> Option<(usize, u32)> {
-    let mut own = Vec::new();
+    let mut label_numbers = Vec::new();
     let mut columns: Vec<Vec<u32>> = Vec::new();
     for label in labels {
-        criteria.numbers(*label, &mut own);
-        columns.resize(own.len(), Vec::new());
-        for (column, number) in columns.iter_mut().zip(&own) {
+        criteria.numbers(*label, &mut label_numbers);
+        columns.resize(label_numbers.len(), Vec::new());
+        for (column, number) in columns.iter_mut().zip(&label_numbers) {
             column.push(*number);
         }
     }
     let balance = |(criterion, column): (usize, &Vec<u32>)| {
         let number = median(criterion, column.clone(), criteria)?;
-        let first = column.iter().filter(|own| criteria.is_as_good(criterion, **own, number)).count();
+        let first = column.iter().filter(|value| criteria.is_as_good(criterion, **value, number)).count();
         let smaller = first.min(column.len().saturating_sub(first));
         (smaller > 0).then_some((smaller, criterion, number))
     };
@@ -206,7 +215,7 @@ fn middle(labels: &[u32], criteria: &impl Criteria) -> Option<(usize, u32)> {
     best.map(|(_, criterion, number)| (criterion, number))
 }
 
-/// A number in the middle, but not the worst one.
+/// Median of a column, or the next better number if the median equals the worst one.
 fn median(criterion: usize, mut column: Vec<u32>, criteria: &impl Criteria) -> Option<u32> {
     column.sort_by(|one, other| {
         match (criteria.is_as_good(criterion, *one, *other), criteria.is_as_good(criterion, *other, *one)) {
@@ -228,7 +237,7 @@ mod tests {
 
     use super::*;
 
-    /// Points of which less is better in each coordinate but the last.
+    /// Points with three coordinates: lower is better in the first two, higher in the last.
     struct Points(Vec<Vec<u32>>);
 
     impl Criteria for Points {
@@ -248,23 +257,23 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_front_is_what_nothing_dominates(most in 0_usize..30, points in proptest::collection::vec(
+        fn a_front_holds_exactly_the_labels_that_no_other_label_dominates(most in 0_usize..30, points in proptest::collection::vec(
             proptest::collection::vec(0_u32..30, 3), 1..400,
         )) {
             let points = Points(points);
             let mut front = Front::new(vec![0], most, &points);
             let mut expected = vec![0_u32];
             for new in 1..dense(points.0.len()) {
-                let own = &points.0[new as usize];
-                let beaten = expected.iter().any(|known| points.dominates(*known, new));
-                prop_assert_eq!(front.any(own, &points, |known| points.dominates(known, new)), beaten);
-                if !beaten {
-                    let mut left = Vec::new();
-                    front.insert(new, &points, |known| left.push(known));
-                    let (mut out, stay): (Vec<u32>, Vec<u32>) = expected.into_iter().partition(|known| points.dominates(new, *known));
-                    left.sort_unstable();
+                let numbers = &points.0[new as usize];
+                let is_dominated = expected.iter().any(|label| points.dominates(*label, new));
+                prop_assert_eq!(front.any(numbers, &points, |label| points.dominates(label, new)), is_dominated);
+                if !is_dominated {
+                    let mut removed = Vec::new();
+                    front.insert(new, &points, |label| removed.push(label));
+                    let (mut out, stay): (Vec<u32>, Vec<u32>) = expected.into_iter().partition(|label| points.dominates(new, *label));
+                    removed.sort_unstable();
                     out.sort_unstable();
-                    prop_assert_eq!(left, out);
+                    prop_assert_eq!(removed, out);
                     expected = stay;
                     expected.push(new);
                 }

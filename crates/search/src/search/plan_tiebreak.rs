@@ -5,9 +5,9 @@
 //! in the domain, of its arguments in the problem, and of its designs. Names play no part. A design is not
 //! chosen if a strictly better one exists (cheaper, or with less consumption).
 //!
-//! The known plan bounds both searches: one for the fewest reconfigurations, and a depth-first search in model
-//! order that stops at the first plan. If these bounds do not keep the searches small, the choice is still
-//! deterministic, but not in this order.
+//! The known plan bounds both searches: one for the fewest reconfigurations, and a depth-first
+//! search in model order that stops at the first plan. If these bounds do not keep the searches
+//! small, the choice is still deterministic, but not in this order.
 
 use std::cell::{Cell, RefCell};
 use std::cmp::Reverse;
@@ -28,16 +28,16 @@ use crate::search::design_combinations::pareto_optimal_combinations;
 use crate::search::monotonicity::is_monotone;
 use crate::search::successor_generator::SuccessorGenerator;
 
-/// How many labels are made at most.
+/// Maximum number of labels that are generated.
 const LABEL_LIMIT: usize = 100_000;
-/// How many pairs of labels are compared at most.
+/// Maximum number of comparisons between labels.
 const PAIR_LIMIT: usize = 50_000_000;
 
-/// Where a plan can have come to.
+/// A partial plan: the state that it reaches and its quality.
 #[derive(Debug, Clone)]
 struct Label {
     state: State,
-    /// The design that each function ran with last.
+    /// Last design of each function.
     designs: Vec<Option<ObjectId>>,
     cost: Int,
     steps: usize,
@@ -45,52 +45,54 @@ struct Label {
 }
 
 impl Label {
-    /// Where numbers have to be equal, they are part of the place.
+    /// Key of the front that the label is compared in. Numbers that must be equal are part of the
+    /// key.
     fn place(&self, task: &Task, monotone: bool) -> Place {
         let numbers = if monotone { Vec::new() } else { self.state.numbers.clone() };
         (self.state.values[..task.basic].into(), self.designs.clone(), numbers)
     }
 }
 
-/// What is kept small, the more important first: steps that are not of the plan to stay close to, and functions that have changed
-/// their design, each summed over the steps.
+/// Secondary objectives in lexicographic order, each summed over the steps: steps that are not part
+/// of the plan to stay close to, and functions that change their design.
 pub type Changes = (usize, usize);
 
 /// A combination of designs of an operator.
 struct Choice {
     designs: Vec<u32>,
     cost: Int,
-    /// Functions, by position, and their designs.
+    /// Positions of functions, with their designs.
     configuration: Vec<(usize, ObjectId)>,
-    /// Whether it is a step of the plan to stay close to, or there is no such plan.
+    /// Whether the step is part of the plan to stay close to, or there is no such plan.
     is_kept: bool,
 }
 
-/// An operator's combinations of designs in order; none if there are too many.
+/// Combinations of designs of an operator, sorted. `None` if there are too many.
 type Choices = Option<Vec<Choice>>;
 
-/// Where a label has come to: its values, designs, and numbers.
+/// Key of a front: values, designs and, if they are not monotone, numbers.
 type Place = (Box<[u32]>, Vec<Option<ObjectId>>, Vec<Int>);
 
-/// Labels, and their positions by where they have come to.
+/// Labels, and their indices by front.
 #[derive(Default)]
 struct Labels {
     all: Vec<Label>,
     fronts: FxHashMap<Place, Vec<usize>>,
 }
 
-/// What is before the plan.
+/// The situation in which the plan begins.
 pub struct PlanPrefix<'a> {
     pub state: &'a State,
-    /// The design that functions ran with last.
+    /// Last design of each function before the plan.
     pub designs: &'a [(ObjectId, ObjectId)],
-    /// Of plans that are as good, one with more of these steps is chosen.
+    /// Steps of a plan to stay close to. Among equally good plans, one with more of these steps is
+    /// chosen.
     pub close_to: &'a FxHashSet<GroundStep>,
 }
 
-/// What choosing needs to know of a task, whatever state plans begin in.
+/// Tie-breaking data of a task, independent of the initial state.
 pub struct TieBreakContext {
-    /// By projection and abstract state.
+    /// Lower bounds on the steps to the goal, by projection and abstract state.
     steps_to_go: Vec<Vec<Option<Int>>>,
     index: SuccessorGenerator,
     monotone: bool,
@@ -109,9 +111,10 @@ impl TieBreakContext {
         let mut functions: Vec<ObjectId> = configurations.map(|(function, _)| *function).collect();
         functions.sort_unstable();
         functions.dedup();
-        // Where every step costs 1, the number of steps is the cost.
+        // With unit costs the goal distance already is the number of steps.
         let is_unit = |cost: (Int, Int)| cost == (1, 1);
-        let unit = task.operators.iter().all(|own| is_unit((own.cost.minimum(), own.cost.maximum())));
+        let unit =
+            task.operators.iter().all(|operator| is_unit((operator.cost.minimum(), operator.cost.maximum())));
         let steps = bounds.projections.iter().map(|projection| {
             if unit { Ok(projection.costs().to_vec()) } else { projection.steps_to_go(limits) }
         });
@@ -124,7 +127,7 @@ impl TieBreakContext {
         })
     }
 
-    /// The combinations that no other one is strictly better than, and those of the steps to stay close to.
+    /// Pareto-optimal combinations of designs, and those of the steps to stay close to.
     fn choices_of(
         &self,
         context: Context<'_>,
@@ -161,7 +164,8 @@ struct Ties<'a> {
     bounds: &'a Bounds,
     prepared: &'a TieBreakContext,
     limits: &'a Limits,
-    /// Where they depend on the plan to stay close to.
+    /// Choices that depend on the plan to stay close to, if there is one; otherwise those of
+    /// `prepared` are shared.
     choices: Option<Vec<OnceLock<Choices>>>,
     close_to: &'a FxHashSet<GroundStep>,
     cost: Int,
@@ -171,21 +175,22 @@ struct Ties<'a> {
     pulse: RefCell<LimitPoll<'a>>,
 }
 
-/// The chosen one among the plans that cost as much as a cheapest plan with fewest steps.
+/// Selects the first plan in the canonical order among the plans with the cost and length of
+/// `plan`.
 pub fn select_canonical_plan(context: Context<'_>, bounds: &Bounds, plan: GroundPlan) -> GroundPlan {
     let close_to = FxHashSet::default();
     let beginning = PlanPrefix { state: &context.task.initial, designs: &[], close_to: &close_to };
     let Ok(prepared) = TieBreakContext::new(context, bounds) else { return plan };
-    let most = (usize::MAX, usize::MAX);
-    choose_from((context, bounds, &prepared), plan, most, &beginning).0
+    let max_changes = (usize::MAX, usize::MAX);
+    choose_from((context, bounds, &prepared), plan, max_changes, &beginning).0
 }
 
-/// The same for plans that begin in another state, or after steps that are settled; with its changes, if they are at most so
-/// many and plans were few enough to tell.
+/// Selects the canonical plan from another state or after settled steps. Also returns its changes
+/// if they are at most `max_changes` and the search stayed within its limits.
 pub fn choose_from(
     (context, bounds, prepared): (Context<'_>, &Bounds, &TieBreakContext),
     plan: GroundPlan,
-    most: Changes,
+    max_changes: Changes,
     beginning: &PlanPrefix<'_>,
 ) -> (GroundPlan, Option<Changes>) {
     let Context { task, limits } = context;
@@ -195,13 +200,13 @@ pub fn choose_from(
             designs[position] = Some(*design);
         }
     }
-    let own = || task.operators.iter().map(|_| OnceLock::new()).collect();
+    let empty_choices = || task.operators.iter().map(|_| OnceLock::new()).collect();
     let ties = Ties {
         task,
         bounds,
         prepared,
         limits,
-        choices: (!beginning.close_to.is_empty()).then(own),
+        choices: (!beginning.close_to.is_empty()).then(empty_choices),
         close_to: beginning.close_to,
         cost: plan.cost,
         steps: plan.steps.len(),
@@ -210,43 +215,46 @@ pub fn choose_from(
         pulse: RefCell::new(limits.pulse()),
     };
     let start = Label { state: beginning.state.clone(), designs, cost: 0, steps: 0, changes: (0, 0) };
-    match ties.first(start, most) {
+    match ties.first(start, max_changes) {
         Some((steps, changes)) => (GroundPlan { steps, cost: plan.cost }, Some(changes)),
         None => (plan, None),
     }
 }
 
-/// What is left to try after a label.
+/// A node of the depth-first search with its untried successors.
 struct Branch<'a> {
     label: usize,
     operators: std::vec::IntoIter<OperatorId>,
-    /// An operator, and those of its choices that are left.
+    /// Current operator and its untried choices.
     current: Option<(OperatorId, std::slice::Iter<'a, Choice>)>,
 }
 
 impl Ties<'_> {
-    /// The first plan in order, and its changes; none if those are more, or if there are too many plans to tell.
-    fn first(&self, start: Label, most: Changes) -> Option<(Vec<GroundStep>, Changes)> {
-        let (changes, known) = self.fewest_changes(start.clone(), most)?;
-        let steps = self.first_in_order(start, changes, &known)?;
+    /// First plan in the canonical order and its changes. Returns `None` if it needs more than
+    /// `max_changes` changes or a limit is reached.
+    fn first(&self, start: Label, max_changes: Changes) -> Option<(Vec<GroundStep>, Changes)> {
+        let (changes, first_labels) = self.fewest_changes(start.clone(), max_changes)?;
+        let steps = self.first_in_order(start, changes, &first_labels)?;
         (steps.len() == self.steps).then_some((steps, changes))
     }
 
-    /// None if there are too many, or if a limit was reached, which is not kept.
+    /// Choices of an operator. Returns `None` if there are too many, or if a limit was reached
+    /// (which is not cached).
     fn choices(&self, operator: OperatorId) -> Option<&[Choice]> {
         let choices = &self.choices.as_ref().unwrap_or(&self.prepared.choices)[operator.index()];
         if choices.get().is_none() {
-            let own = self
+            let operator_choices = self
                 .prepared
                 .choices_of(Context::new(self.task, self.limits), operator, self.close_to)
                 .ok()?;
             // If another thread was first, its choices are the same.
-            let _ = choices.set(own);
+            let _ = choices.set(operator_choices);
         }
         choices.get()?.as_deref()
     }
 
-    /// The label after a step; none if it leads beyond the limits.
+    /// Label after a step. Returns `None` if the step is inapplicable or cannot lead to a plan
+    /// within the cost and length of the given plan.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "costs are not negative and those of labels at most that of a known plan, so that sums with an operator and an estimate fit"
@@ -265,9 +273,9 @@ impl Ties<'_> {
         if cost + self.bounds.estimate(&state)? > self.cost {
             return None;
         }
-        let most = (self.steps - steps) as Int;
+        let remaining_steps = (self.steps - steps) as Int;
         let in_time = |(projection, to_go): (&Projection, &Vec<Option<Int>>)| {
-            to_go[projection.state(&state) as usize].is_some_and(|more| more <= most)
+            to_go[projection.state(&state) as usize].is_some_and(|more| more <= remaining_steps)
         };
         if !self.bounds.projections.iter().zip(&self.prepared.steps_to_go).all(in_time) {
             return None;
@@ -281,8 +289,9 @@ impl Ties<'_> {
         Some(next)
     }
 
-    /// The fewest changes of a plan from a label on, if there is one with at most so many, and the labels that were made.
-    fn fewest_changes(&self, from: Label, most: Changes) -> Option<(Changes, Labels)> {
+    /// Least changes of a plan from a label, at most `max_changes`, and the labels that were
+    /// generated.
+    fn fewest_changes(&self, from: Label, max_changes: Changes) -> Option<(Changes, Labels)> {
         let mut open = BinaryHeap::from([Reverse((from.changes, Reverse(from.steps), 0))]);
         let mut labels = Labels { all: vec![from], ..Labels::default() };
         while let Some(Reverse((changes, _, id))) = open.pop() {
@@ -293,7 +302,9 @@ impl Ties<'_> {
                 for choice in self.choices(operator)? {
                     self.beat()?;
                     let Some(next) = self.successor(&labels.all[id], operator, choice) else { continue };
-                    if next.changes <= most && !self.is_beaten(&labels, &next, false) {
+                    // Labels are popped by changes, then by greatest depth, so the first goal label
+                    // has the least changes.
+                    if next.changes <= max_changes && !self.is_beaten(&labels, &next, false) {
                         open.push(Reverse((next.changes, Reverse(next.steps), labels.all.len())));
                         self.keep(&mut labels, next)?;
                     }
@@ -303,11 +314,18 @@ impl Ties<'_> {
         None
     }
 
-    /// The first plan in the order of the model with so many changes, the fewest that there can be, by a search in depth. A label is
-    /// not followed where one was that is no worse: if that one led to no plan, neither does this one; and if this one comes
-    /// after that one, a plan from here would be one with fewer steps from there. Nor is one that is worse than a known one in cost,
-    /// steps or changes, which are the least already.
-    fn first_in_order(&self, start: Label, changes: Changes, known: &Labels) -> Option<Vec<GroundStep>> {
+    /// First plan in model order with `changes`, which is the minimum, by depth-first search.
+    ///
+    /// A label is pruned if a visited label is at least as good. Either the visited label led to no
+    /// plan, so this one leads to none; or it is an ancestor, and then a plan from here would give
+    /// a shorter plan from there. A label is also pruned if a label of the first search is strictly
+    /// better in cost, steps or changes, which are already minimal.
+    fn first_in_order(
+        &self,
+        start: Label,
+        changes: Changes,
+        first_labels: &Labels,
+    ) -> Option<Vec<GroundStep>> {
         if self.task.is_goal(&start.state) {
             return Some(Vec::new());
         }
@@ -336,7 +354,7 @@ impl Ties<'_> {
             };
             let Some(next) = self.successor(&labels.all[last.label], operator, choice) else { continue };
             if next.changes <= changes
-                && !self.is_beaten(known, &next, true)
+                && !self.is_beaten(first_labels, &next, true)
                 && !self.is_beaten(&labels, &next, false)
             {
                 steps.push(GroundStep { operator, choice: choice.designs.clone() });
@@ -350,23 +368,24 @@ impl Ties<'_> {
         None
     }
 
-    /// Whether some label is no worse than another one; if `strictly`, one with less cost, steps or changes.
+    /// Returns `true` if some label is at least as good as `next`; if `strictly`, also better in
+    /// cost, steps or changes.
     fn is_beaten(&self, labels: &Labels, next: &Label, strictly: bool) -> bool {
         let is_better =
-            |known: &Label| (known.cost, known.steps, known.changes) != (next.cost, next.steps, next.changes);
+            |label: &Label| (label.cost, label.steps, label.changes) != (next.cost, next.steps, next.changes);
         labels.fronts.get(&next.place(self.task, self.prepared.monotone)).is_some_and(|front| {
             self.compared.set(self.compared.get().saturating_add(front.len()));
-            let mut known = front.iter().map(|position| &labels.all[*position]);
-            known.any(|known| self.no_worse(known, next) && (!strictly || is_better(known)))
+            let mut labels_of_front = front.iter().map(|position| &labels.all[*position]);
+            labels_of_front.any(|label| self.no_worse(label, next) && (!strictly || is_better(label)))
         })
     }
 
-    /// None if a limit is reached.
+    /// Polls the limits. Returns `None` if one is reached.
     fn beat(&self) -> Option<()> {
         self.pulse.borrow_mut().beat().ok()
     }
 
-    /// Keeps a label; none if there are too many.
+    /// Stores a label. Returns `None` if there are too many labels or comparisons.
     #[expect(clippy::arithmetic_side_effects, reason = "labels are counted up to their limit")]
     fn keep(&self, labels: &mut Labels, label: Label) -> Option<()> {
         labels
@@ -375,9 +394,9 @@ impl Ties<'_> {
             .or_default()
             .push(labels.all.len());
         labels.all.push(label);
-        let made = self.made.get() + 1;
-        self.made.set(made);
-        (made < LABEL_LIMIT && self.compared.get() < PAIR_LIMIT).then_some(())
+        let label_count = self.made.get() + 1;
+        self.made.set(label_count);
+        (label_count < LABEL_LIMIT && self.compared.get() < PAIR_LIMIT).then_some(())
     }
 
     fn no_worse(&self, a: &Label, b: &Label) -> bool {

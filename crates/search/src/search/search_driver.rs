@@ -1,9 +1,10 @@
 //! The order of searches: a first plan, an optimal plan, and the closed states that prove it.
 //!
-//! A\* with pattern databases runs first. If it does not finish soon, greedy best-first search finds some plan.
-//! Then two searches run interleaved with equal work: one with pattern databases only, one with LM-cut as well.
-//! The first to finish has the answer, so the total work is at most twice that of the better search. Work is
-//! counted in units, not in time, so the result is deterministic.
+//! A\* with pattern databases runs first. If it does not finish soon, greedy best-first search
+//! finds some plan. Then two searches run interleaved with equal work: one with pattern databases
+//! only, one with LM-cut as well. The first to finish has the answer, so the total work is at most
+//! twice that of the better search. Work is counted in units, not in time, so the result is
+//! deterministic.
 
 use std::sync::Arc;
 
@@ -23,124 +24,133 @@ use crate::search::search_task::SearchTask;
 use crate::search::statistics::SearchStatistics;
 use crate::search::stubborn_sets::{Stubborn, StubbornSetPruning};
 
-/// How many states are stored at most where an answer is wanted at once, or is written down.
+/// Maximum number of stored states for searches that must answer quickly, or whose closed list is
+/// written to a certificate.
 pub const STATE_LIMIT: usize = 400_000;
-/// The greedy search stores at least so many states.
+/// Minimum state budget of greedy best-first search.
 const LEAST: usize = 100;
-/// The work that is worth as much as a state, in steps of a computer.
+/// Work units that count as one stored state in the budgets of interleaved searches.
 const WORK_PER_STATE: u64 = 2_500;
-/// After so much work the search that is clearly behind is given up.
+/// Work units after which the lagging search is abandoned.
 const ABANDON_WORK: u64 = 100_000_000_000;
 
-/// Searches a task whose operators all cost at least 0, as long as there is memory and hope to come to the end with it.
+/// Searches for an optimal plan of a task whose operators have non-negative costs. Stops early if
+/// memory is forecast to run out before the proof.
 pub fn search(context: Context<'_>, bounds: &Bounds) -> SearchOutcome {
     let Ok(Some(prepared)) = SearchTask::new(context) else { return SearchOutcome::Unknown(None) };
     let space = || SearchProblem { context, bounds, prepared: &prepared, orbits: None };
-    let mut duo = InterleavedSearch::new(space(), &context.task.initial);
-    let mut some: Option<GroundPlan> = None;
+    let mut searches = InterleavedSearch::new(space(), &context.task.initial);
+    let mut greedy_plan: Option<GroundPlan> = None;
     let soon = context.limits.thresholds().states.max(1);
-    let mut most = soon;
+    let mut max_states = soon;
     loop {
-        match duo.run(most, &mut |_, _| {}) {
+        match searches.run(max_states, &mut |_, _| {}) {
             Some(SearchOutcome::Unknown(plan)) => {
-                let is_met = |plan: &GroundPlan| duo.bound.as_ref() == Some(&plan.cost);
-                return match cheaper(plan, some) {
+                // A plan found by the greedy search is optimal if the proved lower bound has
+                // reached its cost.
+                let is_met = |plan: &GroundPlan| searches.bound.as_ref() == Some(&plan.cost);
+                return match cheaper(plan, greedy_plan) {
                     Some(plan) if is_met(&plan) => SearchOutcome::Optimal(plan),
                     plan => SearchOutcome::Unknown(plan),
                 };
             }
-            Some(found) => return found,
+            Some(outcome) => return outcome,
             None => {}
         }
-        if most == soon && duo.best_plan().is_none() {
-            some = greedy_best_first(&space(), &context.task.initial, usize::MAX);
-            if let Some(plan) = &some {
-                duo.set_upper_bound(&plan.cost);
+        // A long A\* run without a plan has no upper bound for pruning, so a greedy plan supplies
+        // one.
+        if max_states == soon && searches.best_plan().is_none() {
+            greedy_plan = greedy_best_first(&space(), &context.task.initial, usize::MAX);
+            if let Some(plan) = &greedy_plan {
+                searches.set_upper_bound(&plan.cost);
             }
         }
-        most = most.saturating_mul(2);
+        max_states = max_states.saturating_mul(2);
     }
 }
 
-/// Searches it, storing at most so many states.
+/// Runs A\* from the initial state with at most `max_states` stored states.
 pub fn search_states<N: TaskNumber>(
     context: Context<'_, N>,
     bounds: &impl Heuristic<N>,
-    most: usize,
+    max_states: usize,
 ) -> SearchOutcome<N> {
     match SearchTask::new(context) {
         Ok(Some(prepared)) => {
             let space = SearchProblem { context, bounds, prepared: &prepared, orbits: None };
-            search_within(&space, &context.task.initial, None, most, &mut |_, _| {})
+            search_within(&space, &context.task.initial, None, max_states, &mut |_, _| {})
         }
         Ok(None) | Err(Interrupted) => SearchOutcome::Unknown(None),
     }
 }
 
-/// Searches it from a state of its own, storing at most so many states, for a plan that costs at most `limit`: what a known one
-/// costs, or `Int::MAX`.
+/// Runs A\* from `initial` with at most `max_states` stored states, for a plan that costs at most
+/// `limit`. `Int::MAX` means that there is no limit.
 pub fn search_from(
     space: &SearchProblem<'_, Int, Bounds>,
     initial: &State,
     limit: Int,
-    most: usize,
+    max_states: usize,
     hear: ProgressCallback<'_, Int>,
 ) -> SearchOutcome {
     let limit = (limit < Int::MAX).then_some(limit);
-    search_within(space, initial, limit, most, hear)
+    search_within(space, initial, limit, max_states, hear)
 }
 
 fn search_within<N: TaskNumber, E: Heuristic<N>>(
     space: &SearchProblem<'_, N, E>,
     initial: &State<N>,
     limit: Option<N>,
-    most: usize,
+    max_states: usize,
     hear: ProgressCallback<'_, N>,
 ) -> SearchOutcome<N> {
-    let is_known = limit.is_some();
+    let has_incumbent = limit.is_some();
     let mut search = AStar::new(space, initial, OpenListOrder::Fewest, limit);
-    if let Some(found) = search.run_until_states(space.context.limits.thresholds().states.min(most), hear) {
-        return found;
+    if let Some(outcome) =
+        search.run_until_states(space.context.limits.thresholds().states.min(max_states), hear)
+    {
+        return outcome;
     }
-    let mut some = None;
-    if search.best_plan().is_none() && !is_known {
-        some = greedy_best_first(space, initial, most);
-        if let Some(plan) = &some {
+    let mut greedy_plan = None;
+    if search.best_plan().is_none() && !has_incumbent {
+        greedy_plan = greedy_best_first(space, initial, max_states);
+        if let Some(plan) = &greedy_plan {
             search.set_upper_bound_inclusive(&plan.cost);
         }
     }
-    match search.run_until_states(most, hear) {
-        Some(SearchOutcome::Unknown(plan)) => SearchOutcome::Unknown(cheaper(plan, some)),
-        Some(found) => found,
-        None => SearchOutcome::Unknown(cheaper(search.best_plan(), some)),
+    match search.run_until_states(max_states, hear) {
+        Some(SearchOutcome::Unknown(plan)) => SearchOutcome::Unknown(cheaper(plan, greedy_plan)),
+        Some(outcome) => outcome,
+        None => SearchOutcome::Unknown(cheaper(search.best_plan(), greedy_plan)),
     }
 }
 
-/// Some plan, by a search that looks at estimates only.
+/// Runs greedy best-first search for any plan.
 fn greedy_best_first<N: TaskNumber, E: Heuristic<N>>(
     space: &SearchProblem<'_, N, E>,
     initial: &State<N>,
-    most: usize,
+    max_states: usize,
 ) -> Option<GroundPlan<N>> {
     let mut greedy = AStar::new(space, initial, OpenListOrder::Greedy, None);
     let states = space.context.limits.thresholds().states.max(LEAST);
-    greedy.run_until_states(states.min(most), &mut |_, _| {});
+    greedy.run_until_states(states.min(max_states), &mut |_, _| {});
     greedy.best_plan()
 }
 
-/// Two searches of the same task that take turns, until one has an answer: first one with projections alone, then this one and one that looks at
-/// landmarks, too.
+/// Two A\* searches of the same task, interleaved by work. Starts with pattern databases alone;
+/// later adds a search that also evaluates LM-cut lazily.
 pub struct InterleavedSearch<'a, N, E> {
     space: SearchProblem<'a, N, E>,
     initial: State<N>,
     searches: Vec<AStar<'a, N, E>>,
     has_begun: bool,
-    /// Whether searches go on without hope.
+    /// Whether searches continue although memory is forecast to run out.
     is_patient: bool,
-    /// What no plan costs less than.
+    /// Lower bound on the cost of every plan, over both searches.
     bound: Option<N>,
-    /// The best plan of searches that were given up, and what they have done.
+    /// Best plan of the abandoned searches.
     best: Option<GroundPlan<N>>,
+    /// Statistics of the abandoned searches.
     figures: SearchStatistics,
 }
 
@@ -159,84 +169,89 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
         }
     }
 
-    /// Searches go on, with half of the work, where they seem to have no hope to come to the end with the memory that there is.
+    /// Makes searches continue, with half of the work, when memory is forecast to run out before
+    /// they finish.
     #[must_use]
     pub fn continue_without_forecast(self) -> Self {
         Self { is_patient: true, ..self }
     }
 
-    /// Whether some search may come to the end with the memory that there is, if it goes on as it did.
+    /// Returns `true` if the forecast lets at least one search finish within the memory limit.
     pub fn may_finish(&self) -> bool {
         self.searches.iter().any(|search| search.patience != OutOfMemoryPolicy::Needed)
     }
 
-    /// A plan that costs this much is known: nothing dearer is looked at, and it ends once no plan can be cheaper.
+    /// Sets the cost of an external incumbent. More expensive nodes are pruned, and the search ends
+    /// once the lower bound reaches this cost.
     pub fn set_upper_bound(&mut self, cost: &N) {
         self.searches.iter_mut().for_each(|search| search.set_upper_bound(cost.clone()));
     }
 
-    /// What all searches have done.
+    /// Statistics summed over all searches, including abandoned ones.
     pub fn figures(&self) -> SearchStatistics {
         self.searches.iter().fold(self.figures, |sum, search| sum.plus(search.statistics))
     }
 
     pub fn best_plan(&self) -> Option<GroundPlan<N>> {
-        let own = self.searches.iter().filter_map(AStar::best_plan);
-        own.fold(self.best.clone(), |best, plan| cheaper(best, Some(plan)))
+        let plans = self.searches.iter().filter_map(AStar::best_plan);
+        plans.fold(self.best.clone(), |best, plan| cheaper(best, Some(plan)))
     }
 
-    /// Goes on until each search has done as much work as so many states are worth (a quarter of that with landmarks, where these are
-    /// few); the first time, until there are so many states.
-    /// None if nothing is known then. That no plan is cheaper than one that it was told of is an unknown plan.
-    pub fn run(&mut self, most: usize, hear: ProgressCallback<'_, N>) -> Option<SearchOutcome<N>> {
+    /// Resumes all searches until each has done the work of `max_states` states. The first call
+    /// runs a single search until it stores `max_states` states. The LM-cut search gets a quarter
+    /// of the work while `max_states` is small.
+    ///
+    /// Returns `None` if the turn ended without a result. `SearchOutcome::Unknown(None)` also means
+    /// that no plan is cheaper than the external incumbent.
+    pub fn run(&mut self, max_states: usize, hear: ProgressCallback<'_, N>) -> Option<SearchOutcome<N>> {
         if !self.has_begun {
-            let found = self.searches[0].run_until_states(most, hear);
-            if found.is_none() {
+            let outcome = self.searches[0].run_until_states(max_states, hear);
+            if outcome.is_none() {
                 self.begin();
             }
-            return found;
+            return outcome;
         }
-        let until = WORK_PER_STATE.saturating_mul(most as u64);
+        let until = WORK_PER_STATE.saturating_mul(max_states as u64);
         let count = self.searches.len();
         let mut ended = Vec::new();
         let thresholds = self.space.context.limits.thresholds();
         let behind = if until >= thresholds.behind { lagging_search(&self.searches) } else { None };
         for position in 0..count {
             let bound = &mut self.bound;
-            let mut told = |cost: Option<&N>, own: &N| {
-                if bound.as_ref().is_none_or(|bound| own > bound) {
-                    *bound = Some(own.clone());
-                    hear(cost, own);
+            let mut report = |cost: Option<&N>, lower_bound: &N| {
+                if bound.as_ref().is_none_or(|bound| lower_bound > bound) {
+                    *bound = Some(lower_bound.clone());
+                    hear(cost, lower_bound);
                 }
             };
             let search = &mut self.searches[position];
             search.set_memory_share(count);
-            // Most of what is proved at all is proved soon, and without landmarks.
-            let is_soon = search.lazy_heuristic.is_some() && most <= STATE_LIMIT;
+            // Most proofs that succeed at all succeed early and without landmarks.
+            let is_soon = search.lazy_heuristic.is_some() && max_states <= STATE_LIMIT;
             let is_doubtful = behind == Some(position) || search.patience == OutOfMemoryPolicy::Needed;
             let parts = match (is_soon, is_doubtful) {
                 (true, _) => 4,
                 (false, true) => 2,
                 (false, false) => 1,
             };
-            let found = search.run_for_work(until.checked_div(parts).unwrap_or(until), &mut told);
+            let outcome = search.run_for_work(until.checked_div(parts).unwrap_or(until), &mut report);
             let (is_met, is_interrupted) = (search.proves_upper_bound(), search.is_interrupted());
             let best = self.best_plan();
-            match found {
+            match outcome {
                 None => {}
                 Some(SearchOutcome::Unknown(_)) if is_met => {
-                    let own = best.filter(|plan| self.bound.as_ref() == Some(&plan.cost));
-                    return Some(own.map_or(SearchOutcome::Unknown(None), SearchOutcome::Optimal));
+                    let optimal = best.filter(|plan| self.bound.as_ref() == Some(&plan.cost));
+                    return Some(optimal.map_or(SearchOutcome::Unknown(None), SearchOutcome::Optimal));
                 }
                 Some(SearchOutcome::Unknown(_)) if is_interrupted => {
                     return Some(SearchOutcome::Unknown(best));
                 }
                 Some(SearchOutcome::Unknown(_)) => ended.push(position),
-                Some(found) => return Some(found),
+                Some(outcome) => return Some(outcome),
             }
             if let Some(plan) = best {
-                let others = self.searches.iter_mut().enumerate().filter(|(own, _)| *own != position);
-                others.for_each(|(_, other)| other.set_upper_bound(plan.cost.clone()));
+                let peers = self.searches.iter_mut().enumerate().filter(|(index, _)| *index != position);
+                peers.for_each(|(_, peer)| peer.set_upper_bound(plan.cost.clone()));
             }
         }
         if ended.is_empty() && until >= ABANDON_WORK {
@@ -247,11 +262,12 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
             self.figures = self.figures.plus(search.statistics);
             self.best = cheaper(self.best.take(), search.best_plan());
         }
+        // Without a search to resume, the answer is the best plan without a proof.
         self.searches.is_empty().then(|| SearchOutcome::Unknown(self.best.clone()))
     }
 
-    /// Lets the other search begin, leaves out operators that are not needed, and counts states once that interchangeable objects tell
-    /// apart.
+    /// Adds the LM-cut search and enables symmetry reduction and stubborn sets. With symmetries the
+    /// first search restarts, because its stored states are not canonical.
     fn begin(&mut self) {
         self.has_begun = true;
         let SearchProblem { context, bounds, .. } = self.space;
@@ -263,10 +279,10 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
             self.searches =
                 vec![AStar::new(&self.space, &self.initial, OpenListOrder::Fewest, limit.clone())];
         }
-        if let Some(sharper) = bounds.sharper(context.task) {
-            let mut other = AStar::new(&self.space, &self.initial, OpenListOrder::Nearest, limit);
-            other.lazy_heuristic = Some(sharper);
-            self.searches.push(other);
+        if let Some(lm_cut) = bounds.sharper(context.task) {
+            let mut lm_cut_search = AStar::new(&self.space, &self.initial, OpenListOrder::Nearest, limit);
+            lm_cut_search.lazy_heuristic = Some(lm_cut);
+            self.searches.push(lm_cut_search);
         }
         let patience = if self.is_patient { OutOfMemoryPolicy::Some } else { OutOfMemoryPolicy::None };
         self.searches.iter_mut().for_each(|search| search.patience = patience);
@@ -279,24 +295,26 @@ impl<'a, N: TaskNumber, E: Heuristic<N>> InterleavedSearch<'a, N, E> {
     }
 }
 
-/// The search whose lower bound is less than that of the other by more than it rose while its states doubled twice.
-fn lagging_search<N: TaskNumber, E: Heuristic<N>>(left: &[AStar<'_, N, E>]) -> Option<usize> {
-    let [one, other] = left else { return None };
-    let is_behind = |own: &AStar<'_, N, E>, other: &AStar<'_, N, E>| {
-        own.forecast_lower_bound(2).zip(other.bound()).is_some_and(|(then, bound)| then < *bound)
+/// Position of the search whose lower bound, extrapolated over two doublings of its states, stays
+/// below the current bound of the other search.
+fn lagging_search<N: TaskNumber, E: Heuristic<N>>(searches: &[AStar<'_, N, E>]) -> Option<usize> {
+    let [first, second] = searches else { return None };
+    let is_behind = |search: &AStar<'_, N, E>, other: &AStar<'_, N, E>| {
+        search.forecast_lower_bound(2).zip(other.bound()).is_some_and(|(then, bound)| then < *bound)
     };
-    if is_behind(one, other) { Some(0) } else { is_behind(other, one).then_some(1) }
+    if is_behind(first, second) { Some(0) } else { is_behind(second, first).then_some(1) }
 }
 
-fn cheaper<N: Ord>(one: Option<GroundPlan<N>>, other: Option<GroundPlan<N>>) -> Option<GroundPlan<N>> {
-    one.into_iter().chain(other).min_by(|a, b| (&a.cost, a.steps.len()).cmp(&(&b.cost, b.steps.len())))
+fn cheaper<N: Ord>(first: Option<GroundPlan<N>>, second: Option<GroundPlan<N>>) -> Option<GroundPlan<N>> {
+    first.into_iter().chain(second).min_by(|a, b| (&a.cost, a.steps.len()).cmp(&(&b.cost, b.steps.len())))
 }
 
-/// A state's basic values and numbers, and what was paid on the way to it.
+/// A closed state: values of the basic variables, numeric values, and path cost.
 pub type ClosedEntry<N> = (Vec<u32>, Vec<N>, N);
 
-/// The states that a search for a plan cheaper than `cost` has to go through (than any, if there is none) until there is
-/// nothing left; none if there is a cheaper plan, or if a limit comes first.
+/// States whose f value is below `cost` (all of them if `cost` is `None`), after an exhaustive
+/// search. Returns `None` if a plan cheaper than `cost` (or any plan, if `cost` is `None`) exists,
+/// or a limit is reached.
 pub fn closed_labels<N: TaskNumber>(
     context: Context<'_, N>,
     bounds: &impl Heuristic<N>,
@@ -315,10 +333,10 @@ pub fn closed_labels<N: TaskNumber>(
     let mut state = task.initial.clone();
     let label = |id: u32| {
         store.unpack(id, &mut state);
-        let own = store.cost(id);
-        let total = bounds.estimate(&state).and_then(|more| own.plus(&more))?;
+        let path_cost = store.cost(id);
+        let total = bounds.estimate(&state).and_then(|more| path_cost.plus(&more))?;
         let is_below = cost.is_none_or(|cost| total < *cost);
-        is_below.then(|| (state.values[..task.basic].to_vec(), state.numbers.clone(), own.clone()))
+        is_below.then(|| (state.values[..task.basic].to_vec(), state.numbers.clone(), path_cost.clone()))
     };
     let nodes = (0..dense(store.len())).filter(|id| !store.is_dominated(*id));
     Some(nodes.filter_map(label).collect())
@@ -334,9 +352,9 @@ mod tests {
     use testing::random::Random;
     use testing::{depot, fleet, ground_text, optimum, successors};
 
-    /// The cost and the number of steps of a plan that a search finds, with or without the sharper bound, the exchange of objects, and
+    /// Cost and length of the plan that A\* returns, with or without LM-cut, symmetry reduction and
     /// stubborn sets.
-    fn found(
+    fn solve(
         task: &Task,
         order: OpenListOrder,
         [sharp, exchanged, chosen]: [bool; 3],
@@ -358,19 +376,20 @@ mod tests {
         }
     }
 
-    /// Both searches find the optimum of Dijkstra's algorithm, and landmarks never say more than is true of a state.
+    /// Checks that every variant returns the optimum of Dijkstra's algorithm, and that LM-cut never
+    /// overestimates.
     fn check(text: &(String, String)) -> bool {
         let task = ground_text(text.clone());
         if task.unreachable.is_some() {
             return false;
         }
         let cheapest = optimum(&task);
-        let plain = found(&task, OpenListOrder::Fewest, [false; 3]);
+        let plain = solve(&task, OpenListOrder::Fewest, [false; 3]);
         assert_eq!(plain.map(|(cost, _)| cost), cheapest, "{text:?}");
         for ways in (1..8).map(|ways| [ways & 1, ways & 2, ways & 4].map(|way| way > 0)) {
-            let fewest = found(&task, OpenListOrder::Fewest, ways);
+            let fewest = solve(&task, OpenListOrder::Fewest, ways);
             assert_eq!(fewest, plain, "{ways:?}: {text:?}");
-            let nearest = found(&task, OpenListOrder::Nearest, ways);
+            let nearest = solve(&task, OpenListOrder::Nearest, ways);
             assert_eq!(nearest.map(|(cost, _)| cost), cheapest, "{ways:?}: {text:?}");
         }
         let mut cut = crate::bounds::LandmarkCut::new(&task).expect("small costs");

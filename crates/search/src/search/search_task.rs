@@ -11,19 +11,21 @@ use crate::search::design_combinations::{CostedCombinations, pareto_optimal_comb
 use crate::search::monotonicity::is_monotone;
 use crate::search::successor_generator::SuccessorGenerator;
 
-/// What a search needs to know of a task, whatever state it begins in.
+/// Successor data of a task, independent of the initial state.
 pub struct SearchTask<N = Int> {
-    /// For each operator its combinations of designs that no other one dominates, with their costs.
+    /// Per operator: Pareto-optimal combinations of designs with their costs.
     pub(super) choices: Vec<CostedCombinations<N>>,
-    /// For each operator the number of its first combination; at the end, how many there are.
+    /// Per operator: number of its first combination. The last element is the total number of
+    /// combinations.
     pub(super) numbers: Vec<u32>,
     pub(super) index: SuccessorGenerator,
-    /// What the dearest combination costs.
+    /// Cost of the most expensive combination of any operator.
     dearest: N,
 }
 
 impl<N: TaskNumber> SearchTask<N> {
-    /// None if some operator has too many combinations of designs.
+    /// Returns `None` if some operator has too many combinations of designs, or their total number
+    /// overflows `u32`.
     ///
     /// # Errors
     /// Fails when a limit is reached.
@@ -32,24 +34,24 @@ impl<N: TaskNumber> SearchTask<N> {
         let monotone = is_monotone(task);
         let mut choices = Vec::with_capacity(task.operators.len());
         for operator in limits.watch(&task.operators) {
-            let Some(own) = pareto_optimal_combinations(operator?, monotone, false, limits)? else {
+            let Some(combinations) = pareto_optimal_combinations(operator?, monotone, false, limits)? else {
                 return Ok(None);
             };
-            choices.push(own);
+            choices.push(combinations);
         }
         let mut numbers = vec![0_u32];
-        let mut all = 0_u32;
-        for own in &choices {
-            let Some(next) = all.checked_add(dense(own.len())) else { return Ok(None) };
+        let mut total = 0_u32;
+        for combinations in &choices {
+            let Some(next) = total.checked_add(dense(combinations.len())) else { return Ok(None) };
             numbers.push(next);
-            all = next;
+            total = next;
         }
-        let dearest = choices.iter().flatten().map(|(_, cost)| cost).max().cloned();
-        let dearest = dearest.unwrap_or_else(N::zero);
-        Ok(Some(Self { choices, numbers, index: SuccessorGenerator::new(task), dearest }))
+        let max_cost = choices.iter().flatten().map(|(_, cost)| cost).max().cloned();
+        let max_cost = max_cost.unwrap_or_else(N::zero);
+        Ok(Some(Self { choices, numbers, index: SuccessorGenerator::new(task), dearest: max_cost }))
     }
 
-    /// The operator of a combination, by number.
+    /// Operator and combination with this number.
     pub(super) fn step(&self, number: u32) -> GroundStep {
         let operator = self.numbers.partition_point(|first| *first <= number).saturating_sub(1);
         let choice = number.saturating_sub(self.numbers[operator]);
@@ -57,7 +59,7 @@ impl<N: TaskNumber> SearchTask<N> {
         GroundStep { operator: OperatorId(dense(operator)), choice }
     }
 
-    /// The fewest steps that can cost so much.
+    /// Lower bound on the number of steps of a plan suffix with this cost.
     pub(super) fn steps_at_least(&self, cost: &N) -> u32 {
         if self.dearest > N::zero() { cost.times_at_least(&self.dearest) } else { 0 }
     }

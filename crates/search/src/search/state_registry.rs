@@ -1,9 +1,10 @@
 //! State registry and closed list with packed states.
 //!
-//! Finite-domain values take as many bits as they need. Equal numbers are stored once, and states hold their
-//! positions. A *place* combines the finite-domain values with the numbers that are not monotone. Places are
-//! found by a hash table over one arena. The states of a place differ in cost and in comparable numbers; those
-//! that no other state of the place dominates form its Pareto front.
+//! Finite-domain values take as many bits as they need. Equal numbers are stored once, and states
+//! hold their positions. A *place* combines the finite-domain values with the numbers that are not
+//! monotone. Places are found by a hash table over one arena. The states of a place differ in cost
+//! and in comparable numbers; those that no other state of the place dominates form its Pareto
+//! front.
 
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
@@ -18,12 +19,12 @@ use crate::search::monotonicity::{Polarity, directions};
 use crate::search::pareto_front::{Criteria, Front};
 use crate::search::symmetry::Orbits;
 
-/// No further node, no parent, no step.
+/// Marks a missing link: no next node of a front, no parent, no step.
 pub(super) const NONE: u32 = u32::MAX;
 
 const WORD: u32 = u32::BITS;
 
-/// Where a finite-domain variable lies in a key.
+/// Position of a finite-domain variable in a packed key.
 struct BitField {
     variable: usize,
     word: usize,
@@ -31,37 +32,37 @@ struct BitField {
     mask: u32,
 }
 
-/// A numeric variable that is not part of the place.
+/// A numeric variable that is compared within a place, not part of its key.
 struct ComparedVariable {
     variable: usize,
     asked: Polarity,
 }
 
-/// Marks a front that is a tree.
+/// Flag of an entry of `fronts` that refers to a tree.
 const TREE_FLAG: u32 = 1 << 31;
 
-/// Numbers, each once.
+/// Interned numbers.
 struct Numbers<N> {
     all: Vec<N>,
     table: HashTable<u32>,
 }
 
-/// How a state was come to.
+/// Parent link of a node.
 #[derive(Clone, Copy)]
 pub(super) struct ParentLink {
     pub(super) parent: u32,
-    /// An operator with a combination of designs, by number.
+    /// Number of the operator and its design combination, see `SearchTask::step`.
     pub(super) step: u32,
-    /// How many steps lead here.
+    /// Number of steps from the initial state.
     pub(super) steps: u32,
 }
 
 struct Node {
     place: u32,
     origin: ParentLink,
-    /// A position among the numbers.
+    /// Index of an interned number.
     cost: u32,
-    /// The next one of the front.
+    /// Next node of the front, or `NONE`.
     next: u32,
     state: NodeStatus,
 }
@@ -69,37 +70,38 @@ struct Node {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum NodeStatus {
     Open,
-    /// A sharper estimate was looked at.
+    /// The lazy heuristic was evaluated.
     Closer,
     Dominated,
 }
 
-/// The states of a search.
+/// The state registry of A\*.
 pub(super) struct StateRegistry<N> {
     fields: Vec<BitField>,
     exact: Vec<usize>,
     compared: Vec<ComparedVariable>,
-    /// How many words a key has.
+    /// Number of words of a key.
     width: usize,
-    /// For each place its words…
+    /// Keys of all places, `width` words each.
     keys: Vec<u32>,
-    /// … and the first node of its front, or the number of its tree.
+    /// Per place: first node of its front, or number of its tree with `TREE_FLAG`.
     fronts: Vec<u32>,
     trees: Vec<Front>,
-    /// Fronts with more labels are trees.
+    /// Maximum length of a linked front. Longer fronts become trees.
     longest: usize,
-    /// What the trees take.
+    /// Memory use of the trees in bytes.
     tree_bytes: usize,
     table: HashTable<u32>,
     nodes: Vec<Node>,
-    /// For each node the numbers that are not part of the place.
+    /// Per node: indices of the numbers that are not part of the key.
     others: Vec<u32>,
     numbers: Numbers<N>,
-    /// The key and the other numbers of the state that is looked at.
+    /// Scratch buffers for the state that is looked up: its key and its compared numbers.
     key: Vec<u32>,
     own: Vec<u32>,
-    /// Where interchangeable objects are exchanged in keys, the words of the values as they are: of each node, and of the state that is
-    /// looked at.
+    /// Symmetries, if states are merged by them. Keys are then canonical, and `plain` holds the
+    /// words of the original values of each node. `own_plain` holds those of the state that is
+    /// looked up.
     orbits: Option<Arc<Orbits>>,
     plain: Vec<u32>,
     own_plain: Vec<u32>,
@@ -107,7 +109,7 @@ pub(super) struct StateRegistry<N> {
     image: Vec<u32>,
 }
 
-/// A state that was looked up, and is not dominated.
+/// Result of a lookup: an entry for a state that is not dominated.
 pub(super) struct VacantEntry {
     hash: u64,
     place: Option<u32>,
@@ -134,8 +136,8 @@ impl<N: TaskNumber> Numbers<N> {
     }
 }
 
-/// Places for variables of so many values each: those that need most bits first, each where it fits first. With them, the number of
-/// words.
+/// Assigns bit fields to variables with the given domain sizes: first-fit decreasing, by number of
+/// bits. Returns the fields and the number of words.
 #[expect(clippy::arithmetic_side_effects, reason = "bits of a word, and words that are held in memory")]
 fn fields(sizes: &[usize]) -> (Vec<BitField>, usize) {
     let bits = |size: &usize| WORD - dense(size.saturating_sub(1)).leading_zeros();
@@ -143,7 +145,7 @@ fn fields(sizes: &[usize]) -> (Vec<BitField>, usize) {
         sizes.iter().map(bits).zip(0..).filter(|(bits, _)| *bits > 0).collect();
     order.sort_by_key(|(bits, _)| std::cmp::Reverse(*bits));
     let mut used: Vec<u32> = Vec::new();
-    // Words before this one are full.
+    // Words before this index are full.
     let mut first = 0;
     let mut fields = Vec::with_capacity(order.len());
     for (bits, variable) in order {
@@ -213,7 +215,7 @@ impl<N: TaskNumber> StateRegistry<N> {
         self.nodes.len()
     }
 
-    /// About how much memory is taken.
+    /// Approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         let words =
             [&self.keys, &self.fronts, &self.others].map(|list| list.len().saturating_mul(size_of::<u32>()));
@@ -227,9 +229,11 @@ impl<N: TaskNumber> StateRegistry<N> {
             .fold(nodes.saturating_add(numbers), usize::saturating_add)
     }
 
-    /// Looks a state up; none if a known one is as good.
+    /// Looks a state up. Returns `None` if a stored state dominates it.
     pub(super) fn look_up(&mut self, state: &State<N>, cost: &N, steps: u32) -> Option<VacantEntry> {
         let words = self.words();
+        // The original values are stored as well: a plan must be extracted from real states, not
+        // from their canonical images.
         if let Some(orbits) = &self.orbits {
             pack(&self.fields, &state.values, words, &mut self.own_plain);
             self.values.clone_from(&state.values);
@@ -248,11 +252,12 @@ impl<N: TaskNumber> StateRegistry<N> {
             self.own.push(position);
         }
         let hash = hash_of(&self.key[..]);
-        let is_own = |place: &u32| self.key_of(*place) == self.key;
-        let place = self.table.find(hash, is_own).copied();
+        let has_key = |place: &u32| self.key_of(*place) == self.key;
+        let place = self.table.find(hash, has_key).copied();
         let cost = self.numbers.position(cost);
         let front = place.map_or(NONE, |place| self.fronts[place as usize]);
         let dominates = |id: u32| {
+            // Cost and steps are compared lexicographically: they form one criterion.
             let node = &self.nodes[id as usize];
             self.is_as_cheap((node.cost, node.origin.steps), (cost, steps))
                 && self.is_no_worse(self.others_of(id), &self.own)
@@ -267,18 +272,18 @@ impl<N: TaskNumber> StateRegistry<N> {
         (!is_dominated).then_some(VacantEntry { hash, place, cost })
     }
 
-    /// How many words of a key are values.
+    /// Number of words of a key that hold finite-domain values.
     fn words(&self) -> usize {
         self.width.saturating_sub(self.exact.len())
     }
 
-    /// The nodes of a front that is not a tree.
+    /// Nodes of a linked front.
     fn chain(&self, first: u32) -> impl Iterator<Item = u32> {
         let some = |node: u32| (node != NONE).then_some(node);
         std::iter::successors(some(first), move |node| some(self.nodes[*node as usize].next))
     }
 
-    /// Adds the state that was looked up last.
+    /// Stores the state of the last lookup and returns its node.
     pub(super) fn insert(&mut self, vacancy: &VacantEntry, origin: ParentLink) -> u32 {
         let place = vacancy.place.unwrap_or_else(|| self.add_place(vacancy.hash));
         let id = dense(self.nodes.len());
@@ -293,11 +298,11 @@ impl<N: TaskNumber> StateRegistry<N> {
             self.insert_into_tree(front ^ TREE_FLAG, id);
             return id;
         }
-        // What is dominated now leaves the front.
+        // Nodes that the new one dominates leave the front.
         let (out, mut stay): (Vec<u32>, Vec<u32>) =
-            self.chain(front).partition(|known| self.dominates(id, *known));
-        for known in out {
-            self.nodes[known as usize].state = NodeStatus::Dominated;
+            self.chain(front).partition(|node_id| self.dominates(id, *node_id));
+        for node_id in out {
+            self.nodes[node_id as usize].state = NodeStatus::Dominated;
         }
         stay.insert(0, id);
         if stay.len() > self.longest {
@@ -318,9 +323,9 @@ impl<N: TaskNumber> StateRegistry<N> {
         let mut front = std::mem::take(&mut self.trees[tree as usize]);
         let before = front.bytes();
         let mut out = Vec::new();
-        front.insert(id, self, |known| out.push(known));
-        for known in out {
-            self.nodes[known as usize].state = NodeStatus::Dominated;
+        front.insert(id, self, |node_id| out.push(node_id));
+        for node_id in out {
+            self.nodes[node_id as usize].state = NodeStatus::Dominated;
         }
         self.tree_bytes = self.tree_bytes.saturating_add(front.bytes()).saturating_sub(before);
         self.trees[tree as usize] = front;
@@ -353,7 +358,7 @@ impl<N: TaskNumber> StateRegistry<N> {
         one == other || (!up || number(one) >= number(other)) && (!down || number(one) <= number(other))
     }
 
-    /// Whether what may be compared is no worse.
+    /// Returns `true` if all compared variables are at least as good.
     fn is_no_worse(&self, one: &[u32], other: &[u32]) -> bool {
         let mut pairs = self.compared.iter().zip(one.iter().zip(other));
         pairs.all(|(compared, (one, other))| self.compares(compared.asked, *one, *other))
@@ -363,7 +368,7 @@ impl<N: TaskNumber> StateRegistry<N> {
         self.nodes[node as usize].state == NodeStatus::Dominated
     }
 
-    /// Notes that a state is looked at closer; false if it was already.
+    /// Marks the lazy heuristic as evaluated. Returns `false` if it was marked before.
     pub(super) fn mark_reevaluated(&mut self, node: u32) -> bool {
         let state = &mut self.nodes[node as usize].state;
         let is_first = *state == NodeStatus::Open;
@@ -381,9 +386,11 @@ impl<N: TaskNumber> StateRegistry<N> {
         &self.numbers.all[self.nodes[node as usize].cost as usize]
     }
 
-    /// Unpacks a state; its derived variables stay as they are.
+    /// Unpacks a state. Does not set its derived variables.
     pub(super) fn unpack(&self, node: u32, state: &mut State<N>) {
         let key = self.key_of(self.nodes[node as usize].place);
+        // Canonical keys identify states but must not be expanded, since their steps would not
+        // chain into a plan.
         let words = if self.orbits.is_some() { key_of(&self.plain, self.words(), node) } else { key };
         for field in &self.fields {
             state.values[field.variable] = (words[field.word] >> field.shift) & field.mask;

@@ -2,14 +2,14 @@
 
 use task::plan::solution::Statistics;
 
-/// Counts of states.
+/// Numbers of states.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct SearchStatistics {
-    /// Those whose successors were looked at.
+    /// Expanded states.
     pub expanded: u64,
-    /// Successors of these.
+    /// Generated successors.
     pub generated: u64,
-    /// Those that were estimated.
+    /// Evaluated states.
     pub evaluated: u64,
 }
 
@@ -23,7 +23,7 @@ impl SearchStatistics {
         }
     }
 
-    /// Adds to statistics what was done since `before`.
+    /// Adds the difference to the earlier statistics `before`.
     pub fn add_to(self, before: Self, statistics: &mut Statistics) {
         let add =
             |sum: &mut u64, now: u64, before: u64| *sum = sum.saturating_add(now.saturating_sub(before));

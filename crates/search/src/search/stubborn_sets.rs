@@ -4,27 +4,31 @@
 //! operators is stubborn in a state \[1\] if it contains
 //!
 //! - every operator that makes some unsatisfied part of the goal true;
-//! - for each of its inapplicable operators, every operator that makes some unsatisfied part of its precondition true;
-//! - for each of its applicable operators, every operator that it *disturbs*: one that requires or sets another
-//!   value of a variable that it sets, or has a conditional effect on such a value. If it has conditional
-//!   effects itself, it also contains every operator that sets one of their conditions.
+//! - for each of its inapplicable operators, every operator that makes some unsatisfied part of its
+//!   precondition true;
+//! - for each of its applicable operators, every operator that it *disturbs*: one that requires or
+//!   sets another value of a variable that it sets, or has a conditional effect on such a value. If
+//!   it has conditional effects itself, it also contains every operator that sets one of their
+//!   conditions.
 //!
-//! Proof sketch. Take any plan from the state, and its first operator in the set. One exists by the first
-//! condition. It is applicable, because by the second condition an earlier operator would otherwise be in the
-//! set. By the third condition it can be moved to the front: the plan has the same operators in another order.
-//! An earlier operator may make it inapplicable for a while; weak stubborn sets allow this \[2\]. So a cheapest
-//! plan with the fewest steps is preserved from each state. Pruning of dominated states and of symmetric states
-//! remains sound \[3\]: the representative has a plan with the same operators or their images.
+//! Proof sketch. Take any plan from the state, and its first operator in the set. One exists by the
+//! first condition. It is applicable, because by the second condition an earlier operator would
+//! otherwise be in the set. By the third condition it can be moved to the front: the plan has the
+//! same operators in another order. An earlier operator may make it inapplicable for a while; weak
+//! stubborn sets allow this \[2\]. So a cheapest plan with the fewest steps is preserved from each
+//! state. Pruning of dominated states and of symmetric states remains sound \[3\]: the
+//! representative has a plan with the same operators or their images.
 //!
 //! If an operator requires one value of a variable and sets another one, other operators change the variable
 //! only from that value or from any value.
 //!
 //! Pruning is switched off when it removes too few operators to pay for its time.
 //!
-//! - \[1\] M. Wehrle, M. Helmert: Efficient stubborn sets: generalized algorithms and selection strategies, ICAPS 2014.
+//! - \[1\] M. Wehrle, M. Helmert: Efficient stubborn sets: generalized algorithms and selection
+//!   strategies, ICAPS 2014.
 //! - \[2\] S. Sievers, M. Wehrle: On weak stubborn sets in classical planning, IJCAI 2021.
-//! - \[3\] M. Wehrle, M. Helmert, A. Shleyfman, M. Katz: Integrating partial order reduction and symmetry elimination
-//!   for cost-optimal classical planning, IJCAI 2015.
+//! - \[3\] M. Wehrle, M. Helmert, A. Shleyfman, M. Katz: Integrating partial order reduction and
+//!   symmetry elimination for cost-optimal classical planning, IJCAI 2015.
 
 use std::sync::Arc;
 
@@ -32,48 +36,48 @@ use task::lists::Lists;
 use task::number::dense;
 use task::task::{Condition, Fact, Literal, Operator, OperatorId, Task};
 
-/// Stubborn sets pay if at least one of so many operators is left out.
+/// Pruning pays if it removes at least one of this many applicable operators.
 const MIN_PRUNED_FRACTION: u64 = 5;
 
-/// Who requires, sets and asks for what in a task.
+/// Index of a task: which operators require, set and read each fact or variable.
 pub struct Stubborn {
-    /// The number of each variable's first fact.
+    /// Number of each variable's first fact.
     first: Vec<u32>,
-    /// By fact: the operators that require it, and those that may set it.
+    /// By fact: operators that require it, and operators that may set it.
     requiring: Lists,
     setting: Lists,
-    /// By variable: those that require none of its values and may set it, and those that ask for it in a clause or for a conditional
-    /// effect.
+    /// By variable: operators that require no value of it but may set it (`blind`), and operators
+    /// that read it in a clause or a conditional effect (`asking`).
     blind: Lists,
     asking: Lists,
-    /// By operator, and then for the goal: the numbers of the facts required.
+    /// By operator, and at the end for the goal: numbers of the required facts.
     required: Lists,
 }
 
-/// Room for looking at states, and what came of it.
+/// Stubborn-set pruning: scratch buffers and statistics.
 pub(super) struct StubbornSetPruning {
     stubborn: Arc<Stubborn>,
-    /// By operator.
+    /// By operator: whether it is in the set.
     is_in: Vec<bool>,
     can_be_applied: Vec<bool>,
-    /// Operators of the set that are not looked at yet, and all.
+    /// Operators of the set that are not processed yet, and all operators of the set.
     open: Vec<u32>,
     all: Vec<u32>,
-    /// By fact: whether all that set it are in the set.
+    /// By fact: whether all operators that set it are in the set.
     is_set: Vec<bool>,
     set: Vec<u32>,
-    /// How many operators that can be applied are not in the set.
+    /// Number of applicable operators outside the set.
     out: usize,
-    /// After so many states it is looked at whether it pays.
+    /// Number of expansions after which pruning is switched off if it prunes too little.
     trial: u64,
-    /// States, and operators that could be applied in them, and those of them that were left out.
+    /// Statistics: expanded states, applicable operators in them, and pruned operators.
     looked: u64,
     applicable: u64,
     left_out: u64,
 }
 
 impl Stubborn {
-    /// None where states have numbers or derived variables.
+    /// Returns `None` if the task has numeric or derived variables.
     pub(crate) fn new<N>(task: &Task<N>) -> Option<Self> {
         if !task.axioms.is_empty() || !task.initial.numbers.is_empty() || task.basic < task.variables.len() {
             return None;
@@ -86,11 +90,11 @@ impl Stubborn {
         }
         let number = |fact: &Fact| first[fact.variable.index()].saturating_add(fact.value);
         let (mut required, mut set) = (Lists::default(), Lists::default());
-        let (mut blind, mut asked) = (Lists::default(), Lists::default());
+        let (mut blind, mut asking_variables) = (Lists::default(), Lists::default());
         for operator in &task.operators {
             let facts = &operator.condition.facts;
-            let own: Vec<u32> = facts.iter().map(number).collect();
-            required.push(&own);
+            let numbers: Vec<u32> = facts.iter().map(number).collect();
+            required.push(&numbers);
             let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
             let effects = operator.effects.iter().chain(conditional);
             set.push(&sorted(effects.clone().map(number)));
@@ -98,7 +102,7 @@ impl Stubborn {
             blind.push(&sorted(effects.filter(is_free).map(|fact| fact.variable.0)));
             let clauses = operator.condition.clauses.iter().flatten();
             let literals = operator.conditional.iter().flat_map(|effect| &effect.condition);
-            asked.push(&sorted(clauses.chain(literals).map(|literal| literal.fact.variable.0)));
+            asking_variables.push(&sorted(clauses.chain(literals).map(|literal| literal.fact.variable.0)));
         }
         let requiring = required.inverse(facts as usize);
         let goal: Vec<u32> = task.goal.facts.iter().map(number).collect();
@@ -108,13 +112,13 @@ impl Stubborn {
             requiring,
             setting: set.inverse(facts as usize),
             blind: blind.inverse(variables),
-            asking: asked.inverse(variables),
+            asking: asking_variables.inverse(variables),
             required,
             first,
         })
     }
 
-    /// The numbers of a variable's facts.
+    /// Numbers of a variable's facts.
     fn facts(&self, variable: u32) -> std::ops::Range<u32> {
         let next = self.first.get((variable as usize).saturating_add(1)).copied();
         self.first[variable as usize]..next.unwrap_or_else(|| dense(self.setting.count()))
@@ -147,12 +151,13 @@ impl StubbornSetPruning {
         }
     }
 
-    /// Whether it leaves out too little for what it takes.
+    /// Returns `true` if the trial is over and too few operators were pruned.
     pub(super) fn prunes_too_little(&self) -> bool {
         self.looked == self.trial && self.left_out.saturating_mul(MIN_PRUNED_FRACTION) < self.applicable
     }
 
-    /// Leaves of the operators that can be applied in a state those that are enough; all where the goal holds. How many were looked at.
+    /// Removes the applicable operators outside a stubborn set. Removes none if the goal holds.
+    /// Returns the size of the set.
     pub(super) fn prune_operators<N>(
         &mut self,
         task: &Task<N>,
@@ -184,30 +189,40 @@ impl StubbornSetPruning {
         size
     }
 
-    /// Makes a stubborn set as far as it takes to see what it leaves out; an empty one where the goal holds.
+    /// Computes a stubborn set, and stops early if it contains all applicable operators. The set is
+    /// empty if the goal holds.
     fn look<N>(&mut self, task: &Task<N>, values: &[u32]) {
         let stubborn = &*Arc::clone(&self.stubborn);
         let goal = dense(task.operators.len());
         if !self.enable(stubborn, goal, &task.goal, values) {
             return;
         }
+        // Once the set contains all applicable operators, nothing can be pruned.
         while self.out > 0
-            && let Some(own) = self.open.pop()
+            && let Some(operator_id) = self.open.pop()
         {
-            let operator = &task.operators[own as usize];
-            if !self.enable(stubborn, own, &operator.condition, values) {
+            let operator = &task.operators[operator_id as usize];
+            if !self.enable(stubborn, operator_id, &operator.condition, values) {
                 self.disturb(stubborn, operator);
             }
         }
     }
 
-    /// Adds what makes some part of a condition true that does not hold; false if it holds.
-    fn enable<N>(&mut self, stubborn: &Stubborn, own: u32, condition: &Condition<N>, values: &[u32]) -> bool {
+    /// Adds the operators that achieve some unsatisfied part of a condition. Returns `false` if the
+    /// condition holds.
+    fn enable<N>(
+        &mut self,
+        stubborn: &Stubborn,
+        required_index: u32,
+        condition: &Condition<N>,
+        values: &[u32],
+    ) -> bool {
         let mut best: Option<(usize, u32)> = None;
-        for (fact, number) in condition.facts.iter().zip(stubborn.required.of(own)) {
+        for (fact, number) in condition.facts.iter().zip(stubborn.required.of(required_index)) {
             if fact.holds(values) {
                 continue;
             }
+            // An unsatisfied part whose achievers are in the set already costs nothing.
             if self.is_set[*number as usize] {
                 return true;
             }
@@ -223,9 +238,10 @@ impl StubbornSetPruning {
         let fails = |clause: &&Vec<Literal>| !clause.iter().any(|literal| literal.holds(values));
         let Some(clause) = condition.clauses.iter().find(fails) else { return false };
         for literal in clause {
-            let own = stubborn.first[literal.fact.variable.index()].saturating_add(literal.fact.value);
+            let literal_fact =
+                stubborn.first[literal.fact.variable.index()].saturating_add(literal.fact.value);
             for number in stubborn.facts(literal.fact.variable.0) {
-                if (number == own) == literal.positive {
+                if (number == literal_fact) == literal.positive {
                     self.add_setting(stubborn, number);
                 }
             }
@@ -233,13 +249,14 @@ impl StubbornSetPruning {
         true
     }
 
-    /// Adds what an operator disturbs, and what changes what it does.
+    /// Adds the operators that an operator disturbs or that change its conditional effects.
     fn disturb<N>(&mut self, stubborn: &Stubborn, operator: &Operator<N>) {
         for effect in &operator.effects {
             let required = operator.condition.facts.iter().find(|fact| fact.variable == effect.variable);
             let variable = effect.variable.0;
             let number = |fact: &Fact| stubborn.first[variable as usize].saturating_add(fact.value);
             match required {
+                // The operator keeps this value, so it disturbs nothing.
                 Some(required) if required.value == effect.value => continue,
                 Some(required) => {
                     self.add_all(stubborn.requiring.of(number(required)));
@@ -270,7 +287,7 @@ impl StubbornSetPruning {
         }
     }
 
-    /// Adds all that set a fact.
+    /// Adds all operators that set a fact.
     fn add_setting(&mut self, stubborn: &Stubborn, number: u32) {
         if !std::mem::replace(&mut self.is_set[number as usize], true) {
             self.set.push(number);
@@ -305,47 +322,48 @@ pub(super) mod tests {
     use testing::random::Random;
     use testing::{depot, ground_text};
 
-    /// So many states of a task are looked at at most.
+    /// Maximum number of states of a test task.
     const STATES: usize = 3_000;
 
-    /// What can be done in a state: operators with where they lead and what they cost.
+    /// Successors of a state: operator, index of the next state, and cost.
     pub(in crate::search) type Steps = Vec<(OperatorId, usize, Int)>;
 
-    /// All states that can be reached; none if those are too many.
+    /// All reachable states and their successors. Returns `None` if there are more than `STATES`.
     pub(in crate::search) fn reachable(task: &Task) -> Option<(Vec<State>, Vec<Steps>)> {
-        let mut known = FxHashMap::from_iter([(task.initial.clone(), 0)]);
+        let mut indices = FxHashMap::from_iter([(task.initial.clone(), 0)]);
         let (mut states, mut steps): (Vec<State>, Vec<Steps>) = (vec![task.initial.clone()], Vec::new());
         while let Some(state) = states.get(steps.len()).cloned() {
-            let mut own = Steps::new();
+            let mut successors = Steps::new();
             for (operator, id) in task.operators.iter().zip(OperatorId::all(task.operators.len())) {
                 for choice in
                     operator.admitted_combinations().filter(|choice| operator.applicable(&state, choice))
                 {
                     let next = task.successor(operator, &state, &choice)?;
-                    let position = *known.entry(next.clone()).or_insert_with(|| {
+                    let position = *indices.entry(next.clone()).or_insert_with(|| {
                         states.push(next);
                         states.len() - 1
                     });
-                    own.push((id, position, operator.cost_of(&choice)));
+                    successors.push((id, position, operator.cost_of(&choice)));
                 }
             }
             if states.len() > STATES {
                 return None;
             }
-            steps.push(own);
+            steps.push(successors);
         }
         Some((states, steps))
     }
 
-    /// The cost and the steps of a cheapest plan with fewest steps from each state, backwards by Dijkstra's algorithm.
+    /// Cost and length of a cheapest plan with the fewest steps from each state, by backward
+    /// Dijkstra search.
     pub(in crate::search) fn to_go(
         task: &Task,
         states: &[State],
         steps: &[Steps],
     ) -> Vec<Option<(Int, u32)>> {
         let mut before: Vec<Vec<(usize, Int)>> = vec![Vec::new(); states.len()];
-        for (from, own) in steps.iter().enumerate() {
-            for (_, to, cost) in own {
+        for (from, successors) in steps.iter().enumerate() {
+            for (_, to, cost) in successors {
                 before[*to].push((from, *cost));
             }
         }
@@ -367,33 +385,34 @@ pub(super) mod tests {
         best
     }
 
-    /// From each state a cheapest plan with fewest steps is left. How many operators are left out, if the task has stubborn sets.
+    /// Checks that the pruned operators keep a cheapest plan with the fewest steps from each state.
+    /// Returns the number of pruned operators, if the task has stubborn sets.
     fn check(text: &(String, String)) -> Option<usize> {
         let task = ground_text(text.clone());
         let stubborn = Arc::new(Stubborn::new(&task).filter(|_| task.unreachable.is_none())?);
         let (states, steps) = reachable(&task)?;
         let best = to_go(&task, &states, &steps);
         let index = SuccessorGenerator::new(&task);
-        let mut choosing = StubbornSetPruning::new(stubborn, u64::MAX);
+        let mut pruning = StubbornSetPruning::new(stubborn, u64::MAX);
         let mut left_out = 0;
-        for ((state, own), expected) in states.iter().zip(&steps).zip(&best) {
+        for ((state, successors), expected) in states.iter().zip(&steps).zip(&best) {
             if task.is_goal(state) {
                 continue;
             }
             let mut chosen = index.applicable(&task, state);
-            let all = chosen.len();
-            choosing.prune_operators(&task, &state.values, &mut chosen);
-            left_out += all - chosen.len();
+            let applicable_count = chosen.len();
+            pruning.prune_operators(&task, &state.values, &mut chosen);
+            left_out += applicable_count - chosen.len();
             let through = |(id, to, cost): &(OperatorId, usize, Int)| {
                 let (more, steps) = best[*to].filter(|_| chosen.contains(id))?;
                 Some((cost + more, steps + 1))
             };
-            assert_eq!(own.iter().filter_map(through).min(), *expected, "{state:?} {text:?}");
+            assert_eq!(successors.iter().filter_map(through).min(), *expected, "{state:?} {text:?}");
         }
         Some(left_out)
     }
 
-    /// A task whose operators require, set, and ask for whatever it happens to be; mostly of things of their own.
+    /// Random task whose operators require, set and read mostly neighbouring propositions.
     pub(in crate::search) fn switches(seed: u64) -> (String, String) {
         let mut random = Random(seed);
         let mut below = move |limit: i64| random.below(limit.unsigned_abs());
@@ -441,27 +460,27 @@ pub(super) mod tests {
     }
 
     fn check_all(seeds: std::ops::Range<u64>) {
-        let (mut looked, mut paid) = (0, 0);
+        let (mut tasks, mut paid) = (0, 0);
         for seed in seeds {
             let mut random = Generator(Random(seed));
-            let others = [(random.domain(), random.problem()), depot(seed)];
-            for text in (0..40).map(|part| switches(40 * seed + part)).chain(others) {
+            let texts = [(random.domain(), random.problem()), depot(seed)];
+            for text in (0..40).map(|part| switches(40 * seed + part)).chain(texts) {
                 let left_out = check(&text);
-                looked += usize::from(left_out.is_some());
+                tasks += usize::from(left_out.is_some());
                 paid += usize::from(left_out.is_some_and(|count| count > 0));
             }
         }
-        assert!(looked > 1_000 && paid > 200, "{looked} tasks, operators are left out in {paid}");
+        assert!(tasks > 1_000 && paid > 200, "{tasks} tasks, operators are left out in {paid}");
     }
 
     #[test]
-    fn a_cheapest_plan_with_fewest_steps_is_left_from_each_state() {
+    fn pruning_keeps_a_cheapest_shortest_plan_from_each_state() {
         check_all(0..60);
     }
 
     #[test]
     #[ignore = "takes minutes"]
-    fn a_cheapest_plan_with_fewest_steps_is_left_from_each_state_of_many() {
+    fn pruning_keeps_a_cheapest_shortest_plan_in_many_tasks() {
         check_all(60..1_000);
     }
 }

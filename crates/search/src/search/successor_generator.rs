@@ -13,27 +13,27 @@ const NONE: u32 = u32::MAX;
 
 #[derive(Default)]
 struct Node {
-    /// What is required is complete here: a part of `operators`.
+    /// Operators whose preconditions are complete at this node: a range of `operators`.
     complete: (u32, u32),
-    /// The variable that is asked for next.
+    /// Variable that this node tests.
     variable: u32,
-    /// By value, ascending: a part of `children`.
+    /// Children by value, ascending: a range of `children`.
     children: (u32, u32),
-    /// Where those go on that do not ask for it.
+    /// Child for operators that do not require the tested variable, or `NONE`.
     others: u32,
 }
 
-/// The operators of a task by what they require.
+/// The operators of a task, indexed by their preconditions.
 pub struct SuccessorGenerator {
     nodes: Vec<Node>,
     operators: Vec<OperatorId>,
     children: Vec<(u32, u32)>,
 }
 
-/// What an operator requires, ascending by variable, and its position.
+/// Required values, ascending by variable, and the operator.
 type Precondition = (Vec<(u32, u32)>, OperatorId);
 
-/// Operators that share what they require up to some depth, and where their node is to be noted.
+/// Operators with the same preconditions up to `depth`, and the link that their node is stored in.
 struct PendingSubtree {
     from: usize,
     to: usize,
@@ -53,7 +53,7 @@ impl SuccessorGenerator {
         Self::over(task, OperatorId::all(task.operators.len()))
     }
 
-    /// An index of some operators, ascending.
+    /// Builds a generator for some operators, given in ascending order.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub fn over<N>(task: &Task<N>, operators: impl Iterator<Item = OperatorId>) -> Self {
         let required = |id: OperatorId| {
@@ -63,10 +63,11 @@ impl SuccessorGenerator {
             facts.dedup();
             (facts, id)
         };
-        let mut all: Vec<Precondition> = operators.map(required).collect();
-        all.sort_unstable();
+        let mut preconditions: Vec<Precondition> = operators.map(required).collect();
+        preconditions.sort_unstable();
         let mut index = Self { nodes: Vec::new(), operators: Vec::new(), children: Vec::new() };
-        let mut open = vec![PendingSubtree { from: 0, to: all.len(), depth: 0, place: Place::Root }];
+        let mut open =
+            vec![PendingSubtree { from: 0, to: preconditions.len(), depth: 0, place: Place::Root }];
         while let Some(PendingSubtree { mut from, to, depth, place }) = open.pop() {
             let id = index.nodes.len();
             match place {
@@ -75,19 +76,21 @@ impl SuccessorGenerator {
                 Place::Child(child) => index.children[child].1 = dense(id),
             }
             let begin = dense(index.operators.len());
-            while from < to && all[from].0.len() == depth {
-                index.operators.push(all[from].1);
+            while from < to && preconditions[from].0.len() == depth {
+                index.operators.push(preconditions[from].1);
                 from += 1;
             }
             let mut node =
                 Node { complete: (begin, dense(index.operators.len())), others: NONE, ..Node::default() };
             if from < to {
-                let variable = all[from].0[depth].0;
+                let variable = preconditions[from].0[depth].0;
                 node.variable = variable;
                 let first = dense(index.children.len());
-                while from < to && all[from].0[depth].0 == variable {
-                    let value = all[from].0[depth].1;
-                    let end = from + all[from..to].partition_point(|own| own.0[depth] <= (variable, value));
+                while from < to && preconditions[from].0[depth].0 == variable {
+                    let value = preconditions[from].0[depth].1;
+                    let end = from
+                        + preconditions[from..to]
+                            .partition_point(|precondition| precondition.0[depth] <= (variable, value));
                     let child = index.children.len();
                     index.children.push((value, NONE));
                     open.push(PendingSubtree { from, to: end, depth: depth + 1, place: Place::Child(child) });
@@ -103,14 +106,14 @@ impl SuccessorGenerator {
         index
     }
 
-    /// The operators whose propositional condition holds, ascending.
+    /// Operators whose propositional condition holds, ascending.
     pub fn applicable<N>(&self, task: &Task<N>, state: &State<N>) -> Vec<OperatorId> {
-        let mut found = Vec::new();
+        let mut operators = Vec::new();
         let mut stack = vec![0_u32];
         while let Some(mut at) = stack.pop() {
             while at != NONE {
                 let Node { complete, variable, children, others } = &self.nodes[at as usize];
-                found.extend_from_slice(&self.operators[complete.0 as usize..complete.1 as usize]);
+                operators.extend_from_slice(&self.operators[complete.0 as usize..complete.1 as usize]);
                 let children = &self.children[children.0 as usize..children.1 as usize];
                 if !children.is_empty() {
                     let value = state.values[*variable as usize];
@@ -121,13 +124,13 @@ impl SuccessorGenerator {
                 at = *others;
             }
         }
-        // Facts are checked already; clauses are not.
-        found.retain(|id| {
+        // The tree checks facts only; clauses are checked here.
+        operators.retain(|id| {
             let clauses = &task.operators[id.index()].condition.clauses;
             clauses.iter().all(|clause| clause.iter().any(|literal| literal.holds(&state.values)))
         });
-        found.sort_unstable();
-        found
+        operators.sort_unstable();
+        operators
     }
 }
 
@@ -137,7 +140,7 @@ mod tests {
     use testing::{depot, fleet, ground_text};
 
     #[test]
-    fn those_are_found_whose_propositional_conditions_hold() {
+    fn the_generator_returns_the_operators_whose_propositional_condition_holds() {
         for text in (0..30).flat_map(|seed| [fleet(seed), depot(seed)]) {
             let task = ground_text(text);
             let index = SuccessorGenerator::new(&task);

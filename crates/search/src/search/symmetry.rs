@@ -1,9 +1,10 @@
 //! Symmetry reduction: one state represents all states that differ only in interchangeable objects.
 //!
-//! Orbit search \[1\]: whatever can be done from a state can be done, at the same cost, from its image under an
-//! exchange of objects that changes neither operators nor goal. A state is made canonical by exchanges of
-//! neighbouring objects as long as they lower it in the lexicographic order. Symmetric states usually get the
-//! same canonical state; completeness is not needed for soundness.
+//! Orbit search \[1\]: every plan from a state has an image, of the same cost, from the image of
+//! the state under an exchange of objects that changes neither operators nor goal. A state is made
+//! canonical by exchanges of neighbouring objects as long as they lower it in the lexicographic
+//! order. Symmetric states usually get the same canonical state; completeness is not needed for
+//! soundness.
 //!
 //! \[1\] C. Domshlak, M. Katz, A. Shleyfman: Enhanced symmetry breaking in cost-optimal planning as forward
 //! search, ICAPS 2012.
@@ -13,24 +14,24 @@ use task::limits::Interrupted;
 use task::number::Int;
 use task::task::object_symmetry::symmetry_generators;
 
-/// A variable takes the place of another one.
+/// Moves the value of one variable to another one.
 struct Move {
     target: usize,
     source: usize,
-    /// By value of the source.
+    /// Value of the target, by value of the source.
     values: Vec<u32>,
 }
 
-/// The exchanges of interchangeable objects.
+/// The symmetries of a task: exchanges of interchangeable objects.
 pub struct Orbits {
-    /// For each exchange what it moves, ascending by target.
+    /// Moves of each exchange, ascending by target.
     exchanges: Vec<Vec<Move>>,
 }
 
 impl Orbits {
-    /// None if no objects are interchangeable.
+    /// Returns `None` if no objects are interchangeable.
     pub(crate) fn new(context: Context<'_, Int>) -> Result<Option<Self>, Interrupted> {
-        let mut all = Vec::new();
+        let mut exchanges = Vec::new();
         for exchange in symmetry_generators(context, false)? {
             let mut moves = Vec::new();
             for (source, facts) in exchange.facts.iter().enumerate() {
@@ -41,24 +42,25 @@ impl Orbits {
                 let values = facts.iter().map(|fact| fact.value).collect();
                 moves.push(Move { target: first.variable.index(), source, values });
             }
-            moves.sort_by_key(|own| own.target);
-            all.push(moves);
+            moves.sort_by_key(|step| step.target);
+            exchanges.push(moves);
         }
-        all.retain(|moves: &Vec<Move>| !moves.is_empty());
-        Ok((!all.is_empty()).then_some(Self { exchanges: all }))
+        exchanges.retain(|moves: &Vec<Move>| !moves.is_empty());
+        Ok((!exchanges.is_empty()).then_some(Self { exchanges }))
     }
 
-    /// Exchanges objects as long as that brings the values of a state forward in their order.
+    /// Replaces values by a canonical representative: applies exchanges as long as they make the
+    /// values lexicographically smaller.
     pub(crate) fn canonicalize(&self, values: &mut [u32], image: &mut Vec<u32>) {
         let mut changed = true;
         while std::mem::take(&mut changed) {
             for moves in &self.exchanges {
                 image.clear();
-                image.extend(moves.iter().map(|own| own.values[values[own.source] as usize]));
-                let now = moves.iter().map(|own| &values[own.target]);
+                image.extend(moves.iter().map(|step| step.values[values[step.source] as usize]));
+                let now = moves.iter().map(|step| &values[step.target]);
                 if image.iter().lt(now) {
-                    for (own, value) in moves.iter().zip(&*image) {
-                        values[own.target] = *value;
+                    for (step, value) in moves.iter().zip(&*image) {
+                        values[step.target] = *value;
                     }
                     changed = true;
                 }

@@ -7,10 +7,11 @@ use task::task::{Fact, NumericId, OperatorId, Task, VariableId};
 use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::simple_temporal_network::Key;
 
-/// As many pairs of happenings are looked at, at most; nothing is said of actions that are left then.
+/// Work limit in pairs of happenings. No bounds are computed for the actions that remain when it is
+/// reached.
 pub(super) const MAX_PAIR_CHECKS: usize = 20_000_000;
 
-/// The operators that touch each kind of access, and those that change each variable and each number.
+/// Index of operators by access, variable and number.
 pub(super) struct Index<'a> {
     pub(super) task: &'a Task,
     pub(super) happenings: &'a [Happening],
@@ -19,15 +20,15 @@ pub(super) struct Index<'a> {
     pub(super) marking: FxHashMap<Key, Vec<OperatorId>>,
     setting: Vec<Vec<OperatorId>>,
     changing: FxHashMap<NumericId, Vec<OperatorId>>,
-    /// The atoms and numbers that some condition over all reads jointly, ascending.
+    /// Atoms and numbers that a joint condition over all reads, ascending.
     pub(super) joint: Vec<u32>,
 }
 
-/// What holds while an action is under way.
+/// Facts that hold while an action runs.
 #[derive(Default)]
 pub(super) struct Invariant {
     pub(super) facts: Vec<Fact>,
-    /// Of them, those that its condition over all requires.
+    /// The facts among them that the condition over all requires.
     pub(super) over_all: Vec<Fact>,
 }
 
@@ -55,25 +56,27 @@ impl<'a> Index<'a> {
                 changing.entry(effect.variable).or_default().push(id);
             }
         }
-        let mut joint: Vec<u32> = instances.iter().flat_map(|own| own.joint.iter().copied()).collect();
+        let mut joint: Vec<u32> =
+            instances.iter().flat_map(|instance| instance.joint.iter().copied()).collect();
         joint.sort_unstable();
         joint.dedup();
         Self { task, happenings, instances, waiting, marking, setting, changing, joint }
     }
 
-    /// Facts that hold from right after the start to right before the end, whatever happens in between; if `alone`, but for the
-    /// start and the end of other runs of the same instance. None if that takes too long.
+    /// Facts that hold strictly between the start and the end of an action, for all other happenings.
+    /// If `alone`, other runs of the instance do not start or end in between. Returns `None` if the
+    /// work limit is reached.
     pub(super) fn invariant(&self, own: &Instance, alone: bool, left: &mut usize) -> Option<Invariant> {
         let start = &self.task.operators[own.start.index()];
         let basic = |fact: &&Fact| fact.variable.index() < self.task.basic;
         let over_all = own.over_all.map(|id| &self.task.operators[id.index()].condition.facts);
         let over_all: Vec<Fact> = over_all.into_iter().flatten().filter(basic).copied().collect();
         let conditional = start.conditional.iter().flat_map(|effect| &effect.effects);
-        let changed: Vec<_> = conditional.map(|fact| fact.variable).collect();
+        let conditional_variables: Vec<_> = conditional.map(|fact| fact.variable).collect();
         let mut facts = over_all.clone();
         for fact in start.effects.iter().chain(&start.condition.facts).filter(basic) {
-            let is_known = facts.iter().any(|known| known.variable == fact.variable);
-            if !is_known && !changed.contains(&fact.variable) {
+            let is_covered = facts.iter().any(|candidate| candidate.variable == fact.variable);
+            if !is_covered && !conditional_variables.contains(&fact.variable) {
                 facts.push(*fact);
             }
         }
@@ -91,8 +94,9 @@ impl<'a> Index<'a> {
         }
     }
 
-    /// Whether nothing that can lie strictly inside an action makes a fact false; if `alone`, but for the start and the end of other runs of
-    /// the same instance. None if that takes too long.
+    /// Returns `true` if no happening strictly inside an action makes a fact false. If `alone`,
+    /// starts and ends of other runs of the instance are ignored. Returns `None` if the work limit
+    /// is reached.
     fn is_kept(
         &self,
         fact: Fact,
@@ -100,33 +104,33 @@ impl<'a> Index<'a> {
         (own, alone): (&Instance, bool),
         left: &mut usize,
     ) -> Option<bool> {
-        for other in &self.setting[fact.variable.index()] {
+        for id in &self.setting[fact.variable.index()] {
             *left = left.checked_sub(1)?;
-            let is_own = [own.start, own.end].contains(other);
-            // As long as another run is under way, so is the instance.
-            let is_nothing = is_own && (alone || own.under_way.is_some_and(|own| own == fact));
-            if !is_nothing && self.changes(*other, fact) && !self.excludes(invariant, own, *other) {
+            let is_own = [own.start, own.end].contains(id);
+            // The instance is running as long as another run is.
+            let is_nothing = is_own && (alone || own.under_way.is_some_and(|running| running == fact));
+            if !is_nothing && self.changes(*id, fact) && !self.excludes(invariant, own, *id) {
                 return Some(false);
             }
         }
         Some(true)
     }
 
-    /// The happenings of others that change a variable.
+    /// Happenings of other instances that change a variable.
     pub(super) fn setting(&self, own: &Instance, variable: VariableId) -> impl Iterator<Item = OperatorId> {
         let [start, end] = [own.start, own.end];
-        let all = self.setting[variable.index()].iter().copied();
-        all.filter(move |id| ![start, end].contains(id))
+        let operators = self.setting[variable.index()].iter().copied();
+        operators.filter(move |id| ![start, end].contains(id))
     }
 
-    /// The happenings of others that change a number.
+    /// Happenings of other instances that change a number.
     pub(super) fn changing(&self, own: &Instance, number: NumericId) -> impl Iterator<Item = OperatorId> {
         let [start, end] = [own.start, own.end];
-        let all = self.changing.get(&number).into_iter().flatten().copied();
-        all.filter(move |id| ![start, end].contains(id))
+        let operators = self.changing.get(&number).into_iter().flatten().copied();
+        operators.filter(move |id| ![start, end].contains(id))
     }
 
-    /// Whether a happening may make a fact false.
+    /// Returns `true` if a happening may make a fact false.
     pub(super) fn changes(&self, id: OperatorId, fact: Fact) -> bool {
         let operator = &self.task.operators[id.index()];
         let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
@@ -134,67 +138,74 @@ impl<'a> Index<'a> {
         effects.any(|effect| effect.variable == fact.variable && effect.value != fact.value)
     }
 
-    /// Whether a happening cannot lie strictly inside an action as long as the facts hold.
+    /// Returns `true` if a happening cannot take place strictly inside an action while the facts
+    /// hold.
     pub(super) fn excludes(&self, invariant: &Invariant, own: &Instance, id: OperatorId) -> bool {
         let (operator, happening) = (&self.task.operators[id.index()], &self.happenings[id.index()]);
-        let known = |fact: &Fact| invariant.facts.iter().find(|known| known.variable == fact.variable);
-        let contradicts = |fact: &Fact| known(fact).is_some_and(|known| known.value != fact.value);
+        let invariant_fact =
+            |fact: &Fact| invariant.facts.iter().find(|candidate| candidate.variable == fact.variable);
+        let contradicts =
+            |fact: &Fact| invariant_fact(fact).is_some_and(|candidate| candidate.value != fact.value);
         if operator.condition.facts.iter().any(contradicts) {
             return true;
         }
-        // Of what a condition over all requires nothing else can make up at the same time: the two would interfere.
+        // A fact that the condition over all requires cannot be restored by a simultaneous
+        // happening: the two would interfere.
         let breaks = |fact: &Fact| {
             let mut required = invariant.over_all.iter();
-            required.any(|known| known.variable == fact.variable && known.value != fact.value)
+            required.any(|candidate| candidate.variable == fact.variable && candidate.value != fact.value)
         };
         let clashes = |(function, design): &(_, _)| {
-            own.designs.iter().any(|(other, used)| other == function && used != design)
+            own.designs.iter().any(|(candidate, used)| candidate == function && used != design)
         };
         if operator.effects.iter().any(breaks) || happening.designs.iter().any(clashes) {
             return true;
         }
-        let Role::Start(other) = happening.role else { return false };
-        let over_all = self.instances[other as usize].over_all;
+        let Role::Start(instance) = happening.role else { return false };
+        let over_all = self.instances[instance as usize].over_all;
         let required = over_all.into_iter().flat_map(|id| &self.task.operators[id.index()].condition.facts);
         let mut required =
             required.filter(|fact| operator.effects.iter().all(|effect| effect.variable != fact.variable));
         operator.conditional.is_empty() && required.any(contradicts)
     }
 
-    /// The same in time: also the end of an action that needs something else all along. Both what that needs and the facts would hold right before it, unless it
-    /// comes at the time of the start.
+    /// Like [`Self::excludes`], and also `true` for the end of an action whose condition over all
+    /// contradicts the facts: both would hold right before that end. This argument needs that the
+    /// end is not at the time of the start.
     pub(super) fn is_outside(&self, invariant: &Invariant, own: &Instance, id: OperatorId) -> bool {
         if self.excludes(invariant, own, id) {
             return true;
         }
         let happenings = &self.happenings;
-        let Role::End(other) = happenings[id.index()].role else { return false };
+        let Role::End(instance) = happenings[id.index()].role else { return false };
         let before = &self.task.operators[own.start.index()].condition.facts;
-        let waits = |one: OperatorId, other: OperatorId| {
-            let marks = &happenings[other.index()].accesses.marks;
-            let mut after = happenings[one.index()].accesses.after.iter();
+        let waits = |later: OperatorId, earlier: OperatorId| {
+            let marks = &happenings[earlier.index()].accesses.marks;
+            let mut after = happenings[later.index()].accesses.after.iter();
             after.any(|(key, by)| *by > 0 && marks.binary_search(key).is_ok())
         };
         let is_apart = waits(own.start, id) || waits(id, own.start);
-        self.over_all(other).iter().any(|fact| {
-            let known = invariant.facts.iter().find(|known| known.variable == fact.variable);
-            known.is_some_and(|known| known.value != fact.value && (is_apart || before.contains(known)))
+        self.over_all(instance).iter().any(|fact| {
+            let candidate = invariant.facts.iter().find(|candidate| candidate.variable == fact.variable);
+            candidate.is_some_and(|candidate| {
+                candidate.value != fact.value && (is_apart || before.contains(candidate))
+            })
         })
     }
 
-    /// What must hold over all of an instance, as far as it is single facts.
+    /// Facts that the condition over all of an instance requires.
     pub(super) fn over_all(&self, instance: u32) -> &[Fact] {
         let over_all = self.instances[instance as usize].over_all;
         over_all.map_or(&[], |id| &self.task.operators[id.index()].condition.facts)
     }
 
-    /// How long an instance takes, at least.
+    /// Minimal duration of an instance.
     pub(super) fn duration(&self, instance: u32) -> Int {
         self.instances[instance as usize].duration
     }
 
-    /// The starts of actions with what must hold over all of them.
+    /// Starts of actions with their conditions over all.
     pub(super) fn holding(&self) -> impl Iterator<Item = (OperatorId, OperatorId)> {
-        self.instances.iter().filter_map(|own| Some((own.start, own.over_all?)))
+        self.instances.iter().filter_map(|instance| Some((instance.start, instance.over_all?)))
     }
 }

@@ -20,7 +20,8 @@ use crate::concurrent::interference::{Designs, Keys, prune};
 use crate::concurrent::split::{Half, Split};
 use crate::concurrent::unit::{Divisors, Unit};
 
-/// The halves of an instance that the ground task has: several starts, and ends, where effects on numbers have conditions.
+/// Ground operators of an instance. There are several starts and ends if its numeric effects are
+/// conditional.
 #[derive(Clone, Default)]
 struct Halves {
     starts: Vec<OperatorId>,
@@ -40,34 +41,34 @@ fn designs(task: &Task, operator: OperatorId) -> Designs {
     designs
 }
 
-/// The objects of an operator, and a gap for each variable of a quantifier.
+/// Arguments of an operator, followed by an empty slot for each quantified variable.
 fn binding(operator: &Operator, variables: usize) -> Binding {
     let mut binding: Binding = operator.arguments.iter().copied().map(object).collect();
     binding.resize(variables, None);
     binding
 }
 
-/// A schema of the domain with arguments.
+/// A schema of the domain and its arguments.
 type InstanceKey = (usize, Vec<ObjectId>);
 
 pub(super) struct Builder<'a> {
     footprints: Footprints<'a>,
     split: &'a Split,
-    /// In the unit of all times, once that is known.
+    /// Separation in the unit of all times; set once the unit is known.
     pub(super) separation: Int,
-    /// What each operator writes.
+    /// Writes of each operator.
     written: Vec<Footprint>,
-    /// What the start and the end of an operator write that are one happening.
+    /// Writes of the start and of the end of operators whose start and end are one happening.
     joined: Vec<(OperatorId, [Footprint; 2])>,
     instances: FxHashMap<InstanceKey, Halves>,
     order: Vec<InstanceKey>,
-    /// The schemas that have a condition over all which can change.
+    /// Schemas with a condition over all that can change.
     held: FxHashSet<usize>,
 }
 
 impl<'a> Builder<'a> {
     pub(super) fn new(split: &'a Split, reached: &'a RelaxedReachability, limits: &'a Limits) -> Self {
-        let held = split.origins.iter().filter(|origin| origin.half == Half::OverAll);
+        let over_all_origins = split.origins.iter().filter(|origin| origin.half == Half::OverAll);
         Self {
             footprints: Footprints::new(World::new(&split.lifted, reached, limits)),
             split,
@@ -76,11 +77,11 @@ impl<'a> Builder<'a> {
             joined: Vec::new(),
             instances: FxHashMap::default(),
             order: Vec::new(),
-            held: held.map(|origin| origin.schema).collect(),
+            held: over_all_origins.map(|origin| origin.schema).collect(),
         }
     }
 
-    /// Pairs the halves of instances, and collects what operators write.
+    /// Pairs the starts and ends of instances, and collects the writes of all operators.
     pub(super) fn collect(&mut self, context: Context<'_>) -> Result<(), Errors> {
         let Context { task, limits } = context;
         let mut errors = Vec::new();
@@ -94,14 +95,16 @@ impl<'a> Builder<'a> {
             binding.resize(schema.variables, None);
             let is_none = matches!(origin.half, Half::OverAll | Half::Choice | Half::Judge);
             let effects = if is_none { &[] } else { &schema.end_effects[..] };
-            // What is under way, how many events there were and whether they were waited for has no place in the files.
+            // Auxiliary predicates (running actions, event counters, waiting) do not occur in the
+            // files, so plans are not validated against them.
             let time = (!self.split.events.is_empty()).then_some(self.split.lifted.time);
-            let own = |predicate| time.is_some_and(|time| [time.phase, time.waited].contains(&predicate));
+            let is_auxiliary =
+                |predicate| time.is_some_and(|time| [time.phase, time.waited].contains(&predicate));
             let effects: Vec<Effect> = effects
                 .iter()
                 .filter(|effect| match effect.change {
                     Change::Add(predicate, _) | Change::Delete(predicate, _) => {
-                        !own(predicate) && !self.split.lifted.predicates[predicate.index()].running
+                        !is_auxiliary(predicate) && !self.split.lifted.predicates[predicate.index()].running
                     }
                     Change::Assign { function, .. } => !self.split.durations.contains(&function),
                 })
@@ -139,15 +142,16 @@ impl<'a> Builder<'a> {
         if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
     }
 
-    /// Gives each way in which an instance can start and end a start and an end of its own. Returns whether there are several: they are not
-    /// looked for under way together.
+    /// Creates a start and an end for each combination of conditional variants of an instance.
+    /// Returns `true` if an instance has several; simultaneous runs of different variants are not
+    /// searched.
     pub(super) fn pair(&mut self, task: &mut Task) -> bool {
         let before = task.operators.len();
         for key in &self.order {
             let Some(halves) = self.instances.get_mut(key) else { continue };
-            let mut copy = |own: OperatorId| {
-                task.operators.push(task.operators[own.index()].clone());
-                self.written.push(self.written[own.index()].clone());
+            let mut copy = |original: OperatorId| {
+                task.operators.push(task.operators[original.index()].clone());
+                self.written.push(self.written[original.index()].clone());
                 OperatorId(dense(task.operators.len().saturating_sub(1)))
             };
             let (mut starts, mut ends) = (Vec::new(), Vec::new());
@@ -162,7 +166,7 @@ impl<'a> Builder<'a> {
         task.operators.len() > before
     }
 
-    /// The instances that can be executed, and which operators are their starts and ends.
+    /// Executable instances. Also sets the roles of their starts and ends.
     pub(super) fn instances(
         &self,
         context: Context<'_>,
@@ -178,20 +182,20 @@ impl<'a> Builder<'a> {
         });
         for pair in limits.watch(pairs) {
             let (key, start, over_all, end) = pair?;
-            // What must hold over all is out of reach.
+            // The condition over all is unreachable.
             if self.held.contains(&key.0) && over_all.is_none() {
                 continue;
             }
-            let one = Rational::from_integer(1);
-            let divisor = divisors.get(&start).unwrap_or(&one);
+            let unit_divisor = Rational::from_integer(1);
+            let divisor = divisors.get(&start).unwrap_or(&unit_divisor);
             let schema = &self.split.schemas[key.0];
             let placed = |error: Error| error.within(&format!("`{}`", schema.name), Some(schema.place));
             let factor = |timer| unit.factor(task, timer, divisor).map(|factor| (timer, factor));
             let is_chosen = self.split.chosen[key.0];
-            // Those that the planner chooses are cleared at the end, and set by no happening.
+            // A chosen duration is cleared at the end, and no happening sets it.
             let timer = timer(task, if is_chosen { end } else { start });
             let timer = timer.map(factor).transpose().map_err(placed)?;
-            // One that the state decides is looked at when it starts.
+            // A duration that depends on the state is checked at the start.
             let duration = match timer {
                 None if !is_chosen => unit.duration(task, start).map_err(placed)?,
                 _ => self.separation,
@@ -224,7 +228,7 @@ impl<'a> Builder<'a> {
         Ok(instances)
     }
 
-    /// Notes what the start and the end of a durative action write that takes no time.
+    /// Records the writes at the start and the end of a durative action without duration.
     fn join(&mut self, id: OperatorId, schema: usize, binding: &Binding) -> Result<(), Error> {
         let schema = &self.split.schemas[schema];
         if schema.duration.is_some() {
@@ -235,10 +239,10 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// What the numbers are divided by that hold durations.
+    /// Divisors of the numbers that hold durations.
     ///
     /// # Errors
-    /// One that is not positive.
+    /// Fails if a divisor is not positive.
     pub(super) fn divisors(&mut self, Context { task, limits }: Context<'_>) -> Result<Divisors, Error> {
         let mut divisors = Divisors::default();
         for key in limits.watch(&self.order) {
@@ -260,7 +264,7 @@ impl<'a> Builder<'a> {
         Ok(divisors)
     }
 
-    /// The operators whose start and end are one happening although they interfere.
+    /// Operators whose start and end are one happening although they interfere.
     pub(super) fn contradictory(&self, context: Context<'_>) -> Result<FxHashSet<OperatorId>, Error> {
         let Context { task, limits } = context;
         let index = self.footprints.index();
@@ -289,12 +293,12 @@ impl<'a> Builder<'a> {
         contradictory.collect()
     }
 
-    /// Whether happenings are kept apart that need not be in some states.
+    /// Returns `true` if happenings are kept apart that do not interfere in every state.
     pub(super) fn assumes_conflicts(&self) -> bool {
         self.footprints.supposes
     }
 
-    /// What each operator waits for and lets others wait for, and how many kinds of access there are.
+    /// Interference constraints of each operator, and the number of kinds of access.
     pub(super) fn happenings(
         mut self,
         context: Context<'_>,
@@ -328,7 +332,8 @@ impl<'a> Builder<'a> {
         Ok((happenings, keys.len()))
     }
 
-    /// What an operator reads when it happens, and what its condition over all reads; none if it never happens, or by itself.
+    /// Atoms and numbers that an operator reads when it happens, and those that its condition over
+    /// all reads. Returns `None` if it never happens or is a timed literal.
     fn reads(&self, task: &Task, id: OperatorId, role: Role) -> Option<(Reads, Reads)> {
         let operator = &task.operators[id.index()];
         let origin = self.split.origins[operator.schema as usize];
@@ -352,16 +357,16 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// The number that says how long an instance takes, which a happening sets or clears.
+/// Number that holds the duration of an instance, if a happening sets or clears it.
 fn timer(task: &Task, id: OperatorId) -> Option<NumericId> {
-    let mut changed = task.operators[id.index()].numeric_effects.iter().map(|effect| effect.variable);
-    changed.find(|number| {
+    let mut variables = task.operators[id.index()].numeric_effects.iter().map(|effect| effect.variable);
+    variables.find(|number| {
         let name = &task.number_names[number.index()];
         name.starts_with(DURATION_PREFIX) || name.starts_with(FLEXIBLE_DURATION_PREFIX)
     })
 }
 
-/// Adds what comes from conditions over all and from designs.
+/// Adds the constraints of conditions over all and of designs.
 fn join(
     happening: &mut Happening,
     keys: &mut Keys,
@@ -392,7 +397,7 @@ fn join(
     }
 }
 
-/// Whether several happenings can keep up a condition together.
+/// Returns `true` if several happenings can maintain a condition jointly.
 fn is_joint(task: &Task, over_all: OperatorId) -> bool {
     let condition = &task.operators[over_all.index()].condition;
     !condition.clauses.is_empty()
@@ -411,8 +416,8 @@ fn writes(written: &Footprint) -> Vec<u32> {
 )]
 fn ids(atoms: &[AtomId], numbers: impl Iterator<Item = NumericId>) -> Vec<u32> {
     let atoms = atoms.iter().map(|atom| 2 * atom.0);
-    let mut all: Vec<u32> = atoms.chain(numbers.map(|number| 2 * number.0 + 1)).collect();
-    all.sort_unstable();
-    all.dedup();
-    all
+    let mut ids: Vec<u32> = atoms.chain(numbers.map(|number| 2 * number.0 + 1)).collect();
+    ids.sort_unstable();
+    ids.dedup();
+    ids
 }

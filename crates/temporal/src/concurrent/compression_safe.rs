@@ -1,10 +1,11 @@
-//! Compression-safe actions: their end can follow their start directly, so that they take one step of the search.
+//! Compression-safe actions: their end can follow their start directly, so that they take one step
+//! of the search.
 //!
-//! Happenings that do not interfere are unordered in time, whatever their order in a sequence. If an end
-//! interferes with nothing that can happen while its action runs, it can be moved before all of that without
-//! changing times or states. Coles et al. \[1\] require actions that only add facts at their end. Here the
-//! condition is about what can happen in between, by the facts that hold while the action runs, so more actions
-//! qualify and no plan is lost.
+//! Happenings that do not interfere are unordered in time, independent of their order in a
+//! sequence. If an end interferes with nothing that can happen while its action runs, it can be
+//! moved before all of that without changing times or states. Coles et al. \[1\] require actions
+//! that only add facts at their end. Here the condition is about what can happen in between, by the
+//! facts that hold while the action runs, so more actions qualify and no plan is lost.
 //!
 //! \[1\] A. Coles, M. Fox, K. Halsey, D. Long, A. Smith: Managing concurrency in temporal planning using
 //! planner-scheduler interaction, Artificial Intelligence 173, 2009.
@@ -15,7 +16,7 @@ use task::task::Task;
 use crate::concurrent::action_invariants::{Index, MAX_PAIR_CHECKS};
 use crate::concurrent::happening::{Happening, Instance};
 
-/// For each instance whether its end can come right after its start.
+/// Per instance: whether its end can directly follow its start.
 pub(super) fn compression_safe_actions(
     task: &Task,
     happenings: &[Happening],
@@ -23,10 +24,10 @@ pub(super) fn compression_safe_actions(
     limits: &Limits,
 ) -> Result<Vec<bool>, Interrupted> {
     let index = Index::new(task, happenings, instances);
-    let mut left = MAX_PAIR_CHECKS;
+    let mut work_left = MAX_PAIR_CHECKS;
     limits
         .watch(instances)
-        .map(|instance| instance.map(|own| index.is_compressible(own, &mut left)))
+        .map(|instance| instance.map(|instance_data| index.is_compressible(instance_data, &mut work_left)))
         .collect()
 }
 
@@ -36,15 +37,15 @@ impl Index<'_> {
         if !own.joint.is_empty() || end.writes.iter().any(|id| self.joint.binary_search(id).is_ok()) {
             return false;
         }
-        // Of what may overlap with itself, other runs can lie in between as well.
+        // Other runs of an instance that can overlap itself may start or end in between.
         let alone = own.under_way.is_none();
         let Some(invariant) = self.invariant(own, alone, left) else { return false };
         let waiting = end.accesses.marks.iter().filter_map(|key| self.waiting.get(key));
         let marking = end.accesses.after.iter().filter_map(|(key, _)| self.marking.get(key));
         let interfering = waiting.chain(marking).flatten();
         for other in interfering {
-            let Some(rest) = left.checked_sub(1) else { return false };
-            *left = rest;
+            let Some(work_left) = left.checked_sub(1) else { return false };
+            *left = work_left;
             let is_own = alone && [own.start, own.end].contains(other);
             if !is_own && !self.excludes(&invariant, own, *other) {
                 return false;

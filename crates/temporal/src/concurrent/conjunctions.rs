@@ -1,12 +1,12 @@
 //! Explicit conjunctions in the delete relaxation, for facts that no action restores.
 //!
-//! A relaxed plan deletes nothing, so an action that deletes a fact needed later looks useful even if nothing
-//! adds the fact again. For each such fact the relaxed task gets conjunctions with the facts that are needed at
-//! the same time. Only rules that keep the fact achieve them. These are conjunctions of two facts as in the task
-//! Π^C \[1\], for a few selected facts.
+//! A relaxed plan deletes nothing, so an action that deletes a fact needed later looks useful even
+//! if nothing adds the fact again. For each such fact the relaxed task gets conjunctions with the
+//! facts that are needed at the same time. Only rules that keep the fact achieve them. These are
+//! conjunctions of two facts as in the task Π^C \[1\], for a few selected facts.
 //!
-//! \[1\] E. Keyder, J. Hoffmann, P. Haslum: Improving delete relaxation heuristics through explicitly represented
-//! conjunctions, JAIR 50, 2014.
+//! \[1\] E. Keyder, J. Hoffmann, P. Haslum: Improving delete relaxation heuristics through
+//! explicitly represented conjunctions, JAIR 50, 2014.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 use task::lists::Lists;
@@ -14,35 +14,36 @@ use task::number::dense;
 
 use crate::concurrent::rule::{Proposition, Rule};
 
-/// There are no more rules for conjunctions than this by rule of the task, and some.
+/// Limit on added rules: `MAX_RULES_PER_RULE` times the number of rules, plus `EXTRA_RULES`.
 const MAX_RULES_PER_RULE: usize = 2;
 const EXTRA_RULES: usize = 1_000;
-/// Rules are looked at this many times each, at most, to find what conjunctions are worth while.
+/// Work limit of the selection of conjunctions, in rule visits per rule.
 const MAX_VISITS_PER_RULE: usize = 64;
 
-/// A conjunction, and its two facts.
+/// A conjunction proposition and its two facts.
 pub(super) type Conjunction = [Proposition; 3];
 
-/// The rules of a relaxed task, its goal, and its facts.
+/// A relaxed task that is extended by conjunctions.
 pub(super) struct Scope<'a> {
     pub(super) rules: &'a mut Vec<Rule>,
     pub(super) goal: &'a mut Vec<Proposition>,
-    /// The propositions of each variable that happenings set.
+    /// Propositions of each variable that happenings set.
     pub(super) variables: &'a [std::ops::Range<Proposition>],
     pub(super) propositions: &'a mut u32,
 }
 
-/// Which rules have which propositions.
+/// Index of rules by proposition.
 struct Index {
-    /// What rules need, and then the goal.
+    /// Conditions of the rules, followed by the goal.
     needs: Lists,
     adding: Lists,
     needing: Lists,
-    /// By variable: the rules that set it, ascending.
+    /// By variable: rules that set it, ascending.
     setting: Vec<Vec<u32>>,
 }
 
-/// Adds conjunctions to a relaxed task. Returns them with their facts; they hold from the beginning where these do.
+/// Adds conjunctions to a relaxed task, and returns them. A conjunction holds initially if both
+/// facts do.
 #[expect(clippy::arithmetic_side_effects, reason = "propositions and rules are held in memory")]
 pub(super) fn add_conjunctions(scope: &mut Scope<'_>) -> Vec<Conjunction> {
     let index = Index::new(scope);
@@ -56,11 +57,15 @@ pub(super) fn add_conjunctions(scope: &mut Scope<'_>) -> Vec<Conjunction> {
             if setting.is_empty() || !is_needed || !index.adding.of(fact).is_empty() {
                 continue;
             }
-            // All that set the variable, set it to another value.
+            // All rules that set the variable set it to another value, so they delete the fact.
             let together = index.together(fact, setting, scope, &mut looks);
             let is_open = |rule: &u32| setting.binary_search(rule).is_err();
-            let mut rules: Vec<u32> =
-                together.iter().flat_map(|own| index.adding.of(*own)).copied().filter(is_open).collect();
+            let mut rules: Vec<u32> = together
+                .iter()
+                .flat_map(|proposition| index.adding.of(*proposition))
+                .copied()
+                .filter(is_open)
+                .collect();
             rules.sort_unstable();
             rules.dedup();
             if together.is_empty() || rules.len() > copies {
@@ -71,7 +76,8 @@ pub(super) fn add_conjunctions(scope: &mut Scope<'_>) -> Vec<Conjunction> {
             let numbers: FxHashMap<Proposition, Proposition> =
                 together.iter().copied().zip(first..).collect();
             *scope.propositions += dense(together.len());
-            conjunctions.extend(together.iter().map(|own| [numbers[own], fact, *own]));
+            conjunctions
+                .extend(together.iter().map(|proposition| [numbers[proposition], fact, *proposition]));
             for rule in rules {
                 let copy = scope.rules[rule as usize].with(fact, index.needs.of(rule), &numbers);
                 scope.rules.push(copy);
@@ -93,10 +99,10 @@ impl Index {
         let propositions = *scope.propositions as usize;
         let (mut adds, mut needs) = (Lists::default(), Lists::default());
         let mut setting = vec![Vec::new(); scope.variables.len()];
-        for (rule, own) in (0..).zip(scope.rules.iter()) {
-            adds.push(&own.adds);
-            needs.push(&own.needs);
-            for fact in &own.sets {
+        for (rule, content) in (0..).zip(scope.rules.iter()) {
+            adds.push(&content.adds);
+            needs.push(&content.needs);
+            for fact in &content.sets {
                 let variable = scope.variables.partition_point(|range| range.end <= *fact);
                 if setting[variable].last() != Some(&rule) {
                     setting[variable].push(rule);
@@ -108,7 +114,8 @@ impl Index {
         Self { needs, adding, needing, setting }
     }
 
-    /// What is needed together with a fact, itself or for something that is, and may come from a rule that deletes the fact, ascending.
+    /// Propositions that are needed together with a fact, directly or for another needed
+    /// proposition, and that may be achieved by a rule that deletes the fact. Ascending.
     fn together(
         &self,
         fact: Proposition,
@@ -120,11 +127,12 @@ impl Index {
         let mut needed = FxHashSet::default();
         let mut stack: Vec<Proposition> =
             self.needing.of(fact).iter().flat_map(|rule| self.needs.of(*rule)).copied().collect();
-        while let Some(own) = stack.pop() {
-            if own == fact || !needed.insert(own) {
+        while let Some(proposition) = stack.pop() {
+            if proposition == fact || !needed.insert(proposition) {
                 continue;
             }
-            let open = self.adding.of(own).iter().filter(|rule| deleting.binary_search(rule).is_err());
+            let open =
+                self.adding.of(proposition).iter().filter(|rule| deleting.binary_search(rule).is_err());
             for rule in open {
                 *looks = looks.saturating_sub(1);
                 stack.extend(self.needs.of(*rule));
@@ -136,11 +144,11 @@ impl Index {
         let mut spoilt = FxHashSet::default();
         let mut stack: Vec<Proposition> =
             deleting.iter().flat_map(|rule| &rules[*rule as usize].adds).copied().collect();
-        while let Some(own) = stack.pop() {
-            if !needed.contains(&own) || !spoilt.insert(own) {
+        while let Some(proposition) = stack.pop() {
+            if !needed.contains(&proposition) || !spoilt.insert(proposition) {
                 continue;
             }
-            for rule in self.needing.of(own) {
+            for rule in self.needing.of(proposition) {
                 *looks = looks.saturating_sub(1);
                 stack.extend(rules.get(*rule as usize).into_iter().flat_map(|rule| &rule.adds));
             }
@@ -162,7 +170,7 @@ mod tests {
     use crate::concurrent::temporal_relaxation::TemporalRelaxation;
     use task::ground::GroundConfig;
 
-    /// A lock needs the key again after the door, and `break` opens the door by the key.
+    /// `lock` needs the key after the door is open. `break` opens the door but uses up the key.
     const DOMAIN: &str =
         "(define (domain d) (:requirements :durative-actions) (:predicates (key) (window) (inside) (open) (locked))
         (:durative-action climb :parameters () :duration (= ?duration 1) :condition (at start (window)) :effect (at end (inside)))
@@ -172,7 +180,7 @@ mod tests {
         (:durative-action lock :parameters () :duration (= ?duration 1)
           :condition (and (at start (key)) (at start (open))) :effect (at end (locked))))";
 
-    /// The happenings that a relaxed plan begins with; none if there is no such plan.
+    /// Happenings that begin a relaxed plan. Returns `None` if no relaxed plan exists.
     fn guide(facts: &str, goal: &str) -> Option<Vec<String>> {
         let problem = format!("(define (problem p) (:domain d) (:init {facts}) (:goal {goal}))");
         let (domain, problem, _) =
@@ -188,12 +196,12 @@ mod tests {
     }
 
     #[test]
-    fn what_takes_the_key_away_is_no_way_to_where_it_is_needed() {
-        let begins = |actions: &[&str]| Some(actions.iter().map(|own| (*own).to_owned()).collect());
+    fn a_relaxed_plan_does_not_use_up_the_key_that_it_needs_later() {
+        let begins = |actions: &[&str]| Some(actions.iter().map(|name| (*name).to_owned()).collect());
         assert_eq!(guide("(key) (window)", "(open)"), begins(&["break"]));
         assert_eq!(guide("(key) (window)", "(locked)"), begins(&["climb"]));
         assert_eq!(guide("(key)", "(locked)"), None);
-        // The goal needs the key, too.
+        // The goal requires the key as well.
         assert_eq!(guide("(key)", "(and (open) (key))"), None);
         assert_eq!(guide("(key)", "(open)"), begins(&["break"]));
     }

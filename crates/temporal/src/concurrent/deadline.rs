@@ -8,14 +8,16 @@ use task::compile;
 use task::number::Int;
 use task::task::{OperatorId, State, Task};
 
-/// After each state in which one of `begins` can be applied there is, at most so much later, one in which one of `ends` can. Neither happens.
+/// A deadline: after each state in which an operator of `begins` is applicable, there is one within
+/// a time limit in which an operator of `ends` is applicable. These operators are conditions and
+/// never take place.
 #[derive(Debug, Clone)]
 pub(super) struct Deadline {
-    /// In the unit of all times.
+    /// Time limit in the unit of all times.
     within: Int,
     pub(super) is_hard: bool,
     begins: Vec<OperatorId>,
-    /// The first of them notes that it was kept, if it need not be.
+    /// The first one marks that a soft deadline was met.
     pub(super) ends: Vec<OperatorId>,
 }
 
@@ -32,12 +34,12 @@ impl Deadline {
         Self { within: within.unwrap_or(Int::MAX), is_hard: deadline.is_hard, begins, ends }
     }
 
-    /// Whether the states of a plan, with their times, keep it.
+    /// Returns `true` if the timed states of a plan meet the deadline.
     pub(super) fn is_kept(&self, task: &Task, trajectory: &[(Int, State)]) -> bool {
         let holds = |ways: &[OperatorId], state: &State| {
             ways.iter().any(|id| task.operators[id.index()].applicable(state, &[]))
         };
-        // The next state in which it is over, from the last one backwards.
+        // Time of the next state that ends the deadline; states are visited in reverse order.
         let mut next: Option<Int> = None;
         trajectory.iter().rev().all(|(time, state)| {
             if holds(&self.ends, state) {

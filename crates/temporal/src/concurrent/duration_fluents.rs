@@ -1,8 +1,10 @@
-//! Durations that depend on the state or that the planner chooses: one fluent per schema, set by the start and cleared by the end.
+//! Durations that depend on the state or that the planner chooses: one fluent per schema, set by
+//! the start and cleared by the end.
 //!
-//! `?duration` has the value of the expression in the state in which the action starts \[1\]. The start assigns it
-//! to the fluent, which the end, its effects and the temporal network read. A duration that the planner chooses
-//! is set by an operator that never happens; the reachability analysis lets it be any value from 0.
+//! `?duration` has the value of the expression in the state in which the action starts \[1\]. The
+//! start assigns it to the fluent, which the end, its effects and the temporal network read. A
+//! duration that the planner chooses is set by an operator that never happens; the reachability
+//! analysis lets it be any value from 0.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 5.2.
 
@@ -13,12 +15,12 @@ use task::lifted::{
 use task::normalize::duration::CHOSEN;
 use task::number::dense;
 
-/// What the names of these numbers begin with: no name in a file has a blank.
+/// Prefix of the names of duration variables. No name in a file contains a blank.
 pub(super) const DURATION_PREFIX: &str = "(duration of ";
-/// The same for those that the planner chooses, as ground numbers are written.
+/// Prefix of the ground names of duration variables that the planner chooses.
 pub(super) const FLEXIBLE_DURATION_PREFIX: &str = "(chosen duration of ";
 
-/// Whether some action changes what an expression mentions.
+/// Returns `true` if an expression mentions a fluent that some action changes.
 pub(super) fn depends_on_state(lifted: &Lifted, expression: &Expression) -> bool {
     let any = |parts: &[Expression]| parts.iter().any(|part| depends_on_state(lifted, part));
     match expression {
@@ -32,19 +34,19 @@ pub(super) fn depends_on_state(lifted: &Lifted, expression: &Expression) -> bool
     }
 }
 
-/// The number that is the duration of a schema, if the planner chooses that.
+/// Function that holds the duration of a schema, if the planner chooses it.
 pub(super) fn chosen(lifted: &Lifted, duration: &Expression) -> Option<FunctionId> {
     let Expression::Function(function, ..) = duration else { return None };
     lifted.functions[function.index()].name.as_str().starts_with(CHOSEN).then_some(*function)
 }
 
-/// A number for the durations of a schema.
+/// Function that holds the durations of a schema.
 pub(super) struct Timer {
     pub(super) function: FunctionId,
     terms: Vec<Term>,
-    /// What the start assigns; none where the planner chooses.
+    /// Expression that the start assigns. `None` if the planner chooses the duration.
     numerator: Option<Expression>,
-    /// The duration is the number divided by this, which no action changes.
+    /// Static divisor: the duration is the number divided by it.
     pub(super) divisor: Option<Expression>,
 }
 
@@ -66,7 +68,7 @@ impl Timer {
         Self { function, terms, numerator: Some(numerator), divisor }
     }
 
-    /// Whether the planner chooses it.
+    /// Returns `true` if the planner chooses the duration.
     pub(super) fn is_chosen(&self) -> bool {
         self.numerator.is_none()
     }
@@ -75,7 +77,6 @@ impl Timer {
         Expression::Function(self.function, self.terms.clone(), schema.place)
     }
 
-    /// The duration.
     fn expression(&self, schema: &Schema) -> Expression {
         let number = self.number(schema);
         match &self.divisor {
@@ -84,15 +85,15 @@ impl Timer {
         }
     }
 
-    /// What the start does, if the planner does not choose.
+    /// Effect of the start, if the planner does not choose the duration.
     pub(super) fn set(&self, schema: &Schema) -> Option<Effect> {
         Some(self.assign(schema, Assignment::Assign, self.numerator.clone()?))
     }
 
-    /// What makes it any number, as far as can be told from what is in reach.
+    /// Effect that lets relaxed reachability assume any value for a chosen duration.
     pub(super) fn relaxed_increase(&self, schema: &Schema) -> Option<Effect> {
-        let one = Expression::Number(Rational::from_integer(1));
-        self.numerator.is_none().then(|| self.assign(schema, Assignment::Increase, one))
+        let unit_increase = Expression::Number(Rational::from_integer(1));
+        self.numerator.is_none().then(|| self.assign(schema, Assignment::Increase, unit_increase))
     }
 
     fn assign(&self, schema: &Schema, assignment: Assignment, expression: Expression) -> Effect {
@@ -110,30 +111,30 @@ impl Timer {
         self.assign(schema, Assignment::Assign, Expression::Number(Rational::from_integer(0)))
     }
 
-    /// That the start has set it.
+    /// Condition that the start has set the number.
     pub(super) fn is_set(&self, schema: &Schema) -> Option<Formula> {
         let zero = Expression::Number(Rational::from_integer(0));
         let compare = || Formula::Compare(Comparison::Greater, self.number(schema), zero, schema.place);
         self.numerator.is_some().then(compare)
     }
 
-    /// The schema whose end takes its duration from the timer.
+    /// Copy of a schema whose end reads its duration from the timer.
     pub(super) fn with_end(&self, schema: &Schema) -> Schema {
         let Some(duration) = &schema.duration else { return schema.clone() };
         let replace = |expression: &Expression| replaced(expression, duration, &self.expression(schema));
-        let mut own = schema.clone();
-        for effect in &mut own.end_effects {
+        let mut copy = schema.clone();
+        for effect in &mut copy.end_effects {
             if let Change::Assign { expression, .. } = &mut effect.change {
                 *expression = replace(expression);
             }
         }
-        own
+        copy
     }
 }
 
-/// An expression with another one put for each part that is equal to `part`.
+/// Replaces each occurrence of `part` by `other`.
 fn replaced(expression: &Expression, part: &Expression, other: &Expression) -> Expression {
-    let each = |parts: &[Expression]| parts.iter().map(|own| replaced(own, part, other)).collect();
+    let each = |parts: &[Expression]| parts.iter().map(|inner| replaced(inner, part, other)).collect();
     if expression == part {
         return other.clone();
     }

@@ -4,31 +4,31 @@ use task::task::{Condition, Fact, Task, VariableId};
 
 use crate::concurrent::happening::Instance;
 
-/// Takes out the variables that only link a condition over all to an end.
+/// Removes the variables that only link a condition over all to an end.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 pub(super) fn drop_links(task: &mut Task, instances: &[Instance]) {
-    let mut held = vec![false; task.variables.len()];
+    let mut is_link = vec![false; task.variables.len()];
     for id in instances.iter().filter_map(|instance| instance.over_all) {
         for fact in std::mem::take(&mut task.operators[id.index()].effects) {
-            held[fact.variable.index()] = true;
+            is_link[fact.variable.index()] = true;
         }
     }
-    let mut numbers = Vec::with_capacity(held.len());
+    let mut numbers = Vec::with_capacity(is_link.len());
     let mut next = 0;
-    for held in &held {
+    for link in &is_link {
         numbers.push(VariableId(next));
-        next += u32::from(!held);
+        next += u32::from(!link);
     }
-    let is_held = |variable: VariableId| held[variable.index()];
+    let is_removed = |variable: VariableId| is_link[variable.index()];
     let fact = |fact: &mut Fact| fact.variable = numbers[fact.variable.index()];
     let condition = |condition: &mut Condition| {
-        condition.facts.retain(|fact| !is_held(fact.variable));
+        condition.facts.retain(|fact| !is_removed(fact.variable));
         condition.facts.iter_mut().for_each(fact);
         condition.clauses.iter_mut().flatten().for_each(|literal| fact(&mut literal.fact));
     };
     for operator in &mut task.operators {
         condition(&mut operator.condition);
-        operator.effects.retain(|fact| !is_held(fact.variable));
+        operator.effects.retain(|fact| !is_removed(fact.variable));
         operator.effects.iter_mut().for_each(fact);
         for effect in &mut operator.conditional {
             effect.condition.iter_mut().for_each(|literal| fact(&mut literal.fact));
@@ -40,9 +40,9 @@ pub(super) fn drop_links(task: &mut Task, instances: &[Instance]) {
         fact(&mut rule.head);
         condition(&mut rule.body);
     }
-    let mut keep = held.iter().map(|held| !held);
+    let mut keep = is_link.iter().map(|link| !link);
     task.variables.retain(|_| keep.next().unwrap_or(true));
-    let mut keep = held.iter().map(|held| !held);
+    let mut keep = is_link.iter().map(|link| !link);
     task.initial.values.retain(|_| keep.next().unwrap_or(true));
-    task.basic -= held[..task.basic].iter().filter(|held| **held).count();
+    task.basic -= is_link[..task.basic].iter().filter(|link| **link).count();
 }

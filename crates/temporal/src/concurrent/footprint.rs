@@ -1,7 +1,8 @@
 //! Read and write sets of happenings, by the rule of no moving targets of PDDL 2.1 \[1\].
 //!
-//! Everything that a condition or an effect mentions counts as read, whether or not it matters in a state: all
-//! instances of an atom below a quantifier, and everything that the axioms of a derived predicate depend on.
+//! Everything that a condition or an effect mentions counts as read, even if it does not matter in
+//! a state: all instances of an atom below a quantifier, and everything that the axioms of a
+//! derived predicate depend on.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.4.
 
@@ -21,7 +22,7 @@ use task::lifted::{Change, Effect, Expression, FunctionId, ObjectId, PredicateId
 use task::number::dense;
 use task::task::quantity::NumericId;
 
-/// How a number changes: two changes of one way commute, unless both assign.
+/// Kind of a numeric effect. Two effects of the same kind commute, unless both assign.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) enum Way {
     Assign,
@@ -29,7 +30,7 @@ pub(super) enum Way {
     Scale,
 }
 
-/// Atoms and numbers, ascending. The ids are those of this module alone.
+/// Read and write sets of a happening, ascending. The ids are local to this module.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Footprint {
     pub(super) reads: Vec<AtomId>,
@@ -40,16 +41,18 @@ pub(super) struct Footprint {
 }
 
 impl Footprint {
-    /// Whether the order of two happenings would matter: one writes what the other reads, or both write in ways that do not commute.
+    /// Returns `true` if the order of two happenings matters: one writes what the other reads, or
+    /// both write and do not commute.
     pub(super) fn interferes(&self, other: &Self) -> bool {
         let clash = |(number, way): &(NumericId, Way)| {
-            let mut others = other.numbers.iter().filter(|(other, _)| other == number);
-            others.any(|(_, other)| other != way || *way == Way::Assign)
+            let mut ways = other.numbers.iter().filter(|(candidate, _)| candidate == number);
+            ways.any(|(_, other_way)| other_way != way || *way == Way::Assign)
         };
         self.disturbs(other) || other.disturbs(self) || self.numbers.iter().any(clash)
     }
 
-    /// Whether this writes what the other one reads, or adds what it deletes.
+    /// Returns `true` if this happening writes an atom or number that `other` reads, or adds an
+    /// atom that `other` deletes.
     fn disturbs(&self, other: &Self) -> bool {
         let mut written = self.added.iter().chain(&self.deleted);
         written.any(|atom| other.reads.binary_search(atom).is_ok())
@@ -58,10 +61,10 @@ impl Footprint {
     }
 }
 
-/// Collects what is written, then looks up what is read of it.
+/// Collects write sets, then looks up which of the written atoms and numbers are read.
 pub(super) struct Footprints<'a> {
     world: World<'a>,
-    /// Whether more is written somewhere than will be in some state.
+    /// Whether some write set contains writes that do not take place in every state.
     pub(super) supposes: bool,
 }
 
@@ -70,16 +73,16 @@ impl<'a> Footprints<'a> {
         Self { world, supposes: false }
     }
 
-    /// What effects write, or may write.
+    /// Atoms and numbers that effects write or may write.
     ///
     /// # Errors
-    /// A number without a value.
+    /// Fails if a number has no value.
     pub(super) fn writes(&mut self, effects: &[Effect], binding: &Binding) -> Result<Footprint, Error> {
         let mut footprint = Footprint::default();
         for effect in effects {
             let mut bindings = Vec::new();
-            let mut own = binding.clone();
-            each_binding(&mut self.world, &effect.bound, &[], &mut own, &mut |_, binding| {
+            let mut partial_binding = binding.clone();
+            each_binding(&mut self.world, &effect.bound, &[], &mut partial_binding, &mut |_, binding| {
                 bindings.push(binding.clone());
                 true
             })?;
@@ -87,7 +90,8 @@ impl<'a> Footprints<'a> {
                 match residual(&mut self.world, &effect.condition, &mut binding) {
                     Ok(Residual::True) => self.write(&effect.change, &binding, &mut footprint)?,
                     Ok(Residual::False) | Err(Failure::Undefined) => {}
-                    // Whether it applies depends on the state. That it may is enough to keep others away.
+                    // Whether the effect applies depends on the state. A possible write suffices
+                    // for interference.
                     Ok(_) => {
                         self.supposes = true;
                         self.write(&effect.change, &binding, &mut footprint)?;
@@ -102,12 +106,12 @@ impl<'a> Footprints<'a> {
             atoms.dedup();
         }
         numbers.sort_unstable();
-        // The ground operator exists, so its changes of one number go together.
+        // The ground operator exists, so its effects on one number are compatible.
         numbers.dedup();
         Ok(footprint)
     }
 
-    /// The value of an expression that no action changes; none if it has none.
+    /// Value of an expression over static fluents. Returns `None` if it has none.
     pub(super) fn constant(
         &mut self,
         expression: &Expression,
@@ -144,7 +148,7 @@ impl<'a> Footprints<'a> {
         Ok(())
     }
 
-    /// An index of all that has been written so far.
+    /// Index of all collected writes.
     pub(super) fn index(&self) -> WriteIndex {
         let mut written = WriteIndex::default();
         for (index, (predicate, arguments)) in self.world.atoms.keys().enumerate() {
@@ -166,10 +170,10 @@ impl<'a> Footprints<'a> {
     }
 }
 
-/// Rows with what they stand for.
+/// Rows of arguments with their values.
 type Rows<V> = Vec<(Box<[ObjectId]>, V)>;
 
-/// Atoms and numbers by their symbols.
+/// Written atoms and numbers by symbol.
 #[derive(Default)]
 pub(super) struct WriteIndex {
     atoms: FxHashMap<PredicateId, Rows<AtomId>>,
@@ -178,7 +182,7 @@ pub(super) struct WriteIndex {
 }
 
 impl WriteIndex {
-    /// What of all that is written is read.
+    /// Written atoms and numbers among those that are read.
     pub(super) fn look_up(&self, reads: &Reads) -> (Vec<AtomId>, Vec<NumericId>) {
         let (mut atoms, mut numbers) = (Vec::new(), Vec::new());
         for (predicate, pattern) in &reads.atoms {

@@ -1,10 +1,11 @@
 //! Lazy greedy best-first search over sequences of happenings, for a first plan and then better ones.
 //!
-//! Temporal states are evaluated when they are expanded, and queued by the value of their predecessor. Preferred
-//! happenings have a second queue \[1\]. A third queue prefers successors of states with a novel fact, among
-//! states with as many unsatisfied goals \[2\]. If ends directly follow their starts in the sequence, far fewer
-//! states remain, and most tasks still have a plan; times overlap all the same. Only the first state with the
-//! same facts and running actions is expanded, so this search may miss plans and proves nothing.
+//! Temporal states are evaluated when they are expanded, and queued by the value of their
+//! predecessor. Preferred happenings have a second queue \[1\]. A third queue prefers successors of
+//! states with a novel fact, among states with as many unsatisfied goals \[2\]. If ends directly
+//! follow their starts in the sequence, far fewer states remain, and most tasks still have a plan;
+//! times overlap all the same. Only the first state with the same facts and running actions is
+//! expanded, so this search may miss plans and proves nothing.
 //!
 //! \[1\] S. Richter, M. Westphal: The LAMA planner, JAIR 39, 2010.
 //! \[2\] N. Lipovetzky, H. Geffner: Best-first width search, AAAI 2017.
@@ -28,26 +29,28 @@ use crate::concurrent::store::{PackedNode, Packing};
 use crate::concurrent::successors::{DeadEnd, Expansion, TemporalState};
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// What a node takes besides its situation, about: itself, its places in queues, and that it was seen.
+/// Approximate memory use of a node without its packed state: the node, its queue entries and its
+/// hash.
 const OVERHEAD: usize = size_of::<Node>() + 80;
 
-/// A happening, and whether it takes place at the time of the one before.
+/// A happening, and whether it takes place at the time of the previous one.
 type Link = (OperatorId, bool);
 pub(super) type Links = SmallVec<[Link; 2]>;
 
-/// What the search goes through.
+/// Successor relation of the search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Mode {
-    /// Actions one after another in the sequence; their times may overlap all the same, where they do not interfere.
+    /// The end of an action directly follows its start in the sequence. Times may still overlap if
+    /// the actions do not interfere.
     Sequential,
-    /// Starts and ends by themselves.
+    /// Starts and ends are separate successors.
     Overlapping,
-    /// The same, and what is reached again, but sooner, is pursued again.
+    /// Like `Overlapping`, and a state that is reached again earlier is expanded again.
     Sooner,
 }
 
 impl Mode {
-    /// What follows a situation by a happening. Timed initial literals that come before it come first.
+    /// Successor by a happening. Earlier timed initial literals are applied first.
     pub(super) fn apply_happening(
         self,
         concurrent: &TemporalTask,
@@ -61,7 +64,7 @@ impl Mode {
             let before = waited.as_ref().unwrap_or(situation);
             let together = before.clocks.unsettled();
             match expansion.after(before, operator, false) {
-                // That others make up for it at the same time is rare.
+                // Another simultaneous happening rarely repairs a violated condition over all.
                 Ok((situation, _)) if situation.clocks.unsettled() && self != Self::Sooner => return None,
                 Ok((situation, compressed)) => {
                     links.push((operator, together));
@@ -85,21 +88,22 @@ impl Mode {
 struct Node {
     packed: PackedNode,
     parent: u32,
-    /// What has happened since the parent.
+    /// Happenings since the parent.
     links: Links,
 }
 
-/// Whether it is nothing new, what is left, and the least makespan.
+/// Queue key: whether the state has no novel fact, heuristic value, and lower bound on the
+/// makespan.
 type Value = (bool, u64, Int);
 
-/// Why the search came to its end.
+/// Outcome of one run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Outcome {
-    /// A plan that is better than the incumbent.
+    /// Found a plan that is better than the incumbent.
     Found,
-    /// Nothing is left.
+    /// The open list is empty or the memory share is used up.
     Exhausted,
-    /// At a limit.
+    /// Stopped at a limit.
     Stopped,
 }
 
@@ -111,22 +115,24 @@ pub(super) struct Greedy<'a> {
     guidance: RelaxedPlanHeuristic<'a>,
     packing: Packing<'a>,
     nodes: Vec<Node>,
-    /// The node that was looked at last, unpacked.
+    /// Node that was expanded last, unpacked.
     latest: Option<(u32, TemporalState)>,
-    /// By a hash of what must agree: the least makespan with which it was reached.
+    /// Least makespan bound of each visited state, by a hash of the state.
     seen: FxHashMap<u64, Int>,
-    /// About how many bytes the nodes take.
+    /// Approximate memory use of the nodes in bytes.
     bytes: usize,
-    /// By what is left, preferred ones by that, and all again, what follows something new first.
+    /// Queues of all happenings and of preferred ones by heuristic value, and a queue of all
+    /// happenings that prefers novel states.
     open: AlternatingOpenList<Value>,
-    /// The facts that have held, by how many goals were to go.
+    /// Facts that have held, by number of unsatisfied goals.
     known: Vec<FxHashSet<(u32, u32)>>,
     pub(super) mode: Mode,
     nearest: u64,
     pub(super) figures: SearchStatistics,
 }
 
-/// Two situations with one hash are taken for the same: this search claims nothing.
+/// Hash of a state. A collision only loses a state, which is harmless because this search proves
+/// nothing.
 fn hash_of(key: &[u32]) -> u64 {
     let mut hasher = FxHasher::default();
     key.hash(&mut hasher);
@@ -165,7 +171,7 @@ impl<'a> Greedy<'a> {
         }
     }
 
-    /// Searches for a plan that is better than the incumbent, until `work` is used up: each evaluation is one unit of it.
+    /// Searches for a plan that is better than the incumbent, within `work` evaluations.
     #[expect(clippy::arithmetic_side_effects, reason = "counted down from what was given")]
     pub(super) fn run(
         &mut self,
@@ -184,7 +190,7 @@ impl<'a> Greedy<'a> {
             if work == 0 || pulse.beat().is_err() {
                 return Outcome::Stopped;
             }
-            // A quarter of the room is for this.
+            // This search may use a quarter of the memory limit.
             if self.bytes.saturating_add(self.open.size().saturating_mul(8)) > limits.room() / 4 {
                 return Outcome::Exhausted;
             }
@@ -197,11 +203,12 @@ impl<'a> Greedy<'a> {
         }
     }
 
-    /// What follows a node by a happening, or by a whole action; timed initial literals that come before it come first.
+    /// Successor of a node by a happening or, in sequential mode, by a whole action. Earlier timed
+    /// initial literals are applied first.
     fn follow(&mut self, parent: u32, operator: OperatorId) -> Option<(TemporalState, Links)> {
-        let known = self.latest.take().filter(|(own, _)| *own == parent);
+        let cached = self.latest.take().filter(|(id, _)| *id == parent);
         let unpack = || (parent, self.packing.unpack(&self.nodes[parent as usize].packed));
-        let (_, situation) = self.latest.insert(known.unwrap_or_else(unpack));
+        let (_, situation) = self.latest.insert(cached.unwrap_or_else(unpack));
         let mut links = Links::new();
         let next =
             self.mode.apply_happening(self.concurrent, self.expansion, situation, operator, &mut links)?;
@@ -214,7 +221,7 @@ impl<'a> Greedy<'a> {
         Some((next, links))
     }
 
-    /// Evaluates a situation, and queues what can follow it.
+    /// Evaluates a state and queues its successors.
     fn take_up(
         &mut self,
         situation: &TemporalState,
@@ -228,42 +235,44 @@ impl<'a> Greedy<'a> {
         {
             return None;
         }
-        let found = if self.expansion.is_goal(situation) {
+        let outcome = if self.expansion.is_goal(situation) {
             let better = self
                 .sequence(situation, parent, &links)
-                .filter(|own| incumbent.as_ref().is_none_or(|known| own.value < known.value));
-            let found = better.is_some().then_some(Outcome::Found);
+                .filter(|sequence| incumbent.as_ref().is_none_or(|best| sequence.value < best.value));
+            let outcome = better.is_some().then_some(Outcome::Found);
             *incumbent = better.or_else(|| incumbent.take());
-            found
+            outcome
         } else {
             None
         };
-        // Where preferences are violated in the end, a longer plan may be better.
-        if found.is_some() && self.concurrent.violations.is_empty() {
-            return found;
+        // With violated preferences, a longer plan may be better.
+        if outcome.is_some() && self.concurrent.violations.is_empty() {
+            return outcome;
         }
         self.figures.evaluated = self.figures.evaluated.saturating_add(1);
-        let Some(HeuristicValue { left, preferred }) = self.guidance.guide(situation) else { return found };
+        let Some(HeuristicValue { left, preferred }) = self.guidance.guide(situation) else { return outcome };
         if left < self.nearest {
             self.nearest = left;
             self.open.boost();
         }
         let is_old = !self.has_news(situation);
         let id = dense(self.nodes.len());
-        let candidates: Vec<u32> = self.expansion.candidates(situation).iter().map(|own| own.0).collect();
-        let own = SearchStatistics { expanded: 1, generated: candidates.len() as u64, evaluated: 0 };
-        self.figures = self.figures.plus(own);
-        let is_preferred = |own: &u32| preferred.binary_search(&OperatorId(*own)).is_ok();
+        let candidates: Vec<u32> =
+            self.expansion.candidates(situation).iter().map(|operator| operator.0).collect();
+        let counts = SearchStatistics { expanded: 1, generated: candidates.len() as u64, evaluated: 0 };
+        self.figures = self.figures.plus(counts);
+        let is_preferred = |operator: &u32| preferred.binary_search(&OperatorId(*operator)).is_ok();
         let preferred: Vec<u32> = candidates.iter().copied().filter(is_preferred).collect();
         let values = [false, false, is_old].map(|is_old| (is_old, left, value.1));
         self.open.push(id, values, &candidates, &preferred);
         let packed = self.packing.pack(situation);
         self.bytes = self.bytes.saturating_add(OVERHEAD).saturating_add(packed.bytes());
         self.nodes.push(Node { packed, parent, links });
-        found
+        outcome
     }
 
-    /// A lower bound of the metric of plans that go on from here, and of their makespan. None if there is none.
+    /// Lower bounds on the metric and the makespan of plans through this state. Returns `None` if
+    /// it is a dead end or the metric overflows.
     fn value(&self, situation: &TemporalState) -> Option<(Int, Int)> {
         let TemporalState { state, clocks, cost } = situation;
         let makespan = self.estimate.left(state, clocks)?.makespan;
@@ -271,24 +280,25 @@ impl<'a> Greedy<'a> {
         Some((self.concurrent.measure.total(makespan, cost.checked_add(costs)?)?, makespan))
     }
 
-    /// Whether a fact holds that has not held in a situation with as many goals to go.
+    /// Returns `true` if a fact holds that held in no earlier state with the same number of
+    /// unsatisfied goals.
     fn has_news(&mut self, TemporalState { state, .. }: &TemporalState) -> bool {
         let task = &self.concurrent.task;
         let to_go = task.goal.facts.iter().filter(|fact| !fact.holds(&state.values)).count();
         if self.known.len() <= to_go {
             self.known.resize(to_go.saturating_add(1), FxHashSet::default());
         }
-        let known = &mut self.known[to_go];
+        let facts_so_far = &mut self.known[to_go];
         let facts = (0..).zip(&state.values[..task.basic]);
-        facts.fold(false, |news, (variable, value)| known.insert((variable, *value)) || news)
+        facts.fold(false, |news, (variable, value)| facts_so_far.insert((variable, *value)) || news)
     }
 
     fn is_new(&mut self, situation: &TemporalState, makespan: Int) -> bool {
         let TemporalState { state, clocks, .. } = situation;
         let mut key = state.values[..self.concurrent.task.basic].to_vec();
-        // What is only measured makes no difference to what can follow.
-        let rest = &self.concurrent.task.objective.rest;
-        let is_read = |variable: u32| rest.iter().all(|(own, _)| own.0 != variable);
+        // Numbers that only the metric reads do not affect applicability.
+        let measured_terms = &self.concurrent.task.objective.rest;
+        let is_read = |variable: u32| measured_terms.iter().all(|(number, _)| number.0 != variable);
         let numbers = (0..).zip(&state.numbers).filter(|(variable, _)| is_read(*variable));
         key.extend(numbers.flat_map(|(_, number)| words(*number)));
         key.extend(clocks.opens().iter().map(|open| open.instance));
@@ -308,20 +318,21 @@ impl<'a> Greedy<'a> {
         }
     }
 
-    /// The sequence that leads to a goal; none if its metric does not fit, or it does not keep what it has to.
+    /// Plan that leads to a goal state. Returns `None` if its metric overflows or it violates a
+    /// deadline.
     fn sequence(&self, situation: &TemporalState, parent: u32, links: &Links) -> Option<Sequence> {
         let value = self.concurrent.value(situation)?;
-        let mut all: Vec<Link> = links.iter().rev().copied().collect();
+        let mut sequence_links: Vec<Link> = links.iter().rev().copied().collect();
         let mut at = parent as usize;
         while let Some(node) = self.nodes.get(at) {
-            all.extend(node.links.iter().rev());
+            sequence_links.extend(node.links.iter().rev());
             if node.links.is_empty() {
                 break;
             }
             at = node.parent as usize;
         }
-        all.reverse();
-        let (happenings, together) = all.into_iter().unzip();
+        sequence_links.reverse();
+        let (happenings, together) = sequence_links.into_iter().unzip();
         self.concurrent.judge(Sequence { value, happenings, together }, situation.cost)
     }
 }
@@ -337,7 +348,8 @@ mod tests {
     use crate::concurrent::temporal_relaxation::TemporalRelaxation;
     use task::ground::GroundConfig;
 
-    /// Robots on three cells in a row and three beside them change places, and none enters a cell before it has been left.
+    /// Robots on a grid of two rows change places. A cell can only be entered after it has been
+    /// left.
     const DOMAIN: &str = "(define (domain crowd) (:requirements :strips :typing :durative-actions)
         (:types robot cell) (:predicates (at ?r - robot ?c - cell) (clear ?c - cell) (next ?a ?b - cell))
         (:durative-action move :parameters (?r - robot ?from ?to - cell) :duration (= ?duration 1)
@@ -369,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_actions_follow_each_other_and_overlap_in_time() {
+    fn sequential_mode_overlaps_actions_in_time() {
         let (sequence, roles) = first(Mode::Sequential);
         assert!(roles.len() > 6, "{roles:?}");
         for pair in roles.chunks(2) {
@@ -381,7 +393,7 @@ mod tests {
     }
 
     #[test]
-    fn starts_and_ends_by_themselves_reach_the_goal_too() {
+    fn modes_with_separate_starts_and_ends_reach_the_goal() {
         for mode in [Mode::Overlapping, Mode::Sooner] {
             let (sequence, roles) = first(mode);
             assert_eq!(sequence.together.len(), roles.len());

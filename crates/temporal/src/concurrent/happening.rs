@@ -5,56 +5,58 @@ use task::task::{Fact, NumericId, OperatorId};
 
 use crate::concurrent::interference::{Designs, InterferenceConstraints};
 
-/// What a happening is.
+/// Role of an operator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Role {
     /// The start of an instance.
     Start(u32),
     /// The end of an instance.
     End(u32),
-    /// All of an action that takes no time.
+    /// A whole action without duration.
     Whole,
-    /// Timed initial literals, at this time.
+    /// Timed initial literals at this time.
     Timed(Int),
-    /// A condition over all, or half of an instance that cannot be executed: never happens.
+    /// A condition over all, or half of an instance that cannot be executed. Never takes place.
     #[default]
     Never,
 }
 
-/// A happening: an operator of the task with what concerns its time.
+/// Temporal properties of an operator.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Happening {
     pub(super) role: Role,
     pub(super) accesses: InterferenceConstraints,
     pub(super) designs: Designs,
-    /// The atoms (even) and numbers (odd) that it writes, ascending.
+    /// Atoms (even) and numbers (odd) that it writes, ascending.
     pub(super) writes: Vec<u32>,
-    /// The variables that it sets and whose time of change matters.
+    /// Variables that it sets and whose time of change matters.
     pub(super) sets: Vec<u32>,
 }
 
-/// A durative action with its arguments.
+/// A ground durative action.
 #[derive(Debug, Clone)]
 pub(super) struct Instance {
     pub(super) start: OperatorId,
     pub(super) end: OperatorId,
-    /// The operator whose condition must hold over all.
+    /// Operator whose condition must hold over all.
     pub(super) over_all: Option<OperatorId>,
-    /// At least, if the state decides.
+    /// Duration. Only a lower bound if the duration depends on the state.
     pub(super) duration: Int,
-    /// The number that holds the duration from the start to the end, if the state or the planner decides it, and by what it is multiplied.
+    /// Number that holds the duration between start and end, and its factor, if the state or the
+    /// planner determines the duration.
     pub(super) timer: Option<(NumericId, Int)>,
-    /// Whether the planner decides it.
+    /// Whether the planner chooses the duration.
     pub(super) is_chosen: bool,
     pub(super) designs: Designs,
-    /// What a condition over all reads that several happenings can keep up together; numbered as `Happening::writes`.
+    /// Atoms and numbers read by the condition over all if several happenings can maintain it
+    /// jointly, numbered as in `Happening::writes`.
     pub(super) joint: Vec<u32>,
-    /// How many runs can be under way at a time so that it makes a difference.
+    /// Number of simultaneous runs that can be useful.
     pub(super) most: u32,
-    /// The fact that it is under way, if that is more than one.
+    /// Fact that the instance is running, if several simultaneous runs can be useful.
     pub(super) under_way: Option<Fact>,
-    /// Several runs at a time can make a difference, and one whose end changes nothing makes none.
+    /// Whether several runs can be useful, but a run whose end changes nothing cannot.
     pub(super) counts_by_end: bool,
-    /// Whether its end can come right after its start in a sequence, and nothing is lost.
+    /// Whether its end can directly follow its start in a sequence without loss of completeness.
     pub(super) compressible: bool,
 }

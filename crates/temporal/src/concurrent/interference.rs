@@ -10,39 +10,40 @@ use task::task::quantity::NumericId;
 use crate::concurrent::footprint::{Footprint, Way};
 use crate::concurrent::simple_temporal_network::Key;
 
-/// A kind of access.
+/// Kind of access to an atom, number or function.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 enum Access {
     Read(AtomId),
     Added(AtomId),
     Deleted(AtomId),
-    /// A condition over all reads it.
+    /// Read by a condition over all.
     Held(AtomId),
     ReadNumber(NumericId),
     Changed(NumericId, Way),
     HeldNumber(NumericId),
-    /// A function was used with a design, until an end.
+    /// A function was used with a design by an action with duration.
     Used(ObjectId, ObjectId),
-    /// A function was used with a design for a moment.
+    /// A function was used with a design by a happening without duration.
     UsedAtOnce(ObjectId, ObjectId),
 }
 
-/// What a happening waits for, each with how long after it, and the accesses that it makes.
+/// Accesses that a happening waits for, each with the required distance, and the accesses that it
+/// makes.
 #[derive(Debug, Clone, Default)]
 pub(super) struct InterferenceConstraints {
     pub(super) after: Vec<(Key, Int)>,
     pub(super) marks: Vec<Key>,
 }
 
-/// The functions that an action requires, each with its design.
+/// Functions that an action requires, each with its design.
 pub(super) type Designs = Vec<(ObjectId, ObjectId)>;
 
-/// Numbers kinds of access.
+/// Assigns numbers to kinds of access.
 pub(super) struct Keys {
     known: IndexMap<Access, (), FxBuildHasher>,
-    /// In the task's time unit.
+    /// Separation in the task's time unit.
     separation: Int,
-    /// All designs with which some action uses each function.
+    /// Designs with which some action uses each function.
     designs: FxHashSet<(ObjectId, ObjectId)>,
 }
 
@@ -59,65 +60,67 @@ impl Keys {
         dense(self.known.insert_full(access, ()).0)
     }
 
-    /// The accesses of a happening by what it reads and writes.
+    /// Interference constraints of a happening, from its footprint.
     pub(super) fn of(&mut self, footprint: &Footprint) -> InterferenceConstraints {
         use Access::{Added, Changed, Deleted, Held, HeldNumber, Read, ReadNumber};
-        let mut own = InterferenceCollector::default();
+        let mut collector = InterferenceCollector::default();
         for atom in &footprint.reads {
-            own.interferes(&[Added(*atom), Deleted(*atom)], Read(*atom));
+            collector.interferes(&[Added(*atom), Deleted(*atom)], Read(*atom));
         }
         for atom in &footprint.added {
-            own.interferes(&[Read(*atom), Deleted(*atom)], Added(*atom));
-            own.not_before.push(Held(*atom));
+            collector.interferes(&[Read(*atom), Deleted(*atom)], Added(*atom));
+            collector.not_before.push(Held(*atom));
         }
         for atom in &footprint.deleted {
-            own.interferes(&[Read(*atom), Added(*atom)], Deleted(*atom));
-            own.not_before.push(Held(*atom));
+            collector.interferes(&[Read(*atom), Added(*atom)], Deleted(*atom));
+            collector.not_before.push(Held(*atom));
         }
         for number in &footprint.reads_numbers {
             let ways = [Way::Assign, Way::Add, Way::Scale].map(|way| Changed(*number, way));
-            own.interferes(&ways, ReadNumber(*number));
+            collector.interferes(&ways, ReadNumber(*number));
         }
         for (number, way) in &footprint.numbers {
-            let others = [Way::Assign, Way::Add, Way::Scale].into_iter();
-            let others = others.filter(|other| other != way || *way == Way::Assign);
-            let mut all: Vec<_> = others.map(|other| Changed(*number, other)).collect();
-            all.push(ReadNumber(*number));
-            own.interferes(&all, Changed(*number, *way));
-            own.not_before.push(HeldNumber(*number));
+            let other_ways = [Way::Assign, Way::Add, Way::Scale].into_iter();
+            let other_ways = other_ways.filter(|candidate| candidate != way || *way == Way::Assign);
+            let mut conflicting: Vec<_> = other_ways.map(|candidate| Changed(*number, candidate)).collect();
+            conflicting.push(ReadNumber(*number));
+            collector.interferes(&conflicting, Changed(*number, *way));
+            collector.not_before.push(HeldNumber(*number));
         }
-        self.resolve(&own)
+        self.resolve(&collector)
     }
 
-    /// What the start of an action waits for so that its condition over all holds, and what it marks, as does its end.
+    /// Constraints of a condition over all: accesses that the start waits for, and accesses that
+    /// start and end mark.
     pub(super) fn over_all(&mut self, reads: &(Vec<AtomId>, Vec<NumericId>)) -> InterferenceConstraints {
-        let mut own = InterferenceCollector::default();
+        let mut collector = InterferenceCollector::default();
         for atom in &reads.0 {
-            own.not_before.extend([Access::Added(*atom), Access::Deleted(*atom)]);
-            own.marks.push(Access::Held(*atom));
+            collector.not_before.extend([Access::Added(*atom), Access::Deleted(*atom)]);
+            collector.marks.push(Access::Held(*atom));
         }
         for number in &reads.1 {
-            own.not_before
+            collector
+                .not_before
                 .extend([Way::Assign, Way::Add, Way::Scale].map(|way| Access::Changed(*number, way)));
-            own.marks.push(Access::HeldNumber(*number));
+            collector.marks.push(Access::HeldNumber(*number));
         }
-        self.resolve(&own)
+        self.resolve(&collector)
     }
 
-    /// What an action waits for so that at any time each function has one design.
+    /// Constraints that let each function have only one design at a time.
     pub(super) fn designs(&mut self, designs: &Designs) -> Vec<(Key, Int)> {
-        let mut own = InterferenceCollector::default();
+        let mut collector = InterferenceCollector::default();
         for (function, design) in designs {
-            let mut others: Vec<_> =
+            let mut other_designs: Vec<_> =
                 self.designs.iter().filter(|(f, d)| f == function && d != design).copied().collect();
-            others.sort_unstable();
-            own.not_before.extend(others.iter().map(|(f, d)| Access::Used(*f, *d)));
-            own.apart.extend(others.iter().map(|(f, d)| Access::UsedAtOnce(*f, *d)));
+            other_designs.sort_unstable();
+            collector.not_before.extend(other_designs.iter().map(|(f, d)| Access::Used(*f, *d)));
+            collector.apart.extend(other_designs.iter().map(|(f, d)| Access::UsedAtOnce(*f, *d)));
         }
-        self.resolve(&own).after
+        self.resolve(&collector).after
     }
 
-    /// What the end of an action marks, or an action that takes no time.
+    /// Accesses that the end of an action, or an action without duration, marks.
     pub(super) fn used(&mut self, designs: &Designs, at_once: bool) -> Vec<Key> {
         let kind = if at_once { Access::UsedAtOnce } else { Access::Used };
         let access = |(function, design): &(ObjectId, ObjectId)| kind(*function, *design);
@@ -125,13 +128,13 @@ impl Keys {
         accesses.into_iter().map(|access| self.key(access)).collect()
     }
 
-    fn resolve(&mut self, own: &InterferenceCollector) -> InterferenceConstraints {
+    fn resolve(&mut self, collector: &InterferenceCollector) -> InterferenceConstraints {
         let separation = self.separation;
-        let apart: Vec<_> = own.apart.iter().map(|access| (self.key(*access), separation)).collect();
-        let not_before = own.not_before.iter().map(|access| (self.key(*access), 0));
+        let apart: Vec<_> = collector.apart.iter().map(|access| (self.key(*access), separation)).collect();
+        let not_before = collector.not_before.iter().map(|access| (self.key(*access), 0));
         let mut after: Vec<(Key, Int)> = not_before.collect();
         after.extend(apart);
-        let marks = own.marks.iter().map(|access| self.key(*access)).collect();
+        let marks = collector.marks.iter().map(|access| self.key(*access)).collect();
         InterferenceConstraints { after, marks }
     }
 }
@@ -144,9 +147,9 @@ struct InterferenceCollector {
 }
 
 impl InterferenceCollector {
-    fn interferes(&mut self, with: &[Access], own: Access) {
+    fn interferes(&mut self, with: &[Access], access: Access) {
         self.apart.extend(with);
-        self.marks.push(own);
+        self.marks.push(access);
     }
 }
 
@@ -156,7 +159,7 @@ impl InterferenceConstraints {
         self.marks.extend(&other.marks);
     }
 
-    /// Sorts, and keeps the longest wait for each kind of access.
+    /// Sorts, and keeps the largest distance for each kind of access.
     pub(super) fn tidy(&mut self) {
         self.after.sort_unstable_by(|a, b| (a.0, b.1).cmp(&(b.0, a.1)));
         self.after.dedup_by_key(|(key, _)| *key);
@@ -165,14 +168,16 @@ impl InterferenceConstraints {
     }
 }
 
-/// Drops what nothing waits for, and what nothing ever does.
-pub(super) fn prune<'a>(all: impl Iterator<Item = &'a mut InterferenceConstraints>) {
-    let mut all: Vec<_> = all.collect();
-    let waited: FxHashSet<Key> = all.iter().flat_map(|own| own.after.iter().map(|(key, _)| *key)).collect();
-    let marked: FxHashSet<Key> = all.iter().flat_map(|own| own.marks.iter().copied()).collect();
-    for own in &mut all {
-        own.tidy();
-        own.after.retain(|(key, _)| marked.contains(key));
-        own.marks.retain(|key| waited.contains(key));
+/// Removes accesses that no happening waits for, and waits for accesses that no happening makes.
+pub(super) fn prune<'a>(constraints: impl Iterator<Item = &'a mut InterferenceConstraints>) {
+    let mut constraints: Vec<_> = constraints.collect();
+    let waited: FxHashSet<Key> =
+        constraints.iter().flat_map(|happening| happening.after.iter().map(|(key, _)| *key)).collect();
+    let marked: FxHashSet<Key> =
+        constraints.iter().flat_map(|happening| happening.marks.iter().copied()).collect();
+    for happening in &mut constraints {
+        happening.tidy();
+        happening.after.retain(|(key, _)| marked.contains(key));
+        happening.marks.retain(|key| waited.contains(key));
     }
 }

@@ -14,27 +14,28 @@ use crate::concurrent::happening::Role;
 use crate::concurrent::simple_temporal_network::SimpleTemporalNetwork;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// The time to the goal for each value of a variable; none if there is no way.
+/// Remaining time for each value of a variable. `None` if the goal value is unreachable.
 struct Path {
     variable: usize,
     left: Vec<Option<Int>>,
 }
 
-/// Paths of the variables of the goal.
+/// Remaining times for the variables of the goal.
 pub(super) struct Estimate {
     paths: Vec<Path>,
     separation: Int,
 }
 
-/// A change of a variable: from a value, or from any, to a value, so long after the value before.
+/// A change of a variable: source value (`None` for any), target value, and least time after the
+/// previous change.
 type Edge = (Option<u32>, u32, Int);
 
-/// What is left in a node of the search.
+/// Lower bounds for a search node.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RemainingTime {
-    /// The least time at which the goal can be reached.
+    /// Lower bound on the makespan.
     pub(super) makespan: Int,
-    /// The sum over variables, which may be too much.
+    /// Sum over the goal variables; not a lower bound.
     pub(super) sum: Int,
 }
 
@@ -46,31 +47,31 @@ impl Estimate {
         Self { paths, separation: concurrent.separation }
     }
 
-    /// None if the goal is out of reach.
+    /// Lower bounds for a temporal state. Returns `None` if the goal is unreachable.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "fewer than 2^32 happenings, less than 2^91 apart, and a variable has fewer than 2^32 values"
     )]
     pub(super) fn left(&self, state: &State, clocks: &SimpleTemporalNetwork) -> Option<RemainingTime> {
-        // No plan ends with waiting for what happens by itself.
-        let mut left = RemainingTime { makespan: clocks.latest().max(clocks.floor()), sum: 0 };
+        // A plan ends with an action, so pending timed literals alone do not delay its end.
+        let mut remaining = RemainingTime { makespan: clocks.latest().max(clocks.floor()), sum: 0 };
         for open in clocks.opens() {
             let end = clocks.start(open) + open.duration;
-            left.makespan = left.makespan.max(end);
+            remaining.makespan = remaining.makespan.max(end);
         }
         for path in &self.paths {
-            let more = path.left[state.values[path.variable] as usize]?;
-            if more > 0 {
+            let remaining_time = path.left[state.values[path.variable] as usize]?;
+            if remaining_time > 0 {
                 let since = clocks.changed(dense(path.variable)).unwrap_or(-self.separation);
-                left.makespan = left.makespan.max(since + more);
-                left.sum += more;
+                remaining.makespan = remaining.makespan.max(since + remaining_time);
+                remaining.sum += remaining_time;
             }
         }
-        Some(left)
+        Some(remaining)
     }
 }
 
-/// Dijkstra's algorithm from the value of the goal backwards.
+/// Backward Dijkstra search from the goal value.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "a path takes fewer steps than the variable has values, each less than 2^91"
@@ -83,25 +84,25 @@ fn path(concurrent: &TemporalTask, goal: Fact) -> Path {
     for (index, (_, to, _)) in edges.iter().enumerate() {
         into[*to as usize].push(index);
     }
-    let mut left = vec![None; values];
+    let mut distances = vec![None; values];
     let mut open = BinaryHeap::from([Reverse((0, goal.value))]);
     while let Some(Reverse((distance, value))) = open.pop() {
-        if left[value as usize].is_some() {
+        if distances[value as usize].is_some() {
             continue;
         }
-        left[value as usize] = Some(distance);
+        distances[value as usize] = Some(distance);
         for (from, _, weight) in into[value as usize].iter().map(|index| edges[*index]) {
-            let all = 0..dense(values);
-            let sources = from.map_or(all, |from| from..from + 1);
-            for source in sources.filter(|source| left[*source as usize].is_none()) {
+            let all_values = 0..dense(values);
+            let sources = from.map_or(all_values, |from| from..from + 1);
+            for source in sources.filter(|source| distances[*source as usize].is_none()) {
                 open.push(Reverse((distance + weight, source)));
             }
         }
     }
-    Path { variable: variable.index(), left }
+    Path { variable: variable.index(), left: distances }
 }
 
-/// All changes of a variable.
+/// Changes of a variable.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "durations and the separation are below 2^90; setters are counted in memory"
@@ -109,7 +110,8 @@ fn path(concurrent: &TemporalTask, goal: Fact) -> Path {
 fn edges(concurrent: &TemporalTask, variable: VariableId) -> Vec<Edge> {
     let task = &concurrent.task;
     let operators = || task.operators.iter().zip(&concurrent.happenings);
-    let of = |facts: &[Fact]| facts.iter().find(|fact| fact.variable == variable).map(|fact| fact.value);
+    let value_in =
+        |facts: &[Fact]| facts.iter().find(|fact| fact.variable == variable).map(|fact| fact.value);
     let apart = concurrent.separation;
     let mut setters = vec![0_u32; task.variables[variable.index()].values.len()];
     for operator in &task.operators {
@@ -121,10 +123,10 @@ fn edges(concurrent: &TemporalTask, variable: VariableId) -> Vec<Edge> {
     }
     let mut edges = Vec::new();
     for (operator, happening) in operators().filter(|(_, happening)| happening.role != Role::Never) {
-        let conditional = operator.conditional.iter().filter_map(|effect| of(&effect.effects));
+        let conditional = operator.conditional.iter().filter_map(|effect| value_in(&effect.effects));
         edges.extend(conditional.map(|to| (None, to, 0)));
-        let Some(to) = of(&operator.effects) else { continue };
-        let from = of(&operator.condition.facts);
+        let Some(to) = value_in(&operator.effects) else { continue };
+        let from = value_in(&operator.condition.facts);
         match happening.role {
             Role::Never => {}
             Role::Timed(_) => edges.push((from, to, 0)),
@@ -132,20 +134,24 @@ fn edges(concurrent: &TemporalTask, variable: VariableId) -> Vec<Edge> {
             Role::End(instance) => {
                 let instance = &concurrent.instances[instance as usize];
                 let start = &task.operators[instance.start.index()];
-                let held = instance.over_all.map(|id| &task.operators[id.index()]);
-                let kept = held.and_then(|over_all| of(&over_all.condition.facts));
-                edges.push(match (of(&start.effects), from) {
-                    // The value that the start has set stays until the end: it is required all along, or nothing else sets it, not even another run.
+                let over_all = instance.over_all.map(|id| &task.operators[id.index()]);
+                let required_value = over_all.and_then(|over_all| value_in(&over_all.condition.facts));
+                edges.push(match (value_in(&start.effects), from) {
+                    // The start's value persists until the end: either the condition over all
+                    // requires it, or no other happening sets it, including other runs of the
+                    // instance.
                     (Some(set), Some(from))
                         if set == from
-                            && (kept == Some(set)
+                            && (required_value == Some(set)
                                 || instance.under_way.is_none() && setters[set as usize] == 1) =>
                     {
                         (Some(from), to, instance.duration)
                     }
-                    // The value stays from before the start to the end.
+                    // The value persists from before the start to the end.
                     (None, None) => {
-                        match of(&start.condition.facts).filter(|required| kept == Some(*required)) {
+                        match value_in(&start.condition.facts)
+                            .filter(|required| required_value == Some(*required))
+                        {
                             Some(value) => (Some(value), to, instance.duration + apart),
                             None => (None, to, 0),
                         }

@@ -9,23 +9,24 @@ use task::plan::Exact;
 use task::task::Objective;
 use task::task::number::TaskNumber;
 
-/// The metric in integers: `time` for each unit of time and `cost` for each unit of cost.
+/// The metric in integers: `time` per unit of time plus `cost` per unit of cost.
 #[derive(Debug, Clone)]
 pub(super) struct Measure {
     pub(super) time: Int,
     pub(super) cost: Int,
-    /// Both together are this many times the metric.
+    /// Factor between the integer value and the metric.
     scale: Int,
     offset: Int,
     maximize: bool,
 }
 
 impl Measure {
-    /// For costs by an objective, and times that are `time_scale` times those of the files.
+    /// Computes the weights for costs by an objective, and for times that are `time_scale` times
+    /// those of the files.
     pub(super) fn new(objective: &Objective, weight: Rational, time_scale: Int) -> Result<Self, Error> {
         let overflow = || Error::overflow("the metric");
         let by_time = weight / Rational::from_integer(time_scale);
-        let common = by_time.denominator().and_then(|own| checked_lcm(own, objective.scale));
+        let common = by_time.denominator().and_then(|denominator| checked_lcm(denominator, objective.scale));
         let scale = common.filter(|scale| *scale < LIMIT).ok_or_else(overflow)?;
         let time = (by_time * Rational::from_integer(scale)).to_int();
         let cost = scale.checked_div(objective.scale).ok_or_else(overflow)?;
@@ -39,30 +40,31 @@ impl Measure {
         })
     }
 
-    /// A plan of this makespan and cost, in integers; none if that does not fit.
+    /// Integer value of a plan with this makespan and cost. Returns `None` if it overflows.
     pub(super) fn total(&self, makespan: Int, cost: Int) -> Option<Int> {
         self.time.checked_mul(makespan)?.checked_add(self.cost.checked_mul(cost)?)
     }
 
-    /// The metric of the file.
+    /// Metric of the files for an integer value.
     pub(super) fn metric(&self, total: &Rational) -> Exact {
         let sum = total.clone() + Rational::from_integer(self.offset);
         Exact::scaled(&if self.maximize { -sum } else { sum }, self.scale)
     }
 
-    /// The total that has a metric.
+    /// Integer value for a metric of the files.
     pub(super) fn total_of(&self, metric: &Exact) -> Rational {
         let scaled = Rational::from_big(metric.to_rational()) * Rational::from_integer(self.scale);
         (if self.maximize { -scaled } else { scaled }) - &Rational::from_integer(self.offset)
     }
 }
 
-/// The weight of the makespan in a metric to be minimised, and the rest of the metric. None if it is not linear in time.
+/// Splits a metric to be minimised into the weight of the makespan and the remaining metric.
+/// Returns `None` if it is not linear in time or rewards time.
 pub(super) fn split(metric: &Metric) -> Option<(Rational, Metric)> {
     let factor = time_factor(&metric.expression)?;
     let weight = if metric.direction == Direction::Minimize { factor } else { -factor };
-    let rest = Metric { expression: without_time(&metric.expression), ..metric.clone() };
-    (!weight.is_negative()).then_some((weight, rest))
+    let cost_metric = Metric { expression: without_time(&metric.expression), ..metric.clone() };
+    (!weight.is_negative()).then_some((weight, cost_metric))
 }
 
 fn without_time(expression: &Expression) -> Expression {

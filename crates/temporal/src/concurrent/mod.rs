@@ -70,14 +70,15 @@ use search_log::Record;
 use solution::{ended, in_names};
 use source_task::SourceTask;
 
-/// Where durations are chosen, what has to be more than a number is so much more: one part in so many.
+/// Precision with chosen durations: a strict comparison requires a difference of at least 1 /
+/// `PRECISION`.
 const PRECISION: Int = 1_000_000;
 
-/// Grounds a domain and a problem that have passed `pddl::check`, for plans whose actions overlap. Interfering happenings are
-/// to lie `separation` apart, in the domain's time unit.
+/// Grounds a domain and a problem that have passed `pddl::check`, for plans with overlapping
+/// actions. Interfering happenings are at least `separation` apart, in the domain's time unit.
 ///
 /// # Errors
-/// Every construct that cannot be planned with, with its place.
+/// Fails with every unsupported construct and its place.
 pub fn ground_concurrent(
     domain: &Domain,
     problem: &Problem,
@@ -89,24 +90,29 @@ pub fn ground_concurrent(
         return Err(overflow().into());
     }
     let separation = Rational::from_big(separation.clone());
-    let own = PlanSemantics::Overlapping(&separation.to_big());
+    let semantics = PlanSemantics::Overlapping(&separation.to_big());
     let GroundConfig { objectives, limits, .. } = config;
-    let plain = info_span!("compile").in_scope(|| compile_away(domain, problem, objectives, own, limits))?;
-    let kept = SourceTask::new(domain, problem, config);
+    let plain =
+        info_span!("compile").in_scope(|| compile_away(domain, problem, objectives, semantics, limits))?;
+    let source = SourceTask::new(domain, problem, config);
     let config = config.clone().with_objectives(plain.objectives.to_vec());
     let mut task = ground_plain((&plain.domain, &plain.problem, &config, &separation))?;
     let shortest = task.shortest.take().map(|shortest| {
         let shortest = shortest.judged_by(&plain);
-        Box::new(TemporalTask { kept: kept.clone(), ..shortest })
+        Box::new(TemporalTask { kept: source.clone(), ..shortest })
     });
-    Ok(TemporalTask { shortest, kept, ..task.judged_by(&plain) })
+    Ok(TemporalTask { shortest, kept: source, ..task.judged_by(&plain) })
 }
 
 impl TemporalTask {
-    /// The same where constraints on trajectories were compiled away.
+    /// Copies the deadlines and the exactness of compiled trajectory constraints.
     fn judged_by(self, plain: &CompiledTask<'_>) -> Self {
         Self {
-            deadlines: plain.deadlines.iter().map(|own| Deadline::new(&self.task, own)).collect(),
+            deadlines: plain
+                .deadlines
+                .iter()
+                .map(|constraint| Deadline::new(&self.task, constraint))
+                .collect(),
             is_exact: self.is_exact && plain.is_exact,
             is_bounded: plain.is_exact,
             ..self
@@ -114,14 +120,14 @@ impl TemporalTask {
     }
 }
 
-/// Grounds a task without constraints on trajectories.
-fn ground_plain(own: Files<'_>) -> Result<TemporalTask, Errors> {
-    let shortest = ground_with(own, &normalize);
-    let is_judged = own.0.actions.iter().any(|action| is_hidden(action.identifier.name.as_str()));
-    if shortest.is_ok() && (is_fixed(own.0) || is_judged) {
+/// Grounds a task whose trajectory constraints were compiled away.
+fn ground_plain(files: Files<'_>) -> Result<TemporalTask, Errors> {
+    let shortest = ground_with(files, &normalize);
+    let is_judged = files.0.actions.iter().any(|action| is_hidden(action.identifier.name.as_str()));
+    if shortest.is_ok() && (is_fixed(files.0) || is_judged) {
         return shortest;
     }
-    match (ground_with(own, &normalize_freely), shortest) {
+    match (ground_with(files, &normalize_freely), shortest) {
         (Ok(mut free), shortest) => {
             free.is_exact = free.is_exact && flexible_durations::is_exact(&free);
             free.shortest = shortest.ok().map(Box::new);
@@ -132,13 +138,13 @@ fn ground_plain(own: Files<'_>) -> Result<TemporalTask, Errors> {
     }
 }
 
-/// A domain, a problem, and how to ground them with a separation.
+/// Domain, problem, grounding options and separation.
 type Files<'f> = (&'f Domain, &'f Problem, &'f GroundConfig, &'f Rational);
 
-/// The files to a lifted task.
+/// A function that lowers the files to a lifted task.
 type Normalize = dyn Fn(&Domain, &Problem, &[ast::Metric]) -> Result<Lifted, Errors>;
 
-/// Grounds a task; numbers without a value are guarded where they need be.
+/// Grounds a task. Guards fluents without an initial value if some are read.
 fn ground_with(
     (domain, problem, config, separation): Files<'_>,
     normalize: &Normalize,
@@ -146,7 +152,7 @@ fn ground_with(
     let lifted = || normalize(domain, problem, &config.objectives);
     let ground = |lifted| {
         let task = ground_normal(domain, lifted, config, separation)?;
-        let is_open = task.instances.iter().any(|own| own.is_chosen);
+        let is_open = task.instances.iter().any(|instance| instance.is_chosen);
         if is_open { flexible_durations::check(task) } else { Ok(task) }
     };
     match ground(lifted()?) {
@@ -155,7 +161,7 @@ fn ground_with(
             undefined_fluents::guard(&mut lifted);
             ground(lifted)
         }
-        found => found,
+        result => result,
     }
 }
 
@@ -184,20 +190,20 @@ fn ground_normal(
     lifted.metrics = vec![metric];
     let is_strict = strict_comparisons::compares_strictly(&lifted);
     let mut split = split::split(lifted, &config.solves, &|action| mentions_duration(domain, action));
-    // Where durations are chosen, more than some number is this much more, at least.
+    // With chosen durations, strict comparisons require a minimal difference.
     let is_chosen = split.chosen.contains(&true);
     split.is_exact = if is_chosen { !is_strict } else { is_fixed(domain) };
-    let none = vec![Vec::new(); split.designs.len()];
+    let no_atoms = vec![Vec::new(); split.designs.len()];
     let (lifted, designs) = (&split.lifted, &split.designs);
     let precision = (is_chosen && is_strict).then_some(PRECISION);
     let generality =
         Generality { measures_ends: true, measures_rewards: true, precision, ..Generality::default() };
-    let (task, reached) = ground_lifted(lifted, designs, &none, &generality, &config.limits)?;
+    let (task, reached) = ground_lifted(lifted, designs, &no_atoms, &generality, &config.limits)?;
     let _span = info_span!("happenings", operators = task.operators.len()).entered();
     temporal_task::compile(task, &split, &reached, separation, weight, &config.limits)
 }
 
-/// Whether no action has a duration that could be another one.
+/// Returns `true` if every action has exactly one possible duration.
 fn is_fixed(domain: &Domain) -> bool {
     let number = |constraint: &ast::DurationConstraint| match &constraint.expression {
         ast::Expression::Number(number, _) => Some(number.clone()),
@@ -206,11 +212,11 @@ fn is_fixed(domain: &Domain) -> bool {
     domain.actions.iter().all(|action| match &action.body {
         ActionBody::Durative { duration, .. } => match &duration[..] {
             [only] => only.operator == Comparison::Equal,
-            [one, other] => {
-                let bounds = [one.operator, other.operator];
-                let both = [Comparison::GreaterOrEqual, Comparison::LessOrEqual];
-                both.iter().all(|bound| bounds.contains(bound))
-                    && number(one).is_some_and(|one| number(other) == Some(one))
+            [first, second] => {
+                let bounds = [first.operator, second.operator];
+                let equality = [Comparison::GreaterOrEqual, Comparison::LessOrEqual];
+                equality.iter().all(|bound| bounds.contains(bound))
+                    && number(first).is_some_and(|value| number(second) == Some(value))
             }
             _ => false,
         },
@@ -218,7 +224,7 @@ fn is_fixed(domain: &Domain) -> bool {
     })
 }
 
-/// Whether the end of an action mentions `?duration`.
+/// Returns `true` if the end of an action mentions `?duration`.
 fn mentions_duration(domain: &Domain, action: u32) -> bool {
     let Some(action) = domain.actions.get(action as usize) else { return false };
     let ActionBody::Durative { effects, .. } = &action.body else { return false };
@@ -241,8 +247,8 @@ fn measures(effect: &ast::Effect) -> bool {
     }
 }
 
-/// Finds a best plan whose actions overlap; of those, one with the least makespan if it is proved by search. `report` hears of every
-/// improvement.
+/// Finds an optimal plan with overlapping actions. Among optimal plans it returns one with the
+/// least makespan, if the search proves it. Calls `report` for every improvement.
 pub fn optimize_concurrent(
     concurrent: &TemporalTask,
     limits: &Limits,
@@ -253,7 +259,7 @@ pub fn optimize_concurrent(
     if let Some(reason) = &task.unreachable {
         return ended(Status::Unsolvable, Some(Proof::Relaxation(reason.clone())), record);
     }
-    if concurrent.instances.iter().any(|own| own.is_chosen) {
+    if concurrent.instances.iter().any(|instance| instance.is_chosen) {
         return flexible_durations::optimize(concurrent, limits, record);
     }
     let costs = task.operators.iter().any(|operator| operator.cost.constant > 0);
@@ -261,10 +267,10 @@ pub fn optimize_concurrent(
         .then(|| Bounds::new(Context::new(task, limits)).ok())
         .flatten();
     let span = info_span!("optimize", operators = task.operators.len());
-    let (how, incumbent) =
+    let (search_end, incumbent) =
         span.in_scope(|| interleave_searches(concurrent, bounds.as_ref(), limits, &mut record, usize::MAX));
     let plan = incumbent.as_ref().map(|sequence| in_names(concurrent, sequence));
-    let (status, lower) = match (&how, &incumbent) {
+    let (status, lower) = match (&search_end, &incumbent) {
         (SearchEnd::Exhausted, Some(incumbent)) => (Status::Optimal, Some(incumbent.value.0)),
         (SearchEnd::Exhausted, None) => (Status::Unsolvable, None),
         (SearchEnd::Stopped(lower), Some(incumbent)) => {
@@ -274,7 +280,7 @@ pub fn optimize_concurrent(
     };
     let metric = |total| concurrent.measure.metric(&Rational::from_integer(total));
     let proved = || if concurrent.is_exact { Proof::Search } else { Proof::Bound };
-    let proof = matches!(how, SearchEnd::Exhausted).then(proved);
+    let proof = matches!(search_end, SearchEnd::Exhausted).then(proved);
     let steps = plan.as_ref().filter(|_| proof.is_some()).map_or(0, |plan| plan.steps.len());
     Solution {
         horizon: steps,

@@ -1,4 +1,5 @@
-//! Monotonicity of numbers that only the metric reads: if they only grow, their value so far is a lower bound.
+//! Monotonicity of numbers that only the metric reads: if they only grow, their current value is a
+//! lower bound.
 
 use rustc_hash::FxHashSet;
 use task::number::{Int, Rational};
@@ -6,19 +7,21 @@ use task::task::{NumericId, Operator, Task};
 
 use crate::concurrent::happening::Instance;
 
-/// Whether no happening lowers what numbers that only count in the end come to, whatever the durations.
+/// Returns `true` if no happening lowers the contribution of numbers that only the metric reads,
+/// for any durations.
 pub(super) fn only_grows(task: &Task, instances: &[Instance]) -> bool {
-    let timers: FxHashSet<NumericId> = instances.iter().filter_map(|own| Some(own.timer?.0)).collect();
+    let timers: FxHashSet<NumericId> =
+        instances.iter().filter_map(|instance| Some(instance.timer?.0)).collect();
     let grows = |operator: &Operator, variable: NumericId, factor: &Rational| {
         let mut effects = operator.numeric_effects.iter().filter(|effect| effect.variable == variable);
         effects.all(|effect| {
             let value = &effect.value;
             let has_sign = |number: Int| !(Rational::from_integer(number) * factor).is_negative();
-            let others = value.coefficients.iter().filter(|(own, _)| *own != variable);
+            let other_terms = value.coefficients.iter().filter(|(number, _)| *number != variable);
             value.coefficients.contains(&(variable, 1))
                 && value.quantity.tables.is_empty()
                 && has_sign(value.quantity.constant)
-                && others.clone().all(|(own, by)| timers.contains(own) && has_sign(*by))
+                && other_terms.clone().all(|(number, by)| timers.contains(number) && has_sign(*by))
         })
     };
     task.objective

@@ -8,32 +8,34 @@ use crate::concurrent::search::Sequence;
 use crate::concurrent::successors::TemporalState;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// A plan does not keep what it has to.
+/// Error: a plan violates a hard deadline.
 pub(super) struct DeadlineMissed;
 
 impl TemporalTask {
-    /// The preferences that are violated in the last state of a plan.
+    /// Operators of the preferences that are violated in a state.
     pub(super) fn violated(&self, state: &State) -> impl Iterator<Item = OperatorId> {
         let is_violated = |id: &&OperatorId| self.task.operators[id.index()].applicable(state, &[]);
         self.violations.iter().filter_map(move |ways| ways.iter().find(is_violated).copied())
     }
 
-    /// The metric in integers and the makespan of a plan that ends in a situation; none if they do not fit.
+    /// Metric in integers and makespan of a plan that ends in this state. Returns `None` if they
+    /// overflow.
     pub(super) fn value(&self, TemporalState { state, clocks, cost }: &TemporalState) -> Option<(Int, Int)> {
         let makespan = clocks.latest();
         Some((self.measure.total(makespan, cost.checked_add(self.penalty(state)?)?)?, makespan))
     }
 
-    /// What it costs that a plan ends in a state, in the task's cost unit; none if that does not fit.
+    /// Cost of the preferences violated in a final state, in the task's cost unit. Returns `None`
+    /// if it overflows.
     pub(super) fn penalty(&self, state: &State) -> Option<Int> {
         let penalty = |id: OperatorId| self.task.operators[id.index()].cost.constant;
         self.violated(state).try_fold(0, |sum: Int, id| sum.checked_add(penalty(id)))
     }
 
-    /// The last state of a sequence, in which it is noted which deadlines were kept.
+    /// Final state of a sequence, in which the satisfied soft deadlines are marked.
     ///
     /// # Errors
-    /// One was not that has to be.
+    /// Fails if a hard deadline is missed.
     pub(super) fn last_state(
         &self,
         happenings: &[OperatorId],
@@ -55,7 +57,7 @@ impl TemporalTask {
         for (index, position) in order.iter().enumerate() {
             state = next(&state, happenings[*position]);
             let is_last =
-                order.get(index.saturating_add(1)).is_none_or(|other| times[*other] > times[*position]);
+                order.get(index.saturating_add(1)).is_none_or(|next| times[*next] > times[*position]);
             if is_last {
                 trajectory.push((times[*position], state.clone()));
             }
@@ -72,7 +74,9 @@ impl TemporalTask {
         Ok(state)
     }
 
-    /// A sequence that costs so much without what is violated, measured by its times, too; none if it does not keep what it has to.
+    /// Adds the cost of violated preferences and deadlines to the value of a sequence; `cost` is
+    /// the cost of its actions. Returns `None` if a hard deadline is missed or the metric
+    /// overflows.
     pub(super) fn judge(&self, sequence: Sequence, cost: Int) -> Option<Sequence> {
         if self.deadlines.is_empty() {
             return Some(sequence);

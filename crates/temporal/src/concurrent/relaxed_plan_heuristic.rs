@@ -1,7 +1,8 @@
 //! Relaxed-plan heuristic of temporal states, with preferred happenings.
 //!
-//! Costs are added over the conditions of a rule \[1\], and the cheapest rule of each proposition forms the relaxed
-//! plan \[2\]. Its goals are those of the task and the ends of all running actions.
+//! Costs are added over the conditions of a rule \[1\], and the cheapest rule of each proposition
+//! forms the relaxed plan \[2\]. Its goals are those of the task and the ends of all running
+//! actions.
 //!
 //! \[1\] B. Bonet, H. Geffner: Planning as heuristic search, Artificial Intelligence 129, 2001.
 //! \[2\] J. Hoffmann, B. Nebel: The FF planning system, JAIR 14, 2001; E. Keyder, H. Geffner: Heuristics for
@@ -18,37 +19,37 @@ use crate::concurrent::rule::Proposition;
 use crate::concurrent::successors::TemporalState;
 use crate::concurrent::temporal_relaxation::TemporalRelaxation;
 
-/// A cost that stands for being out of reach.
+/// Cost of unreachable propositions.
 const UNREACHABLE: u32 = u32::MAX;
-/// Costs do not grow beyond this.
+/// Cap on costs.
 const MAX_COST: u32 = 1 << 30;
-/// No relaxed plan counts more than this of one rule.
+/// Cap on the number of applications of one rule.
 const MAX_REPETITIONS: u32 = 1 << 20;
 
-/// How far the goal is.
+/// Value of the relaxed-plan heuristic.
 #[derive(Debug, Clone)]
 pub(super) struct HeuristicValue {
-    /// The weight of a relaxed plan.
+    /// Weight of the relaxed plan.
     pub(super) left: u64,
-    /// The happenings of the relaxed plan that need nothing else, ascending.
+    /// Happenings of the relaxed plan without unsatisfied conditions, ascending.
     pub(super) preferred: Vec<OperatorId>,
 }
 
-/// A relaxed task with room for one evaluation at a time.
+/// The relaxed-plan heuristic, with scratch buffers for one evaluation at a time.
 pub(super) struct RelaxedPlanHeuristic<'a> {
     relaxed: &'a TemporalRelaxation,
-    /// By proposition.
+    /// Cost of each proposition.
     costs: Vec<u32>,
-    /// By proposition: the rule that brings it about, and how many times.
+    /// Cheapest rule that adds each proposition, and its number of applications.
     supporters: Vec<Option<(u32, u32)>>,
-    /// By rule: how many of its needs are out of reach, and the sum of the costs of the others.
+    /// Per rule: number of unreached conditions, and sum of the costs of the reached ones.
     unmet: Vec<u32>,
     sums: Vec<u32>,
     marked: Vec<bool>,
-    /// By numeric condition: how much is missing.
+    /// Per numeric condition: amount that is missing. `None` if unknown.
     missing: Vec<Option<Int>>,
     open: Queue,
-    /// What a relaxed plan has to reach.
+    /// Propositions that a relaxed plan must reach.
     targets: Vec<Proposition>,
 }
 
@@ -68,7 +69,7 @@ impl<'a> RelaxedPlanHeuristic<'a> {
         }
     }
 
-    /// None if the goal is out of reach, or the end of an action under way.
+    /// Evaluates a state. Returns `None` if the goal or the end of a running action is unreachable.
     pub(super) fn guide(
         &mut self,
         TemporalState { state, clocks, .. }: &TemporalState,
@@ -77,26 +78,26 @@ impl<'a> RelaxedPlanHeuristic<'a> {
         self.guide_from(&state.values, clocks.opens().iter().map(|open| open.instance), &value)
     }
 
-    /// As [`Self::guide`], from values of variables, the instances under way, and what linear expressions are at most; none if they can be
-    /// anything.
+    /// Like [`Self::guide`], given the values of variables, the running instances, and upper bounds
+    /// on linear expressions. A bound of `None` means that the expression can have any value.
     pub(super) fn guide_from(
         &mut self,
         values: &[u32],
         instances: impl Iterator<Item = u32>,
-        most: &dyn Fn(&Linear<Int>) -> Option<Int>,
+        upper_bound: &dyn Fn(&Linear<Int>) -> Option<Int>,
     ) -> Option<HeuristicValue> {
         let relaxed = self.relaxed;
         let ends: Vec<u32> = instances.map(|instance| relaxed.ends[instance as usize]).collect();
         self.targets.clone_from(&relaxed.goal);
         self.targets.extend(ends.iter().flat_map(|end| relaxed.needs.of(*end)));
-        self.reach(values, most);
+        self.reach(values, upper_bound);
         let is_reached = |target: &Proposition| self.costs[*target as usize] < UNREACHABLE;
         self.targets.iter().all(is_reached).then(|| self.extract(&ends))
     }
 
-    /// Dijkstra's algorithm over propositions, until no target can cost less.
+    /// Dijkstra's algorithm over propositions, until all targets are reached at their final costs.
     #[expect(clippy::arithmetic_side_effects, reason = "values of variables are held in memory")]
-    fn reach(&mut self, values: &[u32], most: &dyn Fn(&Linear<Int>) -> Option<Int>) {
+    fn reach(&mut self, values: &[u32], upper_bound: &dyn Fn(&Linear<Int>) -> Option<Int>) {
         let relaxed = self.relaxed;
         self.costs.fill(UNREACHABLE);
         self.supporters.fill(None);
@@ -104,8 +105,8 @@ impl<'a> RelaxedPlanHeuristic<'a> {
         self.unmet.copy_from_slice(&relaxed.unmet);
         self.open.clear();
         for (missing, numeric) in self.missing.iter_mut().zip(&relaxed.numeric) {
-            // What does not fit can be anything.
-            *missing = most(&numeric.linear).map(Int::saturating_neg);
+            // A value that overflows counts as unbounded.
+            *missing = upper_bound(&numeric.linear).map(Int::saturating_neg);
         }
         for (first, value) in relaxed.first.iter().zip(values) {
             self.improve(first + value, 0, None);
@@ -150,9 +151,9 @@ impl<'a> RelaxedPlanHeuristic<'a> {
     }
 
     fn improve(&mut self, proposition: Proposition, cost: u32, by: Option<(u32, u32)>) {
-        let known = &mut self.costs[proposition as usize];
-        if cost < *known {
-            *known = cost;
+        let current = &mut self.costs[proposition as usize];
+        if cost < *current {
+            *current = cost;
             self.supporters[proposition as usize] = by;
             self.open.push(cost, proposition);
         }
@@ -206,9 +207,9 @@ impl<'a> RelaxedPlanHeuristic<'a> {
     }
 }
 
-/// How many applications add what is missing.
+/// Number of applications that add the missing amount.
 fn times(missing: Option<Int>, by: Option<Int>) -> u32 {
     let (Some(missing), Some(by)) = (missing, by) else { return 1 };
-    let times = missing.checked_add(by.saturating_sub(1)).and_then(|all| all.checked_div(by));
+    let times = missing.checked_add(by.saturating_sub(1)).and_then(|sum| sum.checked_div(by));
     times.and_then(|times| u32::try_from(times).ok()).unwrap_or(MAX_REPETITIONS).clamp(1, MAX_REPETITIONS)
 }

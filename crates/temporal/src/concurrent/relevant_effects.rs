@@ -7,18 +7,18 @@ use task::task::{Fact, NumericEffect, NumericId, Task};
 
 use crate::concurrent::happening::Instance;
 
-/// What is known of a task when runs are counted.
+/// Relevance information of a task.
 pub(super) struct RelevanceContext<'k> {
-    /// How many runs of each instance can make a difference, as far as that is known.
+    /// Number of useful simultaneous runs of each instance, as far as bounded.
     pub(super) most: &'k [u32],
     pub(super) separation: Int,
-    /// By variable, whether anything may need that its atoms are false.
+    /// Per variable: whether the falsity of its atoms may be needed.
     pub(super) needed: &'k [bool],
-    /// By number, what is asked of it; of those that are not in the list nothing is known.
+    /// Polarity of each number. Numbers beyond the end of the list have unknown polarity.
     pub(super) asked: &'k [Polarity],
 }
 
-/// What an effect does to a number, if that does not depend on the state.
+/// Effect on a number, if it does not depend on the state.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Change {
     Sets(Int),
@@ -30,30 +30,31 @@ pub(super) fn change(effect: &NumericEffect) -> Option<Change> {
     let constant = value.quantity.tables.is_empty().then_some(value.quantity.constant)?;
     match value.coefficients.as_slice() {
         [] => Some(Change::Sets(constant)),
-        [(own, 1)] if *own == effect.variable => Some(Change::Adds(constant)),
+        [(variable, 1)] if *variable == effect.variable => Some(Change::Adds(constant)),
         _ => None,
     }
 }
 
 impl RelevanceContext<'_> {
-    /// The effects that somebody may need: without the others a plan is as good.
+    /// Effects that may be needed; removing the others does not make a plan worse.
     pub(super) fn relevant_effects(&self, effects: &[Fact]) -> Vec<Fact> {
-        let is_wanted = |fact: &&Fact| fact.value == 0 || self.needed[fact.variable.index()];
-        effects.iter().filter(is_wanted).copied().collect()
+        let is_relevant = |fact: &&Fact| fact.value == 0 || self.needed[fact.variable.index()];
+        effects.iter().filter(is_relevant).copied().collect()
     }
 
-    /// Whether a number that changes by so much is no better for it, whatever it is.
+    /// Returns `true` if changing a number by this amount is never an improvement.
     fn is_no_better(&self, number: NumericId, by: Int) -> bool {
         by == 0
             || self.asked.get(number.index()).is_some_and(|asked| !if by < 0 { asked.down } else { asked.up })
     }
 
-    /// Whether a plan is no worse without an effect on a number.
+    /// Returns `true` if removing an effect on a number never makes a plan worse.
     pub(super) fn is_loss(&self, effect: &NumericEffect) -> bool {
         matches!(change(effect), Some(Change::Adds(by)) if self.is_no_better(effect.variable, by))
     }
 
-    /// Whether a number that an effect has set is not worse after another effect, so that to set it again does not make it better.
+    /// Returns `true` if a number set to `value` is not worse after another effect, so that setting
+    /// it again is no improvement.
     pub(super) fn keeps(&self, other: &NumericEffect, value: Int) -> bool {
         match change(other) {
             Some(Change::Sets(next)) => self.is_no_better(other.variable, value.saturating_sub(next)),
@@ -63,37 +64,40 @@ impl RelevanceContext<'_> {
     }
 }
 
-/// By number, what is asked of it. Nothing is said where more than conditions asks for numbers: durations, metrics, preferences and constraints on the way.
+/// Polarity of each number. Empty if other parts than conditions read numbers: durations, metrics,
+/// preferences and trajectory constraints.
 pub(super) fn asked(task: &Task, instances: &[Instance]) -> Vec<Polarity> {
     let is_judged = task.schema_names.iter().any(|name| is_hidden(name));
-    let is_timed = instances.iter().any(|own| own.is_chosen || own.timer.is_some());
+    let is_timed = instances.iter().any(|instance| instance.is_chosen || instance.timer.is_some());
     if is_judged || is_timed || !task.objective.rest.is_empty() { Vec::new() } else { directions(task) }
 }
 
-/// By variable, whether anything may need that its atoms are false. Of a single atom nothing does that is required positively only.
+/// Per variable: whether the falsity of its atoms may be needed. It is not if the variable is a
+/// single atom that only occurs positively.
 pub(super) fn needed(task: &Task) -> Vec<bool> {
-    let mut needed: Vec<bool> = task.variables.iter().map(|variable| variable.values.len() != 2).collect();
+    let mut falsity_needed: Vec<bool> =
+        task.variables.iter().map(|variable| variable.values.len() != 2).collect();
     let conditions = task.operators.iter().map(|operator| &operator.condition).chain([&task.goal]);
     for condition in conditions {
         for fact in condition.facts.iter().filter(|fact| fact.value != 0) {
-            needed[fact.variable.index()] = true;
+            falsity_needed[fact.variable.index()] = true;
         }
         for literal in condition.clauses.iter().flatten() {
             if (literal.fact.value == 0) != literal.positive {
-                needed[literal.fact.variable.index()] = true;
+                falsity_needed[literal.fact.variable.index()] = true;
             }
         }
     }
-    // What they bring about may be needed either way.
+    // Effects of conditional effects may be needed either way, so their conditions are as well.
     let effects = task.operators.iter().flat_map(|operator| &operator.conditional);
     for literal in effects.flat_map(|effect| &effect.condition) {
-        needed[literal.fact.variable.index()] = true;
+        falsity_needed[literal.fact.variable.index()] = true;
     }
     for rule in task.axioms.iter().flat_map(|layer| &layer.rules) {
         let literals = rule.body.clauses.iter().flatten().map(|literal| literal.fact);
         for fact in rule.body.facts.iter().copied().chain(literals) {
-            needed[fact.variable.index()] = true;
+            falsity_needed[fact.variable.index()] = true;
         }
     }
-    needed
+    falsity_needed
 }

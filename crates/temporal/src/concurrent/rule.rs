@@ -8,13 +8,13 @@ use task::task::OperatorId;
 /// A fact, a clause, or a numeric condition.
 pub(super) type Proposition = u32;
 
-/// From what is required to what is brought about.
+/// A rule of the relaxation.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Rule {
-    /// Ascending.
+    /// Conditions, ascending.
     pub(super) needs: Vec<Proposition>,
     pub(super) adds: Vec<Proposition>,
-    /// All that it is sure to set.
+    /// Facts that it certainly sets.
     pub(super) sets: Vec<Proposition>,
     pub(super) raises: Vec<NumericEffect>,
     pub(super) weight: u32,
@@ -22,7 +22,8 @@ pub(super) struct Rule {
 }
 
 impl Rule {
-    /// The same where another fact holds before and after it. `numbers` are the conjunctions of that fact by what they say besides.
+    /// Copy of the rule for states in which `fact` holds before and after it. `numbers` maps each
+    /// proposition to its conjunction with `fact`.
     pub(super) fn with(
         &self,
         fact: Proposition,
@@ -38,5 +39,6 @@ impl Rule {
     }
 }
 
-/// A numeric condition by position, and how much a rule adds to it; none if that depends on the state.
+/// A numeric condition by index, and the amount that a rule adds to it. `None` if the amount
+/// depends on the state.
 pub(super) type NumericEffect = (u32, Option<Int>);

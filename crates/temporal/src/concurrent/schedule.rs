@@ -10,11 +10,11 @@ use crate::concurrent::happening::Role;
 use crate::concurrent::simple_temporal_network::Key;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// A lower bound: from a happening to another one, at least so much later.
+/// Lower bound between two happenings of the sequence: indices, and least distance.
 type Bound = (usize, usize, Int);
 
-/// The earliest times of a sequence that the search has found. `together` says which happenings take place at the time of
-/// the one before.
+/// Earliest times of a sequence (Bellman-Ford algorithm). `together` tells which happenings take
+/// place at the time of the previous one.
 #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
 pub(super) fn schedule(
     concurrent: &TemporalTask,
@@ -26,22 +26,22 @@ pub(super) fn schedule(
     let bounds = bounds(concurrent, sequence, (together, durations), &mut times);
     // No chain of bounds is longer than the sequence.
     for _ in 0..=sequence.len() {
-        let mut changed = false;
+        let mut has_changed = false;
         for (from, to, by) in &bounds {
             let least = times[*from] + by;
             if times[*to] < least {
                 times[*to] = least;
-                changed = true;
+                has_changed = true;
             }
         }
-        if !changed {
+        if !has_changed {
             break;
         }
     }
     times
 }
 
-/// How long the actions take that start in a sequence, by position; 0 for what starts none.
+/// Durations of the actions that start in a sequence, by index; 0 for other happenings.
 pub(super) fn durations(concurrent: &TemporalTask, sequence: &[OperatorId]) -> Vec<Int> {
     let mut state = concurrent.task.initial.clone();
     let mut durations = Vec::with_capacity(sequence.len());
@@ -71,9 +71,10 @@ fn bounds(
 ) -> Vec<Bound> {
     let mut bounds = Vec::new();
     let mut marked: FxHashMap<Key, Vec<usize>> = FxHashMap::default();
-    // Of the runs of an instance the first one ends first.
-    let mut started: FxHashMap<u32, VecDeque<usize>> = FxHashMap::default();
-    // For actions under way with a joint condition over all: what has written it last.
+    // Runs of an instance end in the order of their starts.
+    let mut open_starts: FxHashMap<u32, VecDeque<usize>> = FxHashMap::default();
+    // Running actions with a joint condition over all, with the last happening that wrote what it
+    // reads.
     let mut joint: Vec<(u32, usize)> = Vec::new();
     let mut floor = 0;
     for (index, id) in sequence.iter().enumerate() {
@@ -92,7 +93,7 @@ fn bounds(
             bounds.extend([(index - 1, index, 0), (index, index - 1, 0)]);
         }
         if let Role::End(instance) = happening.role {
-            let first = joint.iter().position(|(own, _)| *own == instance);
+            let first = joint.iter().position(|(candidate, _)| *candidate == instance);
             first.map(|first| joint.remove(first));
         }
         for (instance, last) in &mut joint {
@@ -103,13 +104,13 @@ fn bounds(
         }
         match happening.role {
             Role::Start(instance) => {
-                started.entry(instance).or_default().push_back(index);
+                open_starts.entry(instance).or_default().push_back(index);
                 if !concurrent.instances[instance as usize].joint.is_empty() {
                     joint.push((instance, index));
                 }
             }
             Role::End(instance) => {
-                if let Some(start) = started.get_mut(&instance).and_then(VecDeque::pop_front) {
+                if let Some(start) = open_starts.get_mut(&instance).and_then(VecDeque::pop_front) {
                     let duration = durations[start];
                     bounds.extend([(start, index, duration), (index, start, -duration)]);
                 }

@@ -1,10 +1,11 @@
 //! A* over sequences of happenings.
 //!
-//! A node consists of a state, the running actions and a simple temporal network. A node is dominated by another
-//! one with the same state and running actions if every continuation of the first is possible for the second, no
-//! later, at no higher cost and with no less of any resource. Orders of happenings that do not interfere have
-//! the same network, so one of them is searched. Actions can start at any time, not only when others end;
-//! planners that consider no other times are incomplete \[1\].
+//! A node consists of a state, the running actions and a simple temporal network. A node is
+//! dominated by another one with the same state and running actions if every continuation of the
+//! first is possible for the second, no later, at no higher cost and with no less of any resource.
+//! Orders of happenings that do not interfere have the same network, so one of them is searched.
+//! Actions can start at any time, not only when others end; planners that consider no other times
+//! are incomplete \[1\].
 //!
 //! \[1\] W. Cushing, S. Kambhampati, Mausam, D. Weld: When is temporal planning really temporal?, IJCAI 2007.
 
@@ -24,48 +25,50 @@ use crate::concurrent::store::{Origin, Store};
 use crate::concurrent::successors::{DeadEnd, Expansion, TemporalState};
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// So many comparisons of situations are as much work as looking at one.
+/// Number of comparisons of nodes that count as one expanded node.
 const COMPARED: usize = 4;
 
-/// A plan as the search finds it.
+/// A plan as a sequence of happenings.
 #[derive(Debug, Clone)]
 pub(super) struct Sequence {
-    /// The metric in integers, then the makespan.
+    /// Metric in integers, then makespan.
     pub(super) value: (Int, Int),
     pub(super) happenings: Vec<OperatorId>,
-    /// Which of them take place at the time of the one before.
+    /// Per happening: whether it takes place at the time of the previous one.
     pub(super) together: Vec<bool>,
 }
 
 impl Sequence {
-    /// Tells the record of a better plan, and of what none can get below.
+    /// Reports an improved plan and the lower bound to the search log.
     pub(super) fn tell(&self, lower: Int, part: PlannerPart, record: &mut Record<'_>) {
         let [value, lower] = [self.value.0, lower].map(Rational::from_integer);
         record.improve(&value, self.happenings.len(), lower, part);
     }
 }
 
-/// How a search ended.
+/// Outcome of a search.
 pub(super) enum SearchEnd {
-    /// Nothing is left that could be better than the incumbent.
+    /// No open node can be better than the incumbent.
     Exhausted,
-    /// At a limit: no plan that is not known has a lower metric than this, in integers.
+    /// Stopped at a limit. The value is a lower bound on the metric of plans not found yet, in
+    /// integers.
     Stopped(Int),
 }
 
-/// The metric, the makespan, the sum of what is left, the depth, and the number of the node.
+/// Sort key of an open node: metric, makespan, remaining work estimate, depth, and node.
 type Priority = (Int, Int, Int, u32, u32);
 
 pub(super) struct Search<'a> {
     concurrent: &'a TemporalTask,
     estimate: &'a Estimate,
-    /// Lower bounds on costs, and on resources; none if nothing costs.
+    /// Lower bounds on costs and resources. `None` if neither costs nor numbers occur.
     bounds: Option<&'a Bounds>,
     expansion: &'a Expansion<'a>,
     store: Store<'a>,
     open: BinaryHeap<Reverse<Priority>>,
     pub(super) incumbent: Option<Sequence>,
-    /// What was left out because its numbers do not fit: no plan of it has a lower metric than this, in integers.
+    /// Lower bound on the metric of plans below nodes that were dropped because their numbers
+    /// overflow.
     left_out: Option<Int>,
     figures: SearchStatistics,
 }
@@ -77,10 +80,10 @@ impl<'a> Search<'a> {
         estimate: &'a Estimate,
         bounds: Option<&'a Bounds>,
     ) -> Self {
-        // A duration is not a resource, and of what a preference reads less may be better.
+        // A duration is not a resource, and for a number read by a preference less may be better.
         let monotone = is_monotone(&concurrent.task)
             && concurrent.violations.is_empty()
-            && concurrent.instances.iter().all(|own| own.timer.is_none());
+            && concurrent.instances.iter().all(|instance| instance.timer.is_none());
         let mut search = Self {
             concurrent,
             estimate,
@@ -92,22 +95,23 @@ impl<'a> Search<'a> {
             left_out: None,
             figures: SearchStatistics::default(),
         };
-        // Costs and times are not negative.
+        // Costs and times are not negative, so 0 is a lower bound.
         search.push(&expansion.root(), None, 0);
         search
     }
 
-    /// Searches until nothing better is left, `most` situations were looked at, or a limit is reached. It can go on then. `search_log` hears of each better plan and of what none can get below.
-    pub(super) fn run(&mut self, limits: &Limits, most: usize, record: &mut Record<'_>) -> SearchEnd {
+    /// Searches until the open list is exhausted, `max_nodes` nodes were expanded, or a limit is
+    /// reached. The search can be resumed. Better plans and lower bounds are reported to `record`.
+    pub(super) fn run(&mut self, limits: &Limits, max_nodes: usize, record: &mut Record<'_>) -> SearchEnd {
         let before = self.figures;
-        let ended = self.go_on(limits, most, record);
+        let search_end = self.go_on(limits, max_nodes, record);
         self.figures.add_to(before, &mut record.statistics);
-        ended
+        search_end
     }
 
     #[expect(clippy::arithmetic_side_effects, reason = "what was looked at is counted by 64 bits")]
-    fn go_on(&mut self, limits: &Limits, most: usize, record: &mut Record<'_>) -> SearchEnd {
-        let mut looked_at = 0;
+    fn go_on(&mut self, limits: &Limits, max_nodes: usize, record: &mut Record<'_>) -> SearchEnd {
+        let mut expanded = 0;
         let mut pulse = limits.pulse();
         while let Some(Reverse(priority)) = self.open.pop() {
             let id = priority.4;
@@ -125,25 +129,27 @@ impl<'a> Search<'a> {
                     Some(_) => {}
                     None => self.leave_out(value.0),
                 }
-                // Where preferences are violated in the end, or something is missed, a longer plan may be better.
+                // With preferences or deadlines, a longer plan that passes through this goal state
+                // may be better.
                 if self.concurrent.violations.is_empty() && self.concurrent.deadlines.is_empty() {
                     continue;
                 }
             }
-            if looked_at >= most || self.is_full(limits) || pulse.beat().is_err() {
+            if expanded >= max_nodes || self.is_full(limits) || pulse.beat().is_err() {
                 self.open.push(Reverse(priority));
                 return SearchEnd::Stopped(self.lower());
             }
             record.report_lower_bound(Rational::from_integer(self.known(value.0)));
-            looked_at += self.expand(id, &situation, value.0);
+            expanded += self.expand(id, &situation, value.0);
         }
         self.left_out
             .filter(|lower| self.may_be_better(*lower))
             .map_or(SearchEnd::Exhausted, SearchEnd::Stopped)
     }
 
-    /// Whether something that was left out, of which nothing has a lower metric than this, may be better than the incumbent: as good, and over sooner, if
-    /// the metric is not the time.
+    /// Returns `true` if a dropped node with this lower bound may lead to a better plan than the
+    /// incumbent: a lower metric, or the same metric and a lower makespan if the metric is not the
+    /// makespan itself.
     fn may_be_better(&self, lower: Int) -> bool {
         let TemporalTask { task, measure, .. } = self.concurrent;
         let is_time = || measure.time > 0 && task.operators.iter().all(|operator| operator.cost.is_zero());
@@ -151,37 +157,37 @@ impl<'a> Search<'a> {
         value.is_none_or(|value| lower < value || lower == value && !is_time())
     }
 
-    /// Whether there is nothing left to expand.
+    /// Returns `true` if no node is open.
     pub(super) fn is_over(&self) -> bool {
         self.open.is_empty()
     }
 
-    /// Whether it takes half of the room that there is.
+    /// Returns `true` if the search uses more than half of the memory limit.
     pub(super) fn is_full(&self, limits: &Limits) -> bool {
         let open = self.open.len().saturating_mul(size_of::<Priority>());
         self.store.bytes().saturating_add(open) > limits.room() / 2
     }
 
-    /// No plan that is not known has a lower metric than this, in integers.
+    /// Lower bound on the metric of plans not found yet, in integers.
     pub(super) fn lower(&self) -> Int {
         self.known(self.open.peek().map_or(0, |Reverse(priority)| priority.0))
     }
 
-    /// What no plan can get below if none that goes on from what is open can get below `open`.
+    /// Lower bound on the metric of plans not found yet, given the bound `open` of the open nodes.
     fn known(&self, open: Int) -> Int {
         self.left_out.map_or(open, |left_out| left_out.min(open))
     }
 
-    /// Leaves out something below a node in which no plan has a lower metric than `lower`.
+    /// Records that nodes below a node with lower bound `lower` were dropped.
     fn leave_out(&mut self, lower: Int) {
-        self.left_out = Some(self.left_out.map_or(lower, |known| known.min(lower)));
+        self.left_out = Some(self.left_out.map_or(lower, |bound| bound.min(lower)));
     }
 
     fn is_better(&self, value: (Int, Int)) -> bool {
         self.incumbent.as_ref().is_none_or(|incumbent| value < incumbent.value)
     }
 
-    /// Adds what can follow a node in which no plan has a lower metric than `lower`. Returns how much that is.
+    /// Expands a node whose lower bound on the metric is `lower`. Returns the work in nodes.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "a node is no deeper than twice as many as there are nodes; what is done is counted by 64 bits"
@@ -208,11 +214,11 @@ impl<'a> Search<'a> {
         count + 1 + (self.store.compared - compared) / COMPARED
     }
 
-    /// Adds a situation, below a node in which no plan has a lower metric than `lower`.
+    /// Adds a node below a node with lower bound `lower`.
     fn push(&mut self, situation: &TemporalState, origin: Option<Origin>, lower: Int) {
         let TemporalState { state, clocks, cost } = situation;
         self.figures.evaluated = self.figures.evaluated.saturating_add(1);
-        let Some(left) = self.estimate.left(state, clocks) else { return };
+        let Some(remaining) = self.estimate.left(state, clocks) else { return };
         let costs = match self.bounds {
             Some(bounds) => match bounds.estimate(state) {
                 Some(costs) => costs,
@@ -221,22 +227,23 @@ impl<'a> Search<'a> {
             None => 0,
         };
         let total =
-            cost.checked_add(costs).and_then(|cost| self.concurrent.measure.total(left.makespan, cost));
+            cost.checked_add(costs).and_then(|cost| self.concurrent.measure.total(remaining.makespan, cost));
         let Some(total) = total.filter(|total| *total < GROWTH_LIMIT) else {
             self.leave_out(lower);
             return;
         };
-        let value = (total, left.makespan);
+        let value = (total, remaining.makespan);
         if !self.is_better(value) {
             return;
         }
         let depth = origin.map_or(0, |origin| origin.depth);
         if let Some(id) = self.store.add(situation, origin) {
-            self.open.push(Reverse((value.0, value.1, left.sum, depth, id)));
+            self.open.push(Reverse((value.0, value.1, remaining.sum, depth, id)));
         }
     }
 
-    /// The sequence that leads to a goal; none if its metric does not fit, or it does not keep what it has to.
+    /// Plan that leads to a goal node. Returns `None` if its metric overflows or it violates a
+    /// deadline.
     fn sequence(&self, goal: u32, situation: &TemporalState) -> Option<Sequence> {
         let value = self.concurrent.value(situation)?;
         let (mut happenings, mut together) = (Vec::new(), Vec::new());

@@ -7,18 +7,18 @@ use task::plan::solution::{Improvement, Moment, PlannerPart, Statistics};
 
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// Bounds are noted that are one part in so many higher than the one before.
+/// Lower bounds are reported if they rise by at least one part in this number.
 const REPORT_STEP: Int = 100;
 
-/// What has happened so far in one run.
+/// Log of one run.
 pub(super) struct Record<'r> {
     concurrent: &'r TemporalTask,
     report: &'r mut dyn FnMut(Improvement),
     started: Instant,
-    /// The metric of the best plan, in integers, and what none can get below, as they were noted last.
+    /// Metric of the best plan and lower bound, in integers, as reported last.
     noted: Option<(Option<Rational>, Rational)>,
     cost: Option<Rational>,
-    /// Where the search leaves plans out: what could be said of all plans before it began.
+    /// Initial lower bound, if the search is incomplete. No higher bound can be claimed then.
     ceiling: Option<Rational>,
     pub(super) statistics: Statistics,
 }
@@ -33,13 +33,13 @@ impl<'r> Record<'r> {
         Self { concurrent, report, started, noted: None, cost: None, ceiling: None, statistics }
     }
 
-    /// What no plan can get below, before the search has begun.
+    /// Records the initial lower bound.
     pub(super) fn begin(&mut self, root: Rational) {
         self.ceiling = (!self.concurrent.is_exact).then(|| root.clone());
         self.report_lower_bound(root);
     }
 
-    /// Notes a better plan of so many happenings, and what none can get below.
+    /// Records a better plan with `horizon` happenings, and a lower bound.
     pub(super) fn improve(&mut self, value: &Rational, horizon: usize, lower: Rational, part: PlannerPart) {
         self.statistics.found_by = Some(part);
         self.cost = Some(value.clone());
@@ -53,15 +53,16 @@ impl<'r> Record<'r> {
         }
     }
 
-    /// Notes what no plan can get below, and returns what of that can be claimed.
+    /// Records a lower bound and returns it, capped at the ceiling and at the cost of the
+    /// incumbent.
     pub(super) fn report_lower_bound(&mut self, lower: Rational) -> Rational {
-        let known = self.ceiling.iter().chain(&self.cost);
-        let lower = known.fold(lower, |lower, known| if *known < lower { known.clone() } else { lower });
-        let is_news = self.noted.as_ref().is_none_or(|(known, bound)| {
-            let more = lower.clone() - bound;
-            *known != self.cost
-                || more.clone() * Rational::from_integer(REPORT_STEP) > *bound
-                || more.is_positive() && self.cost.as_ref() == Some(&lower)
+        let caps = self.ceiling.iter().chain(&self.cost);
+        let lower = caps.fold(lower, |lower, cap| if *cap < lower { cap.clone() } else { lower });
+        let is_news = self.noted.as_ref().is_none_or(|(cost, bound)| {
+            let rise = lower.clone() - bound;
+            *cost != self.cost
+                || rise.clone() * Rational::from_integer(REPORT_STEP) > *bound
+                || rise.is_positive() && self.cost.as_ref() == Some(&lower)
         });
         if is_news && self.concurrent.is_whole {
             self.noted = Some((self.cost.clone(), lower.clone()));
@@ -76,7 +77,7 @@ impl<'r> Record<'r> {
         lower
     }
 
-    /// The figures of the run, which ends now.
+    /// Ends the run and returns its statistics.
     pub(super) fn end(mut self) -> Statistics {
         self.statistics.search = self.started.elapsed();
         self.statistics

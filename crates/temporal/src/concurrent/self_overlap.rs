@@ -1,8 +1,9 @@
 //! Upper bounds on the number of simultaneous runs of one ground action.
 //!
-//! PDDL 2.1 lets an action start while it runs. Most cannot, because their start requires a fact that it deletes.
-//! A run that starts and ends without a change is redundant. Both are proved by the facts that hold while the
-//! action runs; docs/decisions/self-overlapping-actions.md has the arguments.
+//! PDDL 2.1 lets an action start while it runs. Most cannot, because their start requires a fact
+//! that it deletes. A run that starts and ends without a change is redundant. Both are proved by
+//! the facts that hold while the action runs; docs/decisions/self-overlapping-actions.md has the
+//! arguments.
 
 use std::collections::BTreeMap;
 
@@ -16,10 +17,11 @@ use crate::concurrent::happening::{Happening, Instance, Role};
 use crate::concurrent::relevant_effects::{Change, RelevanceContext, asked, change, needed};
 use crate::concurrent::split::UNDER_WAY;
 
-/// How often it is asked again what follows for others.
+/// Rounds of the fixpoint computation. A bound for one instance can improve the bounds of others.
 const FIXPOINT_ROUNDS: usize = 2;
 
-/// Sets for each instance how many runs at a time can make a difference, and the fact that it is under way where that is more than one.
+/// Sets the number of simultaneous runs of each instance that can be useful, and the fact that it
+/// is running if there can be several.
 pub(super) fn bound_self_overlap(
     task: &Task,
     happenings: &[Happening],
@@ -27,46 +29,47 @@ pub(super) fn bound_self_overlap(
     separation: Int,
     limits: &Limits,
 ) -> Result<(), Interrupted> {
-    for own in &mut *instances {
-        own.under_way = under_way(task, own);
+    for instance in &mut *instances {
+        instance.under_way = under_way(task, instance);
     }
-    let known = instances.to_vec();
-    let index = Index::new(task, happenings, &known);
-    let mut left = MAX_PAIR_CHECKS;
-    for own in limits.watch(&mut *instances) {
-        let own = own?;
-        // Other atoms of its variable are false, and the start requires one of them: that is how such variables come about.
+    let snapshot = instances.to_vec();
+    let index = Index::new(task, happenings, &snapshot);
+    let mut work_left = MAX_PAIR_CHECKS;
+    for instance in limits.watch(&mut *instances) {
+        let instance = instance?;
+        // With two values the variable belongs to this instance alone. Otherwise its other atoms
+        // are false while it runs, and the start requires one of them, so runs exclude each other.
         let is_alone = |fact: Fact| task.variables[fact.variable.index()].values.len() == 2;
-        let is_single =
-            !own.under_way.is_some_and(is_alone) || index.excludes_itself(own, &mut left) == Some(true);
-        own.most = if is_single { 1 } else { u32::MAX };
+        let is_single = !instance.under_way.is_some_and(is_alone)
+            || index.excludes_itself(instance, &mut work_left) == Some(true);
+        instance.most = if is_single { 1 } else { u32::MAX };
     }
-    let (needed, asked) = (needed(task), asked(task, &known));
+    let (needed, read_facts) = (needed(task), asked(task, &snapshot));
     for _ in 0..FIXPOINT_ROUNDS {
-        let most: Vec<u32> = instances.iter().map(|own| own.most).collect();
-        let known = RelevanceContext { most: &most, separation, needed: &needed, asked: &asked };
-        for own in limits.watch(&mut *instances) {
-            let own = own?;
-            if own.most > 1
-                && let Some(bound) = index.most(own, &known, &mut left)
+        let most: Vec<u32> = instances.iter().map(|instance| instance.most).collect();
+        let relevance = RelevanceContext { most: &most, separation, needed: &needed, asked: &read_facts };
+        for instance in limits.watch(&mut *instances) {
+            let instance = instance?;
+            if instance.most > 1
+                && let Some(bound) = index.most(instance, &relevance, &mut work_left)
             {
-                own.most = own.most.min(bound);
+                instance.most = instance.most.min(bound);
             }
         }
-        if instances.iter().zip(&most).all(|(own, most)| own.most == *most) {
+        if instances.iter().zip(&most).all(|(instance, most)| instance.most == *most) {
             break;
         }
     }
-    let known = RelevanceContext { most: &[], separation, needed: &needed, asked: &[] };
-    for own in instances {
-        own.under_way = own.under_way.filter(|_| own.most > 1);
-        own.counts_by_end =
-            own.under_way.is_some_and(|under_way| counts_by_end(task, own, under_way, &known));
+    let relevance = RelevanceContext { most: &[], separation, needed: &needed, asked: &[] };
+    for instance in instances {
+        instance.under_way = instance.under_way.filter(|_| instance.most > 1);
+        instance.counts_by_end =
+            instance.under_way.is_some_and(|under_way| counts_by_end(task, instance, under_way, &relevance));
     }
     Ok(())
 }
 
-/// The fact that an instance is under way.
+/// Fact that an instance is running.
 fn under_way(task: &Task, own: &Instance) -> Option<Fact> {
     let name = |fact: &Fact| &task.variables[fact.variable.index()].values[fact.value as usize];
     let required = &task.operators[own.end.index()].condition.facts;
@@ -77,7 +80,7 @@ fn clashes(fact: Fact, others: &[Fact]) -> bool {
     others.iter().any(|other| other.variable == fact.variable && other.value != fact.value)
 }
 
-/// What can happen while runs of an instance are under way.
+/// Context: happenings during a run of an instance.
 #[derive(Clone, Copy)]
 struct Inside<'i> {
     own: &'i Instance,
@@ -86,7 +89,8 @@ struct Inside<'i> {
 }
 
 impl Index<'_> {
-    /// Whether no run can start while another one is under way. None if that takes too long to find out.
+    /// Returns `true` if no run can start during another one. Returns `None` if the work limit is
+    /// reached.
     fn excludes_itself(&self, own: &Instance, left: &mut usize) -> Option<bool> {
         let invariant = self.invariant(own, true, left)?;
         if self.excludes(&invariant, own, own.start) {
@@ -97,7 +101,7 @@ impl Index<'_> {
             return Some(false);
         }
         for fact in &start.effects {
-            let required = start.condition.facts.iter().find(|own| own.variable == fact.variable);
+            let required = start.condition.facts.iter().find(|condition| condition.variable == fact.variable);
             let Some(required) = required.filter(|required| required.value != fact.value) else { continue };
             if !self.is_reached(own, &invariant, (*fact, required.value), left)? {
                 return Some(true);
@@ -106,7 +110,8 @@ impl Index<'_> {
         Some(false)
     }
 
-    /// Whether others can bring a variable from a value that the start has set to another one.
+    /// Returns `true` if other happenings can change a variable from the value that the start has
+    /// set to `to`.
     fn is_reached(
         &self,
         own: &Instance,
@@ -142,16 +147,17 @@ impl Index<'_> {
         Some(reached.contains(&to))
     }
 
-    /// How many runs at a time can make a difference; none if that is not known, or takes too long to find out.
+    /// Number of simultaneous runs that can be useful. Returns `None` if no bound is known or the
+    /// work limit is reached.
     fn most(&self, own: &Instance, known: &RelevanceContext<'_>, left: &mut usize) -> Option<u32> {
         let [start, end] = [own.start, own.end].map(|id| &self.task.operators[id.index()]);
         if own.is_chosen || ![start, end].into_iter().all(is_plain) {
             return None;
         }
-        let mut numbers = Vec::new();
+        let mut assigned = Vec::new();
         for effect in end.numeric_effects.iter().filter(|effect| !is_timer(own, effect.variable)) {
             match change(effect) {
-                Some(Change::Sets(value)) => numbers.push((effect.variable, value)),
+                Some(Change::Sets(value)) => assigned.push((effect.variable, value)),
                 _ if known.is_loss(effect) => {}
                 _ => return None,
             }
@@ -164,7 +170,8 @@ impl Index<'_> {
         let [starts, ends] = [start, end].map(|operator| -> Vec<Fact> {
             operator.effects.iter().filter(|fact| fact.variable != under_way).copied().collect()
         });
-        // The one that ends first takes away what the other one needs all along: they start and end together, and one does for both.
+        // The run that ends first deletes a fact that the other one needs over all. So they start
+        // and end together, and one run has the effect of both.
         if ends.iter().any(|fact| clashes(*fact, &alone.over_all)) {
             return Some(1);
         }
@@ -180,50 +187,53 @@ impl Index<'_> {
         }
         let set = known.relevant_effects(&starts);
         let inside = Inside { own, invariant: &invariant, known };
-        let mut all: Int = 1;
-        for (facts, numbers) in [(&set, &[][..]), (&wanted, &numbers)] {
+        let mut bound: Int = 1;
+        for (facts, assigned) in [(&set, &[][..]), (&wanted, &assigned)] {
             let facts: Vec<Fact> =
                 facts.iter().filter(|fact| !hidden.contains(&fact.variable)).copied().collect();
-            let undoing = self.undoing(inside, (&facts, numbers), left)?;
-            all = all.saturating_add(self.times_together(inside, undoing, left)?);
+            let undoing = self.undoing(inside, (&facts, assigned), left)?;
+            bound = bound.saturating_add(self.times_together(inside, undoing, left)?);
         }
-        // Ends of earlier runs undo what starts have set: then it is known only that two runs, the first of all that overlap, need not do so.
+        // Ends of earlier runs undo effects of starts. Then it is only proved that two runs, the
+        // first ones that overlap, need not overlap.
         let is_cut = set.iter().any(|fact| clashes(*fact, &ends) && !hidden.contains(&fact.variable));
-        u32::try_from(all).ok().filter(|all| *all == 1 || !is_cut)
+        u32::try_from(bound).ok().filter(|bound| *bound == 1 || !is_cut)
     }
 
-    /// The happenings of others that undo effects while a run is under way.
+    /// Happenings of other instances that undo effects during a run.
     fn undoing(
         &self,
         Inside { own, invariant, known }: Inside<'_>,
-        (facts, numbers): (&[Fact], &[(NumericId, Int)]),
+        (facts, assigned): (&[Fact], &[(NumericId, Int)]),
         left: &mut usize,
     ) -> Option<FxHashSet<OperatorId>> {
-        let mut all = FxHashSet::default();
+        let mut operators = FxHashSet::default();
         for fact in facts {
             *left = left.checked_sub(self.setting(own, fact.variable).count())?;
-            all.extend(self.setting(own, fact.variable).filter(|id| self.changes(*id, *fact)));
+            operators.extend(self.setting(own, fact.variable).filter(|id| self.changes(*id, *fact)));
         }
-        for (number, value) in numbers {
+        for (number, value) in assigned {
             *left = left.checked_sub(self.changing(own, *number).count())?;
-            all.extend(self.changing(own, *number).filter(|id| {
+            operators.extend(self.changing(own, *number).filter(|id| {
                 let mut effects = self.task.operators[id.index()].numeric_effects.iter();
                 effects.any(|effect| effect.variable == *number && !known.keeps(effect, *value))
             }));
         }
-        all.retain(|id| !self.is_outside(invariant, own, *id));
-        Some(all)
+        operators.retain(|id| !self.is_outside(invariant, own, *id));
+        Some(operators)
     }
 
-    /// How often happenings can take place in less time than a run takes, all of them together; none if there is no such bound. Of those that are good for the
-    /// same facts only, the first one makes a difference, and one after each happening that undoes it: a plan is no worse without the others.
+    /// Upper bound on the total number of occurrences of some happenings during a run. Returns
+    /// `None` if there is no bound. Among happenings that only serve the same facts, only the first
+    /// one is useful, and one after each happening that undoes the facts; a plan without the others
+    /// is no worse.
     fn times_together(
         &self,
         inside: Inside<'_>,
         happenings: FxHashSet<OperatorId>,
         left: &mut usize,
     ) -> Option<Int> {
-        let mut all: Int = 0;
+        let mut total: Int = 0;
         let mut groups: BTreeMap<Vec<Fact>, Option<Int>> = BTreeMap::new();
         for id in happenings {
             let times = self.times(id, inside.own, inside.known);
@@ -231,12 +241,12 @@ impl Index<'_> {
                 let sum = groups.entry(facts).or_insert(Some(0));
                 *sum = sum.zip(times).map(|(sum, times)| sum.saturating_add(times));
             } else {
-                all = all.saturating_add(times?);
+                total = total.saturating_add(times?);
             }
         }
         for (facts, times) in groups {
             let undoing = self.undoing(inside, (&facts, &[]), left)?;
-            // Runs of the instance itself may be any number.
+            // The number of runs of the instance itself is not bounded.
             let is_undone = facts
                 .iter()
                 .any(|fact| [inside.own.start, inside.own.end].iter().any(|id| self.changes(*id, *fact)));
@@ -246,38 +256,40 @@ impl Index<'_> {
                     Some(sum.saturating_add(self.times(id, inside.own, inside.known)?))
                 })
             });
-            all = all.saturating_add(match (times, again) {
+            total = total.saturating_add(match (times, again) {
                 (Some(times), Some(again)) => times.min(again),
                 (times, again) => times.or(again)?,
             });
         }
-        Some(all)
+        Some(total)
     }
 
-    /// The facts that a run is good for whose end a happening is; none if it is good for anything else.
+    /// Facts served by the run that a happening ends. Returns `None` if the run serves any other
+    /// purpose.
     fn purpose(&self, id: OperatorId, known: &RelevanceContext<'_>) -> Option<Vec<Fact>> {
         let Role::End(instance) = self.happenings[id.index()].role else { return None };
-        let other = &self.instances[instance as usize];
-        let [start, end] = [other.start, other.end].map(|id| &self.task.operators[id.index()]);
+        let instance = &self.instances[instance as usize];
+        let [start, end] = [instance.start, instance.end].map(|id| &self.task.operators[id.index()]);
         let wanted = |operator: &Operator| -> Vec<Fact> {
-            // One of two values only says that it is under way.
+            // A fact of a variable with two values only marks the instance as running.
             let is_own = |fact: &Fact| {
                 let is_alone = self.task.variables[fact.variable.index()].values.len() == 2;
-                is_alone && other.under_way.is_some_and(|own| own.variable == fact.variable)
+                is_alone && instance.under_way.is_some_and(|running| running.variable == fact.variable)
             };
             known.relevant_effects(&operator.effects).into_iter().filter(|fact| !is_own(fact)).collect()
         };
-        let is_good_for_facts = !other.is_chosen
+        let is_good_for_facts = !instance.is_chosen
             && [start, end].into_iter().all(is_plain)
             && wanted(start).is_empty()
             && [start, end]
                 .into_iter()
                 .flat_map(|operator| &operator.numeric_effects)
-                .all(|effect| is_timer(other, effect.variable) || known.is_loss(effect));
+                .all(|effect| is_timer(instance, effect.variable) || known.is_loss(effect));
         is_good_for_facts.then(|| wanted(end))
     }
 
-    /// How often a happening can take place in less time than a run takes, at most; none if there is no such bound, or the time is not known.
+    /// Upper bound on the occurrences of a happening during a run. Returns `None` if there is no
+    /// bound or the duration is not constant.
     fn times(&self, id: OperatorId, own: &Instance, known: &RelevanceContext<'_>) -> Option<Int> {
         let happening = &self.happenings[id.index()];
         let apart = match happening.role {
@@ -295,7 +307,7 @@ impl Index<'_> {
         duration.checked_div(apart)?.checked_add(1)
     }
 
-    /// Whether a run that starts while another one is under way takes as long.
+    /// Returns `true` if a run that starts during another one has the same duration.
     fn lasts_as_long(&self, own: &Instance, start: &Operator, invariant: &Invariant) -> bool {
         start.numeric_effects.iter().all(|effect| {
             let mut numbers =
@@ -304,7 +316,7 @@ impl Index<'_> {
         })
     }
 
-    /// Whether nothing else has to do with a variable as long as a run is under way.
+    /// Returns `true` if no other happening reads or sets a variable during a run.
     fn is_hidden(
         &self,
         own: &Instance,
@@ -316,7 +328,7 @@ impl Index<'_> {
         let is_derived_from = task.axioms.iter().flat_map(|layer| &layer.rules).any(|rule| {
             let facts = rule.body.facts.iter().map(|fact| fact.variable);
             let clauses = rule.body.clauses.iter().flatten().map(|literal| literal.fact.variable);
-            facts.chain(clauses).any(|own| own == variable)
+            facts.chain(clauses).any(|candidate| candidate == variable)
         });
         let mut operators = OperatorId::all(task.operators.len());
         !is_derived_from
@@ -339,22 +351,24 @@ impl Index<'_> {
     }
 }
 
-/// Whether a happening reads or sets a variable.
+/// Returns `true` if a happening reads or sets a variable.
 fn mentions(operator: &Operator, variable: VariableId) -> bool {
     let facts = operator.condition.facts.iter().chain(&operator.effects);
     let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
     let conditions = operator.conditional.iter().flat_map(|effect| &effect.condition);
     let literals = operator.condition.clauses.iter().flatten().chain(conditions);
-    let all = facts.chain(conditional).copied().chain(literals.map(|literal| literal.fact));
-    all.into_iter().any(|fact| fact.variable == variable)
+    let facts = facts.chain(conditional).copied().chain(literals.map(|literal| literal.fact));
+    facts.into_iter().any(|fact| fact.variable == variable)
 }
 
-/// Whether the effects of a happening on facts do not depend on the state, and it earns nothing.
+/// Returns `true` if the propositional effects of a happening are unconditional and its cost is not
+/// negative.
 fn is_plain(operator: &Operator) -> bool {
     operator.conditional.is_empty() && operator.cost.tables.is_empty() && operator.cost.constant >= 0
 }
 
-/// Whether only the end of a run changes anything that somebody may need, and another end does the same again.
+/// Returns `true` if only the end of a run has relevant effects, and repeating the end has no
+/// further effect.
 fn counts_by_end(task: &Task, own: &Instance, under_way: Fact, known: &RelevanceContext<'_>) -> bool {
     let [start, end] = [own.start, own.end].map(|id| &task.operators[id.index()]);
     let starts = known.relevant_effects(&start.effects);
@@ -365,12 +379,12 @@ fn counts_by_end(task: &Task, own: &Instance, under_way: Fact, known: &Relevance
         && assigns_constants(own, end)
 }
 
-/// Whether a number holds how long an instance takes.
+/// Returns `true` if a number holds the duration of an instance.
 fn is_timer(own: &Instance, number: NumericId) -> bool {
     own.timer.is_some_and(|(timer, _)| timer == number)
 }
 
-/// Whether an end sets numbers to what they are after another end, too.
+/// Returns `true` if the end sets all numbers to constants, so that another end changes nothing.
 fn assigns_constants(own: &Instance, end: &Operator) -> bool {
     let is_set = |effect: &NumericEffect| matches!(change(effect), Some(Change::Sets(_)));
     end.numeric_effects.iter().all(|effect| is_timer(own, effect.variable) || is_set(effect))
@@ -384,7 +398,8 @@ mod tests {
     use crate::concurrent::ground_concurrent;
     use task::ground::GroundConfig;
 
-    /// How many runs of `charge` at a time can make a difference. It also does `more`; `pump` needs it, and is good for `p`, which others need to be either way.
+    /// Number of useful simultaneous runs of `charge` with the additional effects `more`. `pump`
+    /// requires a charge and only serves the fact `p`; other actions need `p` both true and false.
     fn charges(more: &str) -> u32 {
         let domain = format!(
             "(define (domain d) (:requirements :durative-actions :fluents) (:predicates (p) (q) (r)) (:functions (battery))
@@ -402,18 +417,18 @@ mod tests {
         let separation = BigRational::new(1.into(), 1000.into());
         let task =
             ground_concurrent(&domain, &problem, &GroundConfig::default(), &separation).expect("a task");
-        let name = |own: &super::Instance| {
-            let schema = task.task.operators[own.start.index()].schema;
+        let name = |instance: &super::Instance| {
+            let schema = task.task.operators[instance.start.index()].schema;
             task.task.schema_names[schema as usize].as_str()
         };
-        let charge = task.instances.iter().find(|own| name(own) == "charge").expect("an instance");
+        let charge = task.instances.iter().find(|instance| name(instance) == "charge").expect("an instance");
         charge.most
     }
 
     #[test]
-    fn what_is_good_for_one_fact_undoes_once_unless_the_runs_undo_it_themselves() {
+    fn an_action_that_serves_one_fact_undoes_an_effect_once_unless_the_runs_undo_the_fact() {
         assert_eq!(charges(""), 2);
-        // Each end lets the pump make a difference again: no bound is known.
+        // Each end makes another `pump` useful, so no bound is known.
         assert_eq!(charges("(at end (not (p)))"), u32::MAX);
     }
 }

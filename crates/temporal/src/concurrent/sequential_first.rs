@@ -1,11 +1,12 @@
-//! Sequential plans, moved to the earliest times: the first plan of a task that does not require overlap, and an
-//! upper bound on the cost of a best plan for all other tasks.
+//! Sequential plans, moved to the earliest times: the first plan of a task that does not require
+//! overlap, and an upper bound on the cost of a best plan for all other tasks.
 //!
-//! These plans solve the task in which actions do not overlap. Searches for that task are better informed: it has
-//! fewer variables with more values, landmarks, mutexes and interchangeable objects. Each resulting sequence is
-//! executed like any other sequence, so that its actions overlap where they can. So every plan that is returned is
-//! one of the overlapping task. A sequence that is not, for example because a timed initial literal would interrupt
-//! an action, is dropped.
+//! These plans solve the task in which actions do not overlap. Searches for that task are better
+//! informed: it has fewer variables with more values, landmarks, mutexes and interchangeable
+//! objects. Each resulting sequence is executed like any other sequence, so that its actions
+//! overlap where they can. So every plan that is returned is one of the overlapping task. A
+//! sequence that is not, for example because a timed initial literal would interrupt an action, is
+//! dropped.
 
 use std::cell::OnceCell;
 
@@ -29,30 +30,30 @@ use crate::concurrent::search::Sequence;
 use crate::concurrent::successors::{Expansion, TemporalState};
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// Tasks with more operators are not ground twice.
+/// Tasks with more operators are not ground a second time.
 const OPERATORS: usize = 100_000;
 
-/// For each situation of the greedy search, what the search by estimates goes through, in nodes and propositions, and how many states the
-/// other one stores.
+/// Work per evaluation of the greedy search: work units of the satisficing search, and stored
+/// states of the optimal search.
 const WORK: u64 = 1_000;
 const STATES: usize = 4;
-/// That one ends with so many states.
+/// Maximum number of states of the optimal search.
 const MOST_STATES: usize = 1_000_000;
 
-/// A name of an action, and its arguments.
+/// Name and arguments of an action.
 type Call = (String, Vec<String>);
 
-/// The task of actions one after another.
+/// The task in which actions do not overlap.
 pub(super) struct SequentialTask {
     task: Task,
-    /// The happenings with which an action begins.
+    /// Start happenings of each action.
     begins: FxHashMap<Call, Vec<OperatorId>>,
-    /// What the search for a best plan goes by, from its first turn on.
+    /// Heuristics and successor data of the optimal search, computed on first use.
     parts: OnceCell<Option<(Bounds, SearchTask)>>,
 }
 
 impl SequentialTask {
-    /// None if there is no such task, or if it is large.
+    /// Returns `None` if there is no such task or it is too large.
     pub(super) fn new(concurrent: &TemporalTask, limits: &Limits) -> Option<Self> {
         let split = &concurrent.task;
         if split.operators.len() > OPERATORS {
@@ -79,7 +80,8 @@ impl SequentialTask {
         Some(SearchProblem { context, bounds, prepared, orbits: None })
     }
 
-    /// The sequence of a plan; none if it cannot be executed, or if its metric does not fit.
+    /// Happenings of a sequential plan. Returns `None` if they cannot be executed or the metric
+    /// overflows.
     fn sequence(
         &self,
         concurrent: &TemporalTask,
@@ -101,24 +103,24 @@ impl SequentialTask {
                 }
                 continue;
             }
-            // What is violated in the end is found by looking at the last state.
+            // Violated preferences are determined from the final state instead.
             if is_hidden(&self.task.schema_names[operator.schema as usize]) {
                 continue;
             }
             let begins = self.begins.get(&call(&self.task, operator, &step.choice))?;
             let mut executed = begins.iter().filter_map(|begin| {
-                let mut own = Links::new();
+                let mut action_links = Links::new();
                 let mut happen = |situation: &TemporalState, id| {
-                    Mode::Sequential.apply_happening(concurrent, expansion, situation, id, &mut own)
+                    Mode::Sequential.apply_happening(concurrent, expansion, situation, id, &mut action_links)
                 };
                 let mut next = happen(&situation, *begin)?;
                 if !next.clocks.opens().is_empty() {
                     next = happen(&next, concurrent.end_of(*begin))?;
                 }
-                Some((next, own))
+                Some((next, action_links))
             });
-            let (next, own) = executed.next()?;
-            links.extend(own);
+            let (next, action_links) = executed.next()?;
+            links.extend(action_links);
             situation = next;
         }
         let value = concurrent.value(&situation).filter(|_| expansion.is_goal(&situation))?;
@@ -131,20 +133,21 @@ fn call(task: &Task, operator: &Operator, choice: &[u32]) -> Call {
     (task.schema_names[operator.schema as usize].clone(), arguments(task, operator, choice))
 }
 
-/// Searches for a plan of actions one after another: by estimates, and for a best one, which is quicker where estimates lead astray.
+/// Searches for sequential plans: satisficing search and optimal search. The latter is faster if
+/// the heuristics are misleading.
 pub(super) struct SequentialPlanner<'w> {
     whole: &'w SequentialTask,
     limits: &'w Limits,
     satisficer: Option<Satisficer<'w, Int>>,
     exact: Exact<'w>,
-    /// How many states the latter may store by now.
+    /// Number of states that the optimal search may store by now.
     stored: usize,
     /// Lowest known cost of a plan without overlap.
     known: Option<Int>,
 }
 
 enum Exact<'w> {
-    /// Its bounds may take longer than a plan.
+    /// The search has not begun. Computing its heuristics may take longer than finding a plan.
     Later,
     Begun(Box<InterleavedSearch<'w, Int, Bounds>>),
     Over,
@@ -156,20 +159,20 @@ impl<'w> SequentialPlanner<'w> {
         Self { whole, limits, satisficer, exact: Exact::Later, stored: 0, known: None }
     }
 
-    /// Continues both searches for as much work as `situations` of the greedy search are worth. Returns the better one of their plans whose sequences can
-    /// be executed.
+    /// Resumes both searches for the work of `situations` evaluations of the greedy search. Returns
+    /// the better of their executable plans.
     pub(super) fn run(
         &mut self,
         of: (&TemporalTask, &Expansion<'_>),
         situations: usize,
         statistics: &mut Statistics,
     ) -> Option<Sequence> {
-        let some = self.estimate(of, situations, statistics);
+        let satisficing_plan = self.estimate(of, situations, statistics);
         if self.limits.reached() {
-            return some;
+            return satisficing_plan;
         }
         let best = self.search(of, situations, statistics);
-        some.into_iter().chain(best).min_by_key(|sequence| sequence.value)
+        satisficing_plan.into_iter().chain(best).min_by_key(|sequence| sequence.value)
     }
 
     fn estimate(
@@ -210,15 +213,15 @@ impl<'w> SequentialPlanner<'w> {
         let Exact::Begun(exact) = &mut self.exact else { return None };
         self.stored = self.stored.saturating_add(STATES.saturating_mul(situations));
         let before = exact.figures();
-        let found = exact.run(self.stored, &mut |_, _| {});
+        let outcome = exact.run(self.stored, &mut |_, _| {});
         exact.figures().add_to(before, statistics);
-        let plan = match &found {
+        let plan = match &outcome {
             Some(SearchOutcome::Optimal(plan)) => Some(plan.clone()),
             Some(SearchOutcome::Unknown(plan)) => plan.clone(),
             Some(SearchOutcome::None) => None,
             None => exact.best_plan(),
         };
-        if found.is_some() || self.stored > MOST_STATES {
+        if outcome.is_some() || self.stored > MOST_STATES {
             self.exact = Exact::Over;
         }
         plan.and_then(|plan| self.whole.sequence(concurrent, expansion, &plan))

@@ -1,14 +1,15 @@
 //! The temporal part of a search node: an incrementally propagated simple temporal network \[1\].
 //!
-//! The times of a sequence of happenings and the constraints between them form a simple temporal network. Later
-//! happenings only add lower bounds: not before a time, and not within the separation of a time. The network
-//! therefore keeps, for each kind of access to each atom, only the latest time as a lower bound. Starts of
-//! running actions are *time points* that can still be delayed, together with the happenings that depend on
-//! them, so that an end meets its constraints. An end fixes its time point at the earliest possible time.
-//! Happenings that do not interfere are not ordered by their position in the sequence \[2\].
+//! The times of a sequence of happenings and the constraints between them form a simple temporal
+//! network. Later happenings only add lower bounds: not before a time, and not within the
+//! separation of a time. The network therefore keeps, for each kind of access to each atom, only
+//! the latest time as a lower bound. Starts of running actions are *time points* that can still be
+//! delayed, together with the happenings that depend on them, so that an end meets its constraints.
+//! An end fixes its time point at the earliest possible time. Happenings that do not interfere are
+//! not ordered by their position in the sequence \[2\].
 //!
-//! Times are sums over the happenings of a sequence: fewer than 2^32 terms, each below 2^91 (a duration plus the
-//! separation). Missing upper bounds (`Int::MAX`) take no part in arithmetic.
+//! Times are sums over the happenings of a sequence: fewer than 2^32 terms, each below 2^91 (a
+//! duration plus the separation). Missing upper bounds (`Int::MAX`) take no part in arithmetic.
 //!
 //! \[1\] R. Dechter, I. Meiri, J. Pearl: Temporal constraint networks, Artificial Intelligence 49, 1991.
 //! \[2\] A. Coles, A. Coles, M. Fox, D. Long: Forward-chaining partial-order planning, ICAPS 2010.
@@ -23,43 +24,46 @@ use crate::concurrent::time::{TimeExpression, TimePoint, place};
 /// A kind of access to an atom or a number.
 pub(super) type Key = u32;
 
-/// The start of an action under way: at its float and this much later.
+/// A running action. It starts `offset` after its time point.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct RunningAction {
     pub(super) instance: u32,
     pub(super) float: TimePoint,
     pub(super) offset: Int,
     pub(super) duration: Int,
-    /// Of an action with a condition over all that several happenings can keep up together: the last of them.
+    /// For an action whose condition over all several happenings can maintain jointly: time of the
+    /// last such happening.
     last: Option<TimeExpression>,
 }
 
 #[derive(Debug, Clone)]
 struct Start {
     lower: TimeExpression,
-    /// The start is not after this.
+    /// Upper bound on the start.
     upper: Int,
 }
 
-/// The times that matter in a node of the search.
+/// The simple temporal network of a search node.
 #[derive(Debug, Clone)]
 pub(super) struct SimpleTemporalNetwork {
-    /// Ascending by key.
+    /// Latest access per kind, sorted by key.
     entries: Vec<(Key, TimeExpression)>,
-    /// When variables got their values, ascending by variable; those of the initial state have no entry.
+    /// Time at which each variable got its value, sorted by variable. Variables that kept their
+    /// initial value have no entry.
     changed: Vec<(u32, TimeExpression)>,
     floats: Vec<Start>,
-    /// Ascending by instance; of one instance in the order in which its runs have started, and end.
+    /// Sorted by instance; runs of one instance in the order of their starts, which is also the
+    /// order of their ends.
     opens: Vec<RunningAction>,
-    /// The time at which all must happen until each condition over all holds again.
+    /// Time at which all further happenings take place until every condition over all holds again.
     group: Option<(TimePoint, Int)>,
-    /// Negative if nothing has happened.
+    /// Time of the last happening; negative without happenings.
     latest: TimeExpression,
-    /// The time of the last timed initial literals; negative before.
+    /// Time of the last timed initial literals; negative before the first ones.
     floor: Int,
 }
 
-/// Whether a happening is a start, an end, or both.
+/// Kind of a happening: start, end, or both at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
     Start,
@@ -67,32 +71,33 @@ pub(super) enum Kind {
     Whole,
 }
 
-/// A happening, as far as its time is concerned.
+/// Temporal constraints of a happening.
 pub(super) struct Happening<'h> {
     pub(super) kind: Kind,
     pub(super) instance: u32,
-    /// Of the instance, if it starts.
+    /// Duration of the instance, if it starts.
     pub(super) duration: Int,
-    /// It lies this much after the last access of these kinds.
+    /// Required distance after the last access of each kind.
     pub(super) after: &'h [(Key, Int)],
     pub(super) marks: &'h [Key],
-    /// Whether the instance has a condition over all that several happenings can keep up together.
+    /// Whether the instance has a condition over all that several happenings can maintain jointly.
     pub(super) joint: bool,
-    /// Whether this happening writes what such a condition of an instance reads.
+    /// Returns `true` if the happening writes an atom or number that such a condition of the given
+    /// instance reads.
     pub(super) touches: &'h dyn Fn(u32) -> bool,
-    /// The variables that get another value.
+    /// Variables whose value changes.
     pub(super) changes: &'h [u32],
     /// Whether every condition over all holds afterwards.
     pub(super) settled: bool,
 }
 
-/// Timed initial literals, as far as their time is concerned.
+/// Temporal constraints of timed initial literals.
 pub(super) struct Event<'h> {
     pub(super) time: Int,
-    /// They lie this much after the last access of these kinds.
+    /// Required distance after the last access of each kind.
     pub(super) after: &'h [(Key, Int)],
     pub(super) marks: &'h [Key],
-    /// The variables that get another value.
+    /// Variables whose value changes.
     pub(super) changes: &'h [u32],
     /// Whether every condition over all holds afterwards.
     pub(super) settled: bool,
@@ -103,39 +108,41 @@ impl SimpleTemporalNetwork {
         &self.opens
     }
 
-    /// Whether a condition over all does not hold, and something else must happen at once.
+    /// Returns `true` if some condition over all is violated, so that another happening must follow
+    /// at the same time.
     pub(super) fn unsettled(&self) -> bool {
         self.group.is_some()
     }
 
-    /// How many runs of an instance are under way.
+    /// Number of runs of an instance that are running.
     pub(super) fn runs(&self, instance: u32) -> u32 {
         dense(self.opens.iter().filter(|open| open.instance == instance).count())
     }
 
-    /// The time of the last timed initial literals; negative before.
+    /// Time of the last timed initial literals; negative before the first ones.
     pub(super) fn floor(&self) -> Int {
         self.floor
     }
 
-    /// Whether timed initial literals took place after everything else, with nothing under way.
+    /// Returns `true` if no action is running and the last timed initial literals took place after
+    /// all other happenings.
     pub(super) fn waits(&self) -> bool {
         self.opens.is_empty() && self.floor > self.latest()
     }
 
-    /// Whether timed initial literals to come lie far enough after the accesses that they interfere with, if everything so far
-    /// happens as early as it can.
+    /// Returns `true` if future timed initial literals are far enough from the accesses that they
+    /// interfere with, provided that all happenings take place as early as possible.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn are_apart(&self, time: Int, after: &[(Key, Int)]) -> bool {
         after.iter().all(|(key, by)| self.entry(*key).is_none_or(|entry| entry.base + by <= time))
     }
 
-    /// Whether everything so far has happened by some time, as nothing of it can be put off.
+    /// Returns `true` if all happenings are at or before `time` and none of them can be delayed.
     pub(super) fn finishes_by(&self, time: Int) -> bool {
         self.latest.lags.is_empty() && self.latest() <= time
     }
 
-    /// When nothing has happened yet.
+    /// Network without happenings.
     pub(super) fn new() -> Self {
         Self {
             entries: Vec::new(),
@@ -148,33 +155,34 @@ impl SimpleTemporalNetwork {
         }
     }
 
-    /// The least time at which everything so far has happened.
+    /// Earliest possible time of the last happening.
     pub(super) fn latest(&self) -> Int {
         self.latest.base.max(0)
     }
 
-    /// The least time at which an action under way has started.
+    /// Earliest possible start of a running action.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn start(&self, open: &RunningAction) -> Int {
         self.floats[place(open.float)].lower.base + open.offset
     }
 
-    /// The least time at which a variable got its value; none if it has had it from the beginning.
+    /// Earliest possible time at which a variable got its value. Returns `None` if it still has its
+    /// initial value.
     pub(super) fn changed(&self, variable: u32) -> Option<Int> {
         self.change(variable).map(|time| time.base)
     }
 
     fn change(&self, variable: u32) -> Option<&TimeExpression> {
-        let position = self.changed.binary_search_by_key(&variable, |(own, _)| *own).ok()?;
+        let position = self.changed.binary_search_by_key(&variable, |(candidate, _)| *candidate).ok()?;
         Some(&self.changed[position].1)
     }
 
     fn entry(&self, key: Key) -> Option<&TimeExpression> {
-        let position = self.entries.binary_search_by_key(&key, |(own, _)| *own).ok()?;
+        let position = self.entries.binary_search_by_key(&key, |(candidate, _)| *candidate).ok()?;
         Some(&self.entries[position].1)
     }
 
-    /// The clocks after a happening; none if no time is left for it.
+    /// Network after a happening. Returns `None` if the constraints are inconsistent.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn after(&self, happening: &Happening<'_>) -> Option<Self> {
         let mut next = self.clone();
@@ -201,10 +209,10 @@ impl SimpleTemporalNetwork {
                 let end = offset + duration;
                 next.tighten_lower_bound(float, &lower, end)?;
                 match self.group {
-                    Some((other, at)) if other == float => (at == end).then_some((other, at))?,
-                    Some((other, at)) => {
-                        next.merge_time_points(float, other, at - end)?;
-                        (other, at)
+                    Some((target, at)) if target == float => (at == end).then_some((target, at))?,
+                    Some((target, at)) => {
+                        next.merge_time_points(float, target, at - end)?;
+                        (target, at)
                     }
                     None => (float, end),
                 }
@@ -218,7 +226,8 @@ impl SimpleTemporalNetwork {
         Some(next)
     }
 
-    /// The end of the action under way at a position will lie after accesses so far. None if no time is left for it.
+    /// Constrains the end of a running action, given by index, to follow the earlier accesses.
+    /// Returns `None` if that is inconsistent.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn expect_end(&mut self, position: usize, after: &[(Key, Int)]) -> Option<()> {
         let RunningAction { float, offset, duration, .. } = self.opens[position];
@@ -226,13 +235,14 @@ impl SimpleTemporalNetwork {
         let mut lower = TimeExpression::constant(0);
         for (key, by) in after {
             let Some(time) = self.entry(*key) else { continue };
-            let known = &self.floats[place(float)].lower;
-            let is_known = time.base + by - end <= known.base
-                && time.lags.iter().all(|(other, lag)| {
+            let current = &self.floats[place(float)].lower;
+            let is_implied = time.base + by - end <= current.base
+                && time.lags.iter().all(|(source, lag)| {
                     let by = lag + by - end;
-                    (*other == float && by <= 0) || known.lag(*other).is_some_and(|known| by <= known)
+                    (*source == float && by <= 0) || current.lag(*source).is_some_and(|current| by <= current)
                 });
-            if !is_known {
+            // Constraints that are already implied are skipped, because propagation is expensive.
+            if !is_implied {
                 lower.delay_to(time, *by);
             }
         }
@@ -243,7 +253,7 @@ impl SimpleTemporalNetwork {
         }
     }
 
-    /// A moment that is not before `lower`: the one at which all must happen, or a new one.
+    /// Time point for a happening not before `lower`: the time point of the group, or a new one.
     fn moment(&mut self, lower: TimeExpression, group: Option<(TimePoint, Int)>) -> Option<(TimePoint, Int)> {
         if let Some((float, offset)) = group {
             self.tighten_lower_bound(float, &lower, offset)?;
@@ -263,7 +273,7 @@ impl SimpleTemporalNetwork {
         self.opens.insert(position, RunningAction { instance, float, offset, duration, last: None });
     }
 
-    /// The time that lies so much after a float.
+    /// Time expression for `offset` after a time point.
     fn at(&self, float: TimePoint, offset: Int) -> TimeExpression {
         let mut time = self.floats[place(float)].lower.shifted(offset);
         time.put_off_after(float, offset);
@@ -272,7 +282,7 @@ impl SimpleTemporalNetwork {
 
     fn note(&mut self, happening: &Happening<'_>, time: &TimeExpression) {
         for key in happening.marks {
-            match self.entries.binary_search_by_key(key, |(own, _)| *own) {
+            match self.entries.binary_search_by_key(key, |(candidate, _)| *candidate) {
                 Ok(position) => self.entries[position].1.delay_to(time, 0),
                 Err(position) => self.entries.insert(position, (*key, time.clone())),
             }
@@ -286,21 +296,21 @@ impl SimpleTemporalNetwork {
             }
         }
         if happening.kind == Kind::Start && happening.joint {
-            let mut own = self.opens.iter_mut().rev();
-            let started = own.find(|open| open.instance == happening.instance);
-            started.expect("invariant: it has just started").last = Some(time.clone());
+            let mut newest_first = self.opens.iter_mut().rev();
+            let running = newest_first.find(|open| open.instance == happening.instance);
+            running.expect("invariant: it has just running").last = Some(time.clone());
         }
         self.latest.delay_to(time, 0);
     }
 
     fn set_changed(&mut self, variable: u32, time: TimeExpression) {
-        match self.changed.binary_search_by_key(&variable, |(own, _)| *own) {
+        match self.changed.binary_search_by_key(&variable, |(candidate, _)| *candidate) {
             Ok(position) => self.changed[position].1 = time,
             Err(position) => self.changed.insert(position, (variable, time)),
         }
     }
 
-    /// All times apart from those of the floats.
+    /// All time expressions except those of the time points.
     fn times(&mut self) -> impl Iterator<Item = &mut TimeExpression> {
         let entries = self.entries.iter_mut().map(|(_, time)| time);
         let changed = self.changed.iter_mut().map(|(_, time)| time);
@@ -308,57 +318,61 @@ impl SimpleTemporalNetwork {
         entries.chain(changed).chain(lasts).chain([&mut self.latest])
     }
 
-    /// From now on, so much after a float is not before `lower`. None if that cannot be.
+    /// Constrains `float + offset` to be at least `lower`, and propagates. Returns `None` if that
+    /// is inconsistent.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     fn tighten_lower_bound(&mut self, float: TimePoint, lower: &TimeExpression, offset: Int) -> Option<()> {
         let mut bound = lower.shifted(-offset);
+        // A positive lag of the time point after itself would be a positive cycle.
         if bound.forget(float).is_some_and(|lag| lag > 0) {
             return None;
         }
         let before = bound.clone();
-        for (other, lag) in &before.lags {
-            let mut further = self.floats[place(*other)].lower.shifted(*lag);
+        for (source, lag) in &before.lags {
+            let mut further = self.floats[place(*source)].lower.shifted(*lag);
             if further.forget(float).is_some_and(|lag| lag > 0) {
                 return None;
             }
             bound.delay_to(&further, 0);
         }
         self.floats[place(float)].lower.delay_to(&bound, 0);
-        let own = self.floats[place(float)].lower.clone();
+        let new_bound = self.floats[place(float)].lower.clone();
         for time in self.times() {
             if let Some(lag) = time.lag(float) {
-                time.delay_to(&own, lag);
+                time.delay_to(&new_bound, lag);
             }
         }
         for index in 0..self.floats.len() {
-            let other = &mut self.floats[index];
-            if let Some(lag) = other.lower.lag(float) {
-                let mut further = own.shifted(lag);
+            let dependent = &mut self.floats[index];
+            if let Some(lag) = dependent.lower.lag(float) {
+                let mut further = new_bound.shifted(lag);
                 if further.forget(dense(index)).is_some_and(|lag| lag > 0) {
                     return None;
                 }
-                other.lower.delay_to(&further, 0);
+                dependent.lower.delay_to(&further, 0);
             }
         }
         self.propagate_upper_bounds()
     }
 
-    /// What is before something that has to be before some time has to be before it, too. None if that cannot be.
+    /// Propagates upper bounds backwards along lower bounds. Returns `None` if an upper bound falls
+    /// below a lower bound.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     fn propagate_upper_bounds(&mut self) -> Option<()> {
         for _ in 0..self.floats.len() {
             for index in 0..self.floats.len() {
                 let Start { lower, upper } = self.floats[index].clone();
-                for (other, lag) in lower.lags.iter().filter(|_| upper < Int::MAX) {
-                    let known = &mut self.floats[place(*other)].upper;
-                    *known = (*known).min(upper - lag);
+                for (source, lag) in lower.lags.iter().filter(|_| upper < Int::MAX) {
+                    let source_upper = &mut self.floats[place(*source)].upper;
+                    *source_upper = (*source_upper).min(upper - lag);
                 }
             }
         }
         self.floats.iter().all(|start| start.lower.base <= start.upper).then_some(())
     }
 
-    /// One float is another one and so much more.
+    /// Merges time point `float` into `other`, as `other + by`. Returns `None` if that is
+    /// inconsistent.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     fn merge_time_points(&mut self, float: TimePoint, other: TimePoint, by: Int) -> Option<()> {
         let Start { mut lower, upper } = self.floats[place(float)].clone();
@@ -393,7 +407,8 @@ impl SimpleTemporalNetwork {
         self.propagate_upper_bounds()
     }
 
-    /// Forgets floats that nothing hangs on, and numbers the others in the order of the actions under way.
+    /// Removes time points that no running action or group refers to, and renumbers the others in
+    /// the order of the running actions.
     fn compact(&mut self) {
         let mut order: Vec<TimePoint> = Vec::new();
         for float in self.opens.iter().map(|open| open.float).chain(self.group.map(|(float, _)| float)) {
@@ -413,14 +428,15 @@ impl SimpleTemporalNetwork {
             start.lower.renumber(&numbers);
         }
         self.floats = floats;
-        let renamed = |float: TimePoint| numbers[place(float)].unwrap_or(float);
+        let renumbered = |float: TimePoint| numbers[place(float)].unwrap_or(float);
         for open in &mut self.opens {
-            open.float = renamed(open.float);
+            open.float = renumbered(open.float);
         }
-        self.group = self.group.map(|(float, offset)| (renamed(float), offset));
+        self.group = self.group.map(|(float, offset)| (renumbered(float), offset));
     }
 
-    /// The clocks after timed initial literals: nothing so far was after them, and nothing from now on is before. None if that cannot be.
+    /// Network after timed initial literals: earlier happenings are not after them, later ones not
+    /// before. Returns `None` if that is inconsistent.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn timed(&self, event: &Event<'_>) -> Option<Self> {
         let mut next = self.clone();
@@ -433,7 +449,7 @@ impl SimpleTemporalNetwork {
         let now = TimeExpression::constant(event.time);
         next.floor = event.time;
         for key in event.marks {
-            match next.entries.binary_search_by_key(key, |(own, _)| *own) {
+            match next.entries.binary_search_by_key(key, |(candidate, _)| *candidate) {
                 Ok(position) => next.entries[position].1 = now.clone(),
                 Err(position) => next.entries.insert(position, (*key, now.clone())),
             }
@@ -457,7 +473,7 @@ impl SimpleTemporalNetwork {
         Some(next)
     }
 
-    /// A time is not after some moment. None if that cannot be.
+    /// Constrains a time to be at most `moment`. Returns `None` if that is inconsistent.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     fn bound(&mut self, time: &TimeExpression, moment: Int) -> Option<()> {
         for (float, lag) in &time.lags {

@@ -15,7 +15,7 @@ use crate::concurrent::search::Sequence;
 use crate::concurrent::search_log::Record;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// An answer without a plan.
+/// Solution without a plan.
 pub(super) fn ended(status: Status, proof: Option<Proof>, record: Record<'_>) -> Solution {
     Solution {
         status,
@@ -29,7 +29,7 @@ pub(super) fn ended(status: Status, proof: Option<Proof>, record: Record<'_>) ->
     }
 }
 
-/// A sequence in names, its actions in the order of their starts.
+/// Plan with names, sorted by the starts of its actions.
 pub(super) fn in_names(concurrent: &TemporalTask, sequence: &Sequence) -> Plan {
     let durations = schedule::durations(concurrent, &sequence.happenings);
     let times = schedule::schedule(concurrent, &sequence.happenings, &sequence.together, &durations);
@@ -37,8 +37,8 @@ pub(super) fn in_names(concurrent: &TemporalTask, sequence: &Sequence) -> Plan {
     let last = concurrent.last_state(&sequence.happenings, &sequence.together);
     let violated: Vec<OperatorId> = last.iter().flat_map(|last| concurrent.violated(last)).collect();
     let happenings = sequence.happenings.iter().chain(&violated).map(|id| (*id, &[][..]));
-    let (measured, rest) = measured(&concurrent.task, happenings);
-    // Of the runs of an instance the first one ends first.
+    let (measured, unassigned_cost) = measured(&concurrent.task, happenings);
+    // Runs of an instance end in the order of their starts.
     let mut ends: FxHashMap<OperatorId, VecDeque<_>> = FxHashMap::default();
     for (id, added) in sequence.happenings.iter().zip(&measured) {
         if let Role::End(_) = concurrent.happenings[id.index()].role {
@@ -47,19 +47,20 @@ pub(super) fn in_names(concurrent: &TemporalTask, sequence: &Sequence) -> Plan {
     }
     for (position, ((id, time), duration)) in sequence.happenings.iter().zip(times).zip(durations).enumerate()
     {
-        let mut more = measured[position].clone();
+        let mut measured_cost = measured[position].clone();
         let end = match concurrent.happenings[id.index()].role {
             Role::Start(instance) => {
                 let instance = &concurrent.instances[instance as usize];
                 let added = ends.get_mut(&instance.end).and_then(VecDeque::pop_front);
-                more += added.cloned().unwrap_or_default();
+                measured_cost += added.cloned().unwrap_or_default();
                 concurrent.task.operators[instance.end.index()].cost.constant
             }
             Role::Whole => 0,
             _ => continue,
         };
         let operator = &concurrent.task.operators[id.index()];
-        let cost = Rational::from_integer(operator.cost.constant) + &Rational::from_integer(end) + &more;
+        let cost =
+            Rational::from_integer(operator.cost.constant) + &Rational::from_integer(end) + &measured_cost;
         let cost = if concurrent.task.objective.maximize { -cost } else { cost };
         let [start, duration] = [time, duration].map(Rational::from_integer);
         steps.push(((time, *id), Step::new(&concurrent.task, operator, &[], (start, duration, cost))));
@@ -67,9 +68,10 @@ pub(super) fn in_names(concurrent: &TemporalTask, sequence: &Sequence) -> Plan {
     steps.sort_by_key(|(place, _)| *place);
     let steps = steps.into_iter().map(|(_, step)| step).collect();
     let objective = &concurrent.task.objective;
-    let rest = Exact::scaled(&if objective.maximize { -rest } else { rest }, objective.scale);
+    let unassigned_cost =
+        Exact::scaled(&if objective.maximize { -unassigned_cost } else { unassigned_cost }, objective.scale);
     let cost = concurrent.measure.metric(&Rational::from_integer(sequence.value.0));
-    let mut plan = Plan { steps, cost: cost.plus(&rest) };
+    let mut plan = Plan { steps, cost: cost.plus(&unassigned_cost) };
     plan.note_reconfigured();
     plan
 }

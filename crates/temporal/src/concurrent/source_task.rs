@@ -6,7 +6,7 @@ use pddl::ast::{Domain, Problem};
 
 use task::ground::GroundConfig;
 
-/// Problems with more initial facts and values are not kept.
+/// Maximum number of initial facts and values of a problem that is kept.
 const MAX_INITIAL_FACTS: usize = 20_000;
 
 /// The files of a task.

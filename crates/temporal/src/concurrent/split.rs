@@ -1,9 +1,10 @@
 //! Splits durative actions into starts and ends: a lifted task in which each schema is a single happening.
 //!
-//! A durative action becomes two instantaneous ones, the *snap actions* of Fox and Long \[1\], joined by an atom
-//! that holds while the instance runs. Its condition over all becomes a third schema that never happens; the
-//! condition is checked while the instance runs. An instance of duration 0 is one happening without a condition
-//! over all. Timed initial literals become a sequence of schemas without parameters.
+//! A durative action becomes two instantaneous ones, the *snap actions* of Fox and Long \[1\],
+//! joined by an atom that holds while the instance runs. Its condition over all becomes a third
+//! schema that never happens; the condition is checked while the instance runs. An instance of
+//! duration 0 is one happening without a condition over all. Timed initial literals become a
+//! sequence of schemas without parameters.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.
 
@@ -19,30 +20,30 @@ use task::number::dense;
 use crate::concurrent::duration_fluents::{Timer, depends_on_state};
 use pddl::ast::{Comparison, Name, Span};
 
-/// Which happening of a schema another schema stands for.
+/// Part of an action that a schema of the split task represents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Half {
     Start,
-    /// No happening: what must hold between the start and the end.
+    /// No happening: the condition over all.
     OverAll,
     End,
-    /// All of it at once: an instantaneous action, or one that takes no time.
+    /// The whole action: an instantaneous action, or one of duration 0.
     Whole,
-    /// Timed initial literals, by position.
+    /// Timed initial literals, by index.
     Timed(usize),
-    /// No happening: that the planner can choose how long an instance takes.
+    /// No happening: makes every value of a chosen duration reachable.
     Choice,
-    /// No happening: a condition by which the trajectory of a plan is judged.
+    /// No happening: a condition on the trajectory of a plan.
     Judge,
 }
 
-/// What the names of atoms begin with that say what is under way: no name in a file has a parenthesis.
+/// Prefix of atoms that mark running instances. No name in a file contains a parenthesis.
 pub(super) const UNDER_WAY: &str = "((running) ";
 
-/// Where a schema of the split task comes from.
+/// Origin of a schema of the split task.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Origin {
-    /// The schema of the domain; of no meaning for timed initial literals.
+    /// Schema of the domain; meaningless for timed initial literals.
     pub(super) schema: usize,
     pub(super) half: Half,
 }
@@ -50,25 +51,25 @@ pub(super) struct Origin {
 /// A lifted task that is split into happenings.
 pub(super) struct Split {
     pub(super) lifted: Lifted,
-    /// The schemas as the domain has them.
+    /// Schemas of the domain.
     pub(super) schemas: Vec<Schema>,
-    /// By schema of the split task.
+    /// Origin of each schema of the split task.
     pub(super) origins: Vec<Origin>,
     /// The design parameters of each schema of the split task.
     pub(super) designs: Vec<Vec<SlotParameter>>,
     pub(super) events: Vec<Event>,
-    /// The functions that hold durations.
+    /// Functions that hold durations.
     pub(super) durations: Vec<FunctionId>,
-    /// By schema of the domain, whether the planner chooses how long it takes.
+    /// Per schema of the domain: whether the planner chooses its duration.
     pub(super) chosen: Vec<bool>,
-    /// By schema of the domain, what such a number is divided by.
+    /// Per schema of the domain: divisor of the number that holds its duration.
     pub(super) divisors: Vec<Option<Expression>>,
-    /// Whether no duration was chosen where another one could be better.
+    /// Whether no duration was fixed although another one could be better.
     pub(super) is_exact: bool,
 }
 
-/// Splits a task. `solves` names the predicates that say which design solves which function.
-/// `mentions` says whether the end of the action at a position mentions `?duration`.
+/// Splits a task into happenings. `solves` names the predicates that say which design solves which
+/// function. `mentions` returns `true` if the end of the action at an index mentions `?duration`.
 pub(super) fn split(mut lifted: Lifted, solves: &[Name], mentions: &dyn Fn(u32) -> bool) -> Split {
     let mut schemas = std::mem::take(&mut lifted.schemas);
     let (mut durations, mut divisors, mut chosen) = (Vec::new(), Vec::new(), Vec::new());
@@ -76,8 +77,8 @@ pub(super) fn split(mut lifted: Lifted, solves: &[Name], mentions: &dyn Fn(u32) 
     let (mut origins, mut designs) = (Vec::new(), Vec::new());
     let waited = lifted.time.waited;
     if !events.is_empty() {
-        // A plan lasts until its last action ends, so it does not end with what happens by itself. Any action may be worth its
-        // time then, also one that changes nothing.
+        // A plan ends with its last action, not with timed initial literals. An action without
+        // effects may therefore be useful to delay the end.
         let done = Formula::Literal { positive: false, predicate: waited, terms: Vec::new() };
         let goal = std::mem::replace(&mut lifted.goal, Formula::truth());
         lifted.goal = Formula::And(vec![goal, done]);
@@ -94,7 +95,7 @@ pub(super) fn split(mut lifted: Lifted, solves: &[Name], mentions: &dyn Fn(u32) 
                 *schema = timer.with_end(schema);
             }
         }
-        let own = design_parameters(&lifted, schema, solves);
+        let slot_parameters = design_parameters(&lifted, schema, solves);
         for (half, mut part) in parts(&mut lifted, schema, timer.as_ref()) {
             if !events.is_empty() && matches!(half, Half::End | Half::Whole) {
                 part.end_effects.push(effect(Change::Delete(waited, Vec::new())));
@@ -102,7 +103,7 @@ pub(super) fn split(mut lifted: Lifted, solves: &[Name], mentions: &dyn Fn(u32) 
             part.action = dense(lifted.schemas.len());
             lifted.schemas.push(part);
             origins.push(Origin { schema: index, half });
-            designs.push(own.clone());
+            designs.push(slot_parameters.clone());
         }
     }
     for (index, event) in events.iter().enumerate() {
@@ -122,7 +123,7 @@ fn literal(predicate: PredicateId, terms: &[Term]) -> Formula {
     Formula::Literal { positive: true, predicate, terms: terms.to_vec() }
 }
 
-/// The happenings of a schema.
+/// Happenings of a schema.
 fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Half, Schema)> {
     let instantaneous = |condition: Vec<Formula>, effects: Vec<Effect>| Schema {
         start_condition: Formula::And(condition),
@@ -138,21 +139,21 @@ fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Ha
         let half = if is_hidden(schema.name.as_str()) { Half::Judge } else { Half::Whole };
         return vec![(half, schema.clone())];
     };
-    let known = if let Expression::Number(number) = duration { Some(number) } else { None };
+    let constant = if let Expression::Number(number) = duration { Some(number) } else { None };
     let zero = &Rational::from_integer(0);
     let compare = |comparison| {
         Formula::Compare(comparison, duration.clone(), Expression::Number(zero.clone()), schema.place)
     };
     let choice = timer.and_then(|timer| timer.relaxed_increase(schema));
-    let mut all = Vec::new();
-    if choice.is_none() && known.is_none_or(|known| known == zero) {
+    let mut happenings = Vec::new();
+    if choice.is_none() && constant.is_none_or(|number| number == zero) {
         let condition =
             vec![compare(Comparison::Equal), schema.start_condition.clone(), schema.at_end.clone()];
         let effects = schema.start_effects.iter().chain(&schema.end_effects).cloned().collect();
-        all.push((Half::Whole, instantaneous(condition, effects)));
+        happenings.push((Half::Whole, instantaneous(condition, effects)));
     }
-    if known == Some(zero) {
-        return all;
+    if constant == Some(zero) {
+        return happenings;
     }
     let parameters: Vec<Term> = (0..dense(schema.parameters.len())).map(Term::Parameter).collect();
     let running = symbol(lifted, &format!("(running) {}", schema.name), parameters.len(), true);
@@ -162,45 +163,46 @@ fn parts(lifted: &mut Lifted, schema: &Schema, timer: Option<&Timer>) -> Vec<(Ha
         conjuncts(&schema.over_all).into_iter().filter(|conjunct| !is_static(lifted, conjunct)).collect();
 
     let mut condition = vec![schema.start_condition.clone()];
-    condition.extend((known.is_none() && choice.is_none()).then(|| compare(Comparison::Greater)));
+    condition.extend((constant.is_none() && choice.is_none()).then(|| compare(Comparison::Greater)));
     condition.extend(settled);
     let choice = choice.map(|choice| instantaneous(settled_of(lifted, &condition), vec![choice]));
-    all.extend(choice.map(|choice| (Half::Choice, choice)));
+    happenings.extend(choice.map(|choice| (Half::Choice, choice)));
     let mut effects = schema.start_effects.clone();
     effects.push(effect(Change::Add(running, parameters.clone())));
     effects.extend(timer.and_then(|timer| timer.set(schema)));
     let fixed = schema.duration.clone().filter(|_| timer.is_none());
-    all.push((Half::Start, Schema { duration: fixed, ..instantaneous(condition, effects) }));
+    happenings.push((Half::Start, Schema { duration: fixed, ..instantaneous(condition, effects) }));
 
     let mut condition = vec![literal(running, &parameters), schema.at_end.clone()];
     condition.extend(timer.and_then(|timer| timer.is_set(schema)));
     if !changing.is_empty() {
         let held = symbol(lifted, &format!("held {}", schema.name), parameters.len(), false);
-        let own = [literal(running, &parameters)].into_iter().chain(changing.into_iter().cloned()).collect();
+        let over_all_conjuncts =
+            [literal(running, &parameters)].into_iter().chain(changing.into_iter().cloned()).collect();
         let change = effect(Change::Add(held, parameters.clone()));
-        all.push((Half::OverAll, instantaneous(own, vec![change])));
+        happenings.push((Half::OverAll, instantaneous(over_all_conjuncts, vec![change])));
         condition.push(literal(held, &parameters));
     }
     let mut effects = schema.end_effects.clone();
     effects.push(effect(Change::Delete(running, parameters)));
     effects.extend(timer.map(|timer| timer.clear(schema)));
-    all.push((Half::End, instantaneous(condition, effects)));
-    all
+    happenings.push((Half::End, instantaneous(condition, effects)));
+    happenings
 }
 
-/// What no action changes of some conditions.
+/// Static conjuncts of some conditions.
 fn settled_of(lifted: &Lifted, conditions: &[Formula]) -> Vec<Formula> {
-    let all = conditions.iter().flat_map(conjuncts);
-    all.filter(|conjunct| is_static(lifted, conjunct)).cloned().collect()
+    let conjuncts_of_all = conditions.iter().flat_map(conjuncts);
+    conjuncts_of_all.filter(|conjunct| is_static(lifted, conjunct)).cloned().collect()
 }
 
-/// What happens by itself at one time, after what happened before.
+/// Schema of timed initial literals at one time, after those of earlier times.
 #[expect(clippy::arithmetic_side_effects, reason = "phases are objects, which are held in memory")]
 fn timed(lifted: &Lifted, index: u32, event: &Event) -> Schema {
     let phase = |number: u32| vec![Term::Object(ObjectId(lifted.time.first_phase.0 + number))];
     let mut changes: Vec<(PredicateId, &[ObjectId], bool)> = Vec::new();
     for (predicate, arguments, holds) in &event.changes {
-        changes.retain(|(other, known, _)| (other, *known) != (predicate, arguments));
+        changes.retain(|(changed, objects, _)| (changed, *objects) != (predicate, arguments));
         changes.push((*predicate, arguments, *holds));
     }
     let mut effects: Vec<Effect> = changes
@@ -210,7 +212,7 @@ fn timed(lifted: &Lifted, index: u32, event: &Event) -> Schema {
             effect(if holds { Change::Add(predicate, terms) } else { Change::Delete(predicate, terms) })
         })
         .collect();
-    // A plan without actions ends at 0.
+    // A plan without actions ends at time 0.
     if event.time.is_positive() {
         effects.push(effect(Change::Add(lifted.time.waited, Vec::new())));
     }
@@ -234,7 +236,7 @@ fn timed(lifted: &Lifted, index: u32, event: &Event) -> Schema {
     }
 }
 
-/// A new predicate; `running` if it says what is under way.
+/// Declares a new predicate; `running` if it marks running instances.
 fn symbol(lifted: &mut Lifted, name: &str, arity: usize, running: bool) -> PredicateId {
     let id = PredicateId(dense(lifted.predicates.len()));
     let name = Name::new(name);

@@ -1,7 +1,8 @@
 //! Packed temporal states of the exact search.
 //!
-//! Finite-domain values take as many bits as they need, and times as many bytes. States that can dominate each
-//! other share a *place*: the state, the running actions, and the numbers that are not comparable.
+//! Finite-domain values take as many bits as they need, and times as many bytes. States that can
+//! dominate each other share a *place*: the state, the running actions, and the numbers that are
+//! not comparable.
 
 use std::hash::{Hash, Hasher};
 
@@ -14,23 +15,23 @@ use crate::concurrent::simple_temporal_network::SimpleTemporalNetwork;
 use crate::concurrent::successors::TemporalState;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// Where a finite-domain variable lies among the words of a key.
+/// Position of a finite-domain variable in a packed key.
 struct Field {
     word: usize,
     shift: u32,
     mask: u32,
 }
 
-/// A step of the search.
+/// Parent link of a node.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Origin {
     pub(super) parent: u32,
     pub(super) operator: OperatorId,
-    /// Whether the action has ended as well.
+    /// Whether the end of the action was applied as well.
     pub(super) compressed: bool,
-    /// Whether this takes place at the time of what was before.
+    /// Whether the happening takes place at the time of the previous one.
     pub(super) together: bool,
-    /// How many happenings lead here.
+    /// Number of happenings from the root.
     pub(super) depth: u32,
 }
 
@@ -38,7 +39,7 @@ struct Node {
     place: u32,
     origin: Option<Origin>,
     cost: Int,
-    /// The least time at which everything has happened.
+    /// Earliest possible time of the last happening.
     latest: Int,
     numbers: Box<[Int]>,
     clocks: Box<[u8]>,
@@ -47,18 +48,18 @@ struct Node {
 
 struct Place {
     key: Box<[u32]>,
-    /// The nodes that none dominates.
+    /// Nodes that no other node of the place dominates.
     front: Vec<u32>,
 }
 
-/// How situations are packed.
+/// Packs temporal states.
 pub(super) struct Packing<'a> {
     concurrent: &'a TemporalTask,
     fields: Vec<Field>,
     width: usize,
 }
 
-/// A packed situation.
+/// A packed temporal state.
 pub(super) struct PackedNode {
     values: Box<[u32]>,
     numbers: Box<[Int]>,
@@ -67,14 +68,14 @@ pub(super) struct PackedNode {
 }
 
 impl PackedNode {
-    /// About how many bytes it takes besides itself.
+    /// Approximate heap use in bytes.
     pub(super) fn bytes(&self) -> usize {
         let values = size_of_val(&*self.values).saturating_add(size_of_val(&*self.numbers));
         values.saturating_add(self.clocks.len())
     }
 }
 
-/// Packed situations.
+/// Registry of packed temporal states.
 pub(super) struct Store<'a> {
     concurrent: &'a TemporalTask,
     packing: Packing<'a>,
@@ -84,7 +85,7 @@ pub(super) struct Store<'a> {
     table: HashTable<u32>,
     nodes: Vec<Node>,
     bytes: usize,
-    /// How many pairs of situations were compared.
+    /// Number of pairs of nodes that were compared.
     pub(super) compared: usize,
 }
 
@@ -120,7 +121,7 @@ impl<'a> Packing<'a> {
         words
     }
 
-    /// The state of which these are the values and the numbers.
+    /// State with these values and numbers.
     fn state(&self, words: &[u32], numbers: &[Int]) -> State {
         let task = &self.concurrent.task;
         let mut values = task.initial.values.clone();
@@ -162,7 +163,7 @@ impl<'a> Store<'a> {
         }
     }
 
-    /// About how many bytes are taken.
+    /// Approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         self.bytes
     }
@@ -175,28 +176,28 @@ impl<'a> Store<'a> {
         self.nodes[id as usize].origin
     }
 
-    /// Adds a situation; none if another one dominates it.
+    /// Adds a temporal state. Returns `None` if a stored node dominates it.
     pub(super) fn add(&mut self, situation: &TemporalState, origin: Option<Origin>) -> Option<u32> {
         let key = self.key(situation);
         let hash = hash_of(&key);
         let id = dense(self.nodes.len());
-        let found = self.table.find(hash, |place| self.places[*place as usize].key[..] == key[..]).copied();
-        let place = if let Some(place) = found {
+        let existing_place =
+            self.table.find(hash, |place| self.places[*place as usize].key[..] == key[..]).copied();
+        let place = if let Some(place) = existing_place {
             let mut front = std::mem::take(&mut self.places[place as usize].front);
             self.compared = self.compared.saturating_add(front.len());
-            let mut known = front.iter().map(|known| &self.nodes[*known as usize]);
-            let is_dominated = known.any(|known| self.dominates(known, situation));
+            let mut nodes = front.iter().map(|id| &self.nodes[*id as usize]);
+            let is_dominated = nodes.any(|node| self.dominates(node, situation));
             if !is_dominated {
-                let worse: Vec<bool> = front
-                    .iter()
-                    .map(|known| self.is_worse(&self.nodes[*known as usize], situation))
-                    .collect();
-                for (known, worse) in front.iter().zip(&worse) {
-                    let known = &mut self.nodes[*known as usize];
-                    known.is_dominated = *worse;
+                let worse: Vec<bool> =
+                    front.iter().map(|id| self.is_worse(&self.nodes[*id as usize], situation)).collect();
+                for (id, worse) in front.iter().zip(&worse) {
+                    let node = &mut self.nodes[*id as usize];
+                    node.is_dominated = *worse;
                     if *worse {
-                        self.bytes -= known.clocks.len();
-                        known.clocks = Box::default();
+                        // The network of a dominated node is never needed again.
+                        self.bytes -= node.clocks.len();
+                        node.clocks = Box::default();
                     }
                 }
                 let mut worse = worse.into_iter();
@@ -225,14 +226,14 @@ impl<'a> Store<'a> {
         Some(id)
     }
 
-    /// The situation of a node that is not dominated.
+    /// Temporal state of a node that is not dominated.
     pub(super) fn situation(&self, id: u32) -> TemporalState {
         let node = &self.nodes[id as usize];
         let state = self.packing.state(&self.places[node.place as usize].key, &node.numbers);
         TemporalState { state, clocks: SimpleTemporalNetwork::unpack(&node.clocks), cost: node.cost }
     }
 
-    /// What must be equal where one situation dominates another one.
+    /// Key of a place: the parts that must be equal for one state to dominate another one.
     fn key(&self, TemporalState { state, clocks, .. }: &TemporalState) -> Vec<u32> {
         let mut key = self.packing.values(state);
         clocks.signature(&mut key);
@@ -242,32 +243,34 @@ impl<'a> Store<'a> {
         key
     }
 
-    /// Whether a node is no worse than a situation of the same place.
+    /// Returns `true` if a node dominates a temporal state of the same place.
     fn dominates(&self, node: &Node, TemporalState { state, clocks, cost }: &TemporalState) -> bool {
         let (guards, separation) = (&self.concurrent.guards, self.concurrent.separation);
         node.cost <= *cost
             && node.latest <= clocks.latest()
-            && node.numbers.iter().zip(&state.numbers).all(|(own, other)| own >= other)
+            && node.numbers.iter().zip(&state.numbers).all(|(stored, new)| stored >= new)
             && {
-                let mut own = SimpleTemporalNetwork::unpack_head(&node.clocks);
-                own.clocks.dominates_ignoring_accesses(clocks) && {
-                    own.finish();
-                    own.clocks.accesses_no_later(clocks, guards, separation)
+                // Most comparisons are decided by the head, so the accesses are unpacked only if
+                // necessary.
+                let mut head = SimpleTemporalNetwork::unpack_head(&node.clocks);
+                head.clocks.dominates_ignoring_accesses(clocks) && {
+                    head.finish();
+                    head.clocks.accesses_no_later(clocks, guards, separation)
                 }
             }
     }
 
-    /// Whether a situation of the same place is no worse than a node.
+    /// Returns `true` if a temporal state dominates a node of the same place.
     fn is_worse(&self, node: &Node, TemporalState { state, clocks, cost }: &TemporalState) -> bool {
         let (guards, separation) = (&self.concurrent.guards, self.concurrent.separation);
         node.cost >= *cost
             && node.latest >= clocks.latest()
-            && node.numbers.iter().zip(&state.numbers).all(|(own, other)| own <= other)
+            && node.numbers.iter().zip(&state.numbers).all(|(stored, new)| stored <= new)
             && {
-                let mut other = SimpleTemporalNetwork::unpack_head(&node.clocks);
-                clocks.dominates_ignoring_accesses(&other.clocks) && {
-                    other.finish();
-                    clocks.accesses_no_later(&other.clocks, guards, separation)
+                let mut head = SimpleTemporalNetwork::unpack_head(&node.clocks);
+                clocks.dominates_ignoring_accesses(&head.clocks) && {
+                    head.finish();
+                    clocks.accesses_no_later(&head.clocks, guards, separation)
                 }
             }
     }

@@ -5,7 +5,7 @@ use task::lifted::{Formula, Lifted};
 use crate::concurrent::duration_fluents::depends_on_state;
 use pddl::ast::Comparison;
 
-/// Whether some comparison of numbers that actions change is strict.
+/// Returns `true` if a comparison of fluents is strict.
 pub(super) fn compares_strictly(lifted: &Lifted) -> bool {
     let schemas = lifted.schemas.iter().flat_map(|schema| {
         let effects = schema.start_effects.iter().chain(&schema.end_effects);

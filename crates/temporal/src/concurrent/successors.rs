@@ -9,31 +9,33 @@ use crate::concurrent::interference::InterferenceConstraints;
 use crate::concurrent::simple_temporal_network::{self, Kind, SimpleTemporalNetwork};
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// More runs of an instance at a time are not looked for: where so many can make a difference, and where no bound is known.
+/// Limit on the number of simultaneous runs of an instance that are searched if the number of
+/// useful runs is bounded; `UNBOUNDED_RUNS` if it is not.
 const MAX_PARALLEL_RUNS: u32 = 16;
 const UNBOUNDED_RUNS: u32 = 4;
 
-/// Where a sequence of happenings has led.
+/// State after a sequence of happenings.
 #[derive(Debug, Clone)]
 pub(super) struct TemporalState {
     pub(super) state: State,
     pub(super) clocks: SimpleTemporalNetwork,
-    /// In the task's cost unit.
+    /// Cost in the task's cost unit.
     pub(super) cost: Int,
 }
 
-/// Why a happening leads nowhere.
+/// Reason for rejecting a happening.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum DeadEnd {
-    /// It cannot happen here.
+    /// It is not applicable.
     Impossible,
     /// Timed initial literals come first.
     TooLate,
-    /// Numbers do not fit their type, or runs of an instance are too many or of different length: it is left out.
+    /// Numbers overflow, or there are too many runs of an instance or runs of different duration.
+    /// The search becomes incomplete.
     Unfit,
 }
 
-/// What follows what.
+/// Successor function of the temporal state space.
 pub(super) struct Expansion<'a> {
     concurrent: &'a TemporalTask,
     index: SuccessorGenerator,
@@ -48,7 +50,7 @@ impl<'a> Expansion<'a> {
         Self { concurrent, index: SuccessorGenerator::over(&concurrent.task, operators) }
     }
 
-    /// When nothing has happened yet.
+    /// Initial temporal state.
     pub(super) fn root(&self) -> TemporalState {
         TemporalState {
             state: self.concurrent.task.initial.clone(),
@@ -57,7 +59,8 @@ impl<'a> Expansion<'a> {
         }
     }
 
-    /// The happenings whose propositional condition holds: starts, and ends of what is under way.
+    /// Candidate happenings: starts whose propositional condition holds, and ends of running
+    /// actions.
     pub(super) fn candidates(&self, situation: &TemporalState) -> Vec<OperatorId> {
         let mut next = self.starts(&situation.state);
         let mut opens: Vec<u32> = situation.clocks.opens().iter().map(|open| open.instance).collect();
@@ -66,21 +69,22 @@ impl<'a> Expansion<'a> {
         next
     }
 
-    /// The happenings but ends whose propositional condition holds.
+    /// Happenings other than ends whose propositional condition holds.
     pub(super) fn starts(&self, state: &State) -> Vec<OperatorId> {
         self.index.applicable(&self.concurrent.task, state)
     }
 
-    /// The timed initial literals that come next.
+    /// Next timed initial literals.
     pub(super) fn next_event(&self, clocks: &SimpleTemporalNetwork) -> Option<(Int, OperatorId)> {
         let events = &self.concurrent.events;
         events.get(events.partition_point(|(time, _)| *time <= clocks.floor())).copied()
     }
 
-    /// Whether a plan can end here.
+    /// Returns `true` if a plan can end here.
     pub(super) fn is_goal(&self, TemporalState { state, clocks, .. }: &TemporalState) -> bool {
         let concurrent = self.concurrent;
-        // What happens by itself up to the end has taken place, and nothing after the end; what comes soon after keeps apart.
+        // All events up to the end of the plan have taken place, none after it has, and those that
+        // follow keep the separation.
         let mut to_come = concurrent.events.iter().filter(|(time, _)| *time > clocks.floor());
         let is_apart = |(time, event): &(Int, OperatorId)| {
             let after = &concurrent.happenings[event.index()].accesses.after;
@@ -93,25 +97,29 @@ impl<'a> Expansion<'a> {
             && to_come.all(is_apart)
     }
 
-    /// The situation after a happening, and whether its action has ended as well: where that loses nothing, an end
-    /// comes right after its start. A plan may have to wait for timed initial literals with its last end, so while some are to come
-    /// this loses a plan now and then; `exact` is without that.
+    /// Successor of a state by a happening, and whether the end of its action was applied as well.
+    /// An end is applied together with its start if that preserves completeness. A plan may have to
+    /// wait with its last end for timed initial literals, so compression can lose plans while some
+    /// are pending, unless `exact` is set.
     pub(super) fn after(
         &self,
         situation: &TemporalState,
         operator: OperatorId,
         exact: bool,
     ) -> Result<(TemporalState, bool), DeadEnd> {
-        let started = self.step(situation, operator)?;
-        let Some(end) = self.compressed(situation, &started, operator) else { return Ok((started, false)) };
-        let Ok(ended) = self.step(&started, end) else { return Ok((started, false)) };
-        // Were timed initial literals to come in between, the action could not be put off.
+        let after_start = self.step(situation, operator)?;
+        let Some(end) = self.compressed(situation, &after_start, operator) else {
+            return Ok((after_start, false));
+        };
+        let Ok(ended) = self.step(&after_start, end) else { return Ok((after_start, false)) };
+        // If timed initial literals came in between, the action could not be delayed.
         let in_time =
             self.next_event(&ended.clocks).is_none_or(|(time, _)| !exact && ended.clocks.finishes_by(time));
-        Ok(if in_time && !ended.clocks.unsettled() { (ended, true) } else { (started, false) })
+        Ok(if in_time && !ended.clocks.unsettled() { (ended, true) } else { (after_start, false) })
     }
 
-    /// The end that comes right after a start. The first run ends first, so it is not that of another run.
+    /// End that directly follows a start. Only for the first run of an instance, because the first
+    /// run also ends first.
     fn compressed(
         &self,
         before: &TemporalState,
@@ -124,7 +132,7 @@ impl<'a> Expansion<'a> {
         (is_first && instance.compressible && !started.clocks.unsettled()).then_some(instance.end)
     }
 
-    /// The situation after one happening.
+    /// Successor of a state by one happening.
     pub(super) fn step(
         &self,
         situation: &TemporalState,
@@ -140,34 +148,34 @@ impl<'a> Expansion<'a> {
         let (kind, instance) = match happening.role {
             Role::Start(instance) => (Kind::Start, instance),
             Role::End(instance) => (Kind::End, instance),
-            // Those that happen by themselves are told apart below.
+            // Timed initial literals are distinguished below.
             Role::Whole | Role::Timed(_) => (Kind::Whole, u32::MAX),
             Role::Never => return Err(DeadEnd::Impossible),
         };
-        let own = concurrent.instances.get(instance as usize);
-        let counts_by_end = own.is_some_and(|own| own.counts_by_end);
-        let most = own.map_or(u32::MAX, |own| own.most);
-        if kind == Kind::Start && clocks.runs(instance) >= most || self.clashes(clocks, happening) {
+        let instance_data = concurrent.instances.get(instance as usize);
+        let counts_by_end = instance_data.is_some_and(|instance| instance.counts_by_end);
+        let useful_runs = instance_data.map_or(u32::MAX, |instance| instance.most);
+        if kind == Kind::Start && clocks.runs(instance) >= useful_runs || self.clashes(clocks, happening) {
             return Err(DeadEnd::Impossible);
         }
-        let looked_for = if most == u32::MAX { UNBOUNDED_RUNS } else { MAX_PARALLEL_RUNS };
-        if kind == Kind::Start && clocks.runs(instance) >= looked_for {
+        let max_runs = if useful_runs == u32::MAX { UNBOUNDED_RUNS } else { MAX_PARALLEL_RUNS };
+        if kind == Kind::Start && clocks.runs(instance) >= max_runs {
             return Err(DeadEnd::Unfit);
         }
         let mut after = concurrent.task.successor(operator, state, &[]).ok_or(DeadEnd::Unfit)?;
-        // Without such a run everything else is as it was.
+        // The run changes nothing, so the plan is as good without it.
         if kind == Kind::End && counts_by_end && after == *state {
             return Err(DeadEnd::Impossible);
         }
-        // Of the runs of an instance the first one ends first.
+        // The first run of an instance ends first.
         let runs = || clocks.opens().iter().map(|open| open.instance);
         let ended = if kind == Kind::End { runs().position(|open| open == instance) } else { None };
         let going_on = || (0..).zip(runs()).filter(|(position, _)| Some(*position) != ended);
         if kind == Kind::End && going_on().all(|(_, open)| open != instance) {
             concurrent.end_last_run(instance, &mut after);
         }
-        let mut all = going_on().map(|(_, open)| open).chain((kind == Kind::Start).then_some(instance));
-        let settled = all.all(|open| concurrent.holds_over_all(open, &after));
+        let mut running = going_on().map(|(_, open)| open).chain((kind == Kind::Start).then_some(instance));
+        let settled = running.all(|open| concurrent.holds_over_all(open, &after));
         let sets = happening.sets.iter().copied();
         let changes: Vec<u32> = sets
             .filter(|variable| state.values[*variable as usize] != after.values[*variable as usize])
@@ -176,11 +184,11 @@ impl<'a> Expansion<'a> {
             let InterferenceConstraints { after, marks } = &happening.accesses;
             clocks.timed(&simple_temporal_network::Event { time, after, marks, changes: &changes, settled })
         } else {
-            let started = own.filter(|_| kind == Kind::Start);
-            let duration = started.map_or(Some(0), |own| concurrent.duration(own, &after));
-            // The first run ends first only if all take as long.
+            let starting = instance_data.filter(|_| kind == Kind::Start);
+            let duration = starting.map_or(Some(0), |instance| concurrent.duration(instance, &after));
+            // The first run ends first only if all runs have the same duration.
             let mut runs = clocks.opens().iter().filter(|open| open.instance == instance);
-            if started.is_some() && runs.any(|open| Some(open.duration) != duration) {
+            if starting.is_some() && runs.any(|open| Some(open.duration) != duration) {
                 return Err(DeadEnd::Unfit);
             }
             clocks.after(&simple_temporal_network::Happening {
@@ -189,7 +197,7 @@ impl<'a> Expansion<'a> {
                 duration: duration.ok_or(DeadEnd::Unfit)?,
                 after: &happening.accesses.after,
                 marks: &happening.accesses.marks,
-                joint: own.is_some_and(|own| !own.joint.is_empty()),
+                joint: instance_data.is_some_and(|instance| !instance.joint.is_empty()),
                 touches: &|instance| concurrent.touches(operator_id, instance),
                 changes: &changes,
                 settled,
@@ -197,11 +205,11 @@ impl<'a> Expansion<'a> {
         };
         let mut clocks = clocks.ok_or(DeadEnd::Impossible)?;
         for position in 0..clocks.opens().len() {
-            let own = &concurrent.instances[clocks.opens()[position].instance as usize];
-            let after = &concurrent.happenings[own.end.index()].accesses.after;
+            let running = &concurrent.instances[clocks.opens()[position].instance as usize];
+            let after = &concurrent.happenings[running.end.index()].accesses.after;
             clocks.expect_end(position, after).ok_or(DeadEnd::Impossible)?;
         }
-        // Nothing can happen after what comes later in the sequence.
+        // No happening can come after later happenings of the sequence.
         if self.next_event(&clocks).is_some_and(|(time, _)| clocks.latest() > time) {
             return Err(DeadEnd::TooLate);
         }
@@ -210,12 +218,12 @@ impl<'a> Expansion<'a> {
         Ok(TemporalState { state: after, clocks, cost })
     }
 
-    /// Whether an action under way uses a function with another design.
+    /// Returns `true` if a running action uses a function with another design.
     fn clashes(&self, clocks: &SimpleTemporalNetwork, happening: &Happening) -> bool {
         happening.designs.iter().any(|(function, design)| {
             clocks.opens().iter().any(|open| {
-                let other = &self.concurrent.instances[open.instance as usize].designs;
-                other.iter().any(|(own, used)| own == function && used != design)
+                let running_designs = &self.concurrent.instances[open.instance as usize].designs;
+                running_designs.iter().any(|(candidate, used)| candidate == function && used != design)
             })
         })
     }

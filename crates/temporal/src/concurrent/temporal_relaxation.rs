@@ -1,11 +1,13 @@
 //! Delete relaxation of the split task: rules from conditions to effects.
 //!
-//! Each start, end and instantaneous action becomes a rule, as in the relaxed planning graphs of CRIKEY \[1\]. That
-//! an instance runs is a fact that its start adds and its end requires, so required concurrency is visible. An
-//! end requires the condition over all as well. A numeric condition needs as many applications of a rule as its
-//! amount \[2\]; a condition on a duration that the planner chooses always holds.
+//! Each start, end and instantaneous action becomes a rule, as in the relaxed planning graphs of
+//! CRIKEY \[1\]. That an instance runs is a fact that its start adds and its end requires, so
+//! required concurrency is visible. An end requires the condition over all as well. A numeric
+//! condition needs as many applications of a rule as its amount \[2\]; a condition on a duration
+//! that the planner chooses always holds.
 //!
-//! \[1\] A. Coles, M. Fox, D. Long, A. Smith: Planning with problems requiring temporal coordination, AAAI 2008.
+//! \[1\] A. Coles, M. Fox, D. Long, A. Smith: Planning with problems requiring temporal
+//! coordination, AAAI 2008.
 //! \[2\] E. Scala, P. Haslum, S. Thiébaux: Heuristics for numeric planning via subgoaling, IJCAI 2016.
 
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -26,40 +28,39 @@ pub(super) struct Numeric {
     pub(super) proposition: Proposition,
 }
 
-/// A relaxed task; rules are numbered.
+/// The delete relaxation of a temporal task.
 pub(super) struct TemporalRelaxation {
-    /// The proposition of each variable's first value.
+    /// Proposition of each variable's first value.
     pub(super) first: Vec<Proposition>,
     pub(super) propositions: usize,
-    /// What each rule needs, ascending.
+    /// Conditions of each rule, ascending.
     pub(super) needs: Lists,
-    /// How much that is.
+    /// Number of conditions of each rule.
     pub(super) unmet: Vec<u32>,
-    /// The rules that need nothing.
+    /// Rules without conditions.
     pub(super) free: Vec<u32>,
     pub(super) adds: Lists,
-    /// The numeric conditions that each rule raises.
+    /// Numeric conditions that each rule increases.
     pub(super) raises: Vec<Box<[NumericEffect]>>,
-    /// What each rule counts in a relaxed plan.
+    /// Weight of each rule in a relaxed plan.
     pub(super) weights: Vec<u32>,
-    /// The happening of each rule; none for clauses and derived facts.
+    /// Happening of each rule. `None` for clauses and derived facts.
     pub(super) origins: Vec<Option<OperatorId>>,
-    /// The rules that need each proposition.
+    /// Rules that have each proposition as a condition.
     pub(super) needing: Lists,
     pub(super) numeric: Vec<Numeric>,
-    /// Ascending.
+    /// Conditions of the goal, ascending.
     pub(super) goal: Vec<Proposition>,
-    /// By instance the rule of its end.
+    /// Rule of the end of each instance.
     pub(super) ends: Vec<u32>,
-    /// The values that derived variables have unless a rule gives them another one.
+    /// Initial values of derived variables.
     pub(super) defaults: Vec<Proposition>,
     pub(super) conjunctions: Vec<Conjunction>,
 }
 
-/// Collects rules.
 struct RelaxationBuilder<'a> {
     task: &'a Task,
-    /// The numbers that the planner chooses.
+    /// Numbers that hold chosen durations.
     chosen: FxHashSet<NumericId>,
     first: Vec<Proposition>,
     propositions: u32,
@@ -72,28 +73,28 @@ struct RelaxationBuilder<'a> {
 impl TemporalRelaxation {
     pub(super) fn new(concurrent: &TemporalTask) -> Self {
         let task = &concurrent.task;
-        let chosen = concurrent.instances.iter().filter(|own| own.is_chosen);
-        let chosen = chosen.filter_map(|own| own.timer.map(|(number, _)| number)).collect();
-        let mut maker = RelaxationBuilder::new(task, chosen);
+        let chosen = concurrent.instances.iter().filter(|instance| instance.is_chosen);
+        let chosen = chosen.filter_map(|instance| instance.timer.map(|(number, _)| number)).collect();
+        let mut builder = RelaxationBuilder::new(task, chosen);
         let mut ends = vec![0; concurrent.instances.len()];
         let ids = OperatorId::all(task.operators.len());
         for ((operator, happening), id) in task.operators.iter().zip(&concurrent.happenings).zip(ids) {
             if let Role::End(instance) = happening.role {
-                ends[instance as usize] = dense(maker.rules.len());
+                ends[instance as usize] = dense(builder.rules.len());
             }
-            maker.happening(concurrent, id, operator, happening.role);
+            builder.happening(concurrent, id, operator, happening.role);
         }
         for rule in task.axioms.iter().flat_map(|layer| &layer.rules) {
-            let needs = maker.needs(&rule.body);
-            let adds = vec![maker.fact(rule.head)];
-            maker.rules.push(Rule { needs, adds, ..Rule::default() });
+            let needs = builder.needs(&rule.body);
+            let adds = vec![builder.fact(rule.head)];
+            builder.rules.push(Rule { needs, adds, ..Rule::default() });
         }
-        let mut goal = maker.needs(&task.goal);
-        maker.raise(task);
-        let conjunctions = maker.conjoin(concurrent, &mut goal);
+        let mut goal = builder.needs(&task.goal);
+        builder.raise(task);
+        let conjunctions = builder.conjoin(concurrent, &mut goal);
         let derived = task.variables.iter().enumerate().skip(task.basic);
-        let defaults = derived.map(|(variable, own)| maker.last(variable, own.values.len())).collect();
-        let RelaxationBuilder { first, propositions, rules, numeric, .. } = maker;
+        let defaults = derived.map(|(index, variable)| builder.last(index, variable.values.len())).collect();
+        let RelaxationBuilder { first, propositions, rules, numeric, .. } = builder;
         let (mut needs, mut adds) = (Lists::default(), Lists::default());
         for rule in &rules {
             needs.push(&rule.needs);
@@ -106,7 +107,7 @@ impl TemporalRelaxation {
             needing: needs.inverse(propositions),
             needs,
             unmet: rules.iter().map(|rule| dense(rule.needs.len())).collect(),
-            free: (0..).zip(&rules).filter(|(_, rule)| rule.needs.is_empty()).map(|(own, _)| own).collect(),
+            free: (0..).zip(&rules).filter(|(_, rule)| rule.needs.is_empty()).map(|(id, _)| id).collect(),
             adds,
             weights: rules.iter().map(|rule| rule.weight).collect(),
             origins: rules.iter().map(|rule| rule.origin).collect(),
@@ -166,10 +167,10 @@ impl<'a> RelaxationBuilder<'a> {
         needs
     }
 
-    /// A proposition that any of some literals brings about.
+    /// Proposition that holds if any of the literals does.
     fn clause(&mut self, literals: &[Literal]) -> Proposition {
-        if let Some(known) = self.clauses.get(literals) {
-            return *known;
+        if let Some(clause) = self.clauses.get(literals) {
+            return *clause;
         }
         let clause = self.fresh();
         for literal in literals {
@@ -184,8 +185,8 @@ impl<'a> RelaxationBuilder<'a> {
     }
 
     fn comparison(&mut self, linear: &Linear<Int>) -> Proposition {
-        if let Some(known) = self.comparisons.get(linear) {
-            return self.numeric[*known as usize].proposition;
+        if let Some(index) = self.comparisons.get(linear) {
+            return self.numeric[*index as usize].proposition;
         }
         let proposition = self.fresh();
         self.comparisons.insert(linear.clone(), dense(self.numeric.len()));
@@ -200,33 +201,35 @@ impl<'a> RelaxationBuilder<'a> {
             Role::Timed(_) => 0,
             Role::Whole => 1,
             Role::Start(instance) => {
-                // What the start does not bring about itself has to hold before; only other happenings at the same time could help.
+                // The condition over all must hold before the start, except for facts that the
+                // start adds. Only simultaneous happenings could establish it otherwise.
                 let over_all = concurrent.instances[instance as usize].over_all;
                 let required =
                     over_all.into_iter().flat_map(|id| &self.task.operators[id.index()].condition.facts);
-                let sets = |fact: &&Fact| operator.effects.iter().all(|own| own.variable != fact.variable);
+                let sets =
+                    |fact: &&Fact| operator.effects.iter().all(|effect| effect.variable != fact.variable);
                 needs.extend(required.filter(sets).map(|fact| self.fact(*fact)));
                 needs.sort_unstable();
                 needs.dedup();
                 1
             }
             Role::End(instance) => {
-                let own = &concurrent.instances[instance as usize];
-                if let Some(over_all) = own.over_all {
+                let instance_data = &concurrent.instances[instance as usize];
+                if let Some(over_all) = instance_data.over_all {
                     needs.extend(self.needs(&self.task.operators[over_all.index()].condition));
                     needs.sort_unstable();
                     needs.dedup();
                 }
-                u32::from(!own.compressible)
+                u32::from(!instance_data.compressible)
             }
         };
         let adds: Vec<_> = operator.effects.iter().map(|fact| self.fact(*fact)).collect();
         let rule = Rule { needs, sets: adds.clone(), adds, raises: Vec::new(), weight, origin: Some(id) };
         let mut conditional = Vec::new();
         for effect in &operator.conditional {
-            let own: Vec<_> =
+            let effect_needs: Vec<_> =
                 effect.condition.iter().map(|literal| self.clause(std::slice::from_ref(literal))).collect();
-            let mut needs = [&rule.needs[..], &own].concat();
+            let mut needs = [&rule.needs[..], &effect_needs].concat();
             needs.sort_unstable();
             needs.dedup();
             let adds: Vec<_> = effect.effects.iter().map(|fact| self.fact(*fact)).collect();
@@ -237,20 +240,26 @@ impl<'a> RelaxationBuilder<'a> {
         self.rules.extend(conditional);
     }
 
-    /// Adds conjunctions of facts that nothing brings back.
+    /// Adds conjunctions for facts that no action restores.
     fn conjoin(&mut self, concurrent: &TemporalTask, goal: &mut Vec<Proposition>) -> Vec<Conjunction> {
-        let ends = |first: Proposition, own: &Variable| first.saturating_add(dense(own.values.len()));
-        let all = self.first.iter().zip(&self.task.variables).map(|(first, own)| *first..ends(*first, own));
-        let mut variables: Vec<_> = all.take(self.task.basic).collect();
-        // That nothing is under way any more is not among the effects.
-        for fact in concurrent.instances.iter().filter_map(|own| own.under_way) {
+        let ends =
+            |first: Proposition, variable: &Variable| first.saturating_add(dense(variable.values.len()));
+        let ranges = self
+            .first
+            .iter()
+            .zip(&self.task.variables)
+            .map(|(first, variable)| *first..ends(*first, variable));
+        let mut variables: Vec<_> = ranges.take(self.task.basic).collect();
+        // Effects that mark an instance as no longer running are implicit, so these variables are
+        // excluded.
+        for fact in concurrent.instances.iter().filter_map(|instance| instance.under_way) {
             variables[fact.variable.index()].start = variables[fact.variable.index()].end;
         }
         let Self { rules, propositions, .. } = self;
         add_conjunctions(&mut Scope { rules, goal, variables: &variables, propositions })
     }
 
-    /// Notes which rules raise which numeric conditions.
+    /// Determines which rules increase which numeric conditions.
     fn raise(&mut self, task: &Task) {
         let mut mentioning: FxHashMap<u32, Vec<u32>> = FxHashMap::default();
         for (index, numeric) in (0..).zip(&self.numeric) {
@@ -260,12 +269,12 @@ impl<'a> RelaxationBuilder<'a> {
         }
         for rule in &mut self.rules {
             let Some(operator) = rule.origin.map(|id| &task.operators[id.index()]) else { continue };
-            let changed = operator.numeric_effects.iter().map(|effect| effect.variable.0);
-            let mut mentioned: Vec<u32> =
-                changed.filter_map(|variable| mentioning.get(&variable)).flatten().copied().collect();
-            mentioned.sort_unstable();
-            mentioned.dedup();
-            for index in mentioned {
+            let variables = operator.numeric_effects.iter().map(|effect| effect.variable.0);
+            let mut indices: Vec<u32> =
+                variables.filter_map(|variable| mentioning.get(&variable)).flatten().copied().collect();
+            indices.sort_unstable();
+            indices.dedup();
+            for index in indices {
                 let by = difference(&self.numeric[index as usize].linear, operator);
                 if by.is_none_or(|by| by > 0) {
                     rule.raises.push((index, by));
@@ -275,7 +284,7 @@ impl<'a> RelaxationBuilder<'a> {
     }
 }
 
-/// How much an operator adds to a linear expression; none if that depends on the state.
+/// Amount that an operator adds to a linear expression. Returns `None` if it depends on the state.
 fn difference(linear: &Linear<Int>, operator: &Operator) -> Option<Int> {
     let mut sum: Int = 0;
     for effect in &operator.numeric_effects {

@@ -31,30 +31,34 @@ pub struct TemporalTask {
     /// By operator.
     pub(super) happenings: Vec<Happening>,
     pub(super) instances: Vec<Instance>,
-    /// The timed initial literals by their time.
+    /// Timed initial literals, sorted by time.
     pub(super) events: Vec<(Int, OperatorId)>,
-    /// For each kind of access a variable whose current value everything reads that waits for such accesses.
+    /// Per kind of access: a variable whose change shows that earlier accesses of this kind are
+    /// past, because everything that waits for such accesses reads its current value.
     pub(super) guards: Vec<Option<u32>>,
     pub(super) measure: Measure,
-    /// For each preference that may be violated in the end: the operators of which one can be applied then. They never happen.
+    /// Per preference that can be violated: operators one of which is applicable in the final state
+    /// if the preference is violated. They are never part of a plan.
     pub(super) violations: Vec<Vec<OperatorId>>,
-    /// What plans have to keep in time, or should.
+    /// Deadlines of hard and soft trajectory constraints.
     pub(super) deadlines: Vec<Deadline>,
-    /// Whether every plan is among those that the search goes through, with the times that it can have.
+    /// Whether the search covers every plan with all its possible times.
     pub(super) is_exact: bool,
-    /// Whether no plan is better than all that the search goes through. If not, only what costs and times are by themselves is known: not below 0.
+    /// Whether the lower bounds of the search hold for every plan. If not, the only known bound is
+    /// that costs and times are not negative.
     pub(super) is_bounded: bool,
-    /// Whether what plans are compared by is the whole metric.
+    /// Whether the search minimises the whole metric.
     pub(super) is_whole: bool,
-    /// How far apart interfering happenings are, in the task's time unit.
+    /// Least distance between interfering happenings, in the task's time unit.
     pub(super) separation: Int,
-    /// The same with durations that are as short as they may be, where the planner chooses some, and if that can be planned with.
+    /// Variant of the task with minimal durations, if durations are chosen and the variant is
+    /// supported.
     pub(super) shortest: Option<Box<Self>>,
-    /// The files, if actions one after another may be planned as well.
+    /// Source files, if sequential plans may be searched as well.
     pub(super) kept: Option<SourceTask>,
 }
 
-/// Makes happenings of a split ground task.
+/// Computes the happenings of a split ground task.
 pub(super) fn compile(
     mut task: Task,
     split: &Split,
@@ -63,33 +67,33 @@ pub(super) fn compile(
     time_weight: Rational,
     limits: &Limits,
 ) -> Result<TemporalTask, Errors> {
-    let one = |error| vec![error];
-    // Operators are watched as they are collected, each as a whole.
+    let to_errors = |error| vec![error];
+    // Interruption is checked here per operator, so the inner computation needs no limits.
     let unlimited = Limits::none();
     let mut builder = Builder::new(split, reached, &unlimited);
     let context = Context::new(&task, limits);
     builder.collect(context)?;
     let has_cases = builder.pair(&mut task);
     let context = Context::new(&task, limits);
-    let divisors = builder.divisors(context).map_err(one)?;
-    let unit = Unit::new(&task, split, separation, &divisors).map_err(one)?;
-    let separation = unit.of(separation).map_err(one)?;
+    let divisors = builder.divisors(context).map_err(to_errors)?;
+    let unit = Unit::new(&task, split, separation, &divisors).map_err(to_errors)?;
+    let separation = unit.of(separation).map_err(to_errors)?;
     builder.separation = separation;
-    let measure = Measure::new(&task.objective, time_weight, unit.0).map_err(one)?;
+    let measure = Measure::new(&task.objective, time_weight, unit.0).map_err(to_errors)?;
     let mut roles = vec![Role::Never; task.operators.len()];
-    let mut instances = builder.instances(context, unit, &divisors, &mut roles).map_err(one)?;
-    let contradictory = builder.contradictory(context).map_err(one)?;
+    let mut instances = builder.instances(context, unit, &divisors, &mut roles).map_err(to_errors)?;
+    let contradictory = builder.contradictory(context).map_err(to_errors)?;
     for ((operator, role), id) in task.operators.iter().zip(&mut roles).zip((0..).map(OperatorId)) {
         match split.origins[operator.schema as usize].half {
             Half::Whole if !contradictory.contains(&id) => *role = Role::Whole,
-            Half::Timed(event) => *role = Role::Timed(unit.of(&split.events[event].time).map_err(one)?),
+            Half::Timed(event) => *role = Role::Timed(unit.of(&split.events[event].time).map_err(to_errors)?),
             _ => {}
         }
     }
-    let chooses = instances.iter().any(|own| own.is_chosen);
-    let is_whole = task.objective.rest.is_empty() || chooses && only_grows(&task, &instances);
+    let has_chosen_durations = instances.iter().any(|instance| instance.is_chosen);
+    let is_whole = task.objective.rest.is_empty() || has_chosen_durations && only_grows(&task, &instances);
     let is_exact = split.is_exact && !builder.assumes_conflicts() && !has_cases && is_whole;
-    let (mut happenings, keys) = builder.happenings(context, &roles, &mut instances).map_err(one)?;
+    let (mut happenings, keys) = builder.happenings(context, &roles, &mut instances).map_err(to_errors)?;
     let mut events: Vec<(Int, OperatorId)> = Vec::new();
     for (role, id) in roles.iter().zip((0..).map(OperatorId)) {
         events.extend(if let Role::Timed(time) = role { Some((*time, id)) } else { None });
@@ -101,8 +105,8 @@ pub(super) fn compile(
     bound_self_overlap(&task, &happenings, &mut instances, separation, limits)?;
     let keys = keep_runs_apart(&mut task, &instances, &mut happenings, keys);
     let compressible = compression_safe_actions(&task, &happenings, &instances, limits);
-    for (own, compressible) in instances.iter_mut().zip(compressible?) {
-        own.compressible = compressible;
+    for (instance, compressible) in instances.iter_mut().zip(compressible?) {
+        instance.compressible = compressible;
     }
     let guards = vec![None; keys];
     let mut concurrent = TemporalTask {
@@ -125,8 +129,9 @@ pub(super) fn compile(
     Ok(concurrent)
 }
 
-/// Lets the next run of an instance wait for the end of the one before, unless several runs at a time can make a difference: of those no end says
-/// that the instance is not under way any more, and no end clears how long it takes. Returns how many kinds of access there are then.
+/// Makes the next run of an instance wait for the end of the previous one, unless simultaneous runs
+/// can be useful. For those, ends neither clear the fact that the instance is running nor its
+/// duration. Returns the number of kinds of access.
 fn keep_runs_apart(
     task: &mut Task,
     instances: &[Instance],
@@ -134,29 +139,30 @@ fn keep_runs_apart(
     keys: usize,
 ) -> usize {
     let mut next = keys;
-    for own in instances {
-        if let Some(under_way) = own.under_way {
-            let end = &mut task.operators[own.end.index()];
+    for instance in instances {
+        if let Some(under_way) = instance.under_way {
+            let end = &mut task.operators[instance.end.index()];
             end.effects.retain(|effect| effect.variable != under_way.variable);
-            let is_timer = |number| own.timer.is_some_and(|(timer, _)| timer == number);
+            let is_timer = |number| instance.timer.is_some_and(|(timer, _)| timer == number);
             end.numeric_effects.retain(|effect| !is_timer(effect.variable));
         } else {
             let ended = dense(next);
             next = next.saturating_add(1);
-            happenings[own.start.index()].accesses.after.push((ended, 0));
-            happenings[own.end.index()].accesses.marks.push(ended);
+            happenings[instance.start.index()].accesses.after.push((ended, 0));
+            happenings[instance.end.index()].accesses.marks.push(ended);
         }
     }
     next
 }
 
 impl TemporalTask {
-    /// Finds the variables that tell of accesses that they are past, and what happenings set.
+    /// Computes the guards of accesses and the variables that happenings set.
     fn guard(&mut self, limits: &Limits) -> Result<(), Interrupted> {
         let mut common: Vec<Option<Vec<u32>>> = vec![None; self.guards.len()];
-        // An end may come before another run has begun that came before it in the sequence.
+        // A run may end before another run that precedes it in the sequence has begun, so these
+        // variables are no guards.
         let under_way: FxHashSet<VariableId> =
-            self.instances.iter().filter_map(|own| Some(own.under_way?.variable)).collect();
+            self.instances.iter().filter_map(|instance| Some(instance.under_way?.variable)).collect();
         for pair in limits.watch(self.task.operators.iter().zip(&mut self.happenings)) {
             let (operator, happening) = pair?;
             let conditional = operator.conditional.iter().flat_map(|effect| &effect.effects);
@@ -168,15 +174,16 @@ impl TemporalTask {
                 .filter(|variable| variable.index() < self.task.basic && !under_way.contains(variable))
                 .map(|variable| variable.0)
                 .collect();
-            // What happens by itself is put off by nothing: it bounds what was before, the change of a guard like any access.
-            let heeded = match happening.role {
+            // A timed literal cannot be delayed: it bounds the earlier accesses, so it needs no
+            // guard.
+            let waits_for = match happening.role {
                 Role::Timed(_) => &[][..],
                 _ => &happening.accesses.after,
             };
-            for (key, _) in heeded {
+            for (key, _) in waits_for {
                 match &mut common[*key as usize] {
-                    Some(known) => known.retain(|variable| facts.contains(variable)),
-                    none => *none = Some(facts.clone()),
+                    Some(variables) => variables.retain(|variable| facts.contains(variable)),
+                    unset => *unset = Some(facts.clone()),
                 }
             }
         }
@@ -187,24 +194,25 @@ impl TemporalTask {
             *guard = common.into_iter().flatten().filter(|variable| set.contains(variable)).max_by_key(size);
         }
         let goals = self.task.goal.facts.iter().map(|fact| fact.variable.0);
-        let heeded: FxHashSet<u32> = self.guards.iter().flatten().copied().chain(goals).collect();
+        let relevant: FxHashSet<u32> = self.guards.iter().flatten().copied().chain(goals).collect();
         for happening in &mut self.happenings {
-            happening.sets.retain(|variable| heeded.contains(variable));
+            happening.sets.retain(|variable| relevant.contains(variable));
         }
         Ok(())
     }
 
-    /// How long an instance takes that has just started; none if it takes less than the separation, or a time that does not fit.
+    /// Duration of an instance that has just started. Returns `None` if it is shorter than the
+    /// separation or overflows.
     pub(super) fn duration(&self, instance: &Instance, after: &State) -> Option<Int> {
         let Some((timer, factor)) = instance.timer else { return Some(instance.duration) };
         let duration = after.numbers[timer.index()].checked_mul(factor)?;
         (self.separation..TIME_LIMIT).contains(&duration).then_some(duration)
     }
 
-    /// An instance is not under way any more in a state after the end of its last run.
+    /// Marks an instance as not running after its last run has ended.
     pub(super) fn end_last_run(&self, instance: u32, state: &mut State) {
         if let Some(fact) = self.instances[instance as usize].under_way {
-            // Of two values, the other one. What is derived does not depend on it.
+            // The fact has two values; derived variables do not depend on it.
             state.values[fact.variable.index()] = u32::from(fact.value == 0);
             if let Some((timer, _)) = self.instances[instance as usize].timer {
                 state.numbers[timer.index()] = 0;
@@ -212,7 +220,7 @@ impl TemporalTask {
         }
     }
 
-    /// Whether what must hold over all of an instance holds in a state.
+    /// Returns `true` if the condition over all of an instance holds in a state.
     pub(super) fn holds_over_all(&self, instance: u32, state: &State) -> bool {
         let condition = self.instances[instance as usize].over_all;
         let condition = condition.map(|id| &self.task.operators[id.index()].condition);
@@ -222,7 +230,7 @@ impl TemporalTask {
         })
     }
 
-    /// The end of the action that a happening starts; a happening that starts none is its own end.
+    /// End of the action that a happening starts. A happening that starts no action is its own end.
     pub(super) fn end_of(&self, operator: OperatorId) -> OperatorId {
         match self.happenings[operator.index()].role {
             Role::Start(instance) => self.instances[instance as usize].end,
@@ -230,7 +238,8 @@ impl TemporalTask {
         }
     }
 
-    /// Whether a happening writes what the joint condition over all of an instance reads.
+    /// Returns `true` if a happening writes an atom or number that the joint condition over all of
+    /// an instance reads.
     pub(super) fn touches(&self, operator: OperatorId, instance: u32) -> bool {
         let joint = &self.instances[instance as usize].joint;
         let writes = &self.happenings[operator.index()].writes;
@@ -238,7 +247,7 @@ impl TemporalTask {
     }
 }
 
-/// The operators of preferences that are violated, by preference.
+/// Operators that detect violated preferences, per preference.
 fn violations(task: &Task) -> Vec<Vec<OperatorId>> {
     let mut violations: BTreeMap<u32, Vec<OperatorId>> = BTreeMap::new();
     for (operator, id) in task.operators.iter().zip((0..).map(OperatorId)) {

@@ -3,24 +3,24 @@
 use smallvec::SmallVec;
 use task::number::Int;
 
-/// A moment that can still be put off: the start of an action under way, by its position in the clocks.
+/// A time point of the network: the start of a running action that can still be delayed, by index.
 pub(super) type TimePoint = u32;
 
-/// The position of a float.
+/// Index of a time point.
 pub(super) fn place(float: TimePoint) -> usize {
     float as usize
 }
 
-/// The least time of a happening: at least `base`, and at least so long after each of some floats.
+/// Lower bound on a time: at least `base`, and at least a lag after each of some time points.
 #[derive(Debug, PartialEq, Eq, Default)]
 pub(super) struct TimeExpression {
     pub(super) base: Int,
-    /// Ascending by float.
+    /// Lag after each time point, sorted by time point.
     pub(super) lags: SmallVec<[(TimePoint, Int); 1]>,
 }
 
 impl Clone for TimeExpression {
-    /// Most times have no lags, and situations have many times.
+    /// Avoids an allocation in the common case without lags.
     fn clone(&self) -> Self {
         let lags = if self.lags.is_empty() { SmallVec::new() } else { SmallVec::from_slice(&self.lags) };
         Self { base: self.base, lags }
@@ -33,16 +33,16 @@ impl TimeExpression {
     }
 
     pub(super) fn lag(&self, float: TimePoint) -> Option<Int> {
-        self.lags.iter().find(|(own, _)| *own == float).map(|(_, lag)| *lag)
+        self.lags.iter().find(|(point, _)| *point == float).map(|(_, lag)| *lag)
     }
 
-    /// Later, or earlier, by so much.
+    /// Expression shifted by an amount, which may be negative.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn shifted(&self, by: Int) -> Self {
         Self { base: self.base + by, lags: self.lags.iter().map(|(float, lag)| (*float, lag + by)).collect() }
     }
 
-    /// From now on not before `other` and so much more.
+    /// Raises the bound to at least `other + by`.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn delay_to(&mut self, other: &Self, by: Int) {
         self.base = self.base.max(other.base + by);
@@ -52,26 +52,27 @@ impl TimeExpression {
     }
 
     pub(super) fn put_off_after(&mut self, float: TimePoint, by: Int) {
-        match self.lags.binary_search_by_key(&float, |(own, _)| *own) {
+        match self.lags.binary_search_by_key(&float, |(point, _)| *point) {
             Ok(position) => self.lags[position].1 = self.lags[position].1.max(by),
             Err(position) => self.lags.insert(position, (float, by)),
         }
     }
 
-    /// Takes a float out; returns how long after it this was.
+    /// Removes a time point, and returns the lag after it.
     pub(super) fn forget(&mut self, float: TimePoint) -> Option<Int> {
-        let position = self.lags.iter().position(|(own, _)| *own == float)?;
+        let position = self.lags.iter().position(|(point, _)| *point == float)?;
         Some(self.lags.remove(position).1)
     }
 
-    /// Whether this is so much before `other`, whatever the floats come to.
+    /// Returns `true` if this time is at least `by` before `other` for all values of the time
+    /// points.
     #[expect(clippy::arithmetic_side_effects, reason = "fewer than 2^32 happenings, less than 2^91 apart")]
     pub(super) fn precedes(&self, other: &Self, by: Int) -> bool {
         self.base + by <= other.base
             && self.lags.iter().all(|(float, lag)| other.lag(*float).is_some_and(|later| lag + by <= later))
     }
 
-    /// Gives the floats other numbers.
+    /// Renumbers the time points; those without a new number are removed.
     pub(super) fn renumber(&mut self, numbers: &[Option<TimePoint>]) {
         self.lags.retain(|(float, _)| match numbers[place(*float)] {
             Some(number) => {

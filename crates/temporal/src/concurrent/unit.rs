@@ -10,18 +10,19 @@ use task::task::{OperatorId, Task};
 
 use crate::concurrent::split::Split;
 
-/// Times and durations stay below this.
+/// Upper limit on times and durations.
 pub(super) const LIMIT: Int = 1 << 90;
 
-/// What the numbers are divided by that hold durations, by the starts of actions.
+/// Divisors of the numbers that hold durations, by start operator.
 pub(super) type Divisors = FxHashMap<OperatorId, Rational>;
 
-/// The unit of all times: so many to the unit of the files.
+/// The unit of all times: number of units per time unit of the files.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Unit(pub(super) Int);
 
 impl Unit {
-    /// A unit in which durations, separation and timed initial literals are integers.
+    /// Finds a unit in which durations, separation and times of timed initial literals are
+    /// integers.
     pub(super) fn new(
         task: &Task,
         split: &Split,
@@ -29,9 +30,12 @@ impl Unit {
         divisors: &Divisors,
     ) -> Result<Self, Error> {
         let mut times = split.events.iter().map(|event| &event.time).chain([separation]);
-        // Durations that the state decides are numbers.
-        let multiples = task.number_multiples.iter().try_fold(1, |common, own| checked_lcm(common, *own));
-        let scale = multiples.and_then(|own| own.checked_mul(task.number_scale)).filter(|own| *own < LIMIT);
+        // State-dependent durations are numbers of the task, with its scale.
+        let multiples =
+            task.number_multiples.iter().try_fold(1, |common, multiple| checked_lcm(common, *multiple));
+        let scale = multiples
+            .and_then(|multiple| multiple.checked_mul(task.number_scale))
+            .filter(|multiple| *multiple < LIMIT);
         let scale = scale.ok_or_else(|| Error::overflow("durations"))?;
         let numbers = if split.durations.is_empty() { 1 } else { scale };
         let divided = divisors.values().map(|divisor| divisor.to_big().numer().to_i128());
@@ -50,7 +54,7 @@ impl Unit {
         units.filter(|units| (-LIMIT..LIMIT).contains(units)).ok_or_else(|| Error::overflow("a time"))
     }
 
-    /// By what a number of the task is multiplied to be a time in this unit, where it is divided by `divisor`.
+    /// Factor from a number of the task, divided by `divisor`, to a time in this unit.
     pub(super) fn factor(self, task: &Task, timer: NumericId, divisor: &Rational) -> Result<Int, Error> {
         let multiple = task.number_multiples.get(timer.index()).copied().unwrap_or(1);
         let scale = Rational::from_integer(task.number_scale) * Rational::from_integer(multiple);
@@ -58,11 +62,11 @@ impl Unit {
         (by / divisor.clone()).to_int().ok_or_else(|| Error::overflow("a duration"))
     }
 
-    /// A duration of the task, in this unit.
+    /// Duration of an operator in this unit.
     pub(super) fn duration(self, task: &Task, operator: OperatorId) -> Result<Int, Error> {
         let factor = self.0.checked_div(task.time_scale);
-        let own = task.operators[operator.index()].duration.constant;
-        let duration = factor.and_then(|factor| own.checked_mul(factor));
+        let task_duration = task.operators[operator.index()].duration.constant;
+        let duration = factor.and_then(|factor| task_duration.checked_mul(factor));
         let duration = duration.filter(|duration| (-LIMIT..LIMIT).contains(duration));
         duration.ok_or_else(|| Error::overflow("a duration"))
     }

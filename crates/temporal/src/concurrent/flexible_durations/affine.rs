@@ -4,14 +4,14 @@ use num_traits::{One, Zero};
 
 use task::number::Rational;
 
-/// A variable of a linear program, at least 0.
+/// A column of a linear program: a variable that is at least 0.
 pub(super) type Column = u32;
 
-/// A constant plus multiples of columns.
+/// An affine expression: a constant plus multiples of columns.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Hash)]
 pub(super) struct Affine {
     pub(super) constant: Rational,
-    /// Ascending by column; no factor is 0.
+    /// Sorted by column; no factor is 0.
     pub(super) terms: Vec<(Column, Rational)>,
 }
 
@@ -24,36 +24,38 @@ impl Affine {
         Self { constant: Rational::zero(), terms: vec![(column, Rational::one())] }
     }
 
-    /// The value, if it is the same whatever the columns are.
+    /// Value of the expression, if it contains no column.
     pub(super) fn known(&self) -> Option<&Rational> {
         self.terms.is_empty().then_some(&self.constant)
     }
 
     pub(super) fn coefficient(&self, column: Column) -> Option<&Rational> {
-        let position = self.terms.binary_search_by_key(&column, |(own, _)| *own).ok()?;
+        let position = self.terms.binary_search_by_key(&column, |(candidate, _)| *candidate).ok()?;
         Some(&self.terms[position].1)
     }
 
-    /// This and so many times another one.
+    /// Sum of this expression and `times` times another one.
     pub(super) fn plus(&self, other: &Self, times: &Rational) -> Self {
         let mut terms = Vec::with_capacity(self.terms.len().saturating_add(other.terms.len()));
-        let (mut own, mut others) = (self.terms.iter().peekable(), other.terms.iter().peekable());
+        let (mut left_terms, mut right_terms) = (self.terms.iter().peekable(), other.terms.iter().peekable());
         loop {
-            match (own.peek(), others.peek()) {
+            match (left_terms.peek(), right_terms.peek()) {
                 (Some((column, factor)), Some((other, more))) if column == other => {
                     let sum = more.clone() * times + factor;
                     if !sum.is_zero() {
                         terms.push((*column, sum));
                     }
-                    own.next();
-                    others.next();
+                    left_terms.next();
+                    right_terms.next();
                 }
-                (Some((column, _)), Some((other, _))) if column < other => terms.extend(own.next().cloned()),
+                (Some((column, _)), Some((other, _))) if column < other => {
+                    terms.extend(left_terms.next().cloned())
+                }
                 (_, Some((other, more))) => {
                     terms.push((*other, more.clone() * times));
-                    others.next();
+                    right_terms.next();
                 }
-                (Some(_), None) => terms.extend(own.next().cloned()),
+                (Some(_), None) => terms.extend(left_terms.next().cloned()),
                 (None, None) => break,
             }
         }
@@ -72,15 +74,15 @@ impl Affine {
         Self::default().plus(self, factor)
     }
 
-    /// With an expression in the place of a column.
+    /// Replaces a column by an expression.
     pub(super) fn substitute(&mut self, column: Column, by: &Self) {
-        if let Ok(position) = self.terms.binary_search_by_key(&column, |(own, _)| *own) {
+        if let Ok(position) = self.terms.binary_search_by_key(&column, |(candidate, _)| *candidate) {
             let (_, factor) = self.terms.remove(position);
             *self = self.plus(by, &factor);
         }
     }
 
-    /// About how many bytes it takes.
+    /// Approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         self.terms.len().saturating_mul(size_of::<(Column, Rational)>()).saturating_add(size_of::<Self>())
     }

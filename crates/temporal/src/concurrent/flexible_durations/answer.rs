@@ -11,20 +11,21 @@ use crate::concurrent::flexible_durations::partial_plan_lp::{Course, MAKESPAN, d
 use crate::concurrent::happening::Role;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// A plan.
+/// A plan and its metric.
 #[derive(Debug, Clone)]
 pub(super) struct Answer {
-    /// The metric, as integers of [`crate::concurrent::measure::Measure`] count it.
+    /// Metric value in the integer scale of [`crate::concurrent::measure::Measure`].
     pub(super) value: Rational,
-    /// What the same sequence could come to if durations need not be decimals.
+    /// Metric value of the same sequence if durations need not be decimals.
     pub(super) least: Rational,
     pub(super) plan: Plan,
 }
 
-/// The best plan of a sequence; none if its numbers do not reach the goal.
+/// Best plan of a sequence. Returns `None` if its numeric variables do not reach the goal.
 ///
-/// The metric comes first, then the makespan, then how long actions take, then when they start. A metric without a best value has none here,
-/// either: what comes first then is the makespan. Durations are decimals if that is possible, even where that costs a little.
+/// Minimises, in this order: metric, makespan, sum of durations, start times. A metric without a
+/// minimum is skipped. Durations are decimals if possible, even if that increases the metric
+/// slightly.
 pub(super) fn answer(concurrent: &TemporalTask, course: &Course) -> Option<Answer> {
     let mut program = course.program.clone();
     if !program.constrain(&course.goal(concurrent)?) {
@@ -36,7 +37,7 @@ pub(super) fn answer(concurrent: &TemporalTask, course: &Course) -> Option<Answe
     let exact = best(&program, &[&value, &Affine::column(MAKESPAN), &sum(&durations)]);
     let least = exact.value(&value);
     let fixed = fix(&exact, &durations);
-    let is_decimal = durations.iter().all(|own| is_decimal(concurrent, &exact.value(own)));
+    let is_decimal = durations.iter().all(|duration| is_decimal(concurrent, &exact.value(duration)));
     let rounded = if is_decimal { None } else { rounded(concurrent, &program, &value, &durations) };
     let times: Vec<Affine> = course.passed.iter().map(|passed| passed.time.clone()).collect();
     let program = best(&rounded.unwrap_or(fixed), &[&Affine::column(MAKESPAN), &sum(&times)]);
@@ -45,18 +46,19 @@ pub(super) fn answer(concurrent: &TemporalTask, course: &Course) -> Option<Answe
     Some(Answer { plan: in_names(concurrent, course, &value, &at), value, least })
 }
 
-fn sum(all: &[Affine]) -> Affine {
-    all.iter().fold(Affine::default(), |sum, own| sum.plus(own, &Rational::one()))
+fn sum(expressions: &[Affine]) -> Affine {
+    expressions.iter().fold(Affine::default(), |sum, expression| sum.plus(expression, &Rational::one()))
 }
 
-/// The best values by some objectives, the most important first; one without a best value counts for nothing.
+/// Lexicographic optimum of several objectives, the most important first. An objective without a
+/// minimum is skipped.
 fn best(program: &Program, objectives: &[&Affine]) -> Program {
     let mut best = program.clone();
     for objective in objectives {
         let mut next = best.clone();
         if next.minimise(objective) {
-            let most = Affine::constant(next.least().clone()).minus(objective);
-            if next.constrain([&most]) {
+            let slack = Affine::constant(next.least().clone()).minus(objective);
+            if next.constrain([&slack]) {
                 best = next;
             }
         }
@@ -64,25 +66,26 @@ fn best(program: &Program, objectives: &[&Affine]) -> Program {
     best
 }
 
-/// With durations that are what they are at the optimum.
+/// Fixes durations at their values in the optimum.
 fn fix(program: &Program, durations: &[Affine]) -> Program {
     let mut fixed = program.clone();
     for duration in durations {
-        let own = Affine::constant(program.value(duration));
-        let kept = fixed.constrain(&[own.minus(duration), duration.minus(&own)]);
-        debug_assert!(kept, "an optimum has values");
+        let value = Affine::constant(program.value(duration));
+        let is_feasible = fixed.constrain(&[value.minus(duration), duration.minus(&value)]);
+        debug_assert!(is_feasible, "an optimum has values");
     }
     fixed
 }
 
-/// Whether a time can be written as a decimal.
+/// Returns `true` if a time has a finite decimal expansion.
 fn is_decimal(concurrent: &TemporalTask, time: &Rational) -> bool {
     let unit = Rational::from_integer(concurrent.task.time_scale);
     to_decimal(&(time.clone() / unit).to_big()).is_some()
 }
 
-/// With durations that are decimals, one after another the best that is near: plans are written so, and have to be valid as they are
-/// written. None if no such durations will do.
+/// Rounds the durations to decimals one after another, each to the best neighbouring value, because
+/// plans are written and must be valid in decimals. Returns `None` if no such durations are
+/// feasible.
 fn rounded(
     concurrent: &TemporalTask,
     program: &Program,
@@ -95,10 +98,10 @@ fn rounded(
         let exact = best(&rounded, &[value, &Affine::column(MAKESPAN)]).value(duration);
         let low = Rational::from_big((exact.clone() / grain.clone()).to_big().floor()) * &grain;
         let near = if is_decimal(concurrent, &exact) { vec![exact] } else { vec![low.clone() + &grain, low] };
-        let with = |own: &Rational| {
-            let own = Affine::constant(own.clone());
+        let with = |candidate: &Rational| {
+            let value = Affine::constant(candidate.clone());
             let mut with = rounded.clone();
-            with.constrain(&[own.minus(duration), duration.minus(&own)]).then_some(with)
+            with.constrain(&[value.minus(duration), duration.minus(&value)]).then_some(with)
         };
         let worth = |with: &Program| best(with, &[value]).value(value);
         rounded = near.iter().filter_map(with).min_by_key(worth)?;
@@ -106,13 +109,14 @@ fn rounded(
     Some(rounded)
 }
 
-/// A power of ten of the files' time unit, at most a thousandth of the separation.
+/// Granularity of rounded durations: a power of ten of the files' time unit, at most a thousandth
+/// of the separation.
 fn grain(concurrent: &TemporalTask) -> Option<Rational> {
     let unit = Rational::from_integer(concurrent.task.time_scale);
-    let most = Rational::from_integer(concurrent.separation) / Rational::from_integer(1000);
+    let limit = Rational::from_integer(concurrent.separation) / Rational::from_integer(1000);
     let powers = std::iter::successors(Some(1_i128), |power| power.checked_mul(10));
     let mut grains = powers.map(|power| unit.clone() / Rational::from_integer(power));
-    grains.find(|grain| *grain <= most)
+    grains.find(|grain| *grain <= limit)
 }
 
 fn in_names(
@@ -124,7 +128,7 @@ fn in_names(
     let task = &concurrent.task;
     let mut steps = Vec::new();
     let mut before = at(&Course::new(concurrent).measured(concurrent));
-    // By instance the step that it is, in the order of the starts.
+    // Running actions: instance and index of the step, in the order of their starts.
     let mut open: Vec<(u32, usize)> = Vec::new();
     for passed in &course.passed {
         let operator = &task.operators[passed.operator.index()];
@@ -148,7 +152,7 @@ fn in_names(
             _ => {}
         }
     }
-    steps.sort_by(|one, other| (&one.0, one.1).cmp(&(&other.0, other.1)));
+    steps.sort_by(|a, b| (&a.0, a.1).cmp(&(&b.0, b.1)));
     let steps = steps.into_iter().map(|(start, id, duration, cost)| {
         let cost = if task.objective.maximize { -cost } else { cost };
         Step::new(task, &task.operators[id.index()], &[], (start, duration, cost))

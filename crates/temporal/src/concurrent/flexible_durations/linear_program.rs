@@ -1,54 +1,57 @@
 //! Linear programs in exact rationals, solved again after each added constraint.
 //!
-//! A program is stored as a *dictionary* \[1\]: basic columns and slacks as expressions over the nonbasic columns.
-//! The dual simplex algorithm repairs a violated constraint from the last optimum; the primal one minimises
-//! another objective. Both use Bland's rule, so that they terminate \[2\].
+//! A program is stored as a *dictionary* \[1\]: basic columns and slacks as expressions over the
+//! nonbasic columns. The dual simplex algorithm repairs a violated constraint from the last
+//! optimum; the primal one minimises another objective. Both use Bland's rule, so that they
+//! terminate \[2\].
 //!
-//! \[1\] V. Chvátal: Linear Programming, 1983. \[2\] R. Bland: New finite pivoting rules for the simplex method,
-//! Mathematics of Operations Research 2, 1977.
+//! \[1\] V. Chvátal: Linear Programming, 1983. \[2\] R. Bland: New finite pivoting rules for the
+//! simplex method, Mathematics of Operations Research 2, 1977.
 
 use num_traits::Zero;
 use task::number::Rational;
 
 use crate::concurrent::flexible_durations::affine::{Affine, Column};
 
-/// The first column that stands for what a constraint has left.
+/// First column that represents the slack of a constraint.
 const FIRST_SLACK_COLUMN: Column = 1 << 30;
 
-/// A linear program with the optimum of its objective.
+/// A linear program at the optimum of its objective.
 #[derive(Debug, Clone)]
 pub(super) struct Program {
-    /// Ascending by column, each as an expression over columns that are not here.
+    /// Dictionary: basic columns in ascending order, each as an expression over nonbasic columns.
     rows: Vec<(Column, Affine)>,
-    /// What is minimised, over the same columns.
+    /// Objective to minimise, over the nonbasic columns.
     objective: Affine,
     slacks: Column,
 }
 
 impl Program {
-    /// Without constraints, but that no column is below 0. The factors of the objective are not negative.
+    /// Program without constraints other than that all columns are at least 0. The factors of the
+    /// objective must not be negative.
     pub(super) fn new(objective: Affine) -> Self {
         Self { rows: Vec::new(), objective, slacks: FIRST_SLACK_COLUMN }
     }
 
-    /// The least value of the objective.
+    /// Minimum of the objective.
     pub(super) fn least(&self) -> &Rational {
         &self.objective.constant
     }
 
-    /// About how many bytes it takes.
+    /// Approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         self.rows.iter().fold(self.objective.bytes(), |sum, (_, row)| sum.saturating_add(row.bytes()))
     }
 
-    /// The value of an expression at the optimum.
+    /// Value of an expression at the optimum.
     pub(super) fn value(&self, expression: &Affine) -> Rational {
         self.reduced(expression).constant
     }
 
-    /// Asks that none of some expressions is below 0. False if that cannot be: the program is of no use then.
-    pub(super) fn constrain<'e>(&mut self, all: impl IntoIterator<Item = &'e Affine>) -> bool {
-        for expression in all {
+    /// Adds constraints that each expression is at least 0, and reoptimises. Returns `false` if
+    /// they are infeasible; the program must not be used then.
+    pub(super) fn constrain<'e>(&mut self, expressions: impl IntoIterator<Item = &'e Affine>) -> bool {
+        for expression in expressions {
             let row = self.reduced(expression);
             match row.known() {
                 Some(value) if value.is_negative() => return false,
@@ -62,10 +65,12 @@ impl Program {
         self.mend()
     }
 
-    /// Minimises another objective. False if it has no least value.
+    /// Minimises another objective by the primal simplex algorithm. Returns `false` if it is
+    /// unbounded.
     pub(super) fn minimise(&mut self, objective: &Affine) -> bool {
         self.objective = self.reduced(objective);
         loop {
+            // Bland's rule takes the first eligible column, which prevents cycling.
             let entering = self.objective.terms.iter().find(|(_, factor)| factor.is_negative());
             let Some((entering, _)) = entering.cloned() else { return true };
             let mut leaving: Option<(Rational, Column)> = None;
@@ -82,11 +87,11 @@ impl Program {
         }
     }
 
-    /// An expression over the columns that are 0.
+    /// Rewrites an expression over the nonbasic columns, which are 0 at the optimum.
     fn reduced(&self, expression: &Affine) -> Affine {
         let mut reduced = Affine::constant(expression.constant.clone());
         for (column, factor) in &expression.terms {
-            reduced = match self.rows.binary_search_by_key(column, |(own, _)| *own) {
+            reduced = match self.rows.binary_search_by_key(column, |(basic, _)| *basic) {
                 Ok(position) => reduced.plus(&self.rows[position].1, factor),
                 Err(_) => reduced.plus(&Affine::column(*column), factor),
             };
@@ -94,7 +99,8 @@ impl Program {
         reduced
     }
 
-    /// The dual simplex algorithm.
+    /// Restores feasibility by the dual simplex algorithm. Returns `false` if there is no feasible
+    /// solution.
     fn mend(&mut self) -> bool {
         loop {
             let broken = self.rows.iter().find(|(_, row)| row.constant.is_negative());
@@ -113,20 +119,20 @@ impl Program {
         }
     }
 
-    /// What was 0 takes the place of what becomes 0.
+    /// Exchanges the basic column `leaving` with the nonbasic column `entering`.
     fn pivot(&mut self, leaving: Column, entering: Column) {
-        let position = self.rows.binary_search_by_key(&leaving, |(own, _)| *own);
+        let position = self.rows.binary_search_by_key(&leaving, |(candidate, _)| *candidate);
         let (_, mut row) = self.rows.remove(position.expect("invariant: a row of the dictionary"));
-        let position = row.terms.binary_search_by_key(&entering, |(own, _)| *own);
+        let position = row.terms.binary_search_by_key(&entering, |(candidate, _)| *candidate);
         let (_, factor) = row.terms.remove(position.expect("invariant: a column of the row"));
-        // leaving = row + factor · entering
+        // Solves `leaving = row + factor · entering` for `entering`.
         let by = factor.recip();
         let solved = Affine::column(leaving).minus(&row).times(&by);
-        for (_, other) in &mut self.rows {
-            other.substitute(entering, &solved);
+        for (_, row) in &mut self.rows {
+            row.substitute(entering, &solved);
         }
         self.objective.substitute(entering, &solved);
-        let position = self.rows.partition_point(|(own, _)| *own < entering);
+        let position = self.rows.partition_point(|(basic, _)| *basic < entering);
         self.rows.insert(position, (entering, solved));
     }
 }
@@ -145,10 +151,10 @@ mod tests {
         }
     }
 
-    /// The least value over two columns: at one of the points where two constraints meet.
+    /// Minimum over two columns, attained at an intersection of two constraints.
     fn least(constraints: &[Affine], objective: &Affine) -> Option<Rational> {
-        let mut all = constraints.to_vec();
-        all.extend([affine(0, [1, 0]), affine(0, [0, 1])]);
+        let mut half_planes = constraints.to_vec();
+        half_planes.extend([affine(0, [1, 0]), affine(0, [0, 1])]);
         let zero = Rational::zero;
         let at = |expression: &Affine, point: &[Rational; 2]| {
             expression.terms.iter().fold(expression.constant.clone(), |sum, (column, factor)| {
@@ -156,20 +162,25 @@ mod tests {
             })
         };
         let mut best: Option<Rational> = None;
-        for (index, one) in all.iter().enumerate() {
-            for other in &all[..index] {
+        for (index, first_line) in half_planes.iter().enumerate() {
+            for second_line in &half_planes[..index] {
                 let factor = |of: &Affine, column| of.coefficient(column).cloned().unwrap_or_else(zero);
-                let [a, b, c, d] = [factor(one, 0), factor(one, 1), factor(other, 0), factor(other, 1)];
+                let [a, b, c, d] = [
+                    factor(first_line, 0),
+                    factor(first_line, 1),
+                    factor(second_line, 0),
+                    factor(second_line, 1),
+                ];
                 let determinant = a.clone() * &d - &(b.clone() * &c);
                 if determinant.is_zero() {
                     continue;
                 }
-                let first = b * &other.constant - &(d * &one.constant);
-                let second = c * &one.constant - &(a * &other.constant);
-                let point = [first, second].map(|own| own / determinant.clone());
-                if all.iter().all(|own| !at(own, &point).is_negative()) {
+                let first = b * &second_line.constant - &(d * &first_line.constant);
+                let second = c * &first_line.constant - &(a * &second_line.constant);
+                let point = [first, second].map(|numerator| numerator / determinant.clone());
+                if half_planes.iter().all(|expression| !at(expression, &point).is_negative()) {
                     let value = at(objective, &point);
-                    best = Some(best.map_or(value.clone(), |known| known.min(value)));
+                    best = Some(best.map_or(value.clone(), |least| least.min(value)));
                 }
             }
         }
@@ -178,7 +189,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn agrees_with_all_corners(
+        fn the_simplex_optimum_equals_the_best_corner(
             rows in prop::collection::vec((-9_i128..9, [-4_i128..5, -4_i128..5]), 0..7),
             costs in [0_i128..4, 0_i128..4],
             others in [-3_i128..4, -3_i128..4],
@@ -186,20 +197,20 @@ mod tests {
             let mut constraints: Vec<_> = rows.iter().map(|(constant, row)| affine(*constant, *row)).collect();
             let objective = affine(1, costs);
             let mut program = Program::new(objective.clone());
-            // One after another, so that each begins where the last one has ended.
-            let holds = constraints.iter().all(|own| program.constrain([own]));
-            let found = holds.then(|| program.least().clone());
-            prop_assert_eq!(found, least(&constraints, &objective));
+            // Constraints are added one by one, so that each step starts from the last optimum.
+            let holds = constraints.iter().all(|constraint| program.constrain([constraint]));
+            let optimum = holds.then(|| program.least().clone());
+            prop_assert_eq!(optimum, least(&constraints, &objective));
             if holds {
-                let other = affine(0, others);
-                let bounded = program.minimise(&other);
+                let second_objective = affine(0, others);
+                let bounded = program.minimise(&second_objective);
                 if bounded {
-                    prop_assert_eq!(Some(program.least().clone()), least(&constraints, &other));
-                    prop_assert_eq!(program.value(&other), program.least().clone());
+                    prop_assert_eq!(Some(program.least().clone()), least(&constraints, &second_objective));
+                    prop_assert_eq!(program.value(&second_objective), program.least().clone());
                 } else {
-                    // In a large box it has a least value, which is at the border of the box.
+                    // Within a large box it has a minimum, which lies on the border of the box.
                     constraints.extend([affine(1_000_000, [-1, 0]), affine(1_000_000, [0, -1])]);
-                    prop_assert!(least(&constraints, &other).is_some_and(|own| own < Rational::from_integer(-1000)));
+                    prop_assert!(least(&constraints, &second_objective).is_some_and(|value| value < Rational::from_integer(-1000)));
                 }
             }
         }

@@ -4,7 +4,8 @@
 //! Only the lexicographically first sequence of each trace is searched. An end names the run of its instance
 //! that it ends; runs of one instance keep their order.
 //!
-//! \[1\] A. Mazurkiewicz: Concurrent program schemes and their interpretations, DAIMI PB 78, Aarhus University, 1977.
+//! \[1\] A. Mazurkiewicz: Concurrent program schemes and their interpretations, DAIMI PB 78, Aarhus
+//! University, 1977.
 
 use rustc_hash::FxHashMap;
 use task::task::OperatorId;
@@ -13,7 +14,7 @@ use crate::concurrent::flexible_durations::partial_plan_lp::gap;
 use crate::concurrent::happening::Role;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// Which happenings interfere, as far as that has been asked.
+/// Memoised interference relation between happenings.
 pub(super) struct Traces<'a> {
     concurrent: &'a TemporalTask,
     known: FxHashMap<(OperatorId, OperatorId), bool>,
@@ -24,28 +25,28 @@ impl<'a> Traces<'a> {
         Self { concurrent, known: FxHashMap::default() }
     }
 
-    /// The first sequence of the trace.
+    /// Lexicographically first sequence of the trace.
     pub(super) fn first(&mut self, sequence: &[(OperatorId, u32)]) -> Vec<(OperatorId, u32)> {
-        let mut left = sequence.to_vec();
-        let mut first = Vec::with_capacity(left.len());
-        while !left.is_empty() {
+        let mut remaining = sequence.to_vec();
+        let mut first = Vec::with_capacity(remaining.len());
+        while !remaining.is_empty() {
             let mut best: Option<usize> = None;
-            for (position, id) in left.iter().enumerate() {
-                let is_less = best.is_none_or(|best| *id < left[best]);
-                if is_less && left[..position].iter().all(|before| !self.depend(before.0, id.0)) {
+            for (position, id) in remaining.iter().enumerate() {
+                let is_less = best.is_none_or(|best| *id < remaining[best]);
+                if is_less && remaining[..position].iter().all(|before| !self.depend(before.0, id.0)) {
                     best = Some(position);
                 }
             }
-            first.push(left.remove(best.expect("invariant: nothing is before the first one")));
+            first.push(remaining.remove(best.expect("invariant: nothing is before the first one")));
         }
         first
     }
 
-    /// Whether the order of two happenings may matter.
-    fn depend(&mut self, one: OperatorId, other: OperatorId) -> bool {
-        let pair = (one.min(other), one.max(other));
+    /// Returns `true` if the order of two happenings may matter.
+    fn depend(&mut self, first: OperatorId, second: OperatorId) -> bool {
+        let pair = (first.min(second), first.max(second));
         let concurrent = self.concurrent;
-        *self.known.entry(pair).or_insert_with(|| depend(concurrent, one, other))
+        *self.known.entry(pair).or_insert_with(|| depend(concurrent, first, second))
     }
 }
 
@@ -55,24 +56,25 @@ fn depend(concurrent: &TemporalTask, one: OperatorId, other: OperatorId) -> bool
         Role::Start(instance) | Role::End(instance) => Some(instance),
         _ => None,
     };
-    let (own, others) = (instance(first.role), instance(second.role));
+    let (first_instance, second_instance) = (instance(first.role), instance(second.role));
     let is_timed = [first, second].iter().any(|happening| matches!(happening.role, Role::Timed(_)));
     let clashes = || {
         let mut used = first.designs.iter().flat_map(|(function, design)| {
-            second.designs.iter().filter(move |(other, used)| other == function && used != design)
+            second.designs.iter().filter(move |(candidate, used)| candidate == function && used != design)
         });
         used.next().is_some()
     };
-    // What has a joint condition over all goes with all that writes what this reads.
-    let touches = |id, instance: Option<u32>| instance.is_some_and(|own| concurrent.touches(id, own));
+    // An instance with a joint condition over all depends on every happening that writes what the
+    // condition reads.
+    let touches = |id, instance: Option<u32>| instance.is_some_and(|index| concurrent.touches(id, index));
     let mut joint = 0..u32::try_from(concurrent.instances.len()).unwrap_or(u32::MAX);
     is_timed
         || one == other
-        || own.is_some() && own == others
+        || first_instance.is_some() && first_instance == second_instance
         || gap(&first.accesses.after, &second.accesses.marks).is_some()
         || gap(&second.accesses.after, &first.accesses.marks).is_some()
         || clashes()
-        || touches(one, others)
-        || touches(other, own)
+        || touches(one, second_instance)
+        || touches(other, first_instance)
         || joint.any(|instance| touches(one, Some(instance)) && touches(other, Some(instance)))
 }

@@ -1,12 +1,15 @@
-//! Temporal planning with durations that the planner chooses: a linear program for each sequence of happenings.
+//! Temporal planning with durations that the planner chooses: a linear program for each sequence of
+//! happenings.
 //!
-//! The bounds of a duration are conditions at the start of its action, and effects may depend on it. A sequence
-//! has a plan if some times and durations satisfy all constraints. This is a linear program, as in COLIN \[1\].
-//! It is solved in exact arithmetic (`linear_program`): a plan must not be wrong by a rounded epsilon, and
-//! infeasibility is part of proofs. An exhaustive and a greedy search run interleaved (`search`). If every action
-//! can have its minimal duration, the searches for fixed durations are used as well.
+//! The bounds of a duration are conditions at the start of its action, and effects may depend on
+//! it. A sequence has a plan if some times and durations satisfy all constraints. This is a linear
+//! program, as in COLIN \[1\]. It is solved in exact arithmetic (`linear_program`): a plan must not
+//! be wrong by a rounded epsilon, and infeasibility is part of proofs. An exhaustive and a greedy
+//! search run interleaved (`search`). If every action can have its minimal duration, the searches
+//! for fixed durations are used as well.
 //!
-//! \[1\] A. Coles, A. Coles, M. Fox, D. Long: COLIN: planning with continuous linear numeric change, JAIR 44, 2012.
+//! \[1\] A. Coles, A. Coles, M. Fox, D. Long: COLIN: planning with continuous linear numeric
+//! change, JAIR 44, 2012.
 
 mod affine;
 mod answer;
@@ -34,10 +37,10 @@ use answer::Answer;
 use partial_plan_lp::Course;
 use search::{Outcome, Search};
 
-/// The task, if such durations can be planned with.
+/// Returns the task if its chosen durations are supported.
 ///
 /// # Errors
-/// Derived predicates that compare numbers: what they are depends on durations.
+/// Fails if a derived predicate compares numbers, because its truth would depend on durations.
 pub(super) fn check(concurrent: TemporalTask) -> Result<TemporalTask, Errors> {
     let mut rules = concurrent.task.axioms.iter().flat_map(|layer| &layer.rules);
     if rules.all(|rule| rule.body.linears().next().is_none()) {
@@ -51,33 +54,40 @@ pub(super) fn check(concurrent: TemporalTask) -> Result<TemporalTask, Errors> {
     .into())
 }
 
-/// Whether every plan is among those that an exhaustive search goes through, with the times and durations that it can have.
+/// Returns `true` if the exhaustive search covers every plan with all its possible times and
+/// durations.
 ///
-/// Not so where an action may take less time than the separation, or none, which makes one happening of it, where several happenings can keep up a condition together at one
-/// time, and where a plan ends right before timed initial literals.
+/// It does not if an action may take no time or less than the separation (it then becomes a single
+/// happening), if several happenings can jointly maintain a condition at one time, or if the task
+/// has timed initial literals, since a plan may end right before them.
 pub(super) fn is_exact(concurrent: &TemporalTask) -> bool {
-    let takes_time = |own: &Instance| {
-        let condition = &concurrent.task.operators[own.start.index()].condition;
-        !own.is_chosen
+    let takes_time = |instance: &Instance| {
+        let condition = &concurrent.task.operators[instance.start.index()].condition;
+        !instance.is_chosen
             || condition.comparisons.iter().any(|linear| {
                 let [(number, factor)] = linear.coefficients[..] else { return false };
-                let Some((_, times)) = own.timer.filter(|(timer, _)| *timer == number) else { return false };
+                let Some((_, times)) = instance.timer.filter(|(timer, _)| *timer == number) else {
+                    return false;
+                };
                 let least = linear.quantity.constant.saturating_neg().checked_mul(times);
                 let short = concurrent.separation.checked_mul(factor);
                 factor > 0 && least.zip(short).is_some_and(|(least, short)| least >= short)
             })
     };
-    let is_decided = |own: &Instance| own.timer.is_none() || own.is_chosen;
+    let is_decided = |instance: &Instance| instance.timer.is_none() || instance.is_chosen;
     concurrent.is_exact
         && concurrent.events.is_empty()
-        && concurrent.instances.iter().all(|own| own.joint.is_empty() && is_decided(own) && takes_time(own))
+        && concurrent
+            .instances
+            .iter()
+            .all(|instance| instance.joint.is_empty() && is_decided(instance) && takes_time(instance))
 }
 
-/// Finds a best plan; of those, one with the least makespan and the shortest durations.
+/// Finds an optimal plan; among these one with the least makespan and the shortest durations.
 pub(super) fn optimize(concurrent: &TemporalTask, limits: &Limits, mut record: Record<'_>) -> Solution {
     let span = info_span!("optimize", operators = concurrent.task.operators.len());
     let (is_over, lower, best) = span.in_scope(|| take_turns_choosing(concurrent, limits, &mut record));
-    // Durations that are decimals may cost a little.
+    // Rounding durations to decimals may cost a little, and then the value exceeds the bound.
     let is_proved = is_over && concurrent.is_exact && best.as_ref().is_none_or(|best| lower >= best.value);
     let status = match (&best, is_proved) {
         (Some(_), true) => Status::Optimal,
@@ -98,7 +108,8 @@ pub(super) fn optimize(concurrent: &TemporalTask, limits: &Limits, mut record: R
     }
 }
 
-/// Whether nothing is left, what no plan can get below, and the best plan.
+/// Interleaves the searches. Returns whether the exhaustive search is complete, the lower bound on
+/// the metric, and the best plan.
 fn take_turns_choosing(
     concurrent: &TemporalTask,
     limits: &Limits,
@@ -113,48 +124,51 @@ fn take_turns_choosing(
     let mut turn =
         |search: &mut Search<'_>, best: &mut Option<Answer>, work, part, record: &mut Record<'_>| {
             let before = search.figures;
-            let mut left: u64 = work;
+            let mut remaining_work: u64 = work;
             let outcome = loop {
-                let looked_at = search.figures.evaluated;
-                let outcome = search.run(best, limits, left);
+                let evaluated_before = search.figures.evaluated;
+                let outcome = search.run(best, limits, remaining_work);
                 if outcome != Outcome::Found {
                     break outcome;
                 }
-                left = left.saturating_sub(search.figures.evaluated.saturating_sub(looked_at));
-                let found = best.iter().map(|best| (best.value.clone(), best.plan.steps.len()));
-                found.for_each(|(value, steps)| record.improve(&value, steps, lower.clone(), part));
+                remaining_work =
+                    remaining_work.saturating_sub(search.figures.evaluated.saturating_sub(evaluated_before));
+                let improvements = best.iter().map(|best| (best.value.clone(), best.plan.steps.len()));
+                improvements.for_each(|(value, steps)| record.improve(&value, steps, lower.clone(), part));
             };
             search.figures.add_to(before, &mut record.statistics);
             if part == PlannerPart::Search && concurrent.is_exact {
-                let known = search.lower().or_else(|| best.as_ref().map(|best| best.value.clone()));
-                lower = record.report_lower_bound(known.unwrap_or_else(|| lower.clone()));
+                let bound = search.lower().or_else(|| best.as_ref().map(|best| best.value.clone()));
+                lower = record.report_lower_bound(bound.unwrap_or_else(|| lower.clone()));
             }
             (outcome, lower.clone())
         };
     let soon = limits.thresholds().chosen;
-    let (mut ended, mut known) = turn(&mut exhaustive, &mut best, soon, PlannerPart::Search, record);
-    if ended == Outcome::Exhausted || limits.reached() {
-        return (ended == Outcome::Exhausted, known, best);
+    let (mut exhaustive_outcome, mut bound) =
+        turn(&mut exhaustive, &mut best, soon, PlannerPart::Search, record);
+    if exhaustive_outcome == Outcome::Exhausted || limits.reached() {
+        return (exhaustive_outcome == Outcome::Exhausted, bound, best);
     }
     let relaxed = TemporalRelaxation::new(concurrent);
     let mut greedy = Search::greedy(concurrent, &expansion, RelaxedPlanHeuristic::new(&relaxed));
     let (mut work, mut rounds) = (soon.max(1), 1..);
-    while ended != Outcome::Exhausted && !limits.reached() {
-        // These begin anew each time, for twice as long: not where there is a plan that they need not find.
+    while exhaustive_outcome != Outcome::Exhausted && !limits.reached() {
+        // These searches restart in each round with twice the work, so they only run again while no
+        // plan is known.
         if let Some(rounds) = rounds.next().filter(|rounds| *rounds == 1 || best.is_none()) {
-            shortest(concurrent, (limits, rounds), &mut best, (record, &known));
+            shortest(concurrent, (limits, rounds), &mut best, (record, &bound));
         }
         let (greedily, _) = turn(&mut greedy, &mut best, work, PlannerPart::Satisficing, record);
         if exhaustive.is_full(limits) && (greedily == Outcome::Exhausted || greedy.is_full(limits)) {
             break;
         }
-        (ended, known) = turn(&mut exhaustive, &mut best, work, PlannerPart::Search, record);
+        (exhaustive_outcome, bound) = turn(&mut exhaustive, &mut best, work, PlannerPart::Search, record);
         work = work.saturating_mul(2);
     }
-    (ended == Outcome::Exhausted, known, best)
+    (exhaustive_outcome == Outcome::Exhausted, bound, best)
 }
 
-/// Looks for a plan in which every action is as short as it may be, where that can be planned with, for so many rounds.
+/// Searches for a plan with minimal durations, if the task supports them, for a number of rounds.
 fn shortest(
     concurrent: &TemporalTask,
     (limits, rounds): (&Limits, usize),
@@ -162,16 +176,16 @@ fn shortest(
     (record, lower): (&mut Record<'_>, &Rational),
 ) {
     let Some(shortest) = concurrent.shortest.as_deref() else { return };
-    let mut unheard = |_| {};
-    let mut own = Record::new(shortest, std::time::Instant::now(), &mut unheard);
-    let (_, found) = interleave_searches(shortest, None, limits, &mut own, rounds);
-    let (figures, part) = (own.statistics, PlannerPart::Satisficing);
+    let mut discard = |_| {};
+    let mut inner_record = Record::new(shortest, std::time::Instant::now(), &mut discard);
+    let (_, sequence) = interleave_searches(shortest, None, limits, &mut inner_record, rounds);
+    let (figures, part) = (inner_record.statistics, PlannerPart::Satisficing);
     let statistics = &mut record.statistics;
     statistics.expanded = statistics.expanded.saturating_add(figures.expanded);
     statistics.generated = statistics.generated.saturating_add(figures.generated);
     statistics.evaluated = statistics.evaluated.saturating_add(figures.evaluated);
     statistics.restarts = statistics.restarts.saturating_add(figures.restarts);
-    let Some(plan) = found.map(|sequence| in_names(shortest, &sequence)) else { return };
+    let Some(plan) = sequence.map(|sequence| in_names(shortest, &sequence)) else { return };
     let value = concurrent.measure.total_of(&plan.cost);
     if best.as_ref().is_none_or(|best| value < best.value) {
         let steps = plan.steps.len();

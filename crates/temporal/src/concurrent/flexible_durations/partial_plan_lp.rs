@@ -1,12 +1,14 @@
-//! Partial plans with open times and durations: the happenings so far and their linear program.
+//! Partial plans with open times and durations: a prefix of happenings and its linear program.
 //!
-//! As in POPF \[1\] and COLIN \[2\]. Each start has a column for its time, and one for its duration if the planner
-//! chooses the duration. Numeric fluents are expressions over the durations so far. So are conditions, each of
-//! which is a constraint. Interfering happenings are a separation apart, in the order of the sequence. The end
-//! of a running action is constrained as soon as its predecessors have happened. The first column is the makespan.
+//! As in POPF \[1\] and COLIN \[2\]. Each start has a column for its time, and one for its duration
+//! if the planner chooses the duration. Numeric fluents are expressions over earlier durations. So
+//! are conditions, each of which is a constraint. Interfering happenings are a separation apart, in
+//! the order of the sequence. The end of a running action is constrained as soon as its
+//! predecessors have happened. The first column is the makespan.
 //!
 //! \[1\] A. Coles, A. Coles, M. Fox, D. Long: Forward-chaining partial-order planning, ICAPS 2010.
-//! \[2\] A. Coles, A. Coles, M. Fox, D. Long: COLIN: planning with continuous linear numeric change, JAIR 44, 2012.
+//! \[2\] A. Coles, A. Coles, M. Fox, D. Long: COLIN: planning with continuous linear numeric
+//! change, JAIR 44, 2012.
 
 use task::number::{Int, Rational, dense};
 use task::task::number::TaskNumber;
@@ -19,60 +21,64 @@ use crate::concurrent::happening::{Instance, Role};
 use crate::concurrent::simple_temporal_network::Key;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// The column of the makespan.
+/// Column of the makespan.
 pub(super) const MAKESPAN: Column = 0;
 
-/// The column of the time of a start at a position.
+/// Column of the start time of the happening at a position.
 #[expect(clippy::arithmetic_side_effects, reason = "sequences are shorter than 2^28")]
 pub(super) fn time_of(position: usize) -> Column {
     2 * dense(position) + 2
 }
 
-/// The column of the duration that is chosen at a position.
+/// Column of the chosen duration of the action that starts at a position.
 #[expect(clippy::arithmetic_side_effects, reason = "sequences are shorter than 2^28")]
 pub(super) fn duration_of(position: usize) -> Column {
     2 * dense(position) + 3
 }
 
-/// An action under way.
+/// A running action.
 #[derive(Debug, Clone)]
 pub(super) struct RunningAction {
     pub(super) instance: u32,
-    /// When it ends.
+    /// Time of its end.
     end: Affine,
-    /// What the number is that holds how long it takes, if one does: other runs of the instance have other ones.
+    /// Value of the duration variable, if the instance has one. Other runs of the instance may have
+    /// other values.
     number: Option<Affine>,
-    /// The last happening that has written what its joint condition over all reads, if it has one.
+    /// Time of the last happening that wrote an atom or number read by the joint condition over
+    /// all, if there is one.
     last: Option<Affine>,
 }
 
-/// A happening of the sequence, with its time.
+/// A happening of the sequence and its time.
 #[derive(Debug, Clone)]
 pub(super) struct Passed {
     pub(super) operator: OperatorId,
-    /// Of an end, which of the runs of its instance ends, in the order of their starts; 0 for others.
+    /// For an end: index of the ended run among the runs of its instance, in the order of their
+    /// starts. Otherwise 0.
     pub(super) run: u32,
     pub(super) time: Affine,
-    /// Of a start, how long the action takes; 0 for others.
+    /// For a start: duration of the action. Otherwise 0.
     pub(super) duration: Affine,
-    /// What the numbers that only count in the end come to afterwards, in the task's cost unit.
+    /// Contribution of the numbers in the metric after this happening, in the task's cost unit.
     pub(super) measured: Affine,
 }
 
-/// A sequence of happenings that can take place at some times, with some durations.
+/// A partial plan: a sequence of happenings with a feasible linear program.
 #[derive(Debug, Clone)]
 pub(super) struct Course {
     pub(super) values: Vec<u32>,
-    /// The numbers of the task.
+    /// Numeric variables of the task.
     pub(super) numbers: Vec<Affine>,
-    /// Ascending by instance; of one instance in the order in which its runs have started.
+    /// Sorted by instance; runs of one instance in the order of their starts.
     pub(super) opens: Vec<RunningAction>,
     pub(super) passed: Vec<Passed>,
-    /// What each chosen duration can be at least and at most, by the bounds that rest on nothing else; ascending by column.
+    /// Bounds of each chosen duration (minimum and maximum) that follow from constraints on this
+    /// duration and earlier ones. Sorted by column.
     ranges: Vec<(Column, Rational, Option<Rational>)>,
-    /// The time of the last timed initial literals.
+    /// Time of the last timed initial literals, or -1.
     floor: Int,
-    /// In the task's cost unit.
+    /// Path cost in the task's cost unit.
     pub(super) cost: Int,
     pub(super) program: Program,
 }
@@ -82,7 +88,7 @@ fn rational(number: Int) -> Rational {
 }
 
 impl Course {
-    /// When nothing has happened.
+    /// Empty partial plan.
     pub(super) fn new(concurrent: &TemporalTask) -> Self {
         let State { values, numbers } = concurrent.task.initial.clone();
         Self {
@@ -97,16 +103,16 @@ impl Course {
         }
     }
 
-    /// About how many bytes it takes.
+    /// Approximate memory use in bytes.
     pub(super) fn bytes(&self) -> usize {
         let numbers = self.numbers.iter().map(Affine::bytes);
-        // Each happening takes about as much again where sequences are told apart.
+        // The table of traces stores about the same amount for each happening again.
         let times = self.passed.iter().map(|passed| {
-            let own = passed.time.bytes().saturating_add(passed.duration.bytes());
-            own.saturating_add(passed.measured.bytes()).saturating_add(size_of::<Passed>())
+            let bytes = passed.time.bytes().saturating_add(passed.duration.bytes());
+            bytes.saturating_add(passed.measured.bytes()).saturating_add(size_of::<Passed>())
         });
-        let rest = size_of_val(&self.values[..]).saturating_add(self.program.bytes());
-        numbers.chain(times).fold(rest, usize::saturating_add)
+        let fixed_size = size_of_val(&self.values[..]).saturating_add(self.program.bytes());
+        numbers.chain(times).fold(fixed_size, usize::saturating_add)
     }
 
     pub(super) fn state(&self, concurrent: &TemporalTask) -> State {
@@ -117,29 +123,34 @@ impl Course {
         self.opens.iter().map(|open| open.instance)
     }
 
-    /// How many runs of an instance are under way.
+    /// Number of runs of an instance that are running.
     fn runs(&self, instance: u32) -> usize {
         self.instances().filter(|open| *open == instance).count()
     }
 
-    /// Where the runs of an instance lie among the actions under way.
+    /// Index of a run of an instance among the running actions.
     fn position(&self, instance: u32, run: u32) -> Option<usize> {
         let mut runs = (0..self.opens.len()).filter(|position| self.opens[*position].instance == instance);
         runs.nth(run as usize)
     }
 
-    /// What can happen but for starts: the ends of what is under way. Of runs that take as long the first one ends first.
+    /// Possible ends of running actions. If all runs of an instance have the same duration, only
+    /// the first one can end.
     pub(super) fn ends(&self, concurrent: &TemporalTask) -> impl Iterator<Item = (OperatorId, u32)> {
         let mut before: Option<(u32, u32)> = None;
         let runs = self.instances().map(move |instance| {
-            let run = before.filter(|(own, _)| *own == instance).map_or(0, |(_, run)| run.saturating_add(1));
+            let run = before
+                .filter(|(previous, _)| *previous == instance)
+                .map_or(0, |(_, run)| run.saturating_add(1));
             before = Some((instance, run));
             (&concurrent.instances[instance as usize], run)
         });
-        runs.filter(|(own, run)| *run == 0 || own.timer.is_some()).map(|(own, run)| (own.end, run))
+        runs.filter(|(candidate, run)| *run == 0 || candidate.timer.is_some())
+            .map(|(candidate, run)| (candidate.end, run))
     }
 
-    /// The sequence after a happening, an end of the given run; none if it has no times and durations.
+    /// Partial plan after a happening (for an end: of the given run). Returns `None` if no times
+    /// and durations are feasible.
     pub(super) fn after(
         &self,
         concurrent: &TemporalTask,
@@ -150,23 +161,23 @@ impl Course {
             return None;
         }
         let state = self.state(concurrent);
-        let own = &concurrent.task.operators[operator.index()];
-        let mut after = concurrent.task.successor(own, &state, &[])?;
+        let schema = &concurrent.task.operators[operator.index()];
+        let mut after = concurrent.task.successor(schema, &state, &[])?;
         if let Role::End(instance) = role
             && self.runs(instance) == 1
         {
             concurrent.end_last_run(instance, &mut after);
         }
         let mut next =
-            Self { values: after.values, cost: self.cost.checked_add(own.cost.constant)?, ..self.clone() };
-        let mut asked = Vec::new();
-        next.count(concurrent, (operator, run), role, &mut asked)?;
-        next.pass(concurrent, (operator, run), role, &mut asked)?;
-        next.keep_up(concurrent, operator, role, &mut asked)?;
-        if !next.program.constrain(&asked) {
+            Self { values: after.values, cost: self.cost.checked_add(schema.cost.constant)?, ..self.clone() };
+        let mut constraints = Vec::new();
+        next.count(concurrent, (operator, run), role, &mut constraints)?;
+        next.pass(concurrent, (operator, run), role, &mut constraints)?;
+        next.keep_up(concurrent, operator, role, &mut constraints)?;
+        if !next.program.constrain(&constraints) {
             return None;
         }
-        // Where that is the whole metric, no duration makes it better than it can be.
+        // Once the metric itself is minimised, its optimum is a lower bound for every continuation.
         if concurrent.is_whole && !concurrent.task.objective.rest.is_empty() {
             let is_bounded = next.program.minimise(&next.value_of_plan(concurrent));
             debug_assert!(is_bounded, "what only grows has a least value");
@@ -174,13 +185,13 @@ impl Course {
         Some(next)
     }
 
-    /// Whether a happening can come next, but for numbers and times.
+    /// Returns `true` if a happening is applicable, ignoring numbers and times.
     fn admits(&self, concurrent: &TemporalTask, (operator, run): (OperatorId, u32), role: Role) -> bool {
         let designs = &concurrent.happenings[operator.index()].designs;
         let clashes = || {
             designs.iter().any(|(function, design)| {
                 let mut used = self.instances().flat_map(|open| &concurrent.instances[open as usize].designs);
-                used.any(|(own, other)| own == function && other != design)
+                used.any(|(candidate, other)| candidate == function && other != design)
             })
         };
         let is_possible = match role {
@@ -196,35 +207,38 @@ impl Course {
             && concurrent.task.operators[operator.index()].condition.holds_propositionally(&self.values)
     }
 
-    /// The numbers after a happening; what its conditions ask of them is added to `asked`.
+    /// Updates the numbers after a happening, and adds its numeric conditions to `constraints`.
     fn count(
         &mut self,
         concurrent: &TemporalTask,
         (operator, run): (OperatorId, u32),
         role: Role,
-        asked: &mut Vec<Affine>,
+        constraints: &mut Vec<Affine>,
     ) -> Option<()> {
-        let own = &concurrent.task.operators[operator.index()];
+        let schema = &concurrent.task.operators[operator.index()];
         let ending = if let Role::End(instance) = role { Some(instance) } else { None };
         let timer = ending.and_then(|instance| concurrent.instances[instance as usize].timer);
         if let (Some(instance), Some((number, _))) = (ending, timer) {
-            let ended = &self.opens[self.position(instance, run)?];
-            self.numbers[number.index()] = ended.number.clone()?;
+            let run_to_end = &self.opens[self.position(instance, run)?];
+            self.numbers[number.index()] = run_to_end.number.clone()?;
         }
         let column = duration_of(self.passed.len());
         let chosen = chosen(concurrent, role);
-        if let Some((number, factor)) = chosen.and_then(|own| own.timer) {
+        if let Some((number, factor)) = chosen.and_then(|instance| instance.timer) {
             self.numbers[number.index()] = Affine::column(column).times(&rational(factor).recip());
         }
-        for linear in own.condition.linears() {
-            ask(self.value(linear), asked)?;
+        for linear in schema.condition.linears() {
+            ask(self.value(linear), constraints)?;
         }
         if chosen.is_some() {
-            self.note_range(column, rational(concurrent.separation), asked)?;
+            self.note_range(column, rational(concurrent.separation), constraints)?;
         }
-        let changed: Vec<_> =
-            own.numeric_effects.iter().map(|effect| (effect.variable, self.value(&effect.value))).collect();
-        for (variable, value) in changed {
+        let new_values: Vec<_> = schema
+            .numeric_effects
+            .iter()
+            .map(|effect| (effect.variable, self.value(&effect.value)))
+            .collect();
+        for (variable, value) in new_values {
             self.numbers[variable.index()] = value;
         }
         if let Some((number, _)) = timer {
@@ -233,7 +247,7 @@ impl Course {
         Some(())
     }
 
-    /// An expression of the task over durations.
+    /// Value of a linear expression of the task, as an expression over durations.
     pub(super) fn value(&self, linear: &Linear<Int>) -> Affine {
         let constant = Affine::constant(linear.quantity.at(&[], &[]).to_rational());
         let terms = linear.coefficients.iter();
@@ -242,20 +256,20 @@ impl Course {
         })
     }
 
-    /// Notes between what bounds a duration lies. None if there is nothing between them.
-    fn note_range(&mut self, column: Column, least: Rational, asked: &mut Vec<Affine>) -> Option<()> {
-        asked.push(Affine::column(column).shifted(&-least.clone()));
+    /// Stores the bounds of a duration. Returns `None` if they contradict each other.
+    fn note_range(&mut self, column: Column, least: Rational, constraints: &mut Vec<Affine>) -> Option<()> {
+        constraints.push(Affine::column(column).shifted(&-least.clone()));
         let (mut low, mut high) = (least, None);
-        for expression in &*asked {
+        for expression in &*constraints {
             let Some(factor) = expression.coefficient(column) else { continue };
-            let mut rest = expression.clone();
-            rest.substitute(column, &Affine::default());
-            let Some(most) = self.highest(&rest) else { continue };
-            let bound = -most / factor.clone();
+            let mut remainder = expression.clone();
+            remainder.substitute(column, &Affine::default());
+            let Some(maximum) = self.highest(&remainder) else { continue };
+            let bound = -maximum / factor.clone();
             if factor.is_positive() {
                 low = low.max(bound);
             } else {
-                high = Some(high.map_or(bound.clone(), |known: Rational| known.min(bound)));
+                high = Some(high.map_or(bound.clone(), |least: Rational| least.min(bound)));
             }
         }
         let is_empty = high.as_ref().is_some_and(|high| *high < low);
@@ -263,11 +277,11 @@ impl Course {
         (!is_empty).then_some(())
     }
 
-    /// No more than this is an expression over durations; none if there is no such bound.
+    /// Upper bound on an expression over durations. Returns `None` if there is no bound.
     pub(super) fn highest(&self, expression: &Affine) -> Option<Rational> {
         let mut sum = expression.constant.clone();
         for (column, factor) in &expression.terms {
-            let position = self.ranges.binary_search_by_key(column, |(own, ..)| *own).ok()?;
+            let position = self.ranges.binary_search_by_key(column, |(candidate, ..)| *candidate).ok()?;
             let (_, low, high) = &self.ranges[position];
             let value = if factor.is_positive() { high.clone()? } else { low.clone() };
             sum += value * factor;
@@ -275,13 +289,14 @@ impl Course {
         Some(sum)
     }
 
-    /// Notes when a happening takes place: after what it interferes with, and before the ends of what is under way that do.
+    /// Sets the time of a happening: after the happenings that it interferes with, and before the
+    /// ends of running actions that interfere with it.
     fn pass(
         &mut self,
         concurrent: &TemporalTask,
         (operator, run): (OperatorId, u32),
         role: Role,
-        asked: &mut Vec<Affine>,
+        constraints: &mut Vec<Affine>,
     ) -> Option<()> {
         let position = self.passed.len();
         let mut duration = Affine::default();
@@ -296,40 +311,40 @@ impl Course {
         if let Role::Start(instance) = role {
             duration = self.duration(concurrent, instance, position);
             let end = time.plus(&duration, &rational(1));
-            asked.push(Affine::column(MAKESPAN).minus(&end));
-            ask(duration.shifted(&rational(concurrent.separation.saturating_neg())), asked)?;
-            // What it marked before the start, its end comes after.
+            constraints.push(Affine::column(MAKESPAN).minus(&end));
+            ask(duration.shifted(&rational(concurrent.separation.saturating_neg())), constraints)?;
+            // The end also follows accesses from before the start.
             let after =
                 &concurrent.happenings[concurrent.instances[instance as usize].end.index()].accesses.after;
-            self.come_after(concurrent, &end, after, asked)?;
+            self.come_after(concurrent, &end, after, constraints)?;
             let last = (!concurrent.instances[instance as usize].joint.is_empty()).then(|| time.clone());
             let place = self.opens.partition_point(|open| open.instance <= instance);
             let timer = concurrent.instances[instance as usize].timer;
             let number = timer.map(|(number, _)| self.numbers[number.index()].clone());
             self.opens.insert(place, RunningAction { instance, end, number, last });
         } else if role == Role::Whole {
-            asked.push(Affine::column(MAKESPAN).minus(&time));
+            constraints.push(Affine::column(MAKESPAN).minus(&time));
         }
         let happening = &concurrent.happenings[operator.index()];
         if let Role::Timed(at) = role {
-            // Nothing so far is after this, and nothing from now on is before.
+            // Earlier happenings are not after the event, and later ones not before it.
             for passed in &self.passed {
-                ask(time.minus(&passed.time), asked)?;
+                ask(time.minus(&passed.time), constraints)?;
             }
             for open in &self.opens {
-                ask(open.end.minus(&time), asked)?;
+                ask(open.end.minus(&time), constraints)?;
             }
             self.floor = at;
         } else if self.floor > 0 {
-            ask(time.shifted(&rational(self.floor.saturating_neg())), asked)?;
+            ask(time.shifted(&rational(self.floor.saturating_neg())), constraints)?;
         }
         if !matches!(role, Role::End(_)) {
-            self.come_after(concurrent, &time, &happening.accesses.after, asked)?;
+            self.come_after(concurrent, &time, &happening.accesses.after, constraints)?;
         }
         for open in &self.opens {
             let end = &concurrent.happenings[concurrent.instances[open.instance as usize].end.index()];
             if let Some(by) = gap(&end.accesses.after, &happening.accesses.marks) {
-                ask(open.end.minus(&time).shifted(&rational(by.saturating_neg())), asked)?;
+                ask(open.end.minus(&time).shifted(&rational(by.saturating_neg())), constraints)?;
             }
         }
         let measured = self.measured(concurrent);
@@ -337,47 +352,48 @@ impl Course {
         Some(())
     }
 
-    /// How long an instance takes that starts at a position.
+    /// Duration of an instance that starts at a position.
     fn duration(&self, concurrent: &TemporalTask, instance: u32, position: usize) -> Affine {
-        let own = &concurrent.instances[instance as usize];
-        match own.timer {
-            _ if own.is_chosen => Affine::column(duration_of(position)),
+        let action = &concurrent.instances[instance as usize];
+        match action.timer {
+            _ if action.is_chosen => Affine::column(duration_of(position)),
             Some((number, factor)) => self.numbers[number.index()].times(&rational(factor)),
-            None => Affine::constant(rational(own.duration)),
+            None => Affine::constant(rational(action.duration)),
         }
     }
 
-    /// Asks that a time lies after all accesses so far that a happening waits for.
+    /// Adds constraints that a time follows all earlier accesses that the happening waits for.
     fn come_after(
         &self,
         concurrent: &TemporalTask,
         time: &Affine,
         after: &[(Key, Int)],
-        asked: &mut Vec<Affine>,
+        constraints: &mut Vec<Affine>,
     ) -> Option<()> {
         for passed in &self.passed {
             let marks = &concurrent.happenings[passed.operator.index()].accesses.marks;
             if let Some(by) = gap(after, marks) {
-                ask(time.minus(&passed.time).shifted(&rational(by.saturating_neg())), asked)?;
+                ask(time.minus(&passed.time).shifted(&rational(by.saturating_neg())), constraints)?;
             }
         }
         Some(())
     }
 
-    /// Asks that what must hold over all of the actions under way holds now. None if it does not.
+    /// Adds constraints that the conditions over all of the running actions hold now. Returns
+    /// `None` if a propositional one does not hold.
     fn keep_up(
         &mut self,
         concurrent: &TemporalTask,
         operator: OperatorId,
         role: Role,
-        asked: &mut Vec<Affine>,
+        constraints: &mut Vec<Affine>,
     ) -> Option<()> {
         let writes = &concurrent.task.operators[operator.index()].numeric_effects;
         let time = self.passed.last()?.time.clone();
         for index in 0..self.opens.len() {
             let RunningAction { instance, ref last, .. } = self.opens[index];
             if let Some(last) = last.as_ref().filter(|_| concurrent.touches(operator, instance)) {
-                ask(time.minus(last), asked)?;
+                ask(time.minus(last), constraints)?;
                 self.opens[index].last = Some(time.clone());
             }
             let Some(over_all) = concurrent.instances[instance as usize].over_all else { continue };
@@ -386,16 +402,17 @@ impl Course {
                 return None;
             }
             for linear in condition.linears() {
-                let mentions = |variable| linear.coefficients.iter().any(|(own, _)| *own == variable);
+                let mentions =
+                    |variable| linear.coefficients.iter().any(|(candidate, _)| *candidate == variable);
                 if role == Role::Start(instance) || writes.iter().any(|effect| mentions(effect.variable)) {
-                    ask(self.value(linear), asked)?;
+                    ask(self.value(linear), constraints)?;
                 }
             }
         }
         Some(())
     }
 
-    /// What the numbers that only count in the end come to, in the task's cost unit.
+    /// Contribution of the numbers in the metric, in the task's cost unit.
     pub(super) fn measured(&self, concurrent: &TemporalTask) -> Affine {
         let (objective, scale) = (&concurrent.task.objective, concurrent.task.number_scale);
         let unit = rational(objective.scale) / rational(scale);
@@ -404,7 +421,8 @@ impl Course {
         })
     }
 
-    /// The metric as an expression, in integers of [`crate::concurrent::measure::Measure`].
+    /// The metric as an expression, in the integer scale of
+    /// [`crate::concurrent::measure::Measure`].
     pub(super) fn value_of_plan(&self, concurrent: &TemporalTask) -> Affine {
         let measure = &concurrent.measure;
         let whole = Affine::column(MAKESPAN).times(&rational(measure.time));
@@ -412,19 +430,20 @@ impl Course {
         whole.plus(&self.measured(concurrent), &rational(measure.cost))
     }
 
-    /// No plan that begins with this has a lower metric, if numbers that only count in the end only grow.
+    /// Lower bound on the metric of every plan that begins with this sequence. Requires that the
+    /// numbers in the metric never decrease.
     pub(super) fn least(&self, concurrent: &TemporalTask) -> Rational {
         self.program.value(&self.value_of_plan(concurrent))
     }
 
-    /// The positions at which durations are chosen.
+    /// Positions of the actions with chosen durations.
     pub(super) fn chosen(&self, concurrent: &TemporalTask) -> impl Iterator<Item = usize> {
         let roles = self.passed.iter().map(|passed| concurrent.happenings[passed.operator.index()].role);
         let positions = roles.enumerate().filter(|(_, role)| chosen(concurrent, *role).is_some());
         positions.map(|(position, _)| position)
     }
 
-    /// Whether a plan can end here, but for numbers.
+    /// Returns `true` if a plan can end here, ignoring numbers.
     pub(super) fn is_goal(&self, concurrent: &TemporalTask) -> bool {
         let ends =
             |passed: &Passed| !matches!(concurrent.happenings[passed.operator.index()].role, Role::Timed(_));
@@ -433,38 +452,40 @@ impl Course {
             && concurrent.task.goal.holds_propositionally(&self.values)
     }
 
-    /// What the goal asks for besides: of numbers, and that no timed initial literals come any more.
+    /// Further constraints of the goal: numeric conditions, and no later timed initial literals.
     pub(super) fn goal(&self, concurrent: &TemporalTask) -> Option<Vec<Affine>> {
-        let mut asked = Vec::new();
+        let mut constraints = Vec::new();
         for linear in concurrent.task.goal.linears() {
-            ask(self.value(linear), &mut asked)?;
+            ask(self.value(linear), &mut constraints)?;
         }
         for (time, event) in concurrent.events.iter().filter(|(time, _)| *time > self.floor) {
             let before = Affine::constant(rational(time.saturating_sub(1)));
-            asked.push(before.minus(&Affine::column(MAKESPAN)));
+            constraints.push(before.minus(&Affine::column(MAKESPAN)));
             let after = &concurrent.happenings[event.index()].accesses.after;
-            self.come_after(concurrent, &Affine::constant(rational(*time)), after, &mut asked)?;
+            self.come_after(concurrent, &Affine::constant(rational(*time)), after, &mut constraints)?;
         }
-        Some(asked)
+        Some(constraints)
     }
 }
 
-/// Asks that an expression is not below 0. None if it always is.
-fn ask(expression: Affine, asked: &mut Vec<Affine>) -> Option<()> {
+/// Adds the constraint that an expression is at least 0. Returns `None` if the expression is a
+/// negative constant.
+fn ask(expression: Affine, constraints: &mut Vec<Affine>) -> Option<()> {
     if let Some(value) = expression.known() {
         return (!value.is_negative()).then_some(());
     }
-    asked.push(expression);
+    constraints.push(expression);
     Some(())
 }
 
-/// The instance that a happening starts, if it takes as long as the planner chooses.
+/// The instance that a happening starts, if the planner chooses its duration.
 fn chosen(concurrent: &TemporalTask, role: Role) -> Option<&Instance> {
     let Role::Start(instance) = role else { return None };
-    Some(&concurrent.instances[instance as usize]).filter(|own| own.is_chosen)
+    Some(&concurrent.instances[instance as usize]).filter(|instance| instance.is_chosen)
 }
 
-/// How long what waits for some kinds of access comes after what makes others; none if it does not have to.
+/// Least separation between an earlier happening with `marks` and a later one that waits for
+/// `after`. Returns `None` if none is required.
 pub(super) fn gap(after: &[(Key, Int)], marks: &[Key]) -> Option<Int> {
     let by = after.iter().filter(|(key, _)| marks.binary_search(key).is_ok());
     by.map(|(_, by)| *by).max()

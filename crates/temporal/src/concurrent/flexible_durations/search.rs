@@ -1,9 +1,10 @@
 //! Search over sequences of happenings with durations from linear programs: greedy and exhaustive.
 //!
-//! Both searches are lazy: a sequence is evaluated, and its program solved, when it is expanded. The greedy
-//! search is guided by relaxed plans in which a number takes the best value that the bounds of durations allow.
-//! It keeps one sequence for each combination of values, running actions and ranges of numbers. The exhaustive
-//! search expands the sequence with the least metric of its program first, and keeps one sequence per trace.
+//! Both searches are lazy: a sequence is evaluated, and its program solved, when it is expanded.
+//! The greedy search is guided by relaxed plans in which a number takes the best value that the
+//! bounds of durations allow. It keeps one sequence for each combination of values, running actions
+//! and ranges of numbers. The exhaustive search expands the sequence with the least metric of its
+//! program first, and keeps one sequence per trace.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -25,24 +26,26 @@ use crate::concurrent::relaxed_plan_heuristic::{HeuristicValue, RelaxedPlanHeuri
 use crate::concurrent::successors::Expansion;
 use crate::concurrent::temporal_task::TemporalTask;
 
-/// So many more times preferred happenings come first after each progress.
+/// Number of extra turns for the queue of preferred happenings after each improvement of the
+/// heuristic value.
 const BOOST: i64 = 1_000;
 
-/// What was left before it, the least metric, the order, the sequence before, and the happening with the run that it ends.
+/// Queue entry: heuristic value, lower bound on the metric, depth (deepest first), insertion order,
+/// parent node, and the happening with the run that it ends.
 type QueueEntry = Reverse<(u64, Rational, Reverse<u32>, u32, u32, (OperatorId, u32))>;
 
-/// Why the search came to its end.
+/// Outcome of one run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Outcome {
-    /// A plan that is better than the incumbent.
+    /// Found a plan that is better than the incumbent.
     Found,
-    /// Nothing is left.
+    /// All sequences were expanded.
     Exhausted,
-    /// At a limit of time, room or work.
+    /// Stopped at a limit of time, memory or work.
     Stopped,
 }
 
-/// What a sequence has to be new in.
+/// Duplicate detection and guidance of a search.
 enum Kind<'a> {
     Greedy { guidance: Box<RelaxedPlanHeuristic<'a>>, seen: FxHashMap<u64, Rational> },
     Exhaustive { traces: Traces<'a>, seen: FxHashSet<Vec<(OperatorId, u32)>> },
@@ -53,19 +56,19 @@ pub(super) struct Search<'a> {
     expansion: &'a Expansion<'a>,
     kind: Kind<'a>,
     nodes: Vec<Course>,
-    /// Of all happenings, and of preferred ones.
+    /// Queue of all happenings, and queue of preferred ones.
     queues: [BinaryHeap<QueueEntry>; 2],
     priorities: [i64; 2],
     order: u32,
     nearest: u64,
     bytes: usize,
-    /// The least that a plan which was found could come to if its durations need not be decimals.
+    /// Least metric of the known plans if durations need not be decimals.
     reached: Option<Rational>,
     pub(super) figures: SearchStatistics,
 }
 
 impl<'a> Search<'a> {
-    /// By relaxed plans; it proves nothing.
+    /// Greedy search guided by relaxed plans. It proves nothing.
     pub(super) fn greedy(
         concurrent: &'a TemporalTask,
         expansion: &'a Expansion<'a>,
@@ -75,7 +78,7 @@ impl<'a> Search<'a> {
         Self::new(concurrent, expansion, kind)
     }
 
-    /// Through all sequences.
+    /// Exhaustive search over all traces.
     pub(super) fn exhaustive(concurrent: &'a TemporalTask, expansion: &'a Expansion<'a>) -> Self {
         let kind = Kind::Exhaustive { traces: Traces::new(concurrent), seen: FxHashSet::default() };
         Self::new(concurrent, expansion, kind)
@@ -97,20 +100,22 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// No plan that is not known has a lower metric than this, if the search leaves nothing out.
+    /// Lower bound on the metric of plans not found yet, provided that the search prunes nothing
+    /// unsoundly.
     pub(super) fn lower(&self) -> Option<Rational> {
         let open = self.queues[0].peek().map(|Reverse((_, least, ..))| least);
         open.into_iter().chain(&self.reached).min().cloned()
     }
 
-    /// Whether it takes a quarter of the room that there is.
+    /// Returns `true` if the search uses more than a quarter of the memory limit.
     pub(super) fn is_full(&self, limits: &Limits) -> bool {
         let queued = self.queues.iter().map(BinaryHeap::len).fold(0, usize::saturating_add);
         let queued = queued.saturating_mul(size_of::<QueueEntry>());
         self.bytes.saturating_add(queued) > limits.room() / 4
     }
 
-    /// Searches for a plan that is better than the incumbent, until `work` is used up: each sequence that is looked at is one unit of it.
+    /// Searches for a plan that is better than the incumbent, within `work` evaluations of
+    /// sequences.
     pub(super) fn run(&mut self, best: &mut Option<Answer>, limits: &Limits, work: u64) -> Outcome {
         if self.nodes.is_empty()
             && let Some(outcome) = self.take_up(Course::new(self.concurrent), best)
@@ -134,7 +139,7 @@ impl<'a> Search<'a> {
         Outcome::Stopped
     }
 
-    /// Looks at a sequence, and queues what can follow it.
+    /// Evaluates a sequence and queues its successors.
     fn take_up(&mut self, course: Course, best: &mut Option<Answer>) -> Option<Outcome> {
         self.figures.evaluated = self.figures.evaluated.saturating_add(1);
         let least = course.least(self.concurrent);
@@ -144,11 +149,11 @@ impl<'a> Search<'a> {
         let HeuristicValue { left, preferred } = self.judge(&course, &least)?;
         let mut outcome = None;
         if course.is_goal(self.concurrent)
-            && let Some(found) = answer(self.concurrent, &course)
+            && let Some(candidate) = answer(self.concurrent, &course)
         {
-            self.note_reached(&found.least);
-            if best.as_ref().is_none_or(|best| found.value < best.value) {
-                *best = Some(found);
+            self.note_reached(&candidate.least);
+            if best.as_ref().is_none_or(|best| candidate.value < best.value) {
+                *best = Some(candidate);
                 outcome = Some(Outcome::Found);
             }
         }
@@ -159,8 +164,8 @@ impl<'a> Search<'a> {
         let starts =
             self.expansion.starts(&course.state(self.concurrent)).into_iter().map(|start| (start, 0));
         let candidates: Vec<(OperatorId, u32)> = starts.chain(course.ends(self.concurrent)).collect();
-        let own = SearchStatistics { expanded: 1, generated: candidates.len() as u64, evaluated: 0 };
-        self.figures = self.figures.plus(own);
+        let counts = SearchStatistics { expanded: 1, generated: candidates.len() as u64, evaluated: 0 };
+        self.figures = self.figures.plus(counts);
         let (id, depth) = (dense(self.nodes.len()), dense(course.passed.len()));
         for operator in candidates {
             self.order = self.order.wrapping_add(1);
@@ -175,14 +180,14 @@ impl<'a> Search<'a> {
         outcome
     }
 
-    /// Notes what a plan could come to if its durations need not be decimals.
+    /// Updates the least metric that plans without decimal durations can have.
     fn note_reached(&mut self, least: &Rational) {
         if self.reached.as_ref().is_none_or(|reached| least < reached) {
             self.reached = Some(least.clone());
         }
     }
 
-    /// How far the goal is from a sequence; none if it is nothing new, or a dead end.
+    /// Heuristic value of a sequence. Returns `None` if it is a duplicate or a dead end.
     fn judge(&mut self, course: &Course, least: &Rational) -> Option<HeuristicValue> {
         match &mut self.kind {
             Kind::Exhaustive { traces, seen } => {
@@ -192,9 +197,9 @@ impl<'a> Search<'a> {
                 is_new.then(|| HeuristicValue { left: 0, preferred: Vec::new() })
             }
             Kind::Greedy { guidance, seen } => {
-                let known = seen.entry(signature(course));
+                let entry = seen.entry(signature(course));
                 let mut is_new = false;
-                let sooner = known.or_insert_with(|| {
+                let sooner = entry.or_insert_with(|| {
                     is_new = true;
                     least.clone()
                 });
@@ -202,10 +207,10 @@ impl<'a> Search<'a> {
                     return None;
                 }
                 sooner.clone_from(least);
-                let most = |linear: &Linear<Int>| {
+                let upper_bound = |linear: &Linear<Int>| {
                     course.highest(&course.value(linear))?.to_big().floor().to_integer().to_i128()
                 };
-                guidance.guide_from(&course.values, course.instances(), &most)
+                guidance.guide_from(&course.values, course.instances(), &upper_bound)
             }
         }
     }
@@ -219,13 +224,14 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Whether nothing with such a least metric is better than the incumbent.
+/// Returns `true` if no plan with this lower bound is better than the incumbent.
 fn is_lost(concurrent: &TemporalTask, least: &Rational, best: &Answer) -> bool {
     concurrent.is_whole && *least >= best.value
 }
 
-/// A hash of what tells sequences apart for the greedy search: values, actions under way, and the ranges of numbers. Two sequences with one
-/// hash are taken for the same: this search claims nothing.
+/// Hash of the search state for duplicate detection in the greedy search: values, running actions
+/// and ranges of numbers. A hash collision only loses a sequence, which is harmless because this
+/// search proves nothing.
 fn signature(course: &Course) -> u64 {
     let mut hasher = FxHasher::default();
     course.values.hash(&mut hasher);

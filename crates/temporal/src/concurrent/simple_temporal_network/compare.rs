@@ -6,7 +6,7 @@ use crate::concurrent::simple_temporal_network::{Key, RunningAction, SimpleTempo
 use crate::concurrent::time::TimeExpression;
 
 impl SimpleTemporalNetwork {
-    /// What must agree between clocks that can be compared.
+    /// Appends the part that must be equal in two networks that are compared.
     pub(in crate::concurrent) fn signature(&self, out: &mut Vec<u32>) {
         for open in &self.opens {
             out.extend([open.instance, open.float]);
@@ -19,7 +19,8 @@ impl SimpleTemporalNetwork {
         }
     }
 
-    /// Forgets accesses that put nothing off any more: everything that heeds one comes after its guard has changed.
+    /// Removes accesses that no longer delay anything, because every happening that waits for them
+    /// comes after the change of their guard.
     pub(in crate::concurrent) fn forget(&mut self, guards: &[Option<u32>], separation: Int) {
         let mut entries = std::mem::take(&mut self.entries);
         entries.retain(|(key, time)| !self.is_past(*key, time, guards, separation));
@@ -34,33 +35,36 @@ impl SimpleTemporalNetwork {
         guard.is_some_and(|guard| time.precedes(guard, separation))
     }
 
-    /// Whether whatever can follow `other` can follow `self`, no later, as far as accesses do not matter. Their signatures must agree.
+    /// Returns `true` if every continuation of `other` is possible after `self` and not later,
+    /// ignoring accesses. Their signatures must agree.
     pub(in crate::concurrent) fn dominates_ignoring_accesses(&self, other: &Self) -> bool {
         let floats = || self.floats.iter().zip(&other.floats);
         let lasts = || self.opens.iter().zip(&other.opens);
-        let last = |(own, other): (&RunningAction, &RunningAction)| match (&own.last, &other.last) {
-            (Some(own), Some(other)) => own.precedes(other, 0),
+        let last = |(first, second): (&RunningAction, &RunningAction)| match (&first.last, &second.last) {
+            (Some(first), Some(second)) => first.precedes(second, 0),
             _ => true,
         };
         self.floor <= other.floor
             && (!self.waits() || other.waits())
             && self.latest.precedes(&other.latest, 0)
-            && floats().all(|(own, other)| own.lower.precedes(&other.lower, 0) && own.upper >= other.upper)
+            && floats()
+                .all(|(first, second)| first.lower.precedes(&second.lower, 0) && first.upper >= second.upper)
             && lasts().all(last)
     }
 
-    /// The same of accesses alone.
+    /// Returns `true` if the accesses of `self` allow every continuation of `other`, not later.
+    /// Complements [`SimpleTemporalNetwork::dominates_ignoring_accesses`].
     pub(in crate::concurrent) fn accesses_no_later(
         &self,
         other: &Self,
         guards: &[Option<u32>],
         separation: Int,
     ) -> bool {
-        let mut theirs = other.entries.iter().peekable();
+        let mut other_entries = other.entries.iter().peekable();
         self.entries.iter().all(|(key, time)| {
-            while theirs.next_if(|(other, _)| other < key).is_some() {}
-            match theirs.peek() {
-                Some((other, later)) if other == key && time.precedes(later, 0) => true,
+            while other_entries.next_if(|(candidate, _)| candidate < key).is_some() {}
+            match other_entries.peek() {
+                Some((candidate, later)) if candidate == key && time.precedes(later, 0) => true,
                 _ => other.is_past(*key, time, guards, separation),
             }
         })

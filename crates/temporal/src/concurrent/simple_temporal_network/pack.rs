@@ -10,17 +10,17 @@ use crate::concurrent::time::TimeExpression;
 #[derive(Default)]
 struct Writer(Vec<u8>);
 
-/// Reads them again.
+/// Reads numbers in the order in which they were written.
 struct Reader<'a>(std::slice::Iter<'a, u8>);
 
 impl Writer {
-    /// Small magnitudes take little, whatever their sign.
+    /// Writes a number in zigzag and variable-length encoding, so small magnitudes take few bytes.
     fn number(&mut self, number: Int) {
-        let mut rest = ((number << 1) ^ (number >> (Int::BITS - 1))).cast_unsigned();
+        let mut remaining_bits = ((number << 1) ^ (number >> (Int::BITS - 1))).cast_unsigned();
         loop {
-            let byte = (rest & 0x7f) as u8;
-            rest >>= 7;
-            if rest == 0 {
+            let byte = (remaining_bits & 0x7f) as u8;
+            remaining_bits >>= 7;
+            if remaining_bits == 0 {
                 self.0.push(byte);
                 return;
             }
@@ -124,7 +124,8 @@ impl SimpleTemporalNetwork {
         packed.clocks
     }
 
-    /// Only what [`SimpleTemporalNetwork::dominates_ignoring_accesses`] looks at, which is little and rules most comparisons out.
+    /// Unpacks only the part that [`SimpleTemporalNetwork::dominates_ignoring_accesses`] reads. It
+    /// is small and decides most comparisons.
     pub(in crate::concurrent) fn unpack_head(bytes: &[u8]) -> PackedStn<'_> {
         let mut reader = Reader(bytes.iter());
         let (floor, latest) = (reader.number(), reader.time());
@@ -150,10 +151,10 @@ pub(in crate::concurrent) struct PackedStn<'a> {
 }
 
 impl PackedStn<'_> {
-    /// Unpacks the rest.
+    /// Unpacks the remaining part.
     pub(in crate::concurrent) fn finish(&mut self) {
-        let rest = &mut self.rest;
-        let mut times = || rest.list(|reader| (reader.index(), reader.time()));
+        let reader = &mut self.rest;
+        let mut times = || reader.list(|times| (times.index(), times.time()));
         (self.clocks.entries, self.clocks.changed) = (times(), times());
     }
 }
@@ -171,7 +172,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_packed_is_unpacked(
+        fn packing_and_unpacking_preserves_a_network(
             entries in proptest::collection::vec((any::<u32>(), time()), 0..4),
             changed in proptest::collection::vec((any::<u32>(), time()), 0..4),
             floats in proptest::collection::vec((time(), prop_oneof![Just(Int::MAX), -9_i128..1 << 99]), 0..3),
