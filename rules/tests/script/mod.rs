@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use metaplan_rules::replay::{Fault, replay};
 use metaplan_rules::{
     Aggregate, Atom, BuiltIn, Cause, Delta, Derivation, DerivationStep, Engine, Fact, Literal, Program,
-    Reason, Rule, RuleIdentity, Symbol, Symbols, Term, Variable, owl_rl,
+    Reason, Rule, RuleIdentity, Symbol, Symbols, Term, Variable,
 };
 
 use crate::oracle::{
@@ -393,7 +393,7 @@ pub fn check(rules: &[RawRule], start: &[RawChange], script: &[Vec<RawChange>], 
     let program = renumber(program);
     let mut symbols = world.symbols.clone();
     let complete = |program: Program, symbols: &mut Symbols| {
-        if equality { owl_rl::with_equality(&program, symbols) } else { program }
+        if equality { program.with_equality(symbols) } else { program }
     };
     let mut stated: BTreeSet<Fact> =
         start.iter().map(|&(_, p, arguments)| world.fact(p, arguments)).collect();
