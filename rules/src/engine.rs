@@ -34,8 +34,6 @@ pub struct Engine {
     pub(crate) store: Store,
     pub(crate) records: Records,
     pub(crate) limits: Limits,
-    /// Rules that are switched off.
-    pub(crate) disabled: Vec<Rule>,
     /// Where `owl:sameAs` is equality, the names of each individual; the store then knows one of each.
     pub(crate) equality: Option<Arc<Equality>>,
 }

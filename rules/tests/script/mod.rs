@@ -451,16 +451,13 @@ fn switch(
 ) -> Delta {
     let rule = &program.rules[position];
     let number = rule.identity.position;
-    let is_disabled = engine.disabled_rules().contains(rule);
     let comes = absent.remove(&number);
     if !comes {
         absent.insert(number);
     }
-    let change = match way % 3 {
-        0 if !comes || is_disabled => engine.set_enabled(&rule.identity, comes),
-        1 if !comes => engine.remove_rule(&rule.identity),
-        1 if !is_disabled => engine.add_rules([rule.clone()]),
-        _ if is_disabled => engine.set_enabled(&rule.identity, true),
+    let change = match way % 2 {
+        0 if !comes => engine.remove_rule(&rule.identity),
+        0 => engine.add_rules([rule.clone()]),
         _ => {
             let mut rules = engine.program().rules.clone();
             rules.retain(|other| other != rule);
