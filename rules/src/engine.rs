@@ -9,7 +9,7 @@ use crate::fact::{Arguments, Fact};
 use crate::limits::Limits;
 use crate::network::Network;
 use crate::record::Records;
-use crate::rule::{Program, Rule};
+use crate::rule::Program;
 use crate::store::{Store, columns, state};
 use crate::symbol::{Symbol, Symbols};
 

@@ -5,13 +5,11 @@ use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use num_rational::BigRational;
 use pddl::ast::{Domain, Metric, Problem};
 use task::error::{Error, Errors};
 use task::ground::{GroundConfig, ground};
 use task::limits::Limits;
 use task::plan::solution::{Improvement, Solution};
-use temporal::{ground_concurrent, optimize_concurrent};
 
 use crate::exact::{ground_exact, optimize_exact};
 use crate::optimize::{Config, Front, lexicographic, pareto};
@@ -137,17 +135,6 @@ impl<'a> Planner<'a> {
         let task = ground(self.domain, self.problem, &self.grounding)?;
         let (config, mut hear) = (self.config.clone(), self.hear());
         Ok(pareto(&task, &config, &mut hear))
-    }
-
-    /// A plan whose actions may overlap, as PDDL 2.1 has it; those that interfere lie `separation` apart, in the domain's time unit. The
-    /// horizon is not heeded.
-    ///
-    /// # Errors
-    /// As [`Planner::plan`].
-    pub fn plan_concurrently(mut self, separation: &BigRational) -> Result<Solution, Errors> {
-        let task = ground_concurrent(self.domain, self.problem, &self.grounding, separation)?;
-        let (limits, mut hear) = (self.config.limits.clone(), self.hear());
-        Ok(optimize_concurrent(&task, &limits, &mut hear))
     }
 
     /// What the optimizer tells, to who listens; the flag is set when that wants to end.
