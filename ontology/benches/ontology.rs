@@ -36,7 +36,7 @@ fn mission(ontology: &Ontology) -> Runtime {
     let (name, function) = ("search", "f_generate_search_path");
     let objective = NewObjective { name, function, requirements: Vec::new(), always_improve: false };
     runtime.add_objective(&objective).expect("known");
-    let best = runtime.select(name).expect("known").design.expect("one is available");
+    let best = &runtime.available_designs(Some(function)).expect("known")[0];
     runtime.ground(name, &best.name).expect("known");
     runtime
 }
@@ -93,8 +93,8 @@ fn small(criterion: &mut Criterion) {
             bencher.iter(|| {
                 turn = 1 - turn;
                 runtime.measure("water_visibility", decimal(values[turn])).expect("known");
-                for objective in runtime.objectives_to_adapt() {
-                    black_box(runtime.select(&objective.individual.iri).expect("known"));
+                for objective in runtime.objectives().iter().filter(|objective| objective.wants_design()) {
+                    black_box(runtime.candidates(&objective.individual.iri, None).expect("known"));
                 }
             });
         });

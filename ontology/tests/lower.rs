@@ -105,6 +105,18 @@ fn axioms_conclude() {
             ":A owl:hasKey ( :d ) . :i a :A ; :d 1 . :j a :A ; :d 1.0 . :k a :A ; :d 2 .",
             &["i owl:sameAs j", "j owl:sameAs i"],
         ),
+        (
+            ":A rdfs:subClassOf [ a owl:Restriction ; owl:onProperty :p ; owl:maxCardinality 1 ] . :i a :A ; :p :j , :k . :j a :B .",
+            &["j owl:sameAs k", "k a B", "k owl:sameAs j"],
+        ),
+        (
+            ":A rdfs:subClassOf [ a owl:Restriction ; owl:onProperty :p ; owl:maxQualifiedCardinality 1 ; owl:onClass :B ] . :i a :A ; :p :j , :k , :l . :j a :B . :k a :B . :l a :C .",
+            &["j owl:sameAs k", "k owl:sameAs j"],
+        ),
+        (
+            "[ a owl:Restriction ; owl:onProperty :p ; owl:someValuesFrom owl:Thing ] rdfs:subClassOf :A . :i :p :j .",
+            &["i a A"],
+        ),
     ] {
         let (engine, warnings) = engine(text);
         assert_eq!(engine.violations(), [], "{text}");
@@ -123,6 +135,16 @@ fn axioms_forbid() {
         ("[] a owl:AllDisjointClasses ; owl:members ( :A :B :C ) . :i a :A . ", "", ":i a :C ."),
         (":A rdfs:subClassOf [ a owl:Class ; owl:complementOf :B ] . :i a :A . ", "", ":i a :B ."),
         (":A rdfs:subClassOf owl:Nothing . ", ":i a :B .", ":i a :A ."),
+        (
+            ":A rdfs:subClassOf [ a owl:Restriction ; owl:onProperty :p ; owl:maxCardinality 0 ] . :i a :A . ",
+            ":j :p :i .",
+            ":i :p :j .",
+        ),
+        (
+            ":A rdfs:subClassOf [ a owl:Restriction ; owl:onProperty :p ; owl:maxQualifiedCardinality 0 ; owl:onClass :B ] . :i a :A ; :p :j . ",
+            ":j a :C .",
+            ":j a :B .",
+        ),
         (":p owl:propertyDisjointWith :q . :i :p :j . ", ":j :q :i .", ":i :q :j ."),
         (":p a owl:IrreflexiveProperty . ", ":i :p :j .", ":i :p :i ."),
         (":p a owl:AsymmetricProperty . :i :p :j . ", ":j :p :k .", ":j :p :i ."),

@@ -4,6 +4,7 @@
 
 use std::path::PathBuf;
 
+use crate::common::selected;
 use ontology::runtime::{Mode, NewObjective, Objective, Rejection, Runtime};
 use ontology::tomasys::change::Status;
 use ontology::{INTERNAL, ReadOptions, kb, lower, read_files, read_text, vocab};
@@ -119,10 +120,6 @@ fn status(runtime: &Runtime) -> (Vec<String>, bool) {
     (objective.statuses.clone(), objective.updatable)
 }
 
-fn selected(runtime: &Runtime, objective: &str) -> Option<String> {
-    runtime.select(objective).expect("known").design.map(|design| design.name)
-}
-
 /// The statuses after a failure, after its repair and after grounding anew, in a mode.
 fn check_failure(mode: Mode, after_repair: &[&str], updatable: bool) {
     let mut runtime = robot(mode);
@@ -134,7 +131,8 @@ fn check_failure(mode: Mode, after_repair: &[&str], updatable: bool) {
     runtime.report_component("c_motor", Status::Failed).expect("known");
     assert_eq!(runtime.conclude().expect("applied"), []);
     assert_eq!(status(&runtime).0, ["IN_ERROR_COMPONENT"]);
-    assert!(runtime.objectives_to_adapt().iter().all(Objective::is_in_error));
+    let objectives = runtime.objectives();
+    assert!(objectives.iter().filter(|objective| objective.wants_design()).all(Objective::is_in_error));
     let why = runtime.why("o").expect("known");
     let text = why[0].display(runtime.engine().symbols()).to_string();
     assert!(text.contains("c_status> is stated") || text.contains("c_motor>, \"FALSE\""), "{text}");
@@ -177,13 +175,15 @@ fn a_design_that_violates_two_attributes_is_ruled_out_once_with_both_reasons() {
         runtime.measure(attribute, decimal(value)).expect("known");
     }
     runtime.report_component("c_motor", Status::Failed).expect("known");
-    let selection = runtime.select("o").expect("known");
-    assert_eq!(selection.design, None);
-    let rejections: Vec<_> = selection.rejected.values().map(Vec::len).collect();
-    assert_eq!(rejections, [1, 2]);
-    assert_eq!(selection.rejected["http://example.org/robot#fd_fast"], [Rejection::Unavailable]);
+    assert_eq!(selected(&runtime, "o"), None);
+    let rejections = |runtime: &Runtime| -> Vec<Vec<Rejection>> {
+        let candidates = runtime.candidates("o", None).expect("known");
+        candidates.into_iter().map(|candidate| candidate.rejections).collect()
+    };
+    let [fast, slow] = &rejections(&runtime)[..] else { panic!("two designs") };
+    assert_eq!((&fast[..], slow.len()), (&[Rejection::Unavailable][..], 2));
     runtime.measure("light", decimal("2.00")).expect("known");
-    assert_eq!(runtime.select("o").expect("known").rejected["http://example.org/robot#fd_slow"].len(), 1);
+    assert_eq!(rejections(&runtime)[1].len(), 1);
     runtime.measure("air", decimal("4.9")).expect("known");
     assert_eq!(selected(&runtime, "o").as_deref(), Some("fd_slow"));
     assert_eq!(runtime.engine().violations(), []);
@@ -245,7 +245,7 @@ fn wrong_names_are_refused() {
         runtime.measure("light", decimal("bright")).expect_err("no number").code(),
         runtime.report_component("c_radar", Status::Failed).expect_err("no component").code(),
         runtime.ground("o", "fd_fast").expect_err("no objective").code(),
-        runtime.select("o").expect_err("no objective").code(),
+        runtime.candidates("o", None).expect_err("no objective").code(),
     ];
     assert_eq!(runtime.engine().facts().collect::<Vec<_>>(), before);
     pursue(&mut runtime, "o", "f_move");

@@ -5,8 +5,8 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use crate::common::{SHARED, recorded};
-use ontology::runtime::{Mode, NewObjective, Runtime};
+use crate::common::{SHARED, recorded, selected};
+use ontology::runtime::{Mode, NewObjective, Objective, Runtime};
 use ontology::{ReadOptions, lower, read_files, vocab};
 use rules::{Delta, Engine, Fact, Literal, Symbols};
 use serde_json::{Value, json};
@@ -139,7 +139,8 @@ impl Replay {
         let reasoned = !self.runtime.objectives().is_empty();
         same("reasoned", &json!(reasoned), &step["reasoned"])?;
         let consistent = reasoned && self.runtime.conclude().map_err(|error| error.to_string())?.is_empty();
-        let adaptable = if consistent { self.runtime.objectives_to_adapt() } else { Vec::new() };
+        let mut adaptable = if consistent { self.runtime.objectives() } else { Vec::new() };
+        adaptable.retain(Objective::wants_design);
         let mut theirs: Vec<&str> = step["adaptable"]
             .as_array()
             .expect("list")
@@ -156,9 +157,8 @@ impl Replay {
                 self.runtime.note_recoveries().map_err(|error| error.to_string())?;
             }
             let name = &objective.individual.name;
-            let selection = self.runtime.select(name).map_err(|error| error.to_string())?;
-            if let Some(design) = selection.design {
-                plan.insert(name.clone(), design.name);
+            if let Some(design) = selected(&self.runtime, name) {
+                plan.insert(name.clone(), design);
             }
         }
         same("plan", &json!(plan), &step["plan"])?;

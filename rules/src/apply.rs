@@ -65,8 +65,7 @@ impl Engine {
         let (program, symbols) = (Arc::new(program), Arc::new(symbols));
         let equality = same.map(|same| Arc::new(Equality::new(same, &program)));
         let (network, store, records) = (Arc::default(), Store::default(), Records::default());
-        let mut engine =
-            Self { symbols, program, network, store, records, limits, disabled: Vec::new(), equality };
+        let mut engine = Self { symbols, program, network, store, records, limits, equality };
         engine.build(facts)?;
         span.record("facts", engine.store.len());
         Ok(engine)

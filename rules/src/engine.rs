@@ -9,7 +9,7 @@ use crate::fact::{Arguments, Fact};
 use crate::limits::Limits;
 use crate::network::Network;
 use crate::record::Records;
-use crate::rule::{Program, Rule};
+use crate::rule::Program;
 use crate::store::{Store, columns, state};
 use crate::symbol::{Symbol, Symbols};
 
@@ -34,8 +34,6 @@ pub struct Engine {
     pub(crate) store: Store,
     pub(crate) records: Records,
     pub(crate) limits: Limits,
-    /// Rules that are switched off.
-    pub(crate) disabled: Vec<Rule>,
     /// Where `owl:sameAs` is equality, the names of each individual; the store then knows one of each.
     pub(crate) equality: Option<Arc<Equality>>,
 }

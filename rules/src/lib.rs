@@ -20,7 +20,6 @@ mod literal;
 mod lower;
 mod maintain;
 mod network;
-pub mod owl_rl;
 mod plan;
 mod record;
 pub mod replay;

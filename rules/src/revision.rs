@@ -120,33 +120,7 @@ impl Engine {
     pub fn remove_rule(&mut self, identity: &RuleIdentity) -> Result<Delta, Errors> {
         let mut program = Program::clone(&self.program);
         program.rules.retain(|rule| rule.identity != *identity);
-        let change = self.set_program(program)?;
-        self.disabled.retain(|rule| rule.identity != *identity);
-        Ok(change)
-    }
-
-    /// Disables or enables every rule with this identity and returns the net change of all facts that hold, sorted. A
-    /// disabled rule is not in [`Engine::program`] but in [`Engine::disabled_rules`]; enabled again, it comes last.
-    ///
-    /// # Errors
-    /// As [`Engine::new`]; the engine is then as it was before.
-    pub fn set_enabled(&mut self, identity: &RuleIdentity, enabled: bool) -> Result<Delta, Errors> {
-        let mut program = Program::clone(&self.program);
-        let is_meant = |rule: &mut Rule| rule.identity == *identity;
-        let mut disabled = self.disabled.clone();
-        if enabled {
-            program.rules.extend(disabled.extract_if(.., is_meant));
-        } else {
-            disabled.extend(program.rules.extract_if(.., is_meant));
-        }
-        let change = self.set_program(program)?;
-        self.disabled = disabled;
-        Ok(change)
-    }
-
-    /// The rules that [`Engine::set_enabled`] disabled.
-    pub fn disabled_rules(&self) -> &[Rule] {
-        &self.disabled
+        self.set_program(program)
     }
 
     /// Changes the stated rows and the rules over representatives, and returns the net change of rows. After an error the
@@ -203,8 +177,7 @@ impl Engine {
     fn rebuild(&mut self, program: Program) -> Result<Delta, Errors> {
         let mut stated = self.stated();
         stated.sort_unstable();
-        let mut engine = Self::with_limits(self.symbols().clone(), program, stated, self.limits.clone())?;
-        engine.disabled.clone_from(&self.disabled);
+        let engine = Self::with_limits(self.symbols().clone(), program, stated, self.limits.clone())?;
         let insert = engine.facts().filter(|fact| !self.holds(fact)).collect();
         let delete = self.facts().filter(|fact| !engine.holds(fact)).collect();
         *self = engine;

@@ -173,7 +173,7 @@ impl Rule {
 pub struct Program {
     /// In any order.
     pub rules: Vec<Rule>,
-    /// Whether `owl:sameAs` is equality, as [`crate::owl_rl::with_equality`] has it: what holds of an individual holds
+    /// Whether `owl:sameAs` is equality, see [`Program::with_equality`]: what holds of an individual holds
     /// of all its names. Otherwise it is a relation like any other, and every name stands for an individual of its own.
     pub equality: bool,
 }

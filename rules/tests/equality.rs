@@ -3,13 +3,13 @@
 use std::collections::BTreeSet;
 
 use crate::text::{fact, facts, prefixes, show_violation};
-use metaplan_rules::{Delta, Engine, Fact, Limits, Symbols, owl_rl, parse_rules};
+use metaplan_rules::{Delta, Engine, Fact, Limits, Program, Symbols, parse_rules};
 
 fn engine(rules: &str, stated: &str) -> Engine {
     let mut symbols = Symbols::new();
     let program = parse_rules(rules, "test", &mut symbols, &prefixes()).expect("rules");
     let facts = if stated.is_empty() { Vec::new() } else { facts(&mut symbols, stated) };
-    let program = owl_rl::with_equality(&program, &mut symbols);
+    let program = program.with_equality(&mut symbols);
     Engine::new(symbols, program, facts).expect("safe rules")
 }
 
@@ -80,10 +80,9 @@ fn equality_does_not_support_itself() {
     let rules = "[fp] p(?x, ?y) ^ p(?x, ?z) ^ differentFrom(?y, ?z) -> sameAs(?y, ?z) .
         [ifp] p(?x, ?z) ^ p(?y, ?z) ^ differentFrom(?x, ?y) -> sameAs(?x, ?y) .";
     let mut symbols = Symbols::new();
-    let axioms = [symbols.name("p")]
-        .map(|p| [owl_rl::Axiom::FunctionalObject(p), owl_rl::Axiom::InverseFunctional(p)]);
-    assert_eq!(rules.lines().count(), axioms[0].len());
-    let program = owl_rl::with_equality(&owl_rl::rules(&axioms[0], owl_rl::Names::Owl), &mut symbols);
+    let program = parse_rules(rules, "test", &mut symbols, &prefixes()).expect("rules");
+    // `differentFrom` compares names here, as in the rules of OWL 2 RL for functional properties.
+    let program = Program { equality: true, ..program };
     let stated = facts(&mut symbols, "p(a, b), p(c, d), sameAs(a, c), q(a)");
     let mut engine = Engine::new(symbols, program, stated).expect("safe rules");
     let same = fact(&mut engine, "sameAs(b, d)");
@@ -137,7 +136,7 @@ fn an_update_that_is_stopped_leaves_everything_as_it_was() {
     let mut symbols = Symbols::new();
     let program = parse_rules(rules, "test", &mut symbols, &prefixes()).expect("rules");
     let stated = facts(&mut symbols, "sameAs(a, b), p(a), p(c)");
-    let program = owl_rl::with_equality(&program, &mut symbols);
+    let program = program.with_equality(&mut symbols);
     let mut engine =
         Engine::with_limits(symbols, program, stated, Limits { steps: 1000, ..Limits::default() })
             .expect("nothing to count");
@@ -228,7 +227,7 @@ fn swap_pairs(scripts: u64, exchanges_rules: bool) {
                 text = subset();
                 let program =
                     parse_rules(&text, "test", incremental.symbols_mut(), &prefixes()).expect("rules");
-                let program = owl_rl::with_equality(&program, incremental.symbols_mut());
+                let program = program.with_equality(incremental.symbols_mut());
                 incremental.change(delta, program).expect("within the budget")
             } else {
                 incremental.apply(delta).expect("within the budget")
@@ -288,7 +287,7 @@ fn equality_is_switched_on_by_a_change() {
     let mut symbols = Symbols::new();
     let stated = facts(&mut symbols, "p(a, b), q(c)");
     let program = parse_rules("q(?x) -> r(?x) .", "test", &mut symbols, &prefixes()).expect("rules");
-    let complete = owl_rl::with_equality(&program, &mut symbols);
+    let complete = program.with_equality(&mut symbols);
     let mut engine = Engine::new(symbols, program, stated).expect("safe rules");
     let pair = fact(&mut engine, "sameAs(b, c)");
     let change =

@@ -10,7 +10,6 @@ mod equality;
 mod explanations;
 mod incremental;
 mod oracle;
-mod owl_rl;
 mod replay;
 mod robustness;
 mod script;

@@ -177,39 +177,18 @@ impl Possible {
 
     fn condition(&self, condition: &mut Condition) {
         match condition {
-            Condition::And(parts) | Condition::Or(parts) => {
-                for part in parts {
-                    self.condition(part);
-                }
-            }
-            Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
-                self.condition(inner);
-            }
-            Condition::Imply(left, right) => {
-                self.condition(left);
-                self.condition(right);
-            }
             Condition::Atom(own) if self.bounded.contains(&own.predicate.name) => {
                 *condition = Condition::And(vec![possible_atom(own), Condition::Atom(own.clone())]);
             }
-            Condition::Atom(_) | Condition::Equal(..) | Condition::Compare(..) => {}
+            other => other.parts_mut().for_each(|part| self.condition(part)),
         }
     }
 
     fn effect(&self, effect: &mut Effect) {
-        match effect {
-            Effect::And(parts) => {
-                for part in parts {
-                    self.effect(part);
-                }
-            }
-            Effect::ForAll(_, inner) => self.effect(inner),
-            Effect::When(condition, inner) => {
-                self.condition(condition);
-                self.effect(inner);
-            }
-            Effect::Add(_) | Effect::Delete(_) | Effect::Assign(..) => {}
+        if let Effect::When(condition, _) = effect {
+            self.condition(condition);
         }
+        effect.parts_mut().iter_mut().for_each(|part| self.effect(part));
     }
 }
 

@@ -7,8 +7,9 @@
 //! another function are omitted while that design is not chosen, and are checked once it is.
 
 use num_rational::BigRational;
-use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Expression, Name, Problem, Term};
+use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Name, Problem, Term};
 use pddl::validate::advance;
+use pddl::visit::Node;
 
 use crate::mapek::{PlannedStep, resume};
 
@@ -72,26 +73,16 @@ fn drop_open(condition: &mut Condition, open: &[Name]) {
 }
 
 fn mentions(condition: &Condition, names: &[Name]) -> bool {
-    match condition {
-        Condition::And(parts) | Condition::Or(parts) => parts.iter().any(|part| mentions(part, names)),
-        Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
-            mentions(inner, names)
-        }
-        Condition::Imply(left, right) => mentions(left, names) || mentions(right, names),
-        Condition::Atom(atom) => is_about(atom, names),
-        Condition::Equal(left, right, _) => [left, right].into_iter().any(|term| is_one_of(term, names)),
-        Condition::Compare(_, left, right, _) => {
-            mentions_number(left, names) || mentions_number(right, names)
-        }
-    }
-}
-
-fn mentions_number(expression: &Expression, names: &[Name]) -> bool {
-    match expression {
-        Expression::Fluent(atom) => is_about(atom, names),
-        Expression::Operation(_, parts, _) => parts.iter().any(|part| mentions_number(part, names)),
-        Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => false,
-    }
+    let mut is_mentioned = false;
+    condition.walk(&mut |node| {
+        is_mentioned |= match node {
+            Node::Condition(Condition::Equal(left, right, _)) => {
+                [left, right].into_iter().any(|term| is_one_of(term, names))
+            }
+            node => node.atom().or_else(|| node.fluent()).is_some_and(|atom| is_about(atom, names)),
+        };
+    });
+    is_mentioned
 }
 
 fn is_about(atom: &Atom, names: &[Name]) -> bool {

@@ -30,6 +30,7 @@ mod strata;
 mod types;
 pub mod validate;
 mod validator;
+pub mod visit;
 
 pub use ::num_rational::BigRational;
 pub use check::{check, check_domain};

@@ -2,9 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use crate::ast::{
-    ActionBody, Atom, Condition, Constraint, Domain, Effect, InitialElement, Name, Problem, Term, Trajectory,
-};
+use crate::ast::{Atom, Condition, Domain, Effect, InitialElement, Name, Problem, Term};
+use crate::visit::Node;
 
 /// Names that a domain and a problem mention.
 #[derive(Debug, Clone, Default)]
@@ -22,38 +21,15 @@ pub struct Mentioned {
 impl Mentioned {
     /// Returns what a domain mentions.
     pub fn by_domain(domain: &Domain) -> Self {
-        let mut found = Self::default();
-        for axiom in &domain.derived {
-            found.condition(&axiom.condition);
-        }
-        found.constraints(&domain.constraints);
-        for action in &domain.actions {
-            for preference in &action.preferences {
-                found.condition(&preference.condition);
-            }
-            match &action.body {
-                ActionBody::Instantaneous { precondition, effect } => {
-                    found.condition(precondition);
-                    found.effect(effect);
-                }
-                ActionBody::Durative { conditions, effects, .. } => {
-                    for (_, condition) in conditions {
-                        found.condition(condition);
-                    }
-                    for (_, effect) in effects {
-                        found.effect(effect);
-                    }
-                }
-            }
-        }
-        found
+        let mut mentioned = Self::default();
+        domain.walk(&mut |node| mentioned.node(node));
+        mentioned
     }
 
     /// Adds what a problem mentions.
     #[must_use]
     pub fn and_problem(mut self, problem: &Problem) -> Self {
-        self.condition(&problem.goal);
-        self.constraints(&problem.constraints);
+        problem.walk(&mut |node| self.node(node));
         for element in &problem.init {
             match element {
                 InitialElement::Fact(atom) | InitialElement::NegatedFact(atom) => self.atom(atom),
@@ -80,74 +56,21 @@ impl Mentioned {
         }));
     }
 
-    fn constraints(&mut self, constraints: &[Constraint]) {
-        for constraint in constraints {
-            self.trajectory(&constraint.trajectory);
-        }
-    }
-
-    fn trajectory(&mut self, trajectory: &Trajectory) {
-        match trajectory {
-            Trajectory::And(parts) => {
-                for part in parts {
-                    self.trajectory(part);
-                }
-            }
-            Trajectory::ForAll(_, inner) => self.trajectory(inner),
-            Trajectory::AtEnd(own)
-            | Trajectory::Always(own)
-            | Trajectory::Sometime(own)
-            | Trajectory::AtMostOnce(own)
-            | Trajectory::Within(_, own)
-            | Trajectory::HoldDuring(_, _, own)
-            | Trajectory::HoldAfter(_, own) => self.condition(own),
-            Trajectory::SometimeAfter(first, second)
-            | Trajectory::SometimeBefore(first, second)
-            | Trajectory::AlwaysWithin(_, first, second) => {
-                self.condition(first);
-                self.condition(second);
-            }
-        }
-    }
-
     /// Adds what a condition mentions.
     pub fn condition(&mut self, condition: &Condition) {
-        match condition {
-            Condition::And(parts) | Condition::Or(parts) => {
-                for part in parts {
-                    self.condition(part);
-                }
-            }
-            Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
-                self.condition(inner);
-            }
-            Condition::Imply(premise, conclusion) => {
-                self.condition(premise);
-                self.condition(conclusion);
-            }
-            Condition::Atom(atom) => self.atom(atom),
-            Condition::Equal(left, right, _) => self.terms(&[left.clone(), right.clone()]),
-            Condition::Compare(..) => {}
-        }
+        condition.walk(&mut |node| self.node(node));
     }
 
-    fn effect(&mut self, effect: &Effect) {
-        match effect {
-            Effect::And(parts) => {
-                for part in parts {
-                    self.effect(part);
-                }
-            }
-            Effect::Add(atom) | Effect::Delete(atom) => {
+    fn node(&mut self, node: Node<'_>) {
+        match node {
+            Node::Condition(Condition::Atom(atom)) => self.atom(atom),
+            Node::Condition(Condition::Equal(left, right, _)) => self.terms(&[left.clone(), right.clone()]),
+            Node::Effect(Effect::Add(atom) | Effect::Delete(atom)) => {
                 self.atom(atom);
                 self.changed.insert(atom.predicate.name.clone());
             }
-            Effect::ForAll(_, inner) => self.effect(inner),
-            Effect::When(condition, inner) => {
-                self.condition(condition);
-                self.effect(inner);
-            }
-            Effect::Assign(_, target, ..) => self.terms(&target.arguments),
+            Node::Effect(Effect::Assign(_, target, ..)) => self.terms(&target.arguments),
+            _ => {}
         }
     }
 }

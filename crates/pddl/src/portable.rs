@@ -6,10 +6,11 @@
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::ast::{
-    ActionBody, Atom, Comparison, Condition, Constraint, Declaration, Domain, Effect, EffectTime, Expression,
-    Identifier, InitialElement, Name, Problem, Span, Term, Trajectory, TypeExpression, TypedName,
+    ActionBody, Atom, Comparison, Condition, Constraint, Declaration, Domain, DurationConstraint, Effect,
+    EffectTime, Identifier, InitialElement, Name, Problem, Span, Term, Trajectory, TypeExpression, TypedName,
 };
 use super::types::TypeHierarchy;
+use super::visit::{Node, Visit};
 
 /// A domain and a problem as other planners want them; both have passed [`check`](super::check()).
 pub fn portable(domain: &Domain, problem: &Problem) -> (Domain, Problem) {
@@ -52,8 +53,8 @@ fn declare_total_cost(domain: &mut Domain, problem: &Problem) {
     let name = Name::new("total-cost");
     let is_declared = domain.functions.iter().any(|function| function.identifier.name == name);
     let mut is_used = false;
-    walk(domain, problem, &mut |part| {
-        is_used |= matches!(part, Part::Function(atom) if atom.predicate.name == name);
+    walk(domain, problem, &mut |node| {
+        is_used |= function(node).is_some_and(|atom| atom.predicate.name == name);
     });
     if is_used && !is_declared {
         domain.functions.push(Declaration { identifier: identifier("total-cost"), parameters: Vec::new() });
@@ -63,17 +64,14 @@ fn declare_total_cost(domain: &mut Domain, problem: &Problem) {
 /// Makes constants of the problem's objects that the domain uses.
 fn move_constants(domain: &mut Domain, problem: &mut Problem) {
     let mut used: FxHashSet<Name> = FxHashSet::default();
-    walk_domain(domain, &mut |part| {
-        let (Part::Condition(Condition::Atom(atom))
-        | Part::Effect(Effect::Add(atom) | Effect::Delete(atom))
-        | Part::Function(atom)) = part
-        else {
-            if let Part::Condition(Condition::Equal(left, right, _)) = part {
-                used.extend([left, right].into_iter().filter_map(constant));
-            }
-            return;
-        };
-        used.extend(atom.arguments.iter().filter_map(constant));
+    domain.walk(&mut |node| match node {
+        Node::Condition(Condition::Equal(left, right, _)) => {
+            used.extend([left, right].into_iter().filter_map(constant));
+        }
+        Node::Condition(Condition::Atom(atom)) | Node::Effect(Effect::Add(atom) | Effect::Delete(atom)) => {
+            used.extend(atom.arguments.iter().filter_map(constant));
+        }
+        node => used.extend(function(node).iter().flat_map(|atom| &atom.arguments).filter_map(constant)),
     });
     let (moved, kept) = std::mem::take(&mut problem.objects)
         .into_iter()
@@ -153,7 +151,7 @@ const IMPLIED: [(&str, &str); 12] = [
 fn require(domain: &mut Domain, problem: &Problem) {
     let mut needed: FxHashSet<&'static str> = FxHashSet::default();
     needed.insert("strips");
-    walk(domain, problem, &mut |part| needed.extend(part.needs()));
+    walk(domain, problem, &mut |node| needed.extend(needs(node)));
     let mut insert = |flag, is_used: bool| is_used && needed.insert(flag);
     let soft = domain.constraints.iter().chain(&problem.constraints).any(|own| own.preference.is_some());
     insert("preferences", soft);
@@ -181,180 +179,53 @@ fn require(domain: &mut Domain, problem: &Problem) {
     domain.requirements.extend(missing.into_iter().map(identifier));
 }
 
-/// A part of a domain or a problem that may need a requirement.
-#[derive(Clone, Copy)]
-enum Part<'t> {
-    Condition(&'t Condition),
-    Effect(&'t Effect),
-    /// A function in an expression or as the target of an effect.
-    Function(&'t Atom),
-    Duration(Comparison, EffectTime),
-    Constraint(&'t Constraint),
-    /// A preference of an action.
-    Preference,
+fn walk<'t>(domain: &'t Domain, problem: &'t Problem, visit: Visit<'_, 't>) {
+    domain.walk(visit);
+    problem.walk(visit);
 }
 
-impl Part<'_> {
-    fn needs(self) -> Option<&'static str> {
-        match self {
-            Self::Preference => Some("preferences"),
-            Self::Constraint(Constraint { preference, trajectory, .. }) => match trajectory {
-                Trajectory::AtEnd(_) if preference.is_some() => Some("preferences"),
-                _ => Some("constraints"),
+/// The function in an expression or the target of an effect.
+fn function(node: Node<'_>) -> Option<&Atom> {
+    match node {
+        Node::Effect(Effect::Assign(_, target, ..)) => Some(target),
+        node => node.fluent(),
+    }
+}
+
+/// The requirement of a node, without those of the nodes within.
+fn needs(node: Node<'_>) -> Option<&'static str> {
+    match node {
+        Node::Preference(_) => Some("preferences"),
+        Node::Constraint(Constraint { preference, trajectory, .. }) => match trajectory {
+            Trajectory::AtEnd(_) if preference.is_some() => Some("preferences"),
+            _ => Some("constraints"),
+        },
+        Node::Condition(condition) => match condition {
+            Condition::And(_) | Condition::Atom(_) => None,
+            Condition::Or(_) | Condition::Imply(..) => Some("disjunctive-preconditions"),
+            Condition::Not(inner) => match **inner {
+                Condition::Atom(_) | Condition::Equal(..) => Some("negative-preconditions"),
+                _ => Some("disjunctive-preconditions"),
             },
-            Self::Condition(condition) => match condition {
-                Condition::And(_) | Condition::Atom(_) => None,
-                Condition::Or(_) | Condition::Imply(..) => Some("disjunctive-preconditions"),
-                Condition::Not(inner) => match **inner {
-                    Condition::Atom(_) | Condition::Equal(..) => Some("negative-preconditions"),
-                    _ => Some("disjunctive-preconditions"),
-                },
-                Condition::Exists(..) => Some("existential-preconditions"),
-                Condition::ForAll(..) => Some("universal-preconditions"),
-                Condition::Equal(..) => Some("equality"),
-                Condition::Compare(..) => Some("numeric-fluents"),
-            },
-            Self::Effect(effect) => match effect {
-                Effect::When(..) | Effect::ForAll(..) => Some("conditional-effects"),
-                Effect::Assign(_, target, ..) if is_total_cost(target) => Some("action-costs"),
-                Effect::Assign(..) => Some("numeric-fluents"),
-                Effect::And(_) | Effect::Add(_) | Effect::Delete(_) => None,
-            },
-            Self::Function(_) | Self::Duration(Comparison::Equal, EffectTime::AtStart) => None,
-            Self::Duration(..) => Some("duration-inequalities"),
-        }
+            Condition::Exists(..) => Some("existential-preconditions"),
+            Condition::ForAll(..) => Some("universal-preconditions"),
+            Condition::Equal(..) => Some("equality"),
+            Condition::Compare(..) => Some("numeric-fluents"),
+        },
+        Node::Effect(effect) => match effect {
+            Effect::When(..) | Effect::ForAll(..) => Some("conditional-effects"),
+            Effect::Assign(_, target, ..) if is_total_cost(target) => Some("action-costs"),
+            Effect::Assign(..) => Some("numeric-fluents"),
+            Effect::And(_) | Effect::Add(_) | Effect::Delete(_) => None,
+        },
+        Node::Expression(_)
+        | Node::Duration(DurationConstraint {
+            operator: Comparison::Equal, time: EffectTime::AtStart, ..
+        }) => None,
+        Node::Duration(_) => Some("duration-inequalities"),
     }
 }
 
 fn is_total_cost(atom: &Atom) -> bool {
     atom.predicate.name == Name::new("total-cost")
-}
-
-type Found<'f> = &'f mut dyn FnMut(Part<'_>);
-
-fn walk(domain: &Domain, problem: &Problem, found: Found<'_>) {
-    walk_domain(domain, found);
-    walk_condition(&problem.goal, found);
-    walk_constraints(&problem.constraints, found);
-    if let Some(metric) = &problem.metric {
-        walk_expression(&metric.expression, found);
-    }
-}
-
-fn walk_domain(domain: &Domain, found: Found<'_>) {
-    walk_constraints(&domain.constraints, found);
-    for axiom in &domain.derived {
-        walk_condition(&axiom.condition, found);
-    }
-    for action in &domain.actions {
-        for preference in &action.preferences {
-            found(Part::Preference);
-            walk_condition(&preference.condition, found);
-        }
-        match &action.body {
-            ActionBody::Instantaneous { precondition, effect } => {
-                walk_condition(precondition, found);
-                walk_effect(effect, found);
-            }
-            ActionBody::Durative { duration, conditions, effects } => {
-                for constraint in duration {
-                    found(Part::Duration(constraint.operator, constraint.time));
-                    walk_expression(&constraint.expression, found);
-                }
-                for (_, condition) in conditions {
-                    walk_condition(condition, found);
-                }
-                for (_, effect) in effects {
-                    walk_effect(effect, found);
-                }
-            }
-        }
-    }
-}
-
-fn walk_constraints(constraints: &[Constraint], found: Found<'_>) {
-    for constraint in constraints {
-        found(Part::Constraint(constraint));
-        walk_trajectory(&constraint.trajectory, found);
-    }
-}
-
-fn walk_trajectory(trajectory: &Trajectory, found: Found<'_>) {
-    match trajectory {
-        Trajectory::And(parts) => {
-            for part in parts {
-                walk_trajectory(part, found);
-            }
-        }
-        Trajectory::ForAll(_, body) => walk_trajectory(body, found),
-        Trajectory::AtEnd(what)
-        | Trajectory::Always(what)
-        | Trajectory::Sometime(what)
-        | Trajectory::AtMostOnce(what)
-        | Trajectory::Within(_, what)
-        | Trajectory::HoldDuring(_, _, what)
-        | Trajectory::HoldAfter(_, what) => walk_condition(what, found),
-        Trajectory::SometimeAfter(first, second)
-        | Trajectory::SometimeBefore(first, second)
-        | Trajectory::AlwaysWithin(_, first, second) => {
-            walk_condition(first, found);
-            walk_condition(second, found);
-        }
-    }
-}
-
-fn walk_condition(condition: &Condition, found: Found<'_>) {
-    found(Part::Condition(condition));
-    match condition {
-        Condition::And(parts) | Condition::Or(parts) => {
-            for part in parts {
-                walk_condition(part, found);
-            }
-        }
-        Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
-            walk_condition(inner, found);
-        }
-        Condition::Imply(premise, conclusion) => {
-            walk_condition(premise, found);
-            walk_condition(conclusion, found);
-        }
-        Condition::Atom(_) | Condition::Equal(..) => {}
-        Condition::Compare(_, left, right, _) => {
-            walk_expression(left, found);
-            walk_expression(right, found);
-        }
-    }
-}
-
-fn walk_effect(effect: &Effect, found: Found<'_>) {
-    found(Part::Effect(effect));
-    match effect {
-        Effect::And(parts) => {
-            for part in parts {
-                walk_effect(part, found);
-            }
-        }
-        Effect::Add(_) | Effect::Delete(_) => {}
-        Effect::ForAll(_, body) => walk_effect(body, found),
-        Effect::When(condition, body) => {
-            walk_condition(condition, found);
-            walk_effect(body, found);
-        }
-        Effect::Assign(_, target, value, _) => {
-            found(Part::Function(target));
-            walk_expression(value, found);
-        }
-    }
-}
-
-fn walk_expression(expression: &Expression, found: Found<'_>) {
-    match expression {
-        Expression::Fluent(atom) => found(Part::Function(atom)),
-        Expression::Operation(_, operands, _) => {
-            for operand in operands {
-                walk_expression(operand, found);
-            }
-        }
-        Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => {}
-    }
 }

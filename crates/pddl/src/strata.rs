@@ -64,18 +64,12 @@ impl<'d> Strata<'d> {
 /// Calls `found` with each predicate of a condition and whether it stands under an odd number of negations.
 fn uses<'d>(condition: &'d Condition, negated: bool, found: &mut impl FnMut(&'d Name, bool)) {
     match condition {
-        Condition::And(parts) | Condition::Or(parts) => {
-            for part in parts {
-                uses(part, negated, found);
-            }
-        }
         Condition::Not(inner) => uses(inner, !negated, found),
         Condition::Imply(premise, conclusion) => {
             uses(premise, !negated, found);
             uses(conclusion, negated, found);
         }
-        Condition::Exists(_, body) | Condition::ForAll(_, body) => uses(body, negated, found),
         Condition::Atom(atom) => found(&atom.predicate.name, negated),
-        Condition::Equal(..) | Condition::Compare(..) => {}
+        other => other.parts().for_each(|part| uses(part, negated, found)),
     }
 }

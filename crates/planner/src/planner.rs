@@ -5,13 +5,11 @@ use std::ops::ControlFlow;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use num_rational::BigRational;
 use pddl::ast::{Domain, Metric, Problem};
 use task::error::{Error, Errors};
 use task::ground::{GroundConfig, ground};
 use task::limits::Limits;
 use task::plan::solution::{Improvement, Solution};
-use temporal::{ground_concurrent, optimize_concurrent};
 
 use crate::exact::{ground_exact, optimize_exact};
 use crate::optimize::{Config, Front, lexicographic, pareto};
@@ -142,17 +140,6 @@ impl<'a> Planner<'a> {
         let task = ground(self.domain, self.problem, &self.grounding)?;
         let (config, mut hear) = (self.config.clone(), self.hear());
         Ok(pareto(&task, &config, &mut hear))
-    }
-
-    /// Computes a plan with overlapping actions, as defined by PDDL 2.1. Interfering happenings are
-    /// at least `separation` apart, in the domain's time unit. The horizon is ignored.
-    ///
-    /// # Errors
-    /// As [`Planner::plan`].
-    pub fn plan_concurrently(mut self, separation: &BigRational) -> Result<Solution, Errors> {
-        let task = ground_concurrent(self.domain, self.problem, &self.grounding, separation)?;
-        let (limits, mut hear) = (self.config.limits.clone(), self.hear());
-        Ok(optimize_concurrent(&task, &limits, &mut hear))
     }
 
     /// Adapter from the optimizer's reports to the callback. Sets the interrupt flag if the

@@ -14,12 +14,10 @@ mod builder;
 mod candidates;
 mod knowledge;
 mod objective;
-mod select;
 mod state;
 
 pub use builder::RuntimeBuilder;
-pub use candidates::{Candidate, Missed};
+pub use candidates::{Candidate, Missed, Rejection};
 pub use knowledge::{Mode, Runtime};
 pub use objective::NewObjective;
-pub use select::{Rejection, Selection};
 pub use state::{Grounding, Objective};

@@ -68,11 +68,6 @@ impl Runtime {
         objectives
     }
 
-    /// The objectives that a design should be selected for now, sorted by IRI.
-    pub fn objectives_to_adapt(&self) -> Vec<Objective> {
-        self.objectives().into_iter().filter(Objective::wants_design).collect()
-    }
-
     /// Why an objective has its status, or is updatable: one derivation for each.
     ///
     /// # Errors

@@ -4,6 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
+use ontology::runtime::Runtime;
 use serde_json::Value;
 
 pub const SHARED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared");
@@ -20,4 +21,15 @@ pub fn recorded(directory: &str) -> Vec<Value> {
     files.sort();
     let read = |file: PathBuf| serde_json::from_slice(&std::fs::read(file).expect("readable")).expect("JSON");
     files.into_iter().map(read).collect()
+}
+
+/// The design that MROS selects for an objective: the greatest utility among the designs that nothing rules out; of equals, the
+/// first by IRI.
+#[allow(dead_code)] // not every suite selects
+pub fn selected(runtime: &Runtime, objective: &str) -> Option<String> {
+    let mut candidates = runtime.candidates(objective, None).expect("known");
+    candidates.retain(|candidate| candidate.rejections.is_empty());
+    // Of equals, `max_by` returns the last.
+    let best = candidates.into_iter().rev().max_by(|one, other| one.utility.cmp(&other.utility));
+    best.map(|candidate| candidate.design.name)
 }

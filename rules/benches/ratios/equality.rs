@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::time::Instant;
 
-use metaplan_rules::{Delta, Engine, Fact, Prefixes, Program, Symbols, owl_rl, parse_rules};
+use metaplan_rules::{Delta, Engine, Fact, Prefixes, Program, Symbols, parse_rules};
 
 use super::median;
 
@@ -52,7 +52,7 @@ fn measure(names: usize, representatives: bool) -> ([f64; 3], usize) {
     let program = parse_rules(RULES, "bench", &mut symbols, &Prefixes::new()).expect("rules");
     let (mut facts, mut pair) = facts(&mut symbols, names);
     let program = if representatives {
-        owl_rl::with_equality(&program, &mut symbols)
+        program.with_equality(&mut symbols)
     } else {
         let (same, relation) = (pair.predicate, symbols.name("same_as"));
         facts

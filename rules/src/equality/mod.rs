@@ -26,9 +26,48 @@ use std::sync::Arc;
 use rustc_hash::{FxHashMap, FxHashSet};
 
 use crate::fact::Fact;
-use crate::rule::{Atom, Program, Rule, Term};
+use crate::rule::{Atom, Program, Rule, RuleIdentity, Term, Variable};
+use crate::safety::bound_variables;
 use crate::symbol::{Symbol, Symbols};
+use crate::vocabulary::{DIFFERENT_FROM, SAME_AS};
 use classes::Classes;
+
+impl Program {
+    /// Returns the program under OWL's reading of names: `owl:sameAs` is equality, and `differentFrom` in bodies matches
+    /// stated and concluded facts of `owl:differentFrom`; without equality it compares names.
+    ///
+    /// `sameAs` in a body compares individuals where one of its terms is a variable that another atom binds. Between two
+    /// constants, or two variables that no other atom binds, it matches pairs of names of individuals that have several
+    /// names; an individual with one name then equals itself only where that is stated.
+    #[must_use]
+    pub fn with_equality(&self, symbols: &mut Symbols) -> Self {
+        let (same, different) = (symbols.name(SAME_AS), symbols.name(DIFFERENT_FROM));
+        let mut program = Self { equality: true, ..self.clone() };
+        for rule in &mut program.rules {
+            let bound = bound_variables(rule);
+            let is_bound = |term: Term| term.as_variable().is_some_and(|v| bound[usize::from(v.0)]);
+            for atom in &mut rule.body {
+                match *atom {
+                    Atom::Same(left, right) if left != right && !is_bound(left) && !is_bound(right) => {
+                        *atom = Atom::relation(same, [left, right]);
+                    }
+                    Atom::Different(left, right) => *atom = Atom::relation(different, [left, right]),
+                    _ => {}
+                }
+            }
+        }
+        let [x, y] = [0, 1].map(|number| Term::from(Variable(number)));
+        let differ = |left, right| vec![Atom::relation(different, [left, right])];
+        for (label, head, body) in
+            [("eq-diff-sym", differ(y, x), differ(x, y)), ("eq-diff1", Vec::new(), differ(x, x))]
+        {
+            let position = program.rules.len() as u32;
+            let identity = RuleIdentity { source: "OWL 2 RL".into(), label: Some(label.into()), position };
+            program.rules.push(Rule::new(identity, head, body));
+        }
+        program
+    }
+}
 
 /// Which names are one, and what is stated about them.
 #[derive(Clone, Debug)]

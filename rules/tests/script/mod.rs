@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use metaplan_rules::replay::{Fault, replay};
 use metaplan_rules::{
     Aggregate, Atom, BuiltIn, Cause, Delta, Derivation, DerivationStep, Engine, Fact, Literal, Program,
-    Reason, Rule, RuleIdentity, Symbol, Symbols, Term, Variable, owl_rl,
+    Reason, Rule, RuleIdentity, Symbol, Symbols, Term, Variable,
 };
 
 use crate::oracle::{
@@ -393,7 +393,7 @@ pub fn check(rules: &[RawRule], start: &[RawChange], script: &[Vec<RawChange>], 
     let program = renumber(program);
     let mut symbols = world.symbols.clone();
     let complete = |program: Program, symbols: &mut Symbols| {
-        if equality { owl_rl::with_equality(&program, symbols) } else { program }
+        if equality { program.with_equality(symbols) } else { program }
     };
     let mut stated: BTreeSet<Fact> =
         start.iter().map(|&(_, p, arguments)| world.fact(p, arguments)).collect();
@@ -451,16 +451,13 @@ fn switch(
 ) -> Delta {
     let rule = &program.rules[position];
     let number = rule.identity.position;
-    let is_disabled = engine.disabled_rules().contains(rule);
     let comes = absent.remove(&number);
     if !comes {
         absent.insert(number);
     }
-    let change = match way % 3 {
-        0 if !comes || is_disabled => engine.set_enabled(&rule.identity, comes),
-        1 if !comes => engine.remove_rule(&rule.identity),
-        1 if !is_disabled => engine.add_rules([rule.clone()]),
-        _ if is_disabled => engine.set_enabled(&rule.identity, true),
+    let change = match way % 2 {
+        0 if !comes => engine.remove_rule(&rule.identity),
+        0 => engine.add_rules([rule.clone()]),
         _ => {
             let mut rules = engine.program().rules.clone();
             rules.retain(|other| other != rule);

@@ -24,7 +24,7 @@ use pddl::ast::{
 
 use crate::binding::{Bindings, atom, identifier, is_pddl_name};
 use crate::message::{Errors, Message};
-use walk::{mentions, walk_condition, walk_effect, walk_expression, walk_uncounted};
+use walk::{mentions, walk_uncounted};
 
 const FUNCTION: &str = "function";
 const DESIGN: &str = "functiondesign";
@@ -159,15 +159,15 @@ impl CoAdaptation {
         };
         match action.body.clone() {
             ActionBody::Instantaneous { mut precondition, effect } => {
-                walk_condition(&mut precondition, &see);
+                precondition.change_leaves(&mut |leaf| see(leaf));
                 walk_uncounted(effect, &see);
             }
             ActionBody::Durative { duration, conditions, effects } => {
                 for mut constraint in duration {
-                    walk_expression(&mut constraint.expression, &see);
+                    constraint.expression.change_leaves(&mut |leaf| see(leaf));
                 }
                 for (_, mut condition) in conditions {
-                    walk_condition(&mut condition, &see);
+                    condition.change_leaves(&mut |leaf| see(leaf));
                 }
                 for (_, effect) in effects {
                     walk_uncounted(effect, &see);
@@ -281,21 +281,21 @@ impl CoAdaptation {
         let mut work = Vec::new();
         match &mut action.body {
             ActionBody::Instantaneous { precondition, effect } => {
-                walk_condition(precondition, &rewrite);
+                precondition.change_leaves(&mut |leaf| rewrite(leaf));
                 let own = std::mem::replace(precondition, Condition::And(Vec::new()));
                 *precondition = Condition::And(std::iter::once(own).chain(chosen).chain(lasting).collect());
                 self.changes(effect, &designs, &mut work);
-                walk_effect(effect, &rewrite);
+                effect.change_leaves(&mut |leaf| rewrite(leaf));
                 let own = std::mem::replace(effect, Effect::And(Vec::new()));
                 *effect =
                     Effect::And(std::iter::once(own).chain(work).chain(self.starts(&designs)).collect());
             }
             ActionBody::Durative { duration, conditions, effects } => {
                 for constraint in duration {
-                    walk_expression(&mut constraint.expression, &rewrite);
+                    constraint.expression.change_leaves(&mut |leaf| rewrite(leaf));
                 }
                 for (_, condition) in &mut *conditions {
-                    walk_condition(condition, &rewrite);
+                    condition.change_leaves(&mut |leaf| rewrite(leaf));
                 }
                 conditions.extend(chosen.into_iter().map(|condition| (ConditionTime::AtStart, condition)));
                 conditions.extend(lasting.into_iter().map(|condition| (ConditionTime::OverAll, condition)));
@@ -303,7 +303,7 @@ impl CoAdaptation {
                 for (time, effect) in &mut *effects {
                     self.changes(effect, &designs, &mut work);
                     more.extend(work.drain(..).map(|effect| (*time, effect)));
-                    walk_effect(effect, &rewrite);
+                    effect.change_leaves(&mut |leaf| rewrite(leaf));
                 }
                 more.extend(self.starts(&designs).into_iter().map(|effect| (EffectTime::AtEnd, effect)));
                 effects.extend(more);
@@ -336,19 +336,18 @@ impl CoAdaptation {
             ) => {
                 for (design, needed) in designs {
                     let mut with = expression.clone();
-                    let mut counts = false;
-                    walk_expression(&mut with, &|part: &mut Expression| {
+                    with.change_leaves(&mut |part: &mut Expression| {
                         let Expression::Fluent(fluent) = part else { return };
                         let attribute = self.changed.get(&fluent.predicate.name);
                         if let Some(attribute) = attribute.filter(|own| needed.attributes.contains(*own)) {
                             *part = Expression::Fluent(of_design(&value_of(attribute), design, None));
                         }
                     });
-                    mentions(expression, &|name| self.changed.contains_key(name), &mut counts);
+                    let counts = mentions(expression, &|name| self.changed.contains_key(name));
                     if counts {
                         let mut without = expression.clone();
-                        walk_expression(&mut with, &|part| self.sum(part, designs));
-                        walk_expression(&mut without, &|part| self.sum(part, designs));
+                        with.change_leaves(&mut |part| self.sum(part, designs));
+                        without.change_leaves(&mut |part| self.sum(part, designs));
                         let more = Expression::Operation(Arithmetic::Subtract, vec![with, without], *span);
                         let more = Effect::Assign(*kind, target.clone(), more, *span);
                         out.push(Effect::When(changed(design, &needed.name), Box::new(more)));

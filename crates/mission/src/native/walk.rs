@@ -1,71 +1,19 @@
-//! Changes to the expressions of conditions and effects, in place.
+//! Expressions of effects in which changes of designs are not counted.
 
-use pddl::ast::{Assignment, Condition, Effect, Expression, Name};
+use pddl::ast::{Assignment, Effect, Expression, Name};
 
-/// Whether a numeric function is mentioned whose name is wanted.
-pub(super) fn mentions(expression: &Expression, wanted: &dyn Fn(&Name) -> bool, found: &mut bool) {
-    match expression {
-        Expression::Fluent(fluent) => *found |= wanted(&fluent.predicate.name),
-        Expression::Operation(_, parts, _) => parts.iter().for_each(|part| mentions(part, wanted, found)),
-        Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => {}
-    }
+/// Returns `true` if an expression reads a numeric function whose name is wanted.
+pub(super) fn mentions(expression: &Expression, wanted: &dyn Fn(&Name) -> bool) -> bool {
+    let mut is_mentioned = false;
+    expression.walk_fluents(&mut |fluent| is_mentioned |= wanted(&fluent.predicate.name));
+    is_mentioned
 }
 
-/// Applies a change to every part of an expression that has no parts.
-pub(super) fn walk_expression(expression: &mut Expression, change: &dyn Fn(&mut Expression)) {
-    match expression {
-        Expression::Operation(_, parts, _) => {
-            for part in parts {
-                walk_expression(part, change);
-            }
-        }
-        other => change(other),
-    }
-}
-
-/// The same for all expressions of a condition.
-pub(super) fn walk_condition(condition: &mut Condition, change: &dyn Fn(&mut Expression)) {
-    match condition {
-        Condition::And(parts) | Condition::Or(parts) => {
-            for part in parts {
-                walk_condition(part, change);
-            }
-        }
-        Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
-            walk_condition(inner, change);
-        }
-        Condition::Imply(left, right) => {
-            walk_condition(left, change);
-            walk_condition(right, change);
-        }
-        Condition::Compare(_, left, right, _) => {
-            walk_expression(left, change);
-            walk_expression(right, change);
-        }
-        Condition::Atom(_) | Condition::Equal(..) => {}
-    }
-}
-
-/// Goes through what an effect mentions where changes of designs are not counted: everywhere but in what it adds to numbers
-/// unconditionally.
+/// Visits the expressions of an effect, except the amounts that it adds to numbers unconditionally.
 pub(super) fn walk_uncounted(effect: Effect, see: &dyn Fn(&mut Expression)) {
     match effect {
         Effect::And(parts) => parts.into_iter().for_each(|part| walk_uncounted(part, see)),
         Effect::Assign(Assignment::Increase | Assignment::Decrease, ..) => {}
-        mut other => walk_effect(&mut other, see),
-    }
-}
-
-/// The same for all expressions of an effect.
-pub(super) fn walk_effect(effect: &mut Effect, change: &dyn Fn(&mut Expression)) {
-    match effect {
-        Effect::And(parts) => parts.iter_mut().for_each(|part| walk_effect(part, change)),
-        Effect::ForAll(_, inner) => walk_effect(inner, change),
-        Effect::When(condition, inner) => {
-            walk_condition(condition, change);
-            walk_effect(inner, change);
-        }
-        Effect::Assign(_, _, expression, _) => walk_expression(expression, change),
-        Effect::Add(_) | Effect::Delete(_) => {}
+        mut other => other.change_leaves(&mut |leaf| see(leaf)),
     }
 }

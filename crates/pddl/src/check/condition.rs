@@ -26,16 +26,6 @@ impl Kind {
 impl<'a> Checker<'a> {
     pub(super) fn condition(&mut self, condition: &'a Condition, scope: &mut Scope<'a>) {
         match condition {
-            Condition::And(parts) | Condition::Or(parts) => {
-                for part in parts {
-                    self.condition(part, scope);
-                }
-            }
-            Condition::Not(inner) => self.condition(inner, scope),
-            Condition::Imply(premise, conclusion) => {
-                self.condition(premise, scope);
-                self.condition(conclusion, scope);
-            }
             Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {
                 self.quantified(variables, scope, |checker, scope| checker.condition(body, scope));
             }
@@ -48,6 +38,7 @@ impl<'a> Checker<'a> {
                 self.expression(left, scope);
                 self.expression(right, scope);
             }
+            other => other.parts().for_each(|part| self.condition(part, scope)),
         }
     }
 

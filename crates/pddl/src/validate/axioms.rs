@@ -2,7 +2,7 @@
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use crate::ast::{Atom, Condition, Derived, Domain, Expression, Name, TypedName};
+use crate::ast::{Atom, Condition, Derived, Domain, Name, TypedName};
 use crate::strata::Strata;
 
 /// The axioms of predicates that may depend on each other.
@@ -136,36 +136,9 @@ impl<'p> Walk<'_, 'p> {
 
 /// Calls `found` with each predicate and each function of a condition.
 fn names_in<'p>(condition: &'p Condition, found: &mut dyn FnMut(&'p Name)) {
-    match condition {
-        Condition::And(parts) | Condition::Or(parts) => {
-            for part in parts {
-                names_in(part, found);
-            }
+    condition.walk(&mut |node| {
+        if let Some(atom) = node.atom().or_else(|| node.fluent()) {
+            found(&atom.predicate.name);
         }
-        Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
-            names_in(inner, found);
-        }
-        Condition::Imply(premise, conclusion) => {
-            names_in(premise, found);
-            names_in(conclusion, found);
-        }
-        Condition::Atom(atom) => found(&atom.predicate.name),
-        Condition::Equal(..) => {}
-        Condition::Compare(_, left, right, _) => {
-            functions_in(left, found);
-            functions_in(right, found);
-        }
-    }
-}
-
-fn functions_in<'p>(expression: &'p Expression, found: &mut dyn FnMut(&'p Name)) {
-    match expression {
-        Expression::Fluent(atom) => found(&atom.predicate.name),
-        Expression::Operation(_, operands, _) => {
-            for operand in operands {
-                functions_in(operand, found);
-            }
-        }
-        Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => {}
-    }
+    });
 }

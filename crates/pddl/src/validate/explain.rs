@@ -2,7 +2,7 @@
 
 use num_rational::BigRational;
 
-use crate::ast::{Atom, Condition, Expression, Identifier, Term, TypedName};
+use crate::ast::{Condition, Expression, Identifier, Term, TypedName};
 use crate::print::condition_text;
 
 use super::evaluate::{Bindings, Evaluator, Undefined};
@@ -22,7 +22,7 @@ pub(super) fn unmet<'p>(
         return Vec::new();
     }
     let mut functions = Vec::new();
-    functions_in(condition, &mut functions);
+    condition.walk_fluents(&mut |atom| functions.push(atom));
     let mut values: Vec<(String, Option<BigRational>)> = Vec::new();
     for function in functions {
         let Some(arguments) = evaluator.arguments(function, bindings) else { continue };
@@ -47,39 +47,6 @@ pub(super) fn undefined_text(undefined: &Undefined) -> String {
     }
 }
 
-fn functions_in<'c>(condition: &'c Condition, found: &mut Vec<&'c Atom>) {
-    match condition {
-        Condition::And(parts) | Condition::Or(parts) => {
-            for part in parts {
-                functions_in(part, found);
-            }
-        }
-        Condition::Not(inner) => functions_in(inner, found),
-        Condition::Imply(premise, conclusion) => {
-            functions_in(premise, found);
-            functions_in(conclusion, found);
-        }
-        Condition::Exists(_, body) | Condition::ForAll(_, body) => functions_in(body, found),
-        Condition::Atom(_) | Condition::Equal(..) => {}
-        Condition::Compare(_, left, right, _) => {
-            functions_of(left, found);
-            functions_of(right, found);
-        }
-    }
-}
-
-fn functions_of<'c>(expression: &'c Expression, found: &mut Vec<&'c Atom>) {
-    match expression {
-        Expression::Fluent(atom) => found.push(atom),
-        Expression::Operation(_, operands, _) => {
-            for operand in operands {
-                functions_of(operand, found);
-            }
-        }
-        Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => {}
-    }
-}
-
 /// Puts objects for the variables that have one; `hidden` are those of quantifiers within.
 fn substitute(
     condition: &mut Condition,
@@ -88,16 +55,6 @@ fn substitute(
     hidden: &mut Vec<Identifier>,
 ) {
     match condition {
-        Condition::And(parts) | Condition::Or(parts) => {
-            for part in parts {
-                substitute(part, world, bindings, hidden);
-            }
-        }
-        Condition::Not(inner) => substitute(inner, world, bindings, hidden),
-        Condition::Imply(premise, conclusion) => {
-            substitute(premise, world, bindings, hidden);
-            substitute(conclusion, world, bindings, hidden);
-        }
         Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {
             let outer = hidden.len();
             hidden.extend(variables.iter().map(|entry: &TypedName| entry.identifier.clone()));
@@ -110,26 +67,15 @@ fn substitute(
             substitute_terms(std::slice::from_mut(right), world, bindings, hidden);
         }
         Condition::Compare(_, left, right, _) => {
-            substitute_expression(left, world, bindings, hidden);
-            substitute_expression(right, world, bindings, hidden);
-        }
-    }
-}
-
-fn substitute_expression(
-    expression: &mut Expression,
-    world: &World<'_>,
-    bindings: &Bindings<'_>,
-    hidden: &[Identifier],
-) {
-    match expression {
-        Expression::Fluent(atom) => substitute_terms(&mut atom.arguments, world, bindings, hidden),
-        Expression::Operation(_, operands, _) => {
-            for operand in operands {
-                substitute_expression(operand, world, bindings, hidden);
+            for side in [left, right] {
+                side.change_leaves(&mut |leaf| {
+                    if let Expression::Fluent(atom) = leaf {
+                        substitute_terms(&mut atom.arguments, world, bindings, hidden);
+                    }
+                });
             }
         }
-        Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => {}
+        other => other.parts_mut().for_each(|part| substitute(part, world, bindings, hidden)),
     }
 }
 

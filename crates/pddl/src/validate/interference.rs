@@ -160,16 +160,6 @@ type Found<'f, 'c> = &'f mut dyn FnMut(Use<'c>, &[&'c TypedName]);
 
 fn uses_of_condition<'c>(condition: &'c Condition, hidden: &mut Vec<&'c TypedName>, found: Found<'_, 'c>) {
     match condition {
-        Condition::And(parts) | Condition::Or(parts) => {
-            for part in parts {
-                uses_of_condition(part, hidden, found);
-            }
-        }
-        Condition::Not(inner) => uses_of_condition(inner, hidden, found),
-        Condition::Imply(premise, conclusion) => {
-            uses_of_condition(premise, hidden, found);
-            uses_of_condition(conclusion, hidden, found);
-        }
         Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {
             let outer = hidden.len();
             hidden.extend(variables);
@@ -177,21 +167,16 @@ fn uses_of_condition<'c>(condition: &'c Condition, hidden: &mut Vec<&'c TypedNam
             hidden.truncate(outer);
         }
         Condition::Atom(atom) => found(Use::Fact(atom), hidden),
-        Condition::Equal(..) => {}
         Condition::Compare(_, left, right, _) => {
             uses_of_expression(left, hidden, found);
             uses_of_expression(right, hidden, found);
         }
+        other => other.parts().for_each(|part| uses_of_condition(part, hidden, found)),
     }
 }
 
 fn uses_of_effect<'c>(effect: &'c Effect, hidden: &mut Vec<&'c TypedName>, found: Found<'_, 'c>) {
     match effect {
-        Effect::And(parts) => {
-            for part in parts {
-                uses_of_effect(part, hidden, found);
-            }
-        }
         Effect::ForAll(variables, body) => {
             let outer = hidden.len();
             hidden.extend(variables);
@@ -203,20 +188,12 @@ fn uses_of_effect<'c>(effect: &'c Effect, hidden: &mut Vec<&'c TypedName>, found
             uses_of_effect(body, hidden, found);
         }
         Effect::Assign(_, _, value, _) => uses_of_expression(value, hidden, found),
-        Effect::Add(_) | Effect::Delete(_) => {}
+        other => other.parts().iter().for_each(|part| uses_of_effect(part, hidden, found)),
     }
 }
 
 fn uses_of_expression<'c>(expression: &'c Expression, hidden: &[&'c TypedName], found: Found<'_, 'c>) {
-    match expression {
-        Expression::Fluent(atom) => found(Use::Value(atom), hidden),
-        Expression::Operation(_, operands, _) => {
-            for operand in operands {
-                uses_of_expression(operand, hidden, found);
-            }
-        }
-        Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => {}
-    }
+    expression.walk_fluents(&mut |atom| found(Use::Value(atom), hidden));
 }
 
 fn pattern(world: &World<'_>, bindings: &Bindings<'_>, atom: &Atom, hidden: &[&TypedName]) -> Pattern {

@@ -6,10 +6,9 @@
 
 use rustc_hash::FxHashSet;
 
-use crate::ast::{
-    Action, ActionBody, Atom, Condition, Domain, Effect, Expression, InitialElement, Name, Problem, Term,
-};
+use crate::ast::{Action, Atom, Condition, Domain, Effect, InitialElement, Name, Problem, Term};
 use crate::mentioned::Mentioned;
+use crate::visit::Node;
 
 use super::plan::PlanStep;
 
@@ -25,7 +24,7 @@ pub(super) fn relevant(domain: &Domain, problem: &Problem, steps: &[PlanStep]) -
     }
     let mut metric = Vec::new();
     if let Some(own) = &problem.metric {
-        fluents(&own.expression, &mut metric);
+        own.expression.walk_fluents(&mut |atom| metric.push(atom));
     }
     let measures: FxHashSet<&Name> = metric.iter().map(|atom| &atom.predicate.name).collect();
     if measures.iter().any(|name| name.as_str() == "is-violated") {
@@ -67,97 +66,20 @@ fn name(term: &Term) -> &Name {
 
 /// Returns `true` if a condition or an effect of the action runs over all objects, or the action has preferences.
 fn reads_all_objects(action: &Action) -> bool {
-    let is_quantified = match &action.body {
-        ActionBody::Instantaneous { precondition, effect } => {
-            is_quantified(precondition) || is_quantified_effect(effect)
-        }
-        ActionBody::Durative { conditions, effects, .. } => {
-            conditions.iter().any(|(_, condition)| is_quantified(condition))
-                || effects.iter().any(|(_, effect)| is_quantified_effect(effect))
-        }
-    };
+    let mut is_quantified = false;
+    action.body.walk(&mut |node| {
+        is_quantified |= matches!(
+            node,
+            Node::Condition(Condition::Exists(..) | Condition::ForAll(..)) | Node::Effect(Effect::ForAll(..))
+        );
+    });
     is_quantified || !action.preferences.is_empty()
 }
 
-fn is_quantified(condition: &Condition) -> bool {
-    match condition {
-        Condition::And(parts) | Condition::Or(parts) => parts.iter().any(is_quantified),
-        Condition::Not(body) => is_quantified(body),
-        Condition::Imply(left, right) => is_quantified(left) || is_quantified(right),
-        Condition::Exists(..) | Condition::ForAll(..) => true,
-        Condition::Atom(_) | Condition::Equal(..) | Condition::Compare(..) => false,
-    }
-}
-
-fn is_quantified_effect(effect: &Effect) -> bool {
-    match effect {
-        Effect::And(parts) => parts.iter().any(is_quantified_effect),
-        Effect::ForAll(..) => true,
-        Effect::When(condition, body) => is_quantified(condition) || is_quantified_effect(body),
-        Effect::Assign(..) | Effect::Add(_) | Effect::Delete(_) => false,
-    }
-}
-
-/// Adds the numeric functions that an action reads.
+/// Adds the numeric functions that an action reads or changes.
 fn fluents_of<'a>(action: &'a Action, found: &mut Vec<&'a Atom>) {
-    match &action.body {
-        ActionBody::Instantaneous { precondition, effect } => {
-            compared(precondition, found);
-            assigned(effect, found);
-        }
-        ActionBody::Durative { duration, conditions, effects } => {
-            for constraint in duration {
-                fluents(&constraint.expression, found);
-            }
-            for (_, condition) in conditions {
-                compared(condition, found);
-            }
-            for (_, effect) in effects {
-                assigned(effect, found);
-            }
-        }
-    }
-}
-
-fn compared<'a>(condition: &'a Condition, found: &mut Vec<&'a Atom>) {
-    match condition {
-        Condition::And(parts) | Condition::Or(parts) => parts.iter().for_each(|part| compared(part, found)),
-        Condition::Not(body) | Condition::Exists(_, body) | Condition::ForAll(_, body) => {
-            compared(body, found);
-        }
-        Condition::Imply(left, right) => {
-            compared(left, found);
-            compared(right, found);
-        }
-        Condition::Compare(_, left, right, _) => {
-            fluents(left, found);
-            fluents(right, found);
-        }
-        Condition::Atom(_) | Condition::Equal(..) => {}
-    }
-}
-
-fn assigned<'a>(effect: &'a Effect, found: &mut Vec<&'a Atom>) {
-    match effect {
-        Effect::And(parts) => parts.iter().for_each(|part| assigned(part, found)),
-        Effect::ForAll(_, body) => assigned(body, found),
-        Effect::When(condition, body) => {
-            compared(condition, found);
-            assigned(body, found);
-        }
-        Effect::Assign(_, target, value, _) => {
-            found.push(target);
-            fluents(value, found);
-        }
-        Effect::Add(_) | Effect::Delete(_) => {}
-    }
-}
-
-/// Adds the numeric functions in an expression.
-fn fluents<'e>(expression: &'e Expression, found: &mut Vec<&'e Atom>) {
-    match expression {
-        Expression::Fluent(atom) => found.push(atom),
-        Expression::Operation(_, parts, _) => parts.iter().for_each(|part| fluents(part, found)),
-        Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => {}
-    }
+    action.body.walk(&mut |node| match node {
+        Node::Effect(Effect::Assign(_, target, ..)) => found.push(target),
+        node => found.extend(node.fluent()),
+    });
 }

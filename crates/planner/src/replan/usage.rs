@@ -4,7 +4,8 @@
 
 use rustc_hash::FxHashSet;
 
-use pddl::ast::{Action, ActionBody, Atom, Condition, Domain, Effect, Expression, Name, Problem, Term};
+use pddl::ast::{Atom, Condition, Domain, Effect, Expression, Name, Problem, Term};
+use pddl::visit::Node;
 
 /// Uses of symbols.
 #[derive(Debug, Default)]
@@ -23,7 +24,7 @@ impl Usage {
     pub(super) fn of(domain: &Domain, problem: &Problem) -> Self {
         let mut usage = Self::default();
         for action in &domain.actions {
-            usage.action(action);
+            action.body.walk(&mut |node| usage.node(node));
         }
         for derived in &domain.derived {
             usage.changed.insert(derived.head.identifier.name.clone());
@@ -48,80 +49,31 @@ impl Usage {
         self.functions.contains(function)
     }
 
-    fn action(&mut self, action: &Action) {
-        match &action.body {
-            ActionBody::Instantaneous { precondition, effect } => {
-                self.condition(precondition, false);
-                self.effect(effect);
-            }
-            ActionBody::Durative { duration, conditions, effects } => {
-                for constraint in duration {
-                    self.expression(&constraint.expression);
-                }
-                for (_, condition) in conditions {
-                    self.condition(condition, false);
-                }
-                for (_, effect) in effects {
-                    self.effect(effect);
-                }
-            }
-        }
-    }
-
     /// Collects the symbols of a condition. If `is_ground`, only the very atoms that occur without
     /// variables count as read.
     fn condition(&mut self, condition: &Condition, is_ground: bool) {
         match condition {
-            Condition::And(parts) | Condition::Or(parts) => {
-                for part in parts {
-                    self.condition(part, is_ground);
-                }
-            }
-            Condition::Not(part) => self.condition(part, is_ground),
-            Condition::Imply(left, right) => {
-                self.condition(left, is_ground);
-                self.condition(right, is_ground);
-            }
             Condition::Exists(_, part) | Condition::ForAll(_, part) => self.condition(part, false),
             Condition::Atom(atom) if is_ground => {
                 self.goal.insert(key(atom));
             }
-            Condition::Atom(atom) => {
+            Condition::Atom(_) | Condition::Compare(..) => condition.walk(&mut |node| self.node(node)),
+            other => other.parts().for_each(|part| self.condition(part, is_ground)),
+        }
+    }
+
+    fn node(&mut self, node: Node<'_>) {
+        match node {
+            Node::Condition(Condition::Atom(atom)) => {
                 self.read.insert(atom.predicate.name.clone());
             }
-            Condition::Equal(..) => {}
-            Condition::Compare(_, left, right, _) => {
-                self.expression(left);
-                self.expression(right);
-            }
-        }
-    }
-
-    fn effect(&mut self, effect: &Effect) {
-        match effect {
-            Effect::And(parts) => parts.iter().for_each(|part| self.effect(part)),
-            Effect::ForAll(_, part) => self.effect(part),
-            Effect::When(condition, part) => {
-                self.condition(condition, false);
-                self.effect(part);
-            }
-            Effect::Add(atom) | Effect::Delete(atom) => {
+            Node::Effect(Effect::Add(atom) | Effect::Delete(atom) | Effect::Assign(_, atom, ..)) => {
                 self.changed.insert(atom.predicate.name.clone());
             }
-            Effect::Assign(_, target, value, _) => {
-                self.changed.insert(target.predicate.name.clone());
-                self.expression(value);
-            }
-        }
-    }
-
-    fn expression(&mut self, expression: &Expression) {
-        match expression {
-            Expression::Fluent(atom) => {
+            Node::Expression(Expression::Fluent(atom)) => {
                 self.functions.insert(atom.predicate.name.clone());
             }
-            Expression::Operation(_, parts, _) => parts.iter().for_each(|part| self.expression(part)),
-            Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => {}
+            _ => {}
         }
     }
 }
@@ -156,11 +108,7 @@ pub(super) fn requirements(domain: &Domain, predicates: &[Name]) -> Option<Vec<V
     let mut mentions = 0;
     for action in &domain.actions {
         let mut parameters = Vec::new();
-        let conditions: Vec<&Condition> = match &action.body {
-            ActionBody::Instantaneous { precondition, .. } => vec![precondition],
-            ActionBody::Durative { conditions, .. } => conditions.iter().map(|(_, part)| part).collect(),
-        };
-        for atom in conditions.into_iter().flat_map(conjuncts) {
+        for atom in action.body.conditions().flat_map(conjuncts) {
             let Some(predicate) = predicates.iter().position(|name| *name == atom.predicate.name) else {
                 continue;
             };
@@ -185,46 +133,41 @@ fn conjuncts(condition: &Condition) -> Vec<&Atom> {
 }
 
 /// Number of occurrences of a predicate in conditions and effects of a domain.
-#[expect(clippy::arithmetic_side_effects, reason = "occurrences in a text in memory")]
 fn occurrences(domain: &Domain, predicate: &Name) -> usize {
-    let bodies = domain.actions.iter().map(|action| match &action.body {
-        ActionBody::Instantaneous { precondition, effect } => {
-            in_condition(precondition, predicate) + in_effect(effect, predicate)
-        }
-        ActionBody::Durative { conditions, effects, .. } => {
-            let conditions = conditions.iter().map(|(_, part)| in_condition(part, predicate));
-            conditions.chain(effects.iter().map(|(_, part)| in_effect(part, predicate))).sum()
-        }
-    });
-    let derived = domain.derived.iter().map(|derived| {
-        usize::from(derived.head.identifier.name == *predicate) + in_condition(&derived.condition, predicate)
-    });
-    bodies.chain(derived).sum()
+    let mut count = Count { predicate, mentions: 0 };
+    for action in &domain.actions {
+        action.body.walk(&mut |node| count.node(node));
+    }
+    for derived in &domain.derived {
+        count.add(&derived.head.identifier.name);
+        derived.condition.walk(&mut |node| count.node(node));
+    }
+    count.mentions
 }
 
 /// Number of occurrences of a predicate in a condition.
-#[expect(clippy::arithmetic_side_effects, reason = "occurrences in a text in memory")]
 pub(super) fn in_condition(condition: &Condition, predicate: &Name) -> usize {
-    match condition {
-        Condition::And(parts) | Condition::Or(parts) => {
-            parts.iter().map(|part| in_condition(part, predicate)).sum()
-        }
-        Condition::Not(part) | Condition::Exists(_, part) | Condition::ForAll(_, part) => {
-            in_condition(part, predicate)
-        }
-        Condition::Imply(left, right) => in_condition(left, predicate) + in_condition(right, predicate),
-        Condition::Atom(atom) => usize::from(atom.predicate.name == *predicate),
-        Condition::Equal(..) | Condition::Compare(..) => 0,
-    }
+    let mut count = Count { predicate, mentions: 0 };
+    condition.walk(&mut |node| count.node(node));
+    count.mentions
 }
 
-#[expect(clippy::arithmetic_side_effects, reason = "occurrences in a text in memory")]
-fn in_effect(effect: &Effect, predicate: &Name) -> usize {
-    match effect {
-        Effect::And(parts) => parts.iter().map(|part| in_effect(part, predicate)).sum(),
-        Effect::ForAll(_, part) => in_effect(part, predicate),
-        Effect::When(condition, part) => in_condition(condition, predicate) + in_effect(part, predicate),
-        Effect::Add(atom) | Effect::Delete(atom) => usize::from(atom.predicate.name == *predicate),
-        Effect::Assign(..) => 0,
+struct Count<'n> {
+    predicate: &'n Name,
+    mentions: usize,
+}
+
+impl Count<'_> {
+    #[expect(clippy::arithmetic_side_effects, reason = "occurrences in a text in memory")]
+    fn add(&mut self, name: &Name) {
+        self.mentions += usize::from(name == self.predicate);
+    }
+
+    fn node(&mut self, node: Node<'_>) {
+        if let Node::Condition(Condition::Atom(atom))
+        | Node::Effect(Effect::Add(atom) | Effect::Delete(atom)) = node
+        {
+            self.add(&atom.predicate.name);
+        }
     }
 }

@@ -41,13 +41,6 @@ pub struct Options<'a> {
 }
 
 impl<'a> Options<'a> {
-    /// The value of a constant that the model leaves open, as PRISM's `-const` has it.
-    #[must_use]
-    pub fn with_constant(mut self, name: impl Into<String>, value: impl Into<String>) -> Self {
-        self.settings.insert(name.into(), value.into());
-        self
-    }
-
     /// The values of all constants that are set from outside.
     #[must_use]
     pub fn with_settings(self, settings: Settings) -> Self {

@@ -70,31 +70,21 @@ impl<'t> Initial<'t> {
     /// A function that a condition reads, and that may be without a value. Variables that nothing binds stand for all objects.
     fn undefined<'c>(&self, condition: &'c Condition, binding: &mut Binding) -> Option<&'c Name> {
         match condition {
-            Condition::And(parts) | Condition::Or(parts) => {
-                parts.iter().find_map(|part| self.undefined(part, binding))
-            }
-            Condition::Not(inner) => self.undefined(inner, binding),
-            Condition::Imply(premise, conclusion) => {
-                self.undefined(premise, binding).or_else(|| self.undefined(conclusion, binding))
-            }
             Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {
                 let mut instances = self.objects.bindings(variables, binding);
                 instances.find_map(|mut inner| self.undefined(body, &mut inner))
             }
-            Condition::Atom(_) | Condition::Equal(..) => None,
             Condition::Compare(_, left, right, _) => {
                 [left, right].into_iter().find_map(|side| self.undefined_in(side, binding))
             }
+            other => other.parts().find_map(|part| self.undefined(part, binding)),
         }
     }
 
     fn undefined_in<'c>(&self, expression: &'c Expression, binding: &Binding) -> Option<&'c Name> {
         match expression {
             Expression::Fluent(atom) => (!self.has_value(atom, binding)).then_some(&atom.predicate.name),
-            Expression::Operation(_, operands, _) => {
-                operands.iter().find_map(|operand| self.undefined_in(operand, binding))
-            }
-            Expression::Number(..) | Expression::Duration(_) | Expression::TotalTime(_) => None,
+            other => other.operands().iter().find_map(|operand| self.undefined_in(operand, binding)),
         }
     }
 

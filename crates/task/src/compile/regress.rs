@@ -63,16 +63,6 @@ impl Happening {
 
     fn touching(&self, condition: &Condition, inner: &mut Vec<TypedName>, found: &mut Vec<Condition>) {
         match condition {
-            Condition::And(parts) | Condition::Or(parts) => {
-                for part in parts {
-                    self.touching(part, inner, found);
-                }
-            }
-            Condition::Not(part) => self.touching(part, inner, found),
-            Condition::Imply(premise, conclusion) => {
-                self.touching(premise, inner, found);
-                self.touching(conclusion, inner, found);
-            }
             Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {
                 let outer = inner.len();
                 inner.extend(variables.iter().cloned());
@@ -80,7 +70,6 @@ impl Happening {
                 inner.truncate(outer);
             }
             Condition::Atom(atom) => self.touched(atom, false, inner, found),
-            Condition::Equal(..) => {}
             Condition::Compare(_, left, right, _) => {
                 let mut functions = Vec::new();
                 functions_of(left, &mut functions);
@@ -89,6 +78,7 @@ impl Happening {
                     self.touched(atom, true, inner, found);
                 }
             }
+            other => other.parts().for_each(|part| self.touching(part, inner, found)),
         }
     }
 
@@ -256,17 +246,11 @@ fn is_same(left: &Atom, right: &Atom) -> bool {
 
 /// The functions in an expression, each once.
 fn functions_of(expression: &Expression, found: &mut Vec<Atom>) {
-    match expression {
-        Expression::Fluent(atom) if !found.iter().any(|known| is_same(known, atom)) => {
+    expression.walk_fluents(&mut |atom| {
+        if !found.iter().any(|known| is_same(known, atom)) {
             found.push(atom.clone());
         }
-        Expression::Operation(_, operands, _) => {
-            for own in operands {
-                functions_of(own, found);
-            }
-        }
-        _ => {}
-    }
+    });
 }
 
 fn substitute(expression: &Expression, values: &[(Atom, Expression)]) -> Expression {

@@ -6,6 +6,7 @@ use pddl::ast::{
     Action, ActionBody, Comparison, Condition, Constraint, Domain, DurationConstraint, Effect, EffectTime,
     Expression, InitialElement, Problem, Span, Trajectory,
 };
+use pddl::visit::Node;
 use rustc_hash::FxHashSet;
 
 use crate::error::{Error, File};
@@ -401,15 +402,11 @@ impl Addition {
 
 /// Whether a condition is about the objects of an action only.
 fn reads_nothing(condition: &Condition) -> bool {
-    match condition {
-        Condition::And(parts) | Condition::Or(parts) => parts.iter().all(reads_nothing),
-        Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
-            reads_nothing(inner)
-        }
-        Condition::Imply(premise, conclusion) => reads_nothing(premise) && reads_nothing(conclusion),
-        Condition::Equal(..) => true,
-        Condition::Atom(_) | Condition::Compare(..) => false,
-    }
+    let mut reads = false;
+    condition.walk(&mut |node| {
+        reads |= matches!(node, Node::Condition(Condition::Atom(_) | Condition::Compare(..)));
+    });
+    !reads
 }
 
 pub(super) fn decided(holds: bool) -> Condition {
@@ -417,24 +414,7 @@ pub(super) fn decided(holds: bool) -> Condition {
 }
 
 fn predicates_of<'c>(condition: &'c Condition, found: &mut FxHashSet<&'c pddl::ast::Name>) {
-    match condition {
-        Condition::And(parts) | Condition::Or(parts) => {
-            for part in parts {
-                predicates_of(part, found);
-            }
-        }
-        Condition::Not(inner) | Condition::Exists(_, inner) | Condition::ForAll(_, inner) => {
-            predicates_of(inner, found);
-        }
-        Condition::Imply(premise, conclusion) => {
-            predicates_of(premise, found);
-            predicates_of(conclusion, found);
-        }
-        Condition::Atom(atom) => {
-            found.insert(&atom.predicate.name);
-        }
-        Condition::Equal(..) | Condition::Compare(..) => {}
-    }
+    condition.walk(&mut |node| found.extend(node.atom().map(|atom| &atom.predicate.name)));
 }
 
 /// That an action takes time, if its duration is fixed.
