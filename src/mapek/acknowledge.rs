@@ -117,6 +117,8 @@ impl Beliefs {
     /// with another design while the reconfiguration was pending: then nobody knows which came first.
     fn configured(&mut self, effect: u64, function: String, design: String) -> Receipt {
         let own = self.receipts.functions.entry(function.clone()).or_default();
+        // One that was superseded without an answer may have been carried out in between.
+        let is_before_known = own.superseded.range(..effect).next().is_none();
         own.superseded.retain(|number, _| *number > effect);
         if own.last.as_ref().is_some_and(|last| last.effect >= effect) {
             return Receipt::Taken;
@@ -127,6 +129,8 @@ impl Beliefs {
         } else {
             self.configuration.insert(function.clone(), design.clone())
         };
+        // The function was seen with the design before its acknowledgement came: nobody knows the one that it had before.
+        let before = before.filter(|before| is_before_known && *before != design);
         own.last = Some(Acknowledged { effect, design, before, failed: is_doubtful });
         if is_doubtful { Receipt::Doubtful(function) } else { Receipt::Taken }
     }

@@ -30,7 +30,10 @@ pub(super) fn due(beliefs: &Beliefs, settings: &Settings) -> Option<Duration> {
     if settings.deadline.is_zero() {
         return None;
     }
-    let is_effect = |number: &u64| beliefs.outstanding.get(number).is_some_and(|own| !is_request(own));
+    let still = still_request(beliefs);
+    let is_effect = |number: &u64| {
+        beliefs.outstanding.get(number).is_some_and(|own| !is_request(own) || still == Some(*number))
+    };
     let waits = beliefs.waits.iter().filter(|(number, _)| beliefs.receipts.are_sent() && is_effect(number));
     let effects = waits.map(|(_, wait)| wait.since.saturating_add(settings.deadline));
     let running = beliefs.running.as_ref().filter(|own| !own.cancelling && !own.suspended);
@@ -43,6 +46,15 @@ fn is_request(effect: &Effect) -> bool {
     matches!(effect.command, Command::Request { .. })
 }
 
+/// The request of the action under way, if that stands still and has acknowledged it. It is repeated like any other effect: the
+/// action has no deadline then, and begins with a standstill. Before that acknowledgement the action might move.
+fn still_request(beliefs: &Beliefs) -> Option<u64> {
+    let running = beliefs.running.as_ref().filter(|own| own.suspended && !own.cancelling)?;
+    let is_about = |effect: &Effect| effect.action == running.action && effect.command.is_about_going_on();
+    let is_open = beliefs.outstanding.values().any(is_about);
+    (!is_open).then_some(running.request)
+}
+
 /// Effects that the robot should have acknowledged.
 fn effects(beliefs: &mut Beliefs, deadline: Duration, answers: &mut Vec<Answer>) -> Expired {
     let mut expired = Expired::new();
@@ -50,10 +62,11 @@ fn effects(beliefs: &mut Beliefs, deadline: Duration, answers: &mut Vec<Answer>)
         return expired;
     }
     let now = beliefs.now;
+    let still = still_request(beliefs);
     for (number, wait) in &mut beliefs.waits {
         let Some(effect) = beliefs.outstanding.get(number) else { continue };
         let waited = now.saturating_sub(wait.since);
-        if waited < deadline || is_request(effect) {
+        if waited < deadline || is_request(effect) && still != Some(*number) {
             continue;
         }
         let is_hopeless = wait.repeats > 0 && matches!(effect.command, Command::Reconfigure { .. });

@@ -18,15 +18,15 @@ pub struct Judge {
     refused: BTreeSet<String>,
     /// Effects that the loop has asked for.
     asked: BTreeMap<u64, Effect>,
-    /// Effects that a later one has superseded, and those of which the loop has an answer.
+    /// Effects that a later one has superseded.
     superseded: BTreeSet<u64>,
-    answered: BTreeSet<u64>,
     /// Effects that the loop has given up aloud.
     given_up: BTreeSet<u64>,
-    /// Whether the loop may know no design of the function: a reconfiguration was given up, or the function was seen without one.
-    is_design_unknown: bool,
-    /// Whether the report that the robot has restarted was lost: then nobody can know that the function has no design.
-    is_restart_unreported: bool,
+    /// The belief that follows from the messages by the table of the book.
+    belief: Belief,
+    /// Whether the last observation of the function that was delivered was outdated by then. Observations do not say how old they
+    /// are, so that no loop can know.
+    is_misled: bool,
     /// Actions of which the loop has heard the end.
     ended: BTreeSet<u64>,
     /// The last decision on plans, and whether the goal is reached.
@@ -46,51 +46,41 @@ enum Plan {
 
 impl Judge {
     /// Takes a line that was delivered to the loop.
-    pub fn hear(&mut self, event: &Value, is_taken: bool) {
+    pub fn hear(&mut self, event: &Value, is_taken: bool, robot: &Robot) {
+        if !is_taken {
+            return;
+        }
         let component = event["component"].as_str().unwrap_or_default().to_owned();
+        let (effect, action) = (event["effect"].as_u64(), event["action"].as_u64());
         match event["event"].as_str().unwrap_or_default() {
-            _ if !is_taken => {}
             "component_status" if event["status"] == "FALSE" => {
                 self.failed.insert(component);
             }
             "component_status" => {
                 self.failed.remove(&component);
             }
-            "acknowledged" => {
-                self.answered.extend(event["effect"].as_u64());
-            }
-            "reconfiguration_failed" => {
-                let effect = event["effect"].as_u64().unwrap_or_default();
-                self.answered.insert(effect);
-                self.refuse(effect);
-                // The design before may be none.
-                self.is_design_unknown = true;
-            }
+            "acknowledged" => self.belief.acknowledge(effect.unwrap_or_default()),
+            "reconfiguration_failed" => self.refused.extend(self.belief.fail(effect.unwrap_or_default())),
             "design_status" => {
                 self.refused.remove(event["design"].as_str().unwrap_or_default());
             }
             "configuration_observed" => {
-                self.is_design_unknown |= event["design"].is_null();
-                self.is_restart_unreported = false;
+                let design = event["design"].as_str().map(ToOwned::to_owned);
+                self.is_misled = design.is_some() && design != robot.design;
+                let latest = self.asked.last_key_value().map_or(0, |(number, _)| *number);
+                self.belief.observe(design, latest);
             }
-            "action_succeeded" | "action_failed" | "action_cancelled" => {
-                self.ended.extend(event["action"].as_u64());
+            "action_started" | "action_progress" => {
+                self.belief.imply(action.unwrap_or_default(), &self.asked)
             }
+            "action_succeeded" => {
+                self.belief.imply(action.unwrap_or_default(), &self.asked);
+                self.ended.extend(action);
+            }
+            "action_failed" | "action_cancelled" => self.ended.extend(action),
             _ => {}
         }
-    }
-
-    /// The design of a reconfiguration cannot be had until the robot says that it can.
-    fn refuse(&mut self, effect: u64) {
-        if let Some(Command::Reconfigure { to, .. }) = self.asked.get(&effect).map(|own| &own.command) {
-            self.refused.insert(to.clone());
-        }
-    }
-
-    /// Takes a message that is lost.
-    pub fn lose(&mut self, message: &Message) {
-        self.is_restart_unreported |=
-            matches!(message, Message::Event(event) if event["event"] == "configuration_observed");
+        self.is_misled &= self.belief.design != robot.design;
     }
 
     /// Takes an answer of the loop.
@@ -98,8 +88,12 @@ impl Judge {
         match answer {
             Answer::Effect(effect) => {
                 self.superseded.extend(&effect.supersedes);
-                self.asked.insert(effect.number, effect.clone());
-                if matches!(effect.command, Command::Request { .. }) {
+                if self.asked.insert(effect.number, effect.clone()).is_none()
+                    && let Command::Reconfigure { to, .. } = &effect.command
+                {
+                    self.belief.ask(effect.number, to);
+                }
+                if matches!(effect.command, Command::Request { .. }) && !effect.repeated {
                     self.plan = Plan::Open;
                 }
             }
@@ -109,8 +103,9 @@ impl Judge {
             Answer::Overdue { effect, outcome, .. } => {
                 if matches!(outcome, OverdueOutcome::Failed | OverdueOutcome::Cancelled) {
                     self.given_up.extend(*effect);
-                    self.refuse(effect.unwrap_or_default());
-                    self.is_design_unknown = true;
+                }
+                if *outcome == OverdueOutcome::Failed {
+                    self.refused.extend(effect.and_then(|effect| self.belief.give_up(effect)));
                 }
             }
             _ => {}
@@ -123,31 +118,36 @@ impl Judge {
         components.iter().find(|component| self.failed.contains(**component)).copied()
     }
 
-    /// (a) If all effects that are on their way or that the loop still waits for were carried out now, no action would move with a
-    /// design that is forbidden by the reports delivered so far, or without one.
+    /// (a) Once all effects have arrived that the loop waits for, and after them those that are on their way, no action moves with a
+    /// design that is forbidden by the reports delivered so far, without one, or with another one than the loop has given it.
     pub fn intended_motion<'a>(
         &self,
         robot: &Robot,
         control: &Loop,
         messages: impl Iterator<Item = &'a Message>,
     ) -> Result<(), String> {
-        let mut pending: BTreeMap<u64, &Effect> =
-            control.beliefs().outstanding().map(|effect| (effect.number, effect)).collect();
-        for message in messages {
-            if let Message::Effect(effect) = message {
-                pending.insert(effect.number, effect);
-            }
+        let beliefs = control.beliefs();
+        if self.is_misled {
+            return Ok(());
         }
-        // The loop cannot know of a refusal before its answer comes.
-        let refused = self.asked.iter().filter(|(number, _)| robot.refused == Some(**number));
-        pending.extend(refused.map(|(number, effect)| (*number, effect)));
-        pending.retain(|number, _| !robot.seen.contains(number) || robot.refused == Some(*number));
-        let mut robot_then = robot.clone();
-        for (number, effect) in pending {
-            let is_over = self.answered.contains(&number) || self.superseded.contains(&number);
+        let mut robot_then = robot.prospect();
+        // The loop cannot know of a failure before its report comes.
+        let unknown = robot.refused.filter(|number| !self.belief.failed.contains(number));
+        if let Some(effect) = unknown.and_then(|number| self.asked.get(&number)) {
+            robot_then.carry_out(effect);
+        }
+        let on_their_way: BTreeMap<u64, &Effect> = messages
+            .filter_map(|message| match message {
+                Message::Effect(effect) => Some((effect.number, effect)),
+                Message::Event(_) => None,
+            })
+            .collect();
+        // The order of arrival is the worst one: what is outdated comes last, unless something before has superseded it.
+        for effect in beliefs.outstanding().chain(on_their_way.into_values()) {
             let is_moot =
                 self.ended.contains(&effect.action) && !matches!(effect.command, Command::Reconfigure { .. });
-            if !is_over && !is_moot {
+            robot_then.seen.extend(&effect.supersedes);
+            if robot_then.seen.insert(effect.number) && !is_moot {
                 robot_then.carry_out(effect);
             }
         }
@@ -156,11 +156,57 @@ impl Judge {
         let Some(design) = &robot_then.design else {
             return Err(format!("(a) action {} goes on without a design", action.number));
         };
-        match self.forbids(design) {
-            Some(component) => {
-                Err(format!("(a) action {} goes on with {design}, which needs {component}", action.number))
+        if let Some(component) = self.forbids(design) {
+            return Err(format!(
+                "(a) action {} goes on with {design}, which needs {component}",
+                action.number
+            ));
+        }
+        let given = beliefs.running().filter(|(number, _)| *number == action.number && !beliefs.cancelling());
+        match given.and_then(|(_, step)| step.design(FUNCTION)) {
+            Some(given) if given != design => {
+                Err(format!("(a) action {} goes on with {design}, and was given {given}", action.number))
             }
-            None => Ok(()),
+            _ => Ok(()),
+        }
+    }
+
+    /// (f) A line that takes its design from the action under way is answered with a safe effect, before any planning: the best other
+    /// design, or a standstill. `before` is the action that went on before the line, with its design.
+    pub fn reaction(
+        &self,
+        before: Option<(u64, String)>,
+        control: &Loop,
+        answers: &[Answer],
+    ) -> Result<(), String> {
+        let Some((action, design)) = before else { return Ok(()) };
+        let is_lost = self.forbids(&design).is_some() || self.refused.contains(&design);
+        if !is_lost || self.ended.contains(&action) {
+            return Ok(());
+        }
+        let mut effects = answers.iter().filter_map(|answer| match answer {
+            Answer::Effect(effect) if effect.action == action && !effect.repeated => Some(&effect.command),
+            _ => None,
+        });
+        // Designs are ordered by their cost, the best one last.
+        let available = control.beliefs().available();
+        let best = DESIGNS.iter().map(|own| own.0).rfind(|own| available.contains(*own));
+        let is_safe = effects.any(|command| match command {
+            Command::Suspend { .. } | Command::Cancel { .. } => true,
+            Command::Reconfigure { to, .. } => Some(to.as_str()) == best,
+            _ => false,
+        });
+        let beliefs = control.beliefs();
+        let has_best = beliefs.running().and_then(|(_, step)| step.design(FUNCTION)) == best;
+        // A reconfiguration to the best design may be on its way already; and after a failure the function may still have it.
+        let is_on_its_way = beliefs.pending().any(|(_, to)| Some(to) == best);
+        let is_there = self.belief.is_settled() && self.belief.design.as_deref() == best;
+        if is_safe || best.is_some() && has_best && (is_on_its_way || is_there) {
+            Ok(())
+        } else {
+            Err(format!(
+                "(f) action {action} has lost {design}, and no safe effect follows; best is {best:?}"
+            ))
         }
     }
 
@@ -178,14 +224,17 @@ impl Judge {
         }
     }
 
-    /// (b) Where no reconfiguration is pending, the design that the function is believed to have is the one that it has.
+    /// (b) The believed design is the one that follows from the messages; and where nothing is pending it is the actual one.
     pub fn configuration<'a>(
         &self,
         robot: &Robot,
         control: &Loop,
         mut messages: impl Iterator<Item = &'a Message>,
     ) -> Result<(), String> {
-        let beliefs = control.beliefs();
+        let believed = control.beliefs().configuration().get(FUNCTION);
+        if believed != self.belief.design.as_ref() {
+            return Err(format!("(b) believed {believed:?}, by the messages {:?}", self.belief.design));
+        }
         let is_on_its_way = messages.any(|message| match message {
             Message::Effect(effect) => {
                 matches!(effect.command, Command::Reconfigure { .. }) && !robot.seen.contains(&effect.number)
@@ -195,13 +244,15 @@ impl Judge {
                 is_about_designs.iter().any(|kind| event["event"] == *kind)
             }
         });
-        if is_on_its_way || beliefs.is_unsettled(FUNCTION) || self.is_restart_unreported {
-            return Ok(());
-        }
-        match beliefs.configuration().get(FUNCTION) {
-            None if self.is_design_unknown || robot.design.is_none() => Ok(()),
-            believed if believed == robot.design.as_ref() => Ok(()),
-            believed => Err(format!("(b) believed {believed:?}, actual {:?}", robot.design)),
+        // Where the report of a restart is lost nobody can know that the function has no design.
+        let is_unknowable = self.is_misled || robot.has_lost_design;
+        let is_certain = self.belief.is_settled() && !is_on_its_way && !is_unknowable;
+        match believed {
+            // By the table no design is believed where it is not certain.
+            Some(_) if is_certain && believed != robot.design.as_ref() => {
+                Err(format!("(b) believed {believed:?}, actual {:?}", robot.design))
+            }
+            _ => Ok(()),
         }
     }
 
@@ -231,5 +282,103 @@ impl Judge {
             Plan::None("unsolvable") if !is_possible => Ok(()),
             plan => Err(format!("(d) the last decision is {plan:?}; a plan is possible: {is_possible}")),
         }
+    }
+}
+
+/// What is to be believed of the function's design by the table of `docs/reference/events.md`, written without a look at the loop.
+#[derive(Debug, Default)]
+struct Belief {
+    design: Option<String>,
+    /// Whether anything was ever acknowledged by its number.
+    has_receipts: bool,
+    /// The reconfiguration that was asked for last and has no answer, and those before that were superseded without one.
+    pending: BTreeMap<u64, String>,
+    superseded: BTreeMap<u64, String>,
+    /// The greatest reconfiguration that was acknowledged and has not failed since, its design, and the design before.
+    last: Option<(u64, String, Option<String>)>,
+    greatest: u64,
+    /// Reconfigurations up to this one may have been carried out before or after an observation.
+    crossed: u64,
+    /// Reconfigurations that have failed, as the loop was told.
+    failed: BTreeSet<u64>,
+}
+
+impl Belief {
+    fn is_settled(&self) -> bool {
+        self.pending.is_empty() && self.superseded.is_empty()
+    }
+
+    fn ask(&mut self, effect: u64, to: &str) {
+        self.superseded.append(&mut self.pending);
+        self.pending.insert(effect, to.to_owned());
+    }
+
+    fn acknowledge(&mut self, effect: u64) {
+        self.has_receipts = true;
+        self.confirm(effect);
+    }
+
+    fn confirm(&mut self, effect: u64) {
+        let unanswered = self.pending.remove(&effect);
+        let Some(to) = unanswered.or_else(|| self.superseded.remove(&effect)) else { return };
+        let is_before_known = self.superseded.range(..effect).next().is_none();
+        self.superseded.retain(|number, _| *number > effect);
+        if effect < self.greatest {
+            return;
+        }
+        self.greatest = effect;
+        if self.crossed >= effect {
+            (self.design, self.last) = (None, None);
+        } else {
+            let before = self.design.replace(to.clone()).filter(|before| is_before_known && *before != to);
+            self.last = Some((effect, to, before));
+        }
+    }
+
+    /// As long as nothing was acknowledged by its number, a report of an action implies the reconfigurations before its request.
+    fn imply(&mut self, action: u64, asked: &BTreeMap<u64, Effect>) {
+        let is_request =
+            |own: &&Effect| own.action == action && matches!(own.command, Command::Request { .. });
+        let request = asked.values().find(is_request).map_or(0, |own| own.number);
+        let implied: Vec<u64> = self.pending.range(..request).map(|(number, _)| *number).collect();
+        for effect in implied {
+            if !self.has_receipts {
+                self.confirm(effect);
+            }
+        }
+    }
+
+    /// A failure; returns the design that counts as not realisable then.
+    fn fail(&mut self, effect: u64) -> Option<String> {
+        self.failed.insert(effect);
+        if let Some(design) = self.pending.remove(&effect).or_else(|| self.superseded.remove(&effect)) {
+            return Some(design);
+        }
+        let (_, design, before) = self.last.take_if(|last| last.0 == effect)?;
+        if self.design.as_ref() == Some(&design) {
+            self.design = before;
+        }
+        Some(design)
+    }
+
+    /// A reconfiguration that is given up may still be carried out.
+    fn give_up(&mut self, effect: u64) -> Option<String> {
+        let to = self.pending.remove(&effect)?;
+        self.design = None;
+        self.superseded.insert(effect, to.clone());
+        Some(to)
+    }
+
+    fn observe(&mut self, design: Option<String>, latest: u64) {
+        let is_news = self.design != design;
+        match self.pending.last_key_value().map(|(_, to)| to.clone()) {
+            None => self.superseded.clear(),
+            pending => {
+                if (is_news || design.is_none()) && design != pending {
+                    self.crossed = latest;
+                }
+            }
+        }
+        self.design = design;
     }
 }

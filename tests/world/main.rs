@@ -5,11 +5,14 @@
 //! time the robot is fair: nothing is lost, nothing fails any more, and what was said last is said again.
 //!
 //! The judge knows [`DESIGNS`], the messages, and the robot. It demands:
-//! - (a) after each reaction, before any planning: if all effects were carried out that are on their way or that the loop waits for, no action would move with
-//!   a design that is forbidden by the reports delivered so far, or without one; and the robot does not do so for longer than a bound;
-//! - (b) where no reconfiguration is pending, the believed configuration is the actual one;
+//! - (a) after each reaction, before any planning: once all effects have arrived that the loop waits for, and after them those that are on their way, no action moves
+//!   with a design that is forbidden by the reports delivered so far, without one, or with another one than the loop has given it; and
+//!   the robot does not do so for longer than a bound;
+//! - (b) the believed configuration is the one that follows from the messages by the table of `docs/reference/events.md`, and where
+//!   nothing is pending it is the actual one;
 //! - (c) at the end, each effect was carried out, superseded, about an action that has ended, or given up aloud;
 //! - (d) at the end, the robot is at the goal, or the last decision is that there is no plan, and there is none;
+//! - (f) a line that takes its design from the action under way is answered with a safe effect at once;
 //! - (e) a loop that is brought back from its snapshot and the steps since is in the state of the one that has crashed.
 
 mod judge;
@@ -95,7 +98,10 @@ fn violations(seeds: impl Iterator<Item = u64>, faults: fn(u64) -> Faults) -> Ve
     let loops = [pristine(Settings::immediate()), pristine(Settings::default())];
     let run = |seed: u64| {
         let pristine = &loops[usize::from(seed % 4 == 3)];
-        Schedule::new(pristine, seed, faults(seed)).run().err().map(|violation| (seed, violation))
+        let schedule = || Schedule::new(pristine, seed, faults(seed));
+        schedule().run().err()?;
+        // Messages are kept in a second run only, of which they are the larger part.
+        schedule().with_log().run().err().map(|violation| (seed, violation))
     };
     seeds.filter_map(run).collect()
 }
@@ -141,11 +147,14 @@ fn a_million_schedules() {
 
 /// Seeds of violations that were found: an effect that was superseded twice was carried out last (12), a suspension came before its
 /// request (16, 85), an acknowledgement crossed an observation (10, 20, 64, 115), an action that was acknowledged never started (88, 128),
-/// the first request was lost (320), and a design that was given up counted as possible (140, 270).
-const FOUND: [u64; 12] = [10, 12, 16, 20, 64, 85, 88, 115, 128, 140, 270, 320];
+/// the first request was lost (320), a design that was given up counted as possible (140, 270), the lost request of an action that
+/// stood still was never repeated (808, 918, 1102), the robot forgot a suspension (10532) or that its function had the design of a
+/// request (1510), and the judge knew no doubt about an observed design (11036).
+const FOUND: [u64; 18] =
+    [10, 12, 16, 20, 64, 85, 88, 115, 128, 140, 270, 320, 808, 918, 1102, 1510, 10532, 11036];
 
 #[test]
 fn what_was_violated_once_is_kept() {
-    let found = violations(FOUND.into_iter(), faults);
+    let found = violations(FOUND.into_iter(), |seed| faults(seed).of_earlier_kinds());
     assert!(found.is_empty(), "{}", told(&found));
 }

@@ -44,17 +44,21 @@ pub struct Robot {
     pub place: String,
     /// Numbers of effects that were carried out, refused, or superseded before they came.
     pub seen: BTreeSet<u64>,
-    /// The last reconfiguration, if it was refused.
+    /// The last reconfiguration, if it was refused, or has failed after it was acknowledged.
     pub refused: Option<u64>,
     /// Answers to effects and ends of actions, to be reported again.
     pub said: Vec<Value>,
     /// The greatest number of an action that has begun.
     begun: u64,
     has_restarted: bool,
+    /// Whether the function has lost its design in a restart and has got none since.
+    pub has_lost_design: bool,
+    /// The last reconfiguration that was carried out, with the design before, if it can still fail.
+    before: Option<(u64, String)>,
     /// The action and the number of the last reconfiguration that was carried out.
     configured: (u64, u64),
-    /// The action to come that is to stand still from its beginning.
-    still: Option<u64>,
+    /// Actions to come that are to stand still from their beginning.
+    still: BTreeSet<u64>,
 }
 
 impl Default for Robot {
@@ -69,8 +73,10 @@ impl Default for Robot {
             said: Vec::new(),
             begun: 0,
             has_restarted: false,
+            has_lost_design: false,
+            before: None,
             configured: (0, 0),
-            still: None,
+            still: BTreeSet::new(),
         }
     }
 }
@@ -97,21 +103,48 @@ impl Robot {
         reports
     }
 
+    /// The last reconfiguration fails after it was acknowledged: the function has the design before again. Returns the report.
+    pub fn fail_late(&mut self) -> Option<Value> {
+        let (effect, design) = self.before.take()?;
+        (self.design, self.refused) = (Some(design), Some(effect));
+        let report = json!({ "event": "reconfiguration_failed", "effect": effect });
+        self.said.push(report.clone());
+        Some(report)
+    }
+
+    /// A copy without what was said, to be changed as effects to come say.
+    pub fn prospect(&self) -> Self {
+        Self {
+            failed: BTreeSet::new(),
+            design: self.design.clone(),
+            action: self.action.clone(),
+            place: String::new(),
+            seen: self.seen.clone(),
+            said: self.said.iter().filter(|said| is_end(said)).cloned().collect(),
+            still: self.still.clone(),
+            before: None,
+            ..*self
+        }
+    }
+
     /// Changes the robot as an effect says. Returns reports about its action.
     pub fn carry_out(&mut self, effect: &Effect) -> Option<Value> {
         let number = effect.action;
         let own = self.action.as_mut().filter(|own| own.number == number);
         match (&effect.command, own) {
-            (Command::Reconfigure { to, .. }, own) => {
-                self.design = Some(to.clone());
+            (Command::Reconfigure { to, .. }, _) => {
+                self.has_lost_design = false;
+                let before = self.design.replace(to.clone());
+                self.before = before.filter(|before| before != to).map(|before| (effect.number, before));
                 self.configured = (number, effect.number);
-                // An action begins only when its function has its design: that of the request, or a later one.
-                if let Some(own) = own
+                // An action begins only when its function has its design: that of the request, whichever action it was asked for,
+                // or a later one for the action.
+                if let Some(own) = &mut self.action
                     && let Some(wanted) = &own.wanted
-                    && (wanted == to || effect.number > own.request)
+                    && (wanted == to || own.number == number && effect.number > own.request)
                 {
                     own.wanted = None;
-                    return Some(json!({ "event": "action_started", "action": number }));
+                    return Some(json!({ "event": "action_started", "action": own.number }));
                 }
             }
             (Command::Request { step }, _) if number > self.begun => {
@@ -122,14 +155,14 @@ impl Robot {
                 let is_later = self.design.is_some() && self.configured > (number, effect.number);
                 let wanted = wanted.filter(|_| !is_later).map(ToOwned::to_owned);
                 let is_begun = wanted.is_none();
-                let (request, suspended) = (effect.number, self.still == Some(number));
+                let (request, suspended) = (effect.number, self.still.contains(&number));
                 self.action = Some(Action { number, request, done: 0, suspended, to, wanted });
                 return is_begun.then(|| json!({ "event": "action_started", "action": number }));
             }
             (Command::Suspend { .. }, Some(own)) => own.suspended = true,
             // What is said of an action before its request comes holds when it begins.
-            (Command::Suspend { .. }, None) => self.still = Some(number),
-            (Command::Resume, None) => self.still = self.still.filter(|still| *still != number),
+            (Command::Suspend { .. }, None) => drop(self.still.insert(number)),
+            (Command::Resume, None) => drop(self.still.remove(&number)),
             (Command::Resume, Some(own)) => {
                 own.suspended = false;
                 // The action goes on with the design that the function has now.
@@ -174,7 +207,7 @@ impl Robot {
 
     /// Restarts. The function has no design any more, and the action under way has failed. Returns its reports.
     pub fn restart(&mut self) -> Vec<Value> {
-        (self.design, self.has_restarted) = (None, true);
+        (self.design, self.has_restarted, self.has_lost_design, self.before) = (None, true, true, None);
         let failed = self.action.take();
         let failed = failed.map(|own| json!({ "event": "action_failed", "action": own.number }));
         self.said.extend(failed.clone());
@@ -187,7 +220,8 @@ impl Robot {
         json!({ "event": "component_status", "component": component, "status": status })
     }
 
-    fn observed(&self) -> Value {
+    /// The function's design as it is.
+    pub fn observed(&self) -> Value {
         json!({ "event": "configuration_observed", "function": FUNCTION, "design": self.design })
     }
 

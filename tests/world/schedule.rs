@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use crate::judge::Judge;
 use crate::robot::Robot;
-use crate::{COMPONENTS, DESIGNS};
+use crate::{COMPONENTS, DESIGNS, FUNCTION};
 
 /// A step of virtual time.
 const STEP: Duration = Duration::from_millis(500);
@@ -36,6 +36,10 @@ pub struct Faults {
     pub fails: u32,
     pub crashes: u32,
     pub restarts: u32,
+    /// Reconfigurations that fail after they were acknowledged.
+    pub late: u32,
+    /// Observations of the function's design.
+    pub observes: u32,
     /// Whether the effects of the start may be lost, too.
     pub start: bool,
     /// Whether lines have numbers.
@@ -64,7 +68,22 @@ impl Faults {
             numbered: random.bool(),
             beside: random.bool(),
             quiet: random.bool(),
+            late: 0,
+            observes: 0,
         }
+        .with_later_kinds(seed)
+    }
+
+    /// The kinds that were added when seeds of violations had been kept already: they change nothing of the others.
+    fn with_later_kinds(self, seed: u64) -> Self {
+        let mut random = Rng::with_seed(seed ^ 0x1a7e);
+        let mut share = |most: u32| if random.bool() { 0 } else { random.u32(0..=most) };
+        Self { late: share(4), observes: share(6), ..self }
+    }
+
+    /// The same without the kinds that were added later.
+    pub fn of_earlier_kinds(self) -> Self {
+        Self { late: 0, observes: 0, ..self }
     }
 
     /// The same where the effects of the start may be lost.
@@ -107,7 +126,8 @@ pub struct Schedule<'a> {
     snapshot: Option<Snapshot>,
     steps: Vec<Step>,
     judge: Judge,
-    log: Vec<String>,
+    /// Messages, where they are kept.
+    log: Option<Vec<String>>,
 }
 
 impl<'a> Schedule<'a> {
@@ -126,7 +146,19 @@ impl<'a> Schedule<'a> {
             snapshot: None,
             steps: Vec::new(),
             judge: Judge::default(),
-            log: Vec::new(),
+            log: None,
+        }
+    }
+
+    /// The same with a log, for a schedule that is known to violate something.
+    pub fn with_log(self) -> Self {
+        Self { log: Some(Vec::new()), ..self }
+    }
+
+    fn log(&mut self, message: impl FnOnce() -> String) {
+        let now = self.now;
+        if let Some(log) = &mut self.log {
+            log.push(format!("{now}: {}", message()));
         }
     }
 
@@ -144,8 +176,9 @@ impl<'a> Schedule<'a> {
     }
 
     fn explained(&self, violation: &str) -> String {
-        let from = self.log.len().saturating_sub(80);
-        format!("{violation}\n{:?}\n{}", self.faults, self.log[from..].join("\n"))
+        let Some(log) = &self.log else { return violation.to_owned() };
+        let from = log.len().saturating_sub(80);
+        format!("{violation}\n{:?}\n{}", self.faults, log[from..].join("\n"))
     }
 
     fn is_unfair(&self) -> bool {
@@ -165,11 +198,22 @@ impl<'a> Schedule<'a> {
             self.report(self.robot.status(component));
         }
         if self.chance(self.faults.restarts) {
-            self.log.push(format!("{}: the robot restarts", self.now));
+            self.log(|| "the robot restarts".to_owned());
             let reports = self.robot.restart();
             for report in reports {
                 self.report(report);
             }
+        }
+        if self.faults.late > 0
+            && self.chance(self.faults.late)
+            && let Some(report) = self.robot.fail_late()
+        {
+            self.log(|| "a reconfiguration fails late".to_owned());
+            // A robot repeats this report until it has arrived: without it nobody can know.
+            self.report_safely(report);
+        }
+        if self.faults.observes > 0 && self.chance(self.faults.observes) {
+            self.report(self.robot.observed());
         }
         if !self.is_unfair() {
             self.fair_reports();
@@ -190,7 +234,7 @@ impl<'a> Schedule<'a> {
             match self.messages.remove(&key) {
                 Some(Message::Effect(effect)) => {
                     let fails = self.chance(self.faults.refuses);
-                    self.log.push(format!("{}: robot takes {} {fails}", self.now, brief(&effect)));
+                    self.log(|| format!("robot takes {} {fails}", brief(&effect)));
                     for report in self.robot.take(&effect, fails) {
                         self.report(report);
                     }
@@ -232,7 +276,11 @@ impl<'a> Schedule<'a> {
     fn bound(&self) -> Option<u64> {
         // Two deadlines and a step each way: the effect is repeated once, and then given up.
         let deadlines = 2 * 20 + 6;
-        let is_reliable = self.faults.lost == 0 && self.faults.refuses == 0 && self.faults.restarts == 0;
+        let is_reliable = self.faults.lost == 0
+            && self.faults.refuses == 0
+            && self.faults.restarts == 0
+            && self.faults.late == 0
+            && self.faults.observes == 0;
         if self.now > STEPS.0 + self.faults.delay {
             Some(deadlines)
         } else {
@@ -254,13 +302,19 @@ impl<'a> Schedule<'a> {
         self.post(&Message::Event(event));
     }
 
+    /// Sends a report that is not lost.
+    fn report_safely(&mut self, event: Value) {
+        let lost = std::mem::take(&mut self.faults.lost);
+        self.report(event);
+        self.faults.lost = lost;
+    }
+
     /// Sends a message, which may be lost, doubled and overtaken.
     fn post(&mut self, message: &Message) {
         // As long as nothing was acknowledged the loop cannot know whether this robot ever acknowledges anything.
         let is_safe = self.now == 0 && !self.faults.start;
         if !is_safe && self.chance(self.faults.lost) {
-            self.log.push(format!("{}: lost {message:?}", self.now));
-            self.judge.lose(message);
+            self.log(|| format!("lost {message:?}"));
             return;
         }
         let copies = 1 + u32::from(self.chance(self.faults.doubled));
@@ -282,17 +336,24 @@ impl<'a> Schedule<'a> {
     /// Delivers a line, or the passing of time, to the loop, and judges what follows.
     fn deliver(&mut self, line: &str) -> Result<(), String> {
         if line != Observation::TIMER {
-            self.log.push(format!("{}: loop hears {line}", self.now));
+            self.log(|| format!("loop hears {line}"));
         }
         self.steps.push(Step::React(line.to_owned(), self.time()));
+        let known = self.control.beliefs();
+        let going_on = known.running().filter(|_| !known.cancelling() && !known.suspended());
+        let before = going_on.and_then(|(action, step)| Some((action, step.design(FUNCTION)?.to_owned())));
         let answers = self.control.react(&Observation::recorded(line), self.time());
         let is_taken = !answers.iter().any(|answer| {
             matches!(answer, Answer::Error { .. } | Answer::Duplicate { .. } | Answer::Stale { .. })
         });
         if let Ok(event) = serde_json::from_str::<Value>(line) {
-            self.judge.hear(&event, is_taken);
+            self.judge.hear(&event, is_taken, &self.robot);
         }
-        self.control.decision(&answers);
+        self.control.decision(&[]);
+        for answer in &answers {
+            self.judge.note(answer);
+        }
+        self.judge.reaction(before, &self.control, &answers)?;
         self.send(answers);
         self.undeliberated += 1;
         // The effect that makes the robot safe precedes any planning.
@@ -342,7 +403,10 @@ impl<'a> Schedule<'a> {
     }
 
     fn decided(&mut self, answers: Vec<Answer>) {
-        let plans = self.control.decision(&answers).plans;
+        let plans = self.control.decision(&[]).plans;
+        for answer in &answers {
+            self.judge.note(answer);
+        }
         self.steps.push(Step::Deliberate(plans));
         self.undeliberated = 0;
         self.send(answers);
@@ -354,8 +418,7 @@ impl<'a> Schedule<'a> {
     /// Sends effects, and notes other answers.
     fn send(&mut self, answers: Vec<Answer>) {
         for answer in answers {
-            self.log.push(format!("{}: {}", self.now, answer.to_json()));
-            self.judge.note(&answer);
+            self.log(|| answer.to_json().to_string());
             if let Answer::Effect(effect) = answer {
                 self.post(&Message::Effect(effect));
             }
@@ -364,7 +427,7 @@ impl<'a> Schedule<'a> {
 
     /// The loop ends, and comes back from its snapshot and the steps since.
     fn crash(&mut self) -> Result<(), String> {
-        self.log.push(format!("{}: crash", self.now));
+        self.log(|| "crash".to_owned());
         let mut again = self.pristine.clone();
         if let Some(snapshot) = &self.snapshot {
             again.restore(snapshot).map_err(|message| message.message.clone())?;
@@ -381,6 +444,9 @@ impl<'a> Schedule<'a> {
         self.control = again;
         self.thoughts = None;
         let repeated = self.control.repeat();
+        for answer in &repeated {
+            self.judge.note(answer);
+        }
         self.send(repeated);
         Ok(())
     }
