@@ -1,8 +1,8 @@
-//! Changes to the expressions of conditions and effects, in place.
+//! In-place visitors for the expressions of conditions and effects.
 
 use pddl::ast::{Assignment, Condition, Effect, Expression, Name};
 
-/// Whether a numeric function is mentioned whose name is wanted.
+/// Sets `found` if the expression contains a numeric function that `wanted` accepts.
 pub(super) fn mentions(expression: &Expression, wanted: &dyn Fn(&Name) -> bool, found: &mut bool) {
     match expression {
         Expression::Fluent(fluent) => *found |= wanted(&fluent.predicate.name),
@@ -11,7 +11,7 @@ pub(super) fn mentions(expression: &Expression, wanted: &dyn Fn(&Name) -> bool, 
     }
 }
 
-/// Applies a change to every part of an expression that has no parts.
+/// Applies a change to every leaf of an expression.
 pub(super) fn walk_expression(expression: &mut Expression, change: &dyn Fn(&mut Expression)) {
     match expression {
         Expression::Operation(_, parts, _) => {
@@ -23,7 +23,7 @@ pub(super) fn walk_expression(expression: &mut Expression, change: &dyn Fn(&mut 
     }
 }
 
-/// The same for all expressions of a condition.
+/// Applies a change to every leaf of all expressions in a condition.
 pub(super) fn walk_condition(condition: &mut Condition, change: &dyn Fn(&mut Expression)) {
     match condition {
         Condition::And(parts) | Condition::Or(parts) => {
@@ -46,8 +46,8 @@ pub(super) fn walk_condition(condition: &mut Condition, change: &dyn Fn(&mut Exp
     }
 }
 
-/// Goes through what an effect mentions where changes of designs are not counted: everywhere but in what it adds to numbers
-/// unconditionally.
+/// Visits the expressions of an effect in which changes of designs cannot be counted: all except
+/// the amounts of unconditional `increase` and `decrease` effects.
 pub(super) fn walk_uncounted(effect: Effect, see: &dyn Fn(&mut Expression)) {
     match effect {
         Effect::And(parts) => parts.into_iter().for_each(|part| walk_uncounted(part, see)),
@@ -56,7 +56,7 @@ pub(super) fn walk_uncounted(effect: Effect, see: &dyn Fn(&mut Expression)) {
     }
 }
 
-/// The same for all expressions of an effect.
+/// Applies a change to every leaf of all expressions in an effect.
 pub(super) fn walk_effect(effect: &mut Effect, change: &dyn Fn(&mut Expression)) {
     match effect {
         Effect::And(parts) => parts.iter_mut().for_each(|part| walk_effect(part, change)),
