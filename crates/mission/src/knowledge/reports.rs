@@ -3,7 +3,6 @@
 //! An update that exceeds the limits leaves the engine unchanged. The report and all later ones are
 //! then kept as pending. Each new report retries all pending reports in a single update, which is
 //! equivalent to applying the last report on each subject.
-//! last word on everything.
 
 use std::collections::{BTreeMap, BTreeSet};
 

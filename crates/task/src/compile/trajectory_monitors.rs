@@ -1,4 +1,5 @@
-//! Monitors of trajectory constraints: the atoms that store the state of each automaton, and the effects that update them.
+//! Monitors of trajectory constraints: the atoms that store the state of each automaton, and the
+//! effects that update them.
 
 use num_rational::BigRational;
 use num_traits::{Signed, Zero};
@@ -18,34 +19,34 @@ use super::semantics::PlanSemantics;
 use super::simplify::{all, any, assume, flag, holds, is_false, is_true, not, ways};
 use super::syntax_edits::{PreferenceInstance, declare, happen, require, unsupported};
 
-/// Constraints have at most this many instances together.
+/// Limit on the total number of instances of constraints.
 const INSTANCES: usize = 20_000;
 
-/// The constraints of a task, as far as they were taken up.
+/// Monitors of the constraints that were added so far.
 pub(super) struct Monitors<'t> {
     domain: &'t Domain,
     problem: &'t Problem,
     objects: &'t Objects<'t>,
     pub(super) initial: Initial<'t>,
-    /// What the actions have in addition, by action and time.
+    /// Additional conditions and effects by action and time.
     additions: Vec<[Addition; 2]>,
-    /// Atoms that remember, and whether they hold at first.
+    /// Monitor atoms with their initial truth values.
     memory: Vec<(String, bool)>,
-    /// What has to hold in the end.
+    /// Conditions on the last state.
     goals: Vec<Condition>,
     wanted: Vec<PreferenceInstance>,
-    /// Atoms that timed initial literals add, and when.
+    /// Atoms that timed initial literals add, with their times.
     pub(super) moments: Vec<(String, BigRational)>,
     pub(super) course: PlanSemantics<'t>,
-    /// What has to be kept in time: the two conditions, and what notes that it was.
+    /// Deadlines: the two conditions, and the effect that records satisfaction.
     pub(super) deadlines: Vec<(Deadline, [Condition; 2], Effect)>,
-    /// Whether durations are asked for that the files do not ask for.
+    /// `true` if the compilation restricts durations further than the files.
     narrows: bool,
     instances: usize,
     fresh: u64,
 }
 
-/// What one happening of an action has in addition.
+/// Additional conditions and effects of a happening.
 #[derive(Default)]
 pub(super) struct Addition {
     conditions: Vec<Condition>,
@@ -84,7 +85,7 @@ impl<'t> Monitors<'t> {
         self.initial.is_defined(condition, place)
     }
 
-    /// Takes up a constraint.
+    /// Adds a constraint.
     pub(super) fn add_constraint(&mut self, file: File, constraint: &Constraint) -> Result<(), Error> {
         for binding in self.objects.bindings(&constraint.variables, &Vec::new()) {
             let place = (file, constraint.span);
@@ -98,7 +99,8 @@ impl<'t> Monitors<'t> {
         Ok(())
     }
 
-    /// What has to hold in the last state for a trajectory to be as wanted. One that is `hard` can rule actions out.
+    /// Adds the monitor of a trajectory and returns the condition on the last state. A `hard`
+    /// trajectory may also restrict actions.
     fn trajectory(
         &mut self,
         trajectory: &Trajectory,
@@ -166,15 +168,16 @@ impl<'t> Monitors<'t> {
         }
     }
 
-    /// An atom that remembers something about an instance.
+    /// Adds an atom for the state of the current instance.
     pub(super) fn remember(&mut self, what: &str, at_first: bool) -> String {
         let name = format!("instance {} {what}", self.instances);
         self.memory.push((name.clone(), at_first));
         name
     }
 
-    /// Adds to each happening of each action that may change one of some conditions what is made of the condition that it does,
-    /// and of the conditions after it.
+    /// Calls `make` for each happening of each action that may change one of the conditions, with
+    /// the condition of the change and the regressed conditions, and adds the result to the
+    /// happening.
     pub(super) fn after_each(
         &mut self,
         conditions: &[&Condition],
@@ -228,7 +231,7 @@ impl<'t> Monitors<'t> {
         Ok(())
     }
 
-    /// Whether what happenings have in addition keeps none of them apart from another one, and rules none out.
+    /// Returns `true` if the additions neither separate happenings nor exclude any.
     pub(super) fn keeps_apart_nothing(&self) -> bool {
         let is_plain = |addition: &Addition| {
             addition.conditions.is_empty()
@@ -242,7 +245,7 @@ impl<'t> Monitors<'t> {
         !self.narrows && self.deadlines.is_empty() && self.additions.iter().flatten().all(is_plain)
     }
 
-    /// Whether nothing but actions changes a condition.
+    /// Checks that only actions change a condition.
     pub(super) fn can_be_watched(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {
         let mut predicates = FxHashSet::default();
         predicates_of(condition, &mut predicates);
@@ -343,7 +346,8 @@ impl<'t> Monitors<'t> {
         Ok(broken.map_or(decided(!at_first), |broken| not(holds(&broken))))
     }
 
-    /// Changes the task. What is left are the preferences, what has to hold in the last state for each, and what has to be kept in time.
+    /// Applies the monitors to the task. Returns the preferences with their conditions on the last
+    /// state, and the deadlines.
     pub(super) fn install(
         self,
         domain: &mut Domain,
@@ -390,7 +394,7 @@ impl Addition {
         Self { conditions: Vec::new(), effects: vec![effect] }
     }
 
-    /// Rules out what must not be, or notes that it was.
+    /// Excludes a violation, or records it in an atom.
     pub(super) fn forbid(&mut self, what: Condition, broken: Option<&str>) {
         match broken {
             None => self.conditions.push(not(what)),
@@ -399,7 +403,7 @@ impl Addition {
     }
 }
 
-/// Whether a condition is about the objects of an action only.
+/// Returns `true` if a condition depends only on the objects of an action.
 fn reads_nothing(condition: &Condition) -> bool {
     match condition {
         Condition::And(parts) | Condition::Or(parts) => parts.iter().all(reads_nothing),
@@ -437,7 +441,7 @@ fn predicates_of<'c>(condition: &'c Condition, found: &mut FxHashSet<&'c pddl::a
     }
 }
 
-/// That an action takes time, if its duration is fixed.
+/// Returns the condition that an action with a fixed duration takes time.
 fn positive(action: &Action) -> Option<Condition> {
     let ActionBody::Durative { duration, .. } = &action.body else { return None };
     let [DurationConstraint { operator: Comparison::Equal, expression, span, .. }] = &duration[..] else {
@@ -447,7 +451,7 @@ fn positive(action: &Action) -> Option<Condition> {
     Some(Condition::Compare(Comparison::Greater, expression.clone(), zero, *span))
 }
 
-/// Whether an action is known to have a start and an end apart.
+/// Returns `true` if the start and end of an action are always distinct.
 fn takes_time(domain: &Domain, problem: &Problem, action: &Action) -> bool {
     let ActionBody::Durative { duration, .. } = &action.body else { return true };
     let [DurationConstraint { operator, expression, .. }] = &duration[..] else { return false };

@@ -1,4 +1,4 @@
-//! Who else is there: participants with their vendors, and endpoints with their types, as discovery tells.
+//! ROS graph from DDS discovery: participants with their vendors, and endpoints with their types.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -14,13 +14,13 @@ use smol::{Task, Timer};
 
 use crate::node::rmw::{Mapping, Rmw, Vendor};
 
-/// How often is looked at what has been discovered while something is waited for.
+/// Polling interval while waiting for discovery.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// So long other participants are waited for where all that were seen speak either mapping.
+/// Time to wait for further participants if all discovered ones support both mappings.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// What is known of the other participants.
+/// State of the graph.
 #[derive(Debug)]
 pub(crate) struct Graph {
     rmw: Rmw,
@@ -30,32 +30,32 @@ pub(crate) struct Graph {
 
 #[derive(Debug, Default)]
 struct Seen {
-    /// Participants by the first bytes of their GUIDs, and the time of the first.
+    /// Participants by GUID prefix, and the time of the first discovery.
     participants: BTreeMap<[u8; 12], Vendor>,
     first: Option<Instant>,
     endpoints: BTreeMap<[u8; 16], Endpoint>,
-    /// Remote readers that receive what our writers write.
+    /// Remote readers that match our writers.
     matched_readers: BTreeSet<[u8; 16]>,
-    /// The mapping that our own services have, once it is decided on.
+    /// Mapping of our own services, once it is decided.
     mapping: Option<Mapping>,
-    /// The types that we have for topics, as DDS names both, with the type hash.
+    /// Expected types of topics, by DDS names, with the type hash.
     expected: BTreeMap<String, Expected>,
-    /// What was found wrong and is to be reported.
+    /// Problems that are not reported yet.
     complaints: Vec<String>,
-    /// What was reported.
+    /// Problems that were reported.
     reported: BTreeSet<String>,
 }
 
-/// The type of a topic.
+/// Type of a topic.
 #[derive(Debug, Clone)]
 pub(crate) struct Expected {
-    /// As DDS names it.
+    /// DDS name of the type.
     pub(crate) type_name: String,
-    /// `RIHS01_…`; what is compared where the other side says its own.
+    /// `RIHS01_…`; compared only if the other side publishes its hash.
     pub(crate) hash: &'static str,
 }
 
-/// The two topics of a service, named as DDS names them.
+/// DDS names of the two topics of a service.
 #[derive(Debug, Clone)]
 pub(crate) struct Topics {
     pub(crate) requests: String,
@@ -69,16 +69,16 @@ impl Topics {
     }
 }
 
-/// Whoever serves a service.
+/// A server of a service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Server {
-    /// How it maps services.
+    /// Mapping of its services.
     pub(crate) mapping: Mapping,
-    /// What reads its requests.
+    /// Reader of its requests.
     pub(crate) reader: [u8; 16],
 }
 
-/// A reader or a writer of another participant.
+/// A reader or writer of another participant.
 #[derive(Debug, Clone)]
 struct Endpoint {
     is_reader: bool,
@@ -88,9 +88,10 @@ struct Endpoint {
 }
 
 impl Graph {
-    /// Begins to watch, until the task is dropped. Nobody else may listen to the status of the participant.
+    /// Starts to watch discovery until the task is dropped. The status of the participant must have
+    /// no other listener.
     pub(crate) fn watch(participant: &DomainParticipant, own: [u8; 12], rmw: Rmw) -> (Arc<Self>, Task<()>) {
-        // A mapping that is given counts before the first participant is met.
+        // A given mapping is valid before the first participant is discovered.
         let seen = Seen { mapping: rmw.fixed(), ..Seen::default() };
         let graph = Arc::new(Self { rmw, own, seen: Mutex::new(seen) });
         let (listener, watching) = (participant.status_listener(), Arc::clone(&graph));
@@ -161,7 +162,7 @@ impl Graph {
         }
     }
 
-    /// The type of a topic that we use; endpoints with another one are complained of, and not heard.
+    /// Sets the expected type of a topic. Endpoints with another type are reported and ignored.
     pub(crate) fn expect(&self, topic: String, expected: Expected) {
         let mut seen = self.seen();
         let found: Vec<String> = seen
@@ -174,14 +175,14 @@ impl Graph {
         seen.expected.insert(topic, expected);
     }
 
-    /// What was found wrong since it was asked last, each thing once.
+    /// Returns the problems since the last call, each once.
     pub(crate) fn complaints(&self) -> Vec<String> {
         let mut seen = self.seen();
         let new = std::mem::take(&mut seen.complaints);
         new.into_iter().filter(|complaint| seen.reported.insert(complaint.clone())).collect()
     }
 
-    /// Whether what this writer writes has another type than ours.
+    /// Returns `true` if this writer has another type than expected.
     pub(crate) fn is_unfit(&self, writer: Gid) -> bool {
         let seen = self.seen();
         seen.endpoints.get(&writer.to_bytes16()).is_some_and(|endpoint| {
@@ -189,7 +190,7 @@ impl Graph {
         })
     }
 
-    /// Whether somebody writes on a topic, named as DDS does.
+    /// Returns `true` if a topic, given by its DDS name, has a writer.
     pub(crate) fn has_writer(&self, topic: &str) -> bool {
         self.seen().endpoints.values().any(|endpoint| !endpoint.is_reader && endpoint.topic == topic)
     }
@@ -241,14 +242,15 @@ impl Graph {
         !unmatched.is_empty() && unmatched.values().all(|count| *count <= 0)
     }
 
-    /// Who reads on a topic, named as DDS does.
+    /// Returns the readers of a topic, given by its DDS name.
     pub(crate) fn readers(&self, topic: &str) -> BTreeSet<[u8; 16]> {
         let seen = self.seen();
         let is_it = |endpoint: &Endpoint| endpoint.is_reader && endpoint.topic == topic;
         seen.endpoints.iter().filter(|(_, endpoint)| is_it(endpoint)).map(|(guid, _)| *guid).collect()
     }
 
-    /// The mapping of our own services: that of the first participant that has only one.
+    /// Waits for the mapping of our own services: that of the first participant that supports only
+    /// a single one.
     pub(crate) async fn mapping(&self) -> Mapping {
         loop {
             if let Some(mapping) = self.decide() {
@@ -268,7 +270,7 @@ impl Graph {
         seen.mapping
     }
 
-    /// Waits until something can be said, or time is up.
+    /// Polls `look` until it returns a value or the time is up.
     pub(crate) async fn wait<T>(&self, within: Duration, look: impl Fn(&Self) -> Option<T>) -> Option<T> {
         let until = Instant::now() + within;
         loop {
@@ -338,11 +340,12 @@ fn is_reader(guid: [u8; 16]) -> bool {
     matches!(guid[15], 0x04 | 0x07)
 }
 
-/// What an endpoint of ROS 2 Jazzy and later says of its type: `typehash=RIHS01_…;` in its user data (REP 2011).
+/// Parses the type hash that endpoints of ROS 2 Jazzy and later publish: `typehash=RIHS01_…;` in
+/// their user data (REP 2011).
 fn type_hash(user_data: &[u8]) -> Option<String> {
     let text = String::from_utf8_lossy(user_data);
     let hash = text.split(';').find_map(|part| part.trim_matches('\0').strip_prefix("typehash="))?;
-    // What an RMW does not know is all zero, or another version.
+    // An unknown hash is all zero, and other versions are not comparable.
     let digits = hash.strip_prefix("RIHS01_")?;
     digits.bytes().any(|digit| digit != b'0').then(|| hash.to_owned())
 }
