@@ -28,25 +28,25 @@ const SOLVES: [&str; 4] = ["fd_solve_f", "fd_solves_f", "inferred-SolvesF", "sol
 /// The knowledge-base query that a PDDL symbol is bound to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Query {
-    /// Of a type: the individuals of a class, given by local name or IRI.
+    /// Type: the individuals of a class, given by local name or IRI.
     Class(String),
-    /// Of a predicate `(p DESIGN FUNCTION)`: the solved functions of each design.
+    /// Predicate `(p DESIGN FUNCTION)`: the solved functions of each design.
     Solves,
-    /// Of a predicate `(p DESIGN)`: the available designs.
+    /// Predicate `(p DESIGN)`: the available designs.
     Available,
-    /// Of a predicate `(p ACTION FUNCTION…)`: the required functions of all actions, or of the
+    /// Predicate `(p ACTION FUNCTION…)`: the required functions of all actions, or of the
     /// named action.
     Requires(Option<String>),
-    /// Of a numeric function of a design: the estimated value of an attribute.
+    /// Numeric function of a design: the estimated value of an attribute.
     Estimation(String),
-    /// Of a numeric function without parameters: the measured value of an attribute.
+    /// Numeric function without parameters: the measured value of an attribute.
     Measured(String),
-    /// Of a numeric function without parameters in a plain domain: the sum of an attribute over the
+    /// Numeric function without parameters in a plain domain: the sum of an attribute over the
     /// designs that are chosen for an action.
     Chosen(String),
-    /// As `Chosen`, but summed only over the designs that were not in use before the action.
+    /// Variant of `Chosen` that sums only over the designs that were not in use before the action.
     Reconfigured(String),
-    /// Of an action of a plain domain: the corresponding action of the knowledge base.
+    /// Action of a plain domain: the corresponding action of the knowledge base.
     Action(String),
 }
 
@@ -245,9 +245,10 @@ pub(super) fn fill(
     own: &BTreeSet<Name>,
     stands: &dyn Fn(&Name) -> bool,
 ) -> Vec<Message> {
-    let known = knowledge.catalogue();
+    let catalogue = knowledge.catalogue();
     let is_known = knowledge.fault().is_none();
-    let mut fill = Fill { problem, view: knowledge.view(), known, is_known, own, warnings: Vec::new() };
+    let mut fill =
+        Fill { problem, view: knowledge.view(), known: catalogue, is_known, own, warnings: Vec::new() };
     let types = domain.types.iter().map(|declared| &declared.identifier.name);
     let symbols = domain.predicates.iter().chain(&domain.functions).map(|declared| &declared.identifier.name);
     let actions = domain.actions.iter().map(|action| &action.identifier.name);

@@ -42,8 +42,8 @@ impl Mission {
         let actions: BTreeSet<&str> =
             catalogue.actions().iter().map(|action| local_name(&action.individual.iri)).collect();
         let doubt = |symbol: &str, query: &str, lacks: &str, name: &str, names: &BTreeSet<&str>| {
-            let meant = did_you_mean(name, names.iter().copied());
-            let text = format!("`{symbol}` is bound to `{query}`, but {lacks} `{name}`{meant}");
+            let suggestion = did_you_mean(name, names.iter().copied());
+            let text = format!("`{symbol}` is bound to `{query}`, but {lacks} `{name}`{suggestion}");
             Message::warning("M227", text)
         };
         let idle = |(symbol, query): (&String, &String)| {
@@ -82,12 +82,12 @@ impl Mission {
                 continue;
             }
             let candidates = schemas.iter().map(|schema| schema.as_str());
-            let meant = nearest(name.strip_prefix("a_").unwrap_or(name), candidates);
-            let meant = meant.map_or_else(String::new, |meant| {
-                format!("; if it is `{meant}`, name it so, or bind `{meant} = \"action:{name}\"`")
+            let nearest_schema = nearest(name.strip_prefix("a_").unwrap_or(name), candidates);
+            let nearest_schema = nearest_schema.map_or_else(String::new, |nearest_schema| {
+                format!("; if it is `{nearest_schema}`, name it so, or bind `{nearest_schema} = \"action:{name}\"`")
             });
             let text = format!(
-                "no action of the domain stands for <{}>, so what it requires is not asked of any{meant}",
+                "no action of the domain stands for <{}>, so what it requires is not asked of any{nearest_schema}",
                 action.individual.iri
             );
             doubts.push(doubt_about(knowledge, "M205", &action.individual.iri, text));
@@ -131,11 +131,11 @@ impl Mission {
                 && !effects.iter().any(|effect| assigns(effect, name))
         });
         let warning = |identifier: &pddl::ast::Identifier| {
-            let who = match self.knowledge {
+            let sources = match self.knowledge {
                 Some(_) => "neither the problem nor the knowledge base, by its name or a binding",
                 None => "the problem does not, and there is no knowledge base",
             };
-            let text = format!("nothing gives `{}` a value: {who}", identifier.name);
+            let text = format!("nothing gives `{}` a value: {sources}", identifier.name);
             let diagnostic =
                 Diagnostic::new(&self.domain_source, identifier.span, Severity::Warning, "M206", text);
             Message::from_pddl(&[diagnostic], &[&self.domain_source])
@@ -182,11 +182,12 @@ fn components(knowledge: &Knowledge) -> Vec<Message> {
         let (about, referring) = stated(engine, &component.iri);
         if about.is_empty() {
             let candidates = names.iter().map(String::as_str).filter(|name| **name != component.name);
-            let meant = nearest(&component.name, candidates).map(|name| format!("; did you mean `{name}`?"));
+            let suggestion =
+                nearest(&component.name, candidates).map(|name| format!("; did you mean `{name}`?"));
             let text = format!(
                 "the component <{}> is only mentioned, and nothing else is said of it{}",
                 component.iri,
-                meant.unwrap_or_default()
+                suggestion.unwrap_or_default()
             );
             doubts.push(doubt_about(knowledge, "M207", &component.iri, text));
         } else if !required.is_empty()
@@ -228,9 +229,11 @@ fn attributes(knowledge: &Knowledge) -> Vec<Message> {
     for kind in attributes.iter().filter(|kind| mentioned(&kind.iri)) {
         let candidates =
             attributes.iter().filter(|candidate| candidate.iri != kind.iri && !mentioned(&candidate.iri));
-        let meant = did_you_mean(&kind.name, candidates.map(|candidate| candidate.name.as_str()));
-        let text =
-            format!("the attribute <{}> is only mentioned, and nothing else is said of it{meant}", kind.iri);
+        let suggestion = did_you_mean(&kind.name, candidates.map(|candidate| candidate.name.as_str()));
+        let text = format!(
+            "the attribute <{}> is only mentioned, and nothing else is said of it{suggestion}",
+            kind.iri
+        );
         doubts.push(doubt_about(knowledge, "M229", &kind.iri, text));
     }
     for kind in attributes {

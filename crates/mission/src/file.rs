@@ -77,8 +77,8 @@ impl Kind {
     fn of(text: &str) -> Option<Self> {
         let mut lines = text.lines().map(str::trim_start);
         let first = lines.find(|line| !line.is_empty() && !line.starts_with([';', '#']))?;
-        let rest = &text[text.find(first).unwrap_or(0)..];
-        let words: String = rest.chars().take(200).collect::<String>().to_ascii_lowercase();
+        let content = &text[text.find(first).unwrap_or(0)..];
+        let words: String = content.chars().take(200).collect::<String>().to_ascii_lowercase();
         let words = words.replace('(', " ( ");
         let words: Vec<&str> = words.split_whitespace().take(4).collect();
         match words[..] {

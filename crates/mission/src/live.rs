@@ -213,12 +213,12 @@ fn name_of(term: &Term) -> &Name {
 }
 
 fn is_named(atom: &Atom, words: &[&str]) -> bool {
-    let same = |(term, word): (&Term, &&str)| match term {
+    let is_equal = |(term, word): (&Term, &&str)| match term {
         Term::Constant(identifier) | Term::Variable(identifier) => identifier.name == Name::new(word),
     };
     words.split_first().is_some_and(|(symbol, arguments)| {
         atom.predicate.name == Name::new(symbol)
             && atom.arguments.len() == arguments.len()
-            && atom.arguments.iter().zip(arguments).all(same)
+            && atom.arguments.iter().zip(arguments).all(is_equal)
     })
 }

@@ -172,8 +172,8 @@ impl Message {
         match error {
             ontology::Error::Engine(error) => Self::from_rules(error),
             ontology::Error::Unknown { name, known, .. } => {
-                let meant = did_you_mean(name, known.iter().map(String::as_str));
-                Self::from_text("error", error.code(), &(error.to_string() + &meant))
+                let suggestion = did_you_mean(name, known.iter().map(String::as_str));
+                Self::from_text("error", error.code(), &(error.to_string() + &suggestion))
             }
             _ => Self::from_text("error", error.code(), &error.to_string()),
         }

@@ -80,32 +80,32 @@ impl Mission {
             ));
         };
         let target = atom(function, arguments);
-        let same = |element: &InitialElement| matches!(element, InitialElement::Value(a, _, _) if same_atom(a, function, arguments));
-        self.problem.init.retain(|element| !same(element));
+        let is_target = |element: &InitialElement| matches!(element, InitialElement::Value(a, _, _) if same_atom(a, function, arguments));
+        self.problem.init.retain(|element| !is_target(element));
         self.problem.init.push(InitialElement::Value(target, number, Span::default()));
         Ok(())
     }
 
     fn set_fact(&mut self, predicate: &Name, arguments: &[&str], holds: bool) {
-        let same = |element: &InitialElement| match element {
+        let is_target = |element: &InitialElement| match element {
             InitialElement::Fact(a) | InitialElement::NegatedFact(a) => same_atom(a, predicate, arguments),
             _ => false,
         };
-        self.problem.init.retain(|element| !same(element));
+        self.problem.init.retain(|element| !is_target(element));
         if holds {
             self.problem.init.push(InitialElement::Fact(atom(predicate, arguments)));
         }
     }
 
     fn replace_last(&mut self, predicate: &Name, prefix: &[&str], last: &str) {
-        let same = |element: &InitialElement| match element {
+        let is_target = |element: &InitialElement| match element {
             InitialElement::Fact(a) => {
                 let shorter = &a.arguments[..a.arguments.len().saturating_sub(1)];
                 a.predicate.name == *predicate && same_terms(shorter, prefix)
             }
             _ => false,
         };
-        self.problem.init.retain(|element| !same(element));
+        self.problem.init.retain(|element| !is_target(element));
         let arguments: Vec<&str> = prefix.iter().copied().chain([last]).collect();
         self.problem.init.push(InitialElement::Fact(atom(predicate, &arguments)));
     }
@@ -143,10 +143,10 @@ fn same_atom(atom: &pddl::ast::Atom, predicate: &Name, arguments: &[&str]) -> bo
 }
 
 fn same_terms(terms: &[Term], arguments: &[&str]) -> bool {
-    let same = |(term, argument): (&Term, &&str)| match term {
+    let is_equal = |(term, argument): (&Term, &&str)| match term {
         Term::Constant(identifier) | Term::Variable(identifier) => identifier.name == Name::new(argument),
     };
-    terms.len() == arguments.len() && terms.iter().zip(arguments).all(same)
+    terms.len() == arguments.len() && terms.iter().zip(arguments).all(is_equal)
 }
 
 /// Parses a decimal as an exact number: `-12`, `0.25`, `1e2`.

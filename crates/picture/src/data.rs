@@ -102,7 +102,7 @@ pub struct Place {
 /// State of a search at a point in time.
 #[derive(Debug, Clone, Default)]
 pub struct Progress {
-    /// Metric of the best plan so far.
+    /// Metric of the best known plan.
     pub cost: Option<f64>,
     /// Lower bound on the metric of every plan.
     pub lower_bound: f64,

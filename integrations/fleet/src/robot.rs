@@ -116,7 +116,7 @@ impl Robot {
 
     /// Returns the state to save after a decision.
     pub fn save(&self, missions: &Missions, decision: u64) -> Saved {
-        let known = match &self.control {
+        let snapshot = match &self.control {
             Control::None => Value::Null,
             Control::Warm(control) => control.snapshot().0,
             Control::Cold(bytes) => decompressed(bytes),
@@ -128,7 +128,7 @@ impl Robot {
             enrolled: self.enrolled,
             event: self.event,
             decision,
-            known,
+            known: snapshot,
         }
     }
 
@@ -203,8 +203,8 @@ impl Robot {
                     Some(before) => control.handle_again(&observation, now, &before.plans),
                     None => control.handle(&observation, now),
                 };
-                let made = control.decision(&answers);
-                (decided.answers, decided.plans) = (made.answers, made.plans);
+                let decision = control.decision(&answers);
+                (decided.answers, decided.plans) = (decision.answers, decision.plans);
             }
         }
         self.event = event.sequence;

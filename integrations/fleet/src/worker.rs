@@ -194,8 +194,8 @@ impl<S: Store> Worker<S> {
             if let Ok(revision) = self.shared.store.put(Bucket::Leases, &partition.to_string(), name, 0).await
             {
                 tracing::info!(partition, "taken");
-                let held = self.serve(partition, revision, begun);
-                self.held.insert(partition, held);
+                let lease = self.serve(partition, revision, begun);
+                self.held.insert(partition, lease);
             }
         }
     }

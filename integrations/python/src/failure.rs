@@ -7,11 +7,11 @@ use pyo3::prelude::*;
 /// Creates the exception for messages, from the JSON that the command line writes.
 pub(crate) fn raise(py: Python<'_>, messages: &[Message]) -> PyErr {
     let json = serde_json::to_string(&ErrorAnswer::new(messages)).unwrap_or_default();
-    let made = py
+    let exception = py
         .import("metaplan._errors")
         .and_then(|module| module.getattr("Error"))
         .and_then(|class| class.call_method1("_of", (json,)));
-    match made {
+    match exception {
         Ok(error) => PyErr::from_value(error),
         Err(error) => error,
     }

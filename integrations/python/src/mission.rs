@@ -277,7 +277,7 @@ impl Mission {
         let (found, stopped) = detached(py, &interrupt, || planned(&setup, wanted, on_improvement.as_ref()));
         match (found, stopped) {
             (Ok(planned), None) => Ok(planned),
-            // After Ctrl-C, the best plan so far is returned.
+            // After Ctrl-C, the best known plan is returned.
             (Ok(planned), Some(_)) if planned.text.is_some() => Ok(planned),
             (_, Some(error)) | (Err(Stop::Raised(error)), None) => Err(error),
             (Err(Stop::Wrong(messages)), None) => Err(raise(py, &messages)),
@@ -348,8 +348,8 @@ impl Mission {
         let (found, stopped) = detached(py, &interrupt, || {
             let mission = &setup.mission;
             let json = if let Some(design) = &design {
-                let found = explain::design(mission, design, &limits)?;
-                serde_json::to_string(&DesignAnswer::new(&mission.name, &found))
+                let explanation = explain::design(mission, design, &limits)?;
+                serde_json::to_string(&DesignAnswer::new(&mission.name, &explanation))
             } else {
                 let changes = explain::smallest_changes(mission, &limits, &mut |_| {})?;
                 serde_json::to_string(&ChangesAnswer::new(&mission.name, &changes))
@@ -418,10 +418,10 @@ fn planned(setup: &Arc<Setup>, wanted: Wanted, on_improvement: Option<&Py<PyAny>
     let tell = |better: &metaplan::planner::Improvement| {
         let Some(listener) = on_improvement else { return ControlFlow::Continue(()) };
         let (cost, bound) = (better.cost.to_string(), better.lower_bound.to_string());
-        let heard = Python::attach(|py| {
+        let outcome = Python::attach(|py| {
             listener.call1(py, (cost, bound, better.gap(), better.horizon)).and_then(|said| said.extract(py))
         });
-        match heard {
+        match outcome {
             Ok(Some(false)) => ControlFlow::Break(()),
             Ok(_) => ControlFlow::Continue(()),
             Err(error) => {

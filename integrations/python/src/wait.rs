@@ -15,7 +15,7 @@ const STACK: usize = 8 << 20;
 
 /// Runs work while other threads of the interpreter continue. If a signal raises an exception such
 /// as `KeyboardInterrupt`, sets the interrupt flag and waits for the result. The exception is
-/// returned together with the result so far.
+/// returned together with the partial result.
 pub(crate) fn detached<T: Send>(
     py: Python<'_>,
     interrupt: &AtomicBool,
@@ -25,9 +25,9 @@ pub(crate) fn detached<T: Send>(
         thread::scope(|scope| {
             let (sender, receiver) = channel();
             let worker = move || {
-                let found = catch_unwind(AssertUnwindSafe(work));
+                let outcome = catch_unwind(AssertUnwindSafe(work));
                 // The receiver waits until a result arrives.
-                let _ = sender.send(found);
+                let _ = sender.send(outcome);
             };
             let started = thread::Builder::new().stack_size(STACK).spawn_scoped(scope, worker);
             let mut stopped = None;

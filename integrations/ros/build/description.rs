@@ -1,6 +1,6 @@
 //! Interfaces → type descriptions → type hashes RIHS01.
 //!
-//! A service stands for four types, an action for thirteen: those of its services and of its feedback topic are made here, as rosidl makes
+//! A service consists of four types, an action for thirteen: those of its services and of its feedback topic are made here, as rosidl makes
 //! them [1]. The hash of a type is the SHA-256 of the description of it and of all types that it refers to, in JSON [2].
 //!
 //! `hiroz_codegen` has a resolver of its own, which is not used: it describes `CancelGoal` as a part of an action, and with one field too few.

@@ -167,17 +167,17 @@ impl Controller {
 
     async fn plan(&self, domain: String, problem: String) -> Result<Found, NoPlan> {
         let (mission, manner) = (self.joint.mission(), self.manner.get());
-        let (sender, found) = smol::channel::bounded(1);
+        let (sender, receiver) = smol::channel::bounded(1);
         let work = move || {
             let (domain, problem) = (Source::new(DOMAIN, domain), Source::new(PROBLEM, problem));
             let _ = sender.try_send(solve(Request { domain, problem, joint: Some(&mission) }, &manner));
         };
         on_a_thread("plan", work)
             .map_err(|error| NoPlan::None(format!("there is no further thread: {error}")))?;
-        let found =
-            found.recv().await.unwrap_or_else(|_| Err(NoPlan::Fault("the planner has ended".to_owned())));
-        self.told.tell(&found);
-        found
+        let outcome =
+            receiver.recv().await.unwrap_or_else(|_| Err(NoPlan::Fault("the planner has ended".to_owned())));
+        self.told.tell(&outcome);
+        outcome
     }
 
     /// Executes a plan while its designs are available.

@@ -83,7 +83,7 @@ fn asked(
     let mut arguments = arguments.into_iter();
     while let Some(argument) = arguments.next() {
         let (option, value) = argument.split_once('=').unwrap_or((&argument, ""));
-        let own = match option {
+        let target = match option {
             "--metric" => &mut metric,
             "--mission" => &mut mission,
             "--time-limit" => &mut time_limit,
@@ -98,18 +98,18 @@ fn asked(
             }
         };
         let value = if argument.contains('=') { Some(value.to_owned()) } else { arguments.next() };
-        *own = Some(value.ok_or_else(|| format!("`{option}` lacks its value\n{USAGE}"))?);
+        *target = Some(value.ok_or_else(|| format!("`{option}` lacks its value\n{USAGE}"))?);
     }
-    let given = |value: Option<String>| value.filter(|value| !value.is_empty());
-    let overlap = match given(overlap).as_deref() {
+    let non_empty = |value: Option<String>| value.filter(|value| !value.is_empty());
+    let overlap = match non_empty(overlap).as_deref() {
         None | Some("auto") => None,
         Some("yes" | "1" | "true") => Some(true),
         Some("no" | "0" | "false") => Some(false),
         Some(other) => return Err(format!("`--overlap {other}` is neither `yes` nor `no`")),
     };
-    let time_limit = given(time_limit).map_or(Ok(TIME_LIMIT), |text| seconds(&text))?;
-    let manner = Manner { metric: given(metric), time_limit, overlap, alternatives: 0 };
-    let mission = given(mission).map(PathBuf::from);
+    let time_limit = non_empty(time_limit).map_or(Ok(TIME_LIMIT), |text| seconds(&text))?;
+    let manner = Manner { metric: non_empty(metric), time_limit, overlap, alternatives: 0 };
+    let mission = non_empty(mission).map(PathBuf::from);
     // Values of POPF's own arguments precede the files.
     match files.len().checked_sub(2).map(|first| files.split_off(first)).as_deref() {
         Some([domain, problem]) => {

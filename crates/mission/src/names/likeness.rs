@@ -104,11 +104,11 @@ fn ending(one: &str, other: &str) -> usize {
 
 /// Formats names as a list; an empty list is `none`.
 pub(super) fn list(names: &[&str]) -> String {
-    let shown = names.iter().take(SHOWN).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+    let listed = names.iter().take(SHOWN).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
     match names.len() {
         0 => "none".to_owned(),
-        count if count > SHOWN => format!("{shown} and {} more", count - SHOWN),
-        _ => shown,
+        count if count > SHOWN => format!("{listed} and {} more", count - SHOWN),
+        _ => listed,
     }
 }
 

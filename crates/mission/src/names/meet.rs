@@ -144,11 +144,11 @@ impl Comparison<'_> {
             }
         }
         for action in self.known.actions() {
-            let known = &action.individual;
+            let individual = &action.individual;
             let mut schemas = self.domain.actions.iter().map(|schema| &schema.identifier.name);
             let mut predicates = self.domain.predicates.iter().map(|declared| &declared.identifier.name);
-            let stands = schemas.any(|own| self.bindings.is_action(own, known))
-                || predicates.any(|own| self.bindings.says_needs(own, known));
+            let stands = schemas.any(|own| self.bindings.is_action(own, individual))
+                || predicates.any(|own| self.bindings.says_needs(own, individual));
             for function in action.requires.iter().filter(|_| stands) {
                 add(&Name::new(&function.name), None);
             }
@@ -259,12 +259,12 @@ impl Comparison<'_> {
             unknown.iter().map(|object| object.name.as_str()).collect(),
             unnamed.iter().map(|individual| individual.name.as_str()).collect(),
         );
-        let what = noun(&role.class);
+        let members = noun(&role.class);
         let lists =
             format!("in the problem only: {}; in the knowledge base only: {}", list(&here), list(&there));
         match (unknown.first(), unnamed.first()) {
             (Some(first), _) => {
-                let text = format!("the knowledge base does not know all {what} of the problem; {lists}");
+                let text = format!("the knowledge base does not know all {members} of the problem; {lists}");
                 let help = suggestion(&there, &here, false);
                 let ours: Vec<&str> =
                     here.iter().copied().filter(|name| own.contains(&Name::new(name))).collect();
@@ -278,7 +278,7 @@ impl Comparison<'_> {
                 OneSided::Objects(Finding { in_domain: first.in_domain, span: first.span, text, help })
             }
             (None, Some(first)) if role.class == DESIGN => {
-                let text = format!("the problem names {what}, but not all of the knowledge base; {lists}");
+                let text = format!("the problem names {members}, but not all of the knowledge base; {lists}");
                 OneSided::Individuals(first.iri.clone(), text)
             }
             _ => OneSided::Nothing,

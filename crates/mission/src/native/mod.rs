@@ -227,11 +227,11 @@ impl CoAdaptation {
                     design.solves.iter().any(|function| function.name == needed.name)
                         && needed.attributes.contains(&quality.bounds.attribute)
                 });
-                let kept = design.estimations.get(&quality.bounds.attribute).is_some_and(|value| {
+                let is_met = design.estimations.get(&quality.bounds.attribute).is_some_and(|value| {
                     quality.bounds.minimum.as_ref().is_none_or(|minimum| value >= minimum)
                         && quality.bounds.maximum.as_ref().is_none_or(|maximum| value <= maximum)
                 });
-                if (kept || !concerned) && is_pddl_name(&design.individual.name) {
+                if (is_met || !concerned) && is_pddl_name(&design.individual.name) {
                     let fact = atom(&meets(quality), &[&design.individual.name]);
                     problem.init.push(pddl::ast::InitialElement::Fact(fact));
                 }
@@ -378,13 +378,13 @@ impl CoAdaptation {
         }
         let mut effects = Vec::new();
         for (design, needed) in designs {
-            let other = identifier(&Name::new("other"));
+            let other_design = identifier(&Name::new("other"));
             let is_other = Condition::Not(Box::new(Condition::Equal(
-                Term::Variable(other.clone()),
+                Term::Variable(other_design.clone()),
                 Term::Variable(design.clone()),
                 Span::default(),
             )));
-            let stops = Effect::Delete(of_design(AT_WORK, &other, Some(&needed.name)));
+            let stops = Effect::Delete(of_design(AT_WORK, &other_design, Some(&needed.name)));
             let each = Effect::When(is_other, Box::new(stops));
             effects.push(Effect::ForAll(vec![typed("other", DESIGN)], Box::new(each)));
             effects.push(Effect::Add(of_design(AT_WORK, design, Some(&needed.name))));
@@ -405,18 +405,18 @@ fn conditions(
         chosen.push(Condition::Atom(of_design(SOLVES, design, Some(&needed.name))));
         lasting.push(Condition::Atom(of_design(AVAILABLE, design, None)));
         for quality in &needs.quality {
-            let kept = Condition::Atom(of_design(meets(quality).as_str(), design, None));
+            let bounds_met = Condition::Atom(of_design(meets(quality).as_str(), design, None));
             let context = quality.context.as_ref().and_then(|context| {
                 domain.predicates.iter().find(|p| p.identifier.name == Name::new(context))
             });
             lasting.push(match context {
-                None => kept,
+                None => bounds_met,
                 Some(predicate) => {
                     let mut here = atom(&predicate.identifier.name, &[]);
                     let parameters = predicate.parameters.iter();
                     here.arguments =
                         parameters.map(|p| Term::Variable(identifier(&p.identifier.name))).collect();
-                    Condition::Or(vec![Condition::Not(Box::new(Condition::Atom(here))), kept])
+                    Condition::Or(vec![Condition::Not(Box::new(Condition::Atom(here))), bounds_met])
                 }
             });
         }

@@ -94,9 +94,9 @@ impl Planta {
         let declared: Vec<&str> =
             completed.predicates.iter().map(|declared| declared.identifier.name.as_str()).collect();
         let errors = mentioned::undeclared(completed).into_iter().map(|name| {
-            let meant = did_you_mean(name.as_str(), declared.iter().copied());
+            let suggestion = did_you_mean(name.as_str(), declared.iter().copied());
             let text = format!(
-                "the domain asks for `{name}`, and the knowledge base has no class or property of that name{meant}"
+                "the domain asks for `{name}`, and the knowledge base has no class or property of that name{suggestion}"
             );
             Message::error("M215", text)
         });

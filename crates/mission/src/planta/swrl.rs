@@ -155,8 +155,8 @@ fn comparison(iri: &str, left: &Term, right: &Term) -> Result<Condition, String>
         "lessThan" => relation(LESS, left, right),
         "greaterThan" => relation(LESS, right, left),
         "equal" => {
-            let same = Condition::Equal(left.clone(), right.clone(), Span::default());
-            Condition::Or(vec![same, relation(EQUAL, left, right)])
+            let identical = Condition::Equal(left.clone(), right.clone(), Span::default());
+            Condition::Or(vec![identical, relation(EQUAL, left, right)])
         }
         "notEqual" => {
             let same = Condition::Equal(left.clone(), right.clone(), Span::default());

@@ -113,8 +113,8 @@ impl<'t> Initial<'t> {
                 function.parameters.iter().map(|parameter| self.objects.members(&parameter.r#type).count());
             members.fold(1, usize::saturating_mul)
         });
-        let known = self.values.keys().filter(|(function, _)| function == name).count();
-        instances.is_some_and(|instances| known >= instances)
+        let with_value = self.values.keys().filter(|(function, _)| function == name).count();
+        instances.is_some_and(|instances| with_value >= instances)
     }
 
     /// Returns the truth value in Kleene's logic, or `None` if it depends on an undefined value.

@@ -166,11 +166,11 @@ fn asked(objectives: &[Metric]) -> Vec<Name> {
             }
         }
     }
-    let mut found = Vec::new();
+    let mut preferences = Vec::new();
     for metric in objectives {
-        walk(&metric.expression, &mut found);
+        walk(&metric.expression, &mut preferences);
     }
-    found
+    preferences
 }
 
 /// Replaces the number of violations of each preference by a numeric function.

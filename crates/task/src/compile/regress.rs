@@ -108,9 +108,9 @@ impl Happening {
             };
             let pairs = target.arguments.iter().zip(&atom.arguments).filter(|(_, own)| !is_inner(own));
             let matches = all(pairs.map(|(changed, own)| equal(changed, own)));
-            let same = exists(&change.bound, matches);
-            if !found.iter().any(|known| format!("{known:?}") == format!("{same:?}")) {
-                found.push(same);
+            let is_affected = exists(&change.bound, matches);
+            if !found.iter().any(|known| format!("{known:?}") == format!("{is_affected:?}")) {
+                found.push(is_affected);
             }
         }
     }
@@ -248,13 +248,13 @@ fn is_same_symbol(left: &Atom, right: &Atom) -> bool {
 }
 
 fn is_same(left: &Atom, right: &Atom) -> bool {
-    let same = |(left, right): (&Term, &Term)| match (left, right) {
+    let is_equal = |(left, right): (&Term, &Term)| match (left, right) {
         (Term::Variable(left), Term::Variable(right)) | (Term::Constant(left), Term::Constant(right)) => {
             left.name == right.name
         }
         _ => false,
     };
-    is_same_symbol(left, right) && left.arguments.iter().zip(&right.arguments).all(same)
+    is_same_symbol(left, right) && left.arguments.iter().zip(&right.arguments).all(is_equal)
 }
 
 /// Collects the functions of an expression without duplicates.

@@ -31,8 +31,8 @@ impl Monitors<'_> {
     /// Returns the atom that is added at a time above 0.
     fn moment(&mut self, time: BigRational) -> Condition {
         let name = format!("time {time} has come");
-        let known = self.moments.iter().any(|(known, _)| *known == name);
-        self.moments.extend((!known).then(|| (name.clone(), time)));
+        let is_declared = self.moments.iter().any(|(is_declared, _)| *is_declared == name);
+        self.moments.extend((!is_declared).then(|| (name.clone(), time)));
         holds(&name)
     }
 
@@ -86,14 +86,14 @@ impl Monitors<'_> {
         };
         self.after_each(&[what], place, |touched, after| {
             let touched = all([touched, begun.clone()]);
-            let left = all([touched.clone(), not(holds(&looked_at)), not(what.clone())]);
+            let violated = all([touched.clone(), not(holds(&looked_at)), not(what.clone())]);
             let reached = all([touched.clone(), not(over.clone()), not(after[0].clone())]);
             let mut addition = Addition::notes(touched, Effect::Add(flag(&looked_at)));
-            addition.forbid(any([left, reached]), broken.as_deref());
+            addition.forbid(any([violated, reached]), broken.as_deref());
             addition
         })?;
-        let kept = broken.map_or(decided(at_first), |broken| not(holds(&broken)));
-        Ok(all([kept, any([holds(&looked_at), what.clone()])]))
+        let satisfied = broken.map_or(decided(at_first), |broken| not(holds(&broken)));
+        Ok(all([satisfied, any([holds(&looked_at), what.clone()])]))
     }
 
     /// During search, the constraint counts as satisfied while no deadline is pending. The
@@ -122,8 +122,8 @@ impl Monitors<'_> {
             // executed.
             (Effect::When(holds(&begun), Box::new(Effect::Add(flag(LOOKED_AT)))), truth())
         } else {
-            let kept = self.remember("is kept", false);
-            (Effect::Add(flag(&kept)), any([not(holds(&begun)), holds(&kept)]))
+            let satisfied = self.remember("is kept", false);
+            (Effect::Add(flag(&satisfied)), any([not(holds(&begun)), holds(&satisfied)]))
         };
         self.deadlines.push((deadline, [first.clone(), second.clone()], noted));
         Ok(last)

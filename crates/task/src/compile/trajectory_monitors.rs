@@ -22,7 +22,7 @@ use super::syntax_edits::{PreferenceInstance, declare, happen, require, unsuppor
 /// Limit on the total number of instances of constraints.
 const INSTANCES: usize = 20_000;
 
-/// Monitors of the constraints that were added so far.
+/// Monitors of the added constraints.
 pub(super) struct Monitors<'t> {
     domain: &'t Domain,
     problem: &'t Problem,
@@ -222,9 +222,11 @@ impl<'t> Monitors<'t> {
                 })?;
                 for way in ways(touched) {
                     let after: Vec<_> = after.iter().map(|condition| assume(condition, &way)).collect();
-                    let more = make(way, &after);
-                    addition.conditions.extend(more.conditions.into_iter().filter(|own| !is_true(own)));
-                    addition.effects.extend(more.effects);
+                    let addition_of_way = make(way, &after);
+                    addition
+                        .conditions
+                        .extend(addition_of_way.conditions.into_iter().filter(|own| !is_true(own)));
+                    addition.effects.extend(addition_of_way.effects);
                 }
             }
         }
@@ -281,11 +283,11 @@ impl<'t> Monitors<'t> {
     }
 
     fn sometime(&mut self, what: &Condition, place: (File, Span)) -> Result<Condition, Error> {
-        let seen = self.remember("was met", self.initial.holds(what));
+        let was_met = self.remember("was met", self.initial.holds(what));
         self.after_each(&[what], place, |touched, after| {
-            Addition::notes(all([touched, after[0].clone()]), Effect::Add(flag(&seen)))
+            Addition::notes(all([touched, after[0].clone()]), Effect::Add(flag(&was_met)))
         })?;
-        Ok(holds(&seen))
+        Ok(holds(&was_met))
     }
 
     fn at_most_once(
@@ -332,16 +334,16 @@ impl<'t> Monitors<'t> {
         hard: bool,
         place: (File, Span),
     ) -> Result<Condition, Error> {
-        let seen = self.remember("was met", self.initial.holds(second));
+        let was_met = self.remember("was met", self.initial.holds(second));
         let at_first = self.initial.holds(first);
         let broken = if hard { None } else { Some(self.remember("is broken", at_first)) };
         self.after_each(&[first], place, |touched, after| {
             let mut addition = Addition::default();
-            addition.forbid(all([touched, after[0].clone(), not(holds(&seen))]), broken.as_deref());
+            addition.forbid(all([touched, after[0].clone(), not(holds(&was_met))]), broken.as_deref());
             addition
         })?;
         self.after_each(&[second], place, |touched, after| {
-            Addition::notes(all([touched, after[0].clone()]), Effect::Add(flag(&seen)))
+            Addition::notes(all([touched, after[0].clone()]), Effect::Add(flag(&was_met)))
         })?;
         Ok(broken.map_or(decided(!at_first), |broken| not(holds(&broken))))
     }

@@ -62,30 +62,32 @@ fn fold(task: &mut GroundTask<'_>, axioms: &mut Vec<GroundAxiom>) -> Result<(), 
     let (world, limits) = (&task.world, task.world.limits);
     let derived: Vec<AtomId> =
         (0..dense(world.atoms.len())).map(AtomId).filter(|atom| world.is_derived(*atom)).collect();
-    let mut known: FxHashMap<AtomId, bool> = FxHashMap::default();
+    let mut truth_values: FxHashMap<AtomId, bool> = FxHashMap::default();
     loop {
-        let before = known.len();
+        let before = truth_values.len();
         let mut has_rule = FxHashSet::default();
         for axiom in limits.watch(axioms.iter()) {
             let axiom = axiom?;
             has_rule.insert(axiom.head);
             if axiom.body == GroundCondition::default() {
-                known.insert(axiom.head, true);
+                truth_values.insert(axiom.head, true);
             }
         }
         for atom in derived.iter().filter(|atom| !has_rule.contains(*atom)) {
-            known.entry(*atom).or_insert(false);
+            truth_values.entry(*atom).or_insert(false);
         }
-        if known.len() == before {
+        if truth_values.len() == before {
             break;
         }
-        axioms.retain_mut(|axiom| !known.contains_key(&axiom.head) && substitute(&mut axiom.body, &known));
+        axioms.retain_mut(|axiom| {
+            !truth_values.contains_key(&axiom.head) && substitute(&mut axiom.body, &truth_values)
+        });
     }
     retain(&mut task.operators, limits, |operator| {
-        operator.conditional.retain_mut(|effect| conjunction(&mut effect.condition, &known));
-        substitute(&mut operator.condition, &known)
+        operator.conditional.retain_mut(|effect| conjunction(&mut effect.condition, &truth_values));
+        substitute(&mut operator.condition, &truth_values)
     })?;
-    if task.goal.as_mut().is_some_and(|goal| !substitute(goal, &known)) {
+    if task.goal.as_mut().is_some_and(|goal| !substitute(goal, &truth_values)) {
         task.goal = None;
     }
     Ok(())

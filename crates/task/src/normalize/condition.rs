@@ -14,10 +14,10 @@ pub(super) fn condition(
     scope: &mut Scope,
 ) -> Formula {
     use ast::Condition as C;
-    let all = |parts| if positive { Formula::And(parts) } else { Formula::Or(parts) };
+    let junction = |parts| if positive { Formula::And(parts) } else { Formula::Or(parts) };
     let any = |parts| if positive { Formula::Or(parts) } else { Formula::And(parts) };
     match written {
-        C::And(parts) => all(parts.iter().map(|part| condition(names, part, positive, scope)).collect()),
+        C::And(parts) => junction(parts.iter().map(|part| condition(names, part, positive, scope)).collect()),
         C::Or(parts) => any(parts.iter().map(|part| condition(names, part, positive, scope)).collect()),
         C::Not(inner) => condition(names, inner, !positive, scope),
         C::Imply(premise, conclusion) => any(vec![

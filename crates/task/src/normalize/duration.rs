@@ -93,15 +93,16 @@ pub(super) fn duration(
         let number = chosen(names, action, scope.place(span));
         let fixed = fixed.into_iter().map(|(bound, span)| (Comparison::Equal, bound, span));
         let open = lower.into_iter().chain(upper);
-        let all = open.map(|(bound, constraint)| (constraint.operator, bound, constraint.span)).chain(fixed);
+        let constraints_on_duration =
+            open.map(|(bound, constraint)| (constraint.operator, bound, constraint.span)).chain(fixed);
         let compare =
             |(operator, bound, span)| Formula::Compare(operator, number.clone(), bound, scope.place(span));
-        let conditions = all.map(compare).collect();
+        let conditions = constraints_on_duration.map(compare).collect();
         scope.duration = Duration::Fixed(number.clone());
         return (number, conditions);
     }
     scope.duration = Duration::Open;
-    let taken = match longest {
+    let selected = match longest {
         Some(longest) if fixed.is_empty() => match if longest { &upper[..] } else { &lower[..] } {
             [(expression, constraint)]
                 if matches!(constraint.operator, Comparison::GreaterOrEqual | Comparison::LessOrEqual) =>
@@ -112,7 +113,7 @@ pub(super) fn duration(
         },
         _ => None,
     };
-    let Some(chosen) = taken else {
+    let Some(chosen) = selected else {
         names.unsupported(
             "a duration without one bound that the metric makes it take",
             "one `(= ?duration …)`, one `(>= ?duration …)` and a metric that does not reward time, or `--concurrent`",

@@ -31,11 +31,11 @@ pub(super) fn mark_fluents(lifted: &mut Lifted) {
         let depends = |axiom: &&Axiom| {
             !lifted.predicates[axiom.predicate.index()].fluent && !is_static(lifted, &axiom.condition)
         };
-        let more: Vec<_> = lifted.axioms.iter().filter(depends).map(|axiom| axiom.predicate).collect();
-        if more.is_empty() {
+        let dependents: Vec<_> = lifted.axioms.iter().filter(depends).map(|axiom| axiom.predicate).collect();
+        if dependents.is_empty() {
             return;
         }
-        for predicate in more {
+        for predicate in dependents {
             lifted.predicates[predicate.index()].fluent = true;
         }
     }

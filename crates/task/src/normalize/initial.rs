@@ -17,12 +17,12 @@ pub(super) fn initial_state(
     problem: &ast::Problem,
 ) -> (Vec<(PredicateId, Arguments)>, Vec<(FunctionId, Arguments, Rational)>) {
     let (mut facts, mut values) = (Vec::new(), Vec::new());
-    let mut seen = FxHashSet::default();
+    let mut stated = FxHashSet::default();
     for element in &problem.init {
         match element {
             ast::InitialElement::Fact(atom) => {
                 let fact = (names.predicate(&atom.predicate, File::Problem), objects(names, atom));
-                if seen.insert(fact.clone()) {
+                if stated.insert(fact.clone()) {
                     facts.push(fact);
                 }
             }

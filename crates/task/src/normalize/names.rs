@@ -26,7 +26,7 @@ pub(super) struct Scope {
     variables: Vec<Name>,
     /// Terms of each variable in scope, innermost last.
     terms: FxHashMap<Name, Vec<Term>>,
-    /// Number of variables bound so far, including those out of scope.
+    /// Number of bound variables, including those out of scope.
     pub(super) bound: u32,
     /// Meaning of `?duration`.
     pub(super) duration: Duration,
@@ -59,7 +59,7 @@ impl Scope {
     }
 }
 
-/// Symbol tables of the files, and the errors so far.
+/// Symbol tables of the files, and the errors.
 pub(super) struct Names {
     pub(super) objects: Vec<Name>,
     object_ids: FxHashMap<Name, ObjectId>,
@@ -138,9 +138,9 @@ impl Names {
             });
             let mut open: Vec<Name> = entry.r#type.alternatives.iter().map(|t| t.name.clone()).collect();
             open.push(Name::new("object"));
-            let mut seen = FxHashSet::default();
+            let mut declared = FxHashSet::default();
             while let Some(name) = open.pop() {
-                if seen.insert(name.clone()) {
+                if declared.insert(name.clone()) {
                     open.extend(parents.get(&name).into_iter().flatten().cloned());
                     self.members.entry(name).or_default().push(id);
                 }

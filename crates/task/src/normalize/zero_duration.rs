@@ -55,8 +55,8 @@ pub fn split(lifted: &mut Lifted) -> Result<(), Errors> {
                 }
                 copy.start_condition = Formula::And(vec![is_zero, copy.start_condition]);
                 instants.push(copy);
-                let own = std::mem::replace(&mut schema.start_condition, Formula::truth());
-                schema.start_condition = Formula::And(vec![is_positive, own]);
+                let original = std::mem::replace(&mut schema.start_condition, Formula::truth());
+                schema.start_condition = Formula::And(vec![is_positive, original]);
             }
         }
     }

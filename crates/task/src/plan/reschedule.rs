@@ -43,13 +43,13 @@ pub fn earliest<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) ->
 /// Returns the other operators of an operator's action.
 fn same_action<N: TaskNumber>(task: &Task<N>, id: OperatorId) -> impl Iterator<Item = OperatorId> + '_ {
     let operator = &task.operators[id.index()];
-    let same = move |other: &Operator<N>| {
+    let is_same_action = move |other: &Operator<N>| {
         other.schema == operator.schema
             && other.arguments == operator.arguments
             && other.slots == operator.slots
     };
     let operators = task.operators.iter().zip((0..).map(OperatorId));
-    operators.filter(move |(other, other_id)| *other_id != id && same(other)).map(|(_, id)| id)
+    operators.filter(move |(other, other_id)| *other_id != id && is_same_action(other)).map(|(_, id)| id)
 }
 
 /// Replaces an operator of the plan and inserts the necessary waits. Returns `None` if the result

@@ -51,7 +51,7 @@ pub enum Proof {
 /// A better plan or a better lower bound.
 #[derive(Debug, Clone)]
 pub struct Improvement {
-    /// Metric of the best plan so far.
+    /// Metric of the best known plan.
     pub cost: Exact,
     /// Lower bound on the metric of every plan.
     pub lower_bound: Exact,
@@ -97,7 +97,7 @@ words! { PlannerPart, "part of the planner": Search = "search", Satisficing = "s
 pub struct Moment {
     /// Time since the start of the optimiser.
     pub time: Duration,
-    /// Metric of the best plan so far.
+    /// Metric of the best known plan.
     pub cost: Option<Exact>,
     /// Lower bound on the metric of every plan.
     pub lower_bound: Exact,

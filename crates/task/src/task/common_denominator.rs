@@ -11,7 +11,7 @@ use rustc_hash::FxHashMap;
 use crate::number::Rational;
 use crate::task::quantity::Quantity;
 
-/// Least common denominator of the numbers so far.
+/// Least common denominator of the added numbers.
 pub struct CommonDenominator {
     /// `None` if it exceeds the limit of bits.
     common: Option<BigInt>,

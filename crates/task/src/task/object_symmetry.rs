@@ -152,12 +152,12 @@ impl Exchange {
             let mut image = atom.clone();
             // The first word is the predicate.
             for word in image.iter_mut().skip(1) {
-                let other = match Some(*word) {
+                let exchanged_word = match Some(*word) {
                     word if word == a_word => b_word,
                     word if word == b_word => a_word,
                     word => word,
                 };
-                *word = other?;
+                *word = exchanged_word?;
             }
             parts.facts.get(&image).copied()
         };
@@ -246,8 +246,8 @@ impl Exchange {
     }
 
     fn identity(task: &Task) -> Self {
-        let all = task.variables.iter().zip(VariableId::all(task.variables.len()));
-        let facts = all.map(|(own, variable)| {
+        let variables = task.variables.iter().zip(VariableId::all(task.variables.len()));
+        let facts = variables.map(|(own, variable)| {
             own.values.iter().zip(0..).map(|(_, value)| Fact { variable, value }).collect()
         });
         Self { objects: (ObjectId(u32::MAX), ObjectId(u32::MAX)), facts: facts.collect() }

@@ -138,8 +138,8 @@ fn message(
     stream: u8,
     sequence: u64,
 ) -> Result<Option<Stored>, Fault> {
-    let found = messages.get((stream, sequence)).map_err(failed)?;
-    Ok(found.map(|value| {
+    let entry = messages.get((stream, sequence)).map_err(failed)?;
+    Ok(entry.map(|value| {
         let (subject, id, time, payload) = value.value();
         let id = (!id.is_empty()).then(|| id.to_owned());
         Stored { sequence, subject: subject.to_owned(), id, time, payload: payload.to_owned() }

@@ -157,7 +157,7 @@ pub trait Store: Clone + Send + Sync + 'static {
         after: u64,
     ) -> impl Future<Output = Result<Vec<Stored>, Fault>> + Send;
 
-    /// Returns the sequence of the last message of a partition; 0 if there is none.
+    /// Returns the sequence of the last message of a partition; 0 for an empty partition.
     fn end(&self, stream: Stream, partition: u32) -> impl Future<Output = Result<u64, Fault>> + Send;
 
     /// Appends a message durably.

@@ -134,8 +134,8 @@ impl Nats {
                 max_age: if kind.expires() { layout.lease } else { Duration::ZERO },
                 ..kv::Config::default()
             };
-            let known = context.get_key_value(&bucket).await;
-            buckets.push(match known {
+            let existing = context.get_key_value(&bucket).await;
+            buckets.push(match existing {
                 Ok(store) => store,
                 Err(_) => match context.create_key_value(config).await {
                     Ok(store) => store,
@@ -170,11 +170,11 @@ impl Nats {
     /// The server cannot be reached.
     pub async fn notices(&self) -> Result<BoxStream<'static, (String, String)>, Fault> {
         let subscriber = self.client.subscribe("err.*.*").await.map_err(failed)?;
-        let known = subscriber.map(|message| {
+        let refusals = subscriber.map(|message| {
             let subject = message.subject.strip_prefix("err.").unwrap_or_default().to_owned();
             (subject, String::from_utf8_lossy(&message.payload).into_owned())
         });
-        Ok(known.boxed())
+        Ok(refusals.boxed())
     }
 
     fn stream(&self, stream: Stream) -> &stream::Stream<()> {

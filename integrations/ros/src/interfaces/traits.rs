@@ -26,11 +26,11 @@ pub trait Msg: Structure {
 pub trait Service {
     /// Request of the client.
     type Request: Structure;
-    /// What the server answers.
+    /// Reply of the server.
     type Response: Structure;
-    /// As in `std_srvs`.
+    /// Package, as in `std_srvs`.
     const PACKAGE: &'static str;
-    /// As in `Trigger`.
+    /// Name, as in `Trigger`.
     const NAME: &'static str;
 }
 
@@ -53,15 +53,15 @@ impl ServiceHashes {
 
 /// An action.
 pub trait Action {
-    /// What the client wants.
+    /// Goal of the client.
     type Goal: Structure;
-    /// What has come of it.
+    /// Result of the action.
     type Result: Structure;
-    /// What is told on the way.
+    /// Intermediate feedback.
     type Feedback: Structure;
-    /// As in `nav2_msgs`.
+    /// Package, as in `nav2_msgs`.
     const PACKAGE: &'static str;
-    /// As in `NavigateToPose`.
+    /// Name, as in `NavigateToPose`.
     const NAME: &'static str;
     /// Type hashes of the service `send_goal`.
     const SEND_GOAL_RIHS01: ServiceHashes;

@@ -185,8 +185,8 @@ impl Driver {
             let absent =
                 self.machine.modes_of(&function).into_iter().filter(|mode| !available.contains(mode));
             missing.extend(absent.map(|mode| {
-                let meant = did_you_mean(&mode, available.iter().map(String::as_str));
-                format!("{function} has no mode `{mode}`{meant}")
+                let suggestion = did_you_mean(&mode, available.iter().map(String::as_str));
+                format!("{function} has no mode `{mode}`{suggestion}")
             }));
         }
         if missing.is_empty() {

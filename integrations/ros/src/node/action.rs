@@ -370,9 +370,9 @@ impl Node {
                 status_publisher: latched(1),
             };
             let kind = ActionTypeName::new(A::PACKAGE, A::NAME);
-            let made =
+            let created =
                 node.inner().create_action_server(mapping.service_mapping(), &action_name, &kind, policies);
-            match made {
+            match created {
                 Ok(server) => drop(served.server.set(server)),
                 Err(error) => {
                     node.log(Severity::Fatal, &not_made(&full, &error).message);

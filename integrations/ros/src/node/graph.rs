@@ -119,17 +119,17 @@ impl Graph {
             }
             Event::ParticipantLost { id, .. } => {
                 let lost: &[u8] = id.as_ref();
-                let mut seen = self.seen();
-                seen.participants.retain(|prefix, _| prefix != lost);
-                seen.endpoints.retain(|guid, _| &guid[..12] != lost);
-                seen.matched_readers.retain(|guid| &guid[..12] != lost);
+                let mut state = self.seen();
+                state.participants.retain(|prefix, _| prefix != lost);
+                state.endpoints.retain(|guid, _| &guid[..12] != lost);
+                state.matched_readers.retain(|guid| &guid[..12] != lost);
             }
             Event::ReaderDetected { reader } => self.found(true, reader),
             Event::WriterDetected { writer } => self.found(false, writer),
             Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => {
-                let mut seen = self.seen();
-                seen.endpoints.remove(&bytes(guid));
-                seen.matched_readers.remove(&bytes(guid));
+                let mut state = self.seen();
+                state.endpoints.remove(&bytes(guid));
+                state.matched_readers.remove(&bytes(guid));
             }
             Event::RemoteReaderMatched { remote_reader, .. } => {
                 self.seen().matched_readers.insert(bytes(remote_reader));
@@ -147,46 +147,47 @@ impl Graph {
         }
         let EndpointDescription { topic_name: topic, type_name, user_data, .. } = description;
         let endpoint = Endpoint { is_reader, topic, type_name, hash: type_hash(&user_data) };
-        let mut seen = self.seen();
-        let complaint = seen.expected.get(&endpoint.topic).and_then(|expected| endpoint.complaint(expected));
-        seen.complaints.extend(complaint);
-        seen.endpoints.insert(guid, endpoint);
+        let mut state = self.seen();
+        let complaint = state.expected.get(&endpoint.topic).and_then(|expected| endpoint.complaint(expected));
+        state.complaints.extend(complaint);
+        state.endpoints.insert(guid, endpoint);
     }
 
     fn incompatible(&self, guid: GUID) {
-        let mut seen = self.seen();
-        let topic = seen.endpoints.get(&bytes(guid)).map(|endpoint| endpoint.topic.clone());
+        let mut state = self.seen();
+        let topic = state.endpoints.get(&bytes(guid)).map(|endpoint| endpoint.topic.clone());
         if let Some(topic) = topic {
-            seen.complaints
+            state
+                .complaints
                 .push(format!("an endpoint of {topic} has a quality of service that does not fit ours"));
         }
     }
 
     /// Sets the expected type of a topic. Endpoints with another type are reported and ignored.
     pub(crate) fn expect(&self, topic: String, expected: Expected) {
-        let mut seen = self.seen();
-        let found: Vec<String> = seen
+        let mut state = self.seen();
+        let complaints: Vec<String> = state
             .endpoints
             .values()
             .filter(|endpoint| endpoint.topic == topic)
             .filter_map(|endpoint| endpoint.complaint(&expected))
             .collect();
-        seen.complaints.extend(found);
-        seen.expected.insert(topic, expected);
+        state.complaints.extend(complaints);
+        state.expected.insert(topic, expected);
     }
 
     /// Returns the problems since the last call, each once.
     pub(crate) fn complaints(&self) -> Vec<String> {
-        let mut seen = self.seen();
-        let new = std::mem::take(&mut seen.complaints);
-        new.into_iter().filter(|complaint| seen.reported.insert(complaint.clone())).collect()
+        let mut state = self.seen();
+        let new = std::mem::take(&mut state.complaints);
+        new.into_iter().filter(|complaint| state.reported.insert(complaint.clone())).collect()
     }
 
     /// Returns `true` if this writer has another type than expected.
     pub(crate) fn is_unfit(&self, writer: Gid) -> bool {
-        let seen = self.seen();
-        seen.endpoints.get(&writer.to_bytes16()).is_some_and(|endpoint| {
-            seen.expected.get(&endpoint.topic).is_some_and(|expected| endpoint.complaint(expected).is_some())
+        let state = self.seen();
+        state.endpoints.get(&writer.to_bytes16()).is_some_and(|endpoint| {
+            state.expected.get(&endpoint.topic).is_some_and(|expected| endpoint.complaint(expected).is_some())
         })
     }
 
@@ -198,21 +199,21 @@ impl Graph {
     /// Returns the server of a service if there is one. An endpoint with another type name is an error. A differing type hash is
     /// not: DDS has matched the type names, and the warning has been logged.
     pub(crate) fn server(&self, topics: &Topics) -> Option<Result<Server, String>> {
-        let seen = self.seen();
+        let state = self.seen();
         let endpoint = |topic: &str, is_reader: bool| {
             let is_it = |own: &(&[u8; 16], &Endpoint)| own.1.is_reader == is_reader && own.1.topic == topic;
-            seen.endpoints.iter().find(is_it)
+            state.endpoints.iter().find(is_it)
         };
         let ((guid, reader), (_, writer)) =
             (endpoint(&topics.requests, true)?, endpoint(&topics.replies, false)?);
         for endpoint in [reader, writer] {
-            let expected = seen.expected.get(&endpoint.topic);
+            let expected = state.expected.get(&endpoint.topic);
             if let Some(complaint) = expected.and_then(|expected| endpoint.wrong_type(expected)) {
                 return Some(Err(complaint));
             }
         }
         let vendor = Vendor::new([guid[0], guid[1]]);
-        let mapping = self.rmw.fixed().or_else(|| vendor.mapping()).or(seen.mapping);
+        let mapping = self.rmw.fixed().or_else(|| vendor.mapping()).or(state.mapping);
         Some(Ok(Server { mapping: mapping.unwrap_or(Mapping::Enhanced), reader: *guid }))
     }
 
@@ -223,16 +224,16 @@ impl Graph {
     /// bytes that are no GUID, so that every participant that writes requests must have as many reply readers matched.
     pub(crate) fn can_reply(&self, topics: &Topics, client: Gid) -> bool {
         let client = client.to_bytes16();
-        let seen = self.seen();
-        let is_known = seen.participants.keys().any(|prefix| *prefix == client[..12]);
+        let state = self.seen();
+        let is_known = state.participants.keys().any(|prefix| *prefix == client[..12]);
         if is_known && is_reader(client) {
-            return seen.matched_readers.contains(&client);
+            return state.matched_readers.contains(&client);
         }
         let mut unmatched: BTreeMap<&[u8], i64> = BTreeMap::new();
-        for (guid, endpoint) in &seen.endpoints {
+        for (guid, endpoint) in &state.endpoints {
             if !endpoint.is_reader && endpoint.topic == topics.requests {
                 *unmatched.entry(&guid[..12]).or_default() += 1;
-            } else if endpoint.topic == topics.replies && seen.matched_readers.contains(guid) {
+            } else if endpoint.topic == topics.replies && state.matched_readers.contains(guid) {
                 *unmatched.entry(&guid[..12]).or_default() -= 1;
             }
         }
@@ -244,9 +245,9 @@ impl Graph {
 
     /// Returns the readers of a topic, given by its DDS name.
     pub(crate) fn readers(&self, topic: &str) -> BTreeSet<[u8; 16]> {
-        let seen = self.seen();
+        let state = self.seen();
         let is_it = |endpoint: &Endpoint| endpoint.is_reader && endpoint.topic == topic;
-        seen.endpoints.iter().filter(|(_, endpoint)| is_it(endpoint)).map(|(guid, _)| *guid).collect()
+        state.endpoints.iter().filter(|(_, endpoint)| is_it(endpoint)).map(|(guid, _)| *guid).collect()
     }
 
     /// Waits for the mapping of our own services: that of the first participant that supports only
@@ -261,13 +262,13 @@ impl Graph {
     }
 
     fn decide(&self) -> Option<Mapping> {
-        let mut seen = self.seen();
-        if seen.mapping.is_none() {
-            let met = seen.participants.values().find_map(|vendor| vendor.mapping());
-            let waited = seen.first.is_some_and(|first| first.elapsed() >= PATIENCE);
-            seen.mapping = met.or_else(|| waited.then_some(Mapping::Enhanced));
+        let mut state = self.seen();
+        if state.mapping.is_none() {
+            let met = state.participants.values().find_map(|vendor| vendor.mapping());
+            let waited = state.first.is_some_and(|first| first.elapsed() >= PATIENCE);
+            state.mapping = met.or_else(|| waited.then_some(Mapping::Enhanced));
         }
-        seen.mapping
+        state.mapping
     }
 
     /// Polls `look` until it returns a value or the time is up.

@@ -86,8 +86,11 @@ impl Node {
         for (name, value) in self.arguments.parameters(&self.name) {
             match table.get_mut(&name) {
                 None => {
-                    let meant = did_you_mean(&name, table.keys().map(String::as_str));
-                    warnings.push(Message::warning("N103", format!("there is no parameter `{name}`{meant}")));
+                    let suggestion = did_you_mean(&name, table.keys().map(String::as_str));
+                    warnings.push(Message::warning(
+                        "N103",
+                        format!("there is no parameter `{name}`{suggestion}"),
+                    ));
                 }
                 Some(parameter) => match parameter.accept(value) {
                     Ok(value) => parameter.value = value,
@@ -277,10 +280,10 @@ fn listed(names: Vec<String>, prefixes: &[String], depth: u64) -> msg::ListParam
         if prefixes.is_empty() { is_near(name) } else { prefixes.iter().any(below) }
     };
     let names: Vec<String> = names.into_iter().filter(is_wanted).collect();
-    let mut found: Vec<String> =
+    let mut names_below: Vec<String> =
         names.iter().filter_map(|name| name.rsplit_once('.')).map(|(prefix, _)| prefix.to_owned()).collect();
-    found.dedup();
-    msg::ListParametersResult { names, prefixes: found }
+    names_below.dedup();
+    msg::ListParametersResult { names, prefixes: names_below }
 }
 
 fn described(name: &str, own: Option<&Declared>) -> msg::ParameterDescriptor {

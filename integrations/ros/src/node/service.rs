@@ -228,14 +228,14 @@ impl Node {
             let mapping = graph.mapping().await;
             let Some(node) = weak.upgrade() else { return };
             let kind = ServiceTypeName::new(S::PACKAGE, S::NAME);
-            let made = node.inner().create_server::<S::Request, S::Response>(
+            let created = node.inner().create_server::<S::Request, S::Response>(
                 mapping.service_mapping(),
                 &service_name,
                 &kind,
                 qos::service(),
                 qos::service(),
             );
-            let server = match made {
+            let server = match created {
                 Ok(server) => server,
                 Err(error) => {
                     node.log(Severity::Fatal, &not_made(&full, &error).message);

@@ -159,7 +159,7 @@ async fn ask(
     }
     let begun = Instant::now();
     hub.say(asking.request());
-    let mut asked = Instant::now();
+    let mut last_request = Instant::now();
     loop {
         let hears = async { Next::Heard(heard.recv().await.ok()) };
         let canceled = async {
@@ -167,7 +167,7 @@ async fn ask(
             Next::Canceled
         };
         let time = async {
-            smol::Timer::after(AGAIN.saturating_sub(asked.elapsed())).await;
+            smol::Timer::after(AGAIN.saturating_sub(last_request.elapsed())).await;
             Next::Time
         };
         match smol::future::or(hears, smol::future::or(canceled, time)).await {
@@ -184,7 +184,7 @@ async fn ask(
                 return End::Canceled;
             }
             Next::Time => {
-                asked = Instant::now();
+                last_request = Instant::now();
                 if asking.performer.is_none() {
                     if begun.elapsed() > PATIENCE {
                         let seconds = PATIENCE.as_secs();

@@ -170,8 +170,8 @@ impl Poses {
 
     /// Error about a missing pose, with a suggestion.
     pub(super) fn lacking(&self, object: &str) -> String {
-        let meant = did_you_mean(object, self.places.keys().map(String::as_str));
-        format!("`[poses]` has no `{object}`{meant}")
+        let suggestion = did_you_mean(object, self.places.keys().map(String::as_str));
+        format!("`[poses]` has no `{object}`{suggestion}")
     }
 }
 
@@ -185,8 +185,8 @@ pub(super) fn argument(
         Some(number) => Some(number.get() - 1),
         None => arguments.len().checked_sub(from_end + 1),
     };
-    let found = index.and_then(|index| arguments.get(index)).map(String::as_str);
-    found.ok_or_else(|| match number {
+    let argument_text = index.and_then(|index| arguments.get(index)).map(String::as_str);
+    argument_text.ok_or_else(|| match number {
         Some(number) => format!("there is no argument {number}, but {}", arguments.len()),
         None => format!("{} arguments are too few", arguments.len()),
     })

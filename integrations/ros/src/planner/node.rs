@@ -117,8 +117,8 @@ impl Planner {
             let is_ready = is_ready(&phase);
             planner.aside("get_plan_array", move |planner| {
                 let alternatives = planner.manner.get().alternatives;
-                let found = planner.plan(is_ready, request.domain, request.problem, alternatives);
-                answer.send(get_plan_array_response(found));
+                let planned = planner.plan(is_ready, request.domain, request.problem, alternatives);
+                answer.send(get_plan_array_response(planned));
             });
         })?;
         let (planner, phase) = (Arc::clone(self), Arc::clone(lifecycle));
@@ -153,9 +153,9 @@ impl Planner {
             self.busy.fetch_sub(1, Ordering::Relaxed);
             return Err(NoPlan::None(format!("{MOST} other plans are being looked for")));
         }
-        let found = self.plan_now(domain, problem, alternatives);
+        let planned = self.plan_now(domain, problem, alternatives);
         self.busy.fetch_sub(1, Ordering::Relaxed);
-        found
+        planned
     }
 
     fn plan_now(&self, domain: String, problem: String, alternatives: usize) -> Result<Found, NoPlan> {
@@ -166,9 +166,9 @@ impl Planner {
             problem: Source::new(PROBLEM, problem),
             joint: joint.as_ref(),
         };
-        let found = solve(request, &manner);
-        self.told.tell(&found);
-        found
+        let planned = solve(request, &manner);
+        self.told.tell(&planned);
+        planned
     }
 }
 

@@ -32,13 +32,13 @@ pub enum Slot {
 
 /// Returns `true` if objects match the slots of a pattern.
 pub fn fits(pattern: &[Slot], arguments: &[ObjectId]) -> bool {
-    let same = |variable: u32, object: ObjectId| {
+    let is_consistent = |variable: u32, object: ObjectId| {
         let mut pairs = pattern.iter().zip(arguments);
         pairs.all(|(slot, other)| !matches!(slot, Slot::Each(own, _) if *own == variable) || *other == object)
     };
     let slot_fits = |(slot, object): (&Slot, &ObjectId)| match slot {
         Slot::Object(own) => own == object,
-        Slot::Each(variable, objects) => objects.contains(object) && same(*variable, *object),
+        Slot::Each(variable, objects) => objects.contains(object) && is_consistent(*variable, *object),
         Slot::Any => true,
     };
     pattern.len() == arguments.len() && pattern.iter().zip(arguments).all(slot_fits)

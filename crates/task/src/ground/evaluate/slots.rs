@@ -82,7 +82,7 @@ fn table(
     for_each_combination(&mentioned, slots, binding, limits, &mut |binding, combination| {
         match ground(world, expression, binding) {
             Ok(linear) => {
-                // Factors beside a slot in a product or quotient are static, otherwise the
+                // Factors of a slot in a product or quotient are static, otherwise the
                 // parameter would not be a slot.
                 assert!(linear.coefficients.is_empty(), "invariant: a table has no fluents");
                 values.push(linear.quantity.constant);

@@ -1,4 +1,4 @@
-//! Slots of a task: the functions whose designs are left open by operators.
+//! Slots of a task: the functions with open designs in operators.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -31,8 +31,8 @@ pub(super) struct Slots {
 
 impl Slots {
     pub(super) fn new(operators: &[GroundOperator]) -> Self {
-        let mut seen = FxHashSet::default();
-        let distinct = operators.iter().filter(|operator| seen.insert(operator.slots.as_ptr()));
+        let mut visited = FxHashSet::default();
+        let distinct = operators.iter().filter(|operator| visited.insert(operator.slots.as_ptr()));
         let mut designs: BTreeMap<SlotKey, Vec<ObjectId>> = BTreeMap::new();
         for (key, suitable) in distinct.flat_map(|operator| slot_keys(&operator.slots)) {
             designs.entry(key).or_default().extend(suitable);

@@ -233,8 +233,8 @@ impl Case {
         let mut conditional: Vec<GroundConditional> = Vec::new();
         for (condition, change) in self.end.iter().filter(|(condition, _)| *condition != Residual::True) {
             let GroundChange::Atom(atom, positive) = change else { continue };
-            let gone = start.deletes.contains(atom) && !start.adds.contains(atom);
-            if !positive && (gone || end_adds.contains(atom)) {
+            let is_deleted = start.deletes.contains(atom) && !start.adds.contains(atom);
+            if !positive && (is_deleted || end_adds.contains(atom)) {
                 continue;
             }
             let condition = literals(world, definitions, condition);

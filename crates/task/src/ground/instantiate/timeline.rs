@@ -131,7 +131,7 @@ impl Timeline {
         let unit =
             times.fold(BigInt::from(1000), |unit, time| num_integer::lcm(unit, time.to_big().denom() * 2_u8));
         let moment = Rational::from_big(BigRational::new(BigInt::from(1), unit));
-        let put = |linear: &mut Linear<Rational>| {
+        let substitute_moment = |linear: &mut Linear<Rational>| {
             let position = linear.coefficients.iter().position(|(variable, _)| *variable == self.moment);
             if let Some(position) = position {
                 let (_, factor) = linear.coefficients.remove(position);
@@ -139,10 +139,10 @@ impl Timeline {
             }
         };
         operators.retain_mut(|operator| {
-            operator.numeric_effects.each(&mut |value| put(value));
+            operator.numeric_effects.each(&mut |value| substitute_moment(value));
             let mut holds = true;
             operator.condition.comparisons.retain_mut(|(linear, strict)| {
-                put(linear);
+                substitute_moment(linear);
                 let truth_value = constant_comparison(linear, *strict);
                 holds &= truth_value != Some(Residual::False);
                 truth_value.is_none()

@@ -61,13 +61,14 @@ pub(super) fn backward(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
 
 /// Returns `true` if the operator changes nothing and cannot reduce the cost of a plan.
 fn is_idle(operator: &GroundOperator) -> bool {
-    let known = |atom: AtomId, value: bool| operator.condition.literals.binary_search(&(atom, value)).is_ok();
+    let is_required =
+        |atom: AtomId, value: bool| operator.condition.literals.binary_search(&(atom, value)).is_ok();
     let lowest = |cost: &Quantity<Rational>| {
         let tables = cost.tables.iter().filter_map(|table| table.values.iter().min());
         tables.fold(cost.constant.clone(), |sum, value| sum + value)
     };
-    operator.adds.iter().all(|atom| known(*atom, true))
-        && operator.deletes.iter().all(|atom| known(*atom, false))
+    operator.adds.iter().all(|atom| is_required(*atom, true))
+        && operator.deletes.iter().all(|atom| is_required(*atom, false))
         && operator.conditional.is_empty()
         && operator.numeric_effects.iter().all(|(variable, value)| {
             value.quantity.is_zero() && value.coefficients[..] == [(*variable, Rational::from_integer(1))]

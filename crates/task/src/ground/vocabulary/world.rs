@@ -1,4 +1,4 @@
-//! Static facts and values, and the fluent atoms and numeric variables found so far.
+//! Static facts and values, and the fluent atoms and numeric variables found by grounding.
 
 use std::num::Wrapping;
 

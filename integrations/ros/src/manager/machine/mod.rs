@@ -300,10 +300,10 @@ impl Machine {
             }
             Command::Request { step } => {
                 let call = call(&step);
-                let needed: BTreeSet<&String> =
+                let required: BTreeSet<&String> =
                     step.configuration.iter().map(|(function, _)| function).collect();
                 let idle: Vec<String> =
-                    self.functions.iter().filter(|function| !needed.contains(function)).cloned().collect();
+                    self.functions.iter().filter(|function| !required.contains(function)).cloned().collect();
                 for function in &idle {
                     self.unground(function);
                 }

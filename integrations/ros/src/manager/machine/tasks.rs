@@ -26,8 +26,8 @@ impl Machine {
 
     pub(super) fn request(&mut self, number: u64, task: &str) -> String {
         let Some(settings) = self.settings.tasks.get(task).cloned() else {
-            let meant = did_you_mean(task, self.settings.tasks.keys().map(String::as_str));
-            let because = format!("there is no task `{task}`{meant}");
+            let suggestion = did_you_mean(task, self.settings.tasks.keys().map(String::as_str));
+            let because = format!("there is no task `{task}`{suggestion}");
             self.outputs.push(Output::Reply(number, false));
             self.refuse(&because);
             return because;
