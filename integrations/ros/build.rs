@@ -1,4 +1,4 @@
-//! Makes Rust types of the ROS definitions below `interfaces/`, with their type hashes.
+//! Generates Rust types from the ROS definitions below `interfaces/`, with their type hashes.
 
 #[path = "build/definition.rs"]
 mod definition;

@@ -1,4 +1,4 @@
-//! What a knowledge base contributes to a PDDL problem, before and after a component has failed.
+//! Prints the contributions of a knowledge base to a PDDL problem, before and after the failure of a component.
 //!
 //! `cargo run -p metaplan-mission --example filled`
 #![expect(clippy::print_stdout, reason = "an example prints")]

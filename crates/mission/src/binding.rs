@@ -1,7 +1,9 @@
-//! Bindings: which PDDL symbol stands for what in the knowledge base, and a problem filled with it.
+//! Bindings of PDDL symbols to queries on the knowledge base, and the completion of a problem with
+//! their results.
 //!
-//! The defaults fit the names of the Metaplan paper and of the files of kas-lab. A type stands for a class, a predicate for a
-//! relation between designs, functions and actions, a numeric function for an estimated or measured attribute.
+//! The defaults fit the names of the Metaplan paper and of the files of kas-lab. A type is bound to
+//! a class, a predicate to a relation between designs, functions and actions, and a numeric
+//! function to an estimated or measured attribute.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -19,45 +21,47 @@ use crate::knowledge::{Catalogue, Knowledge};
 use crate::message::Message;
 use crate::visible::visible;
 
-/// The predicates that say which design solves which function, unless a binding says so of others, too.
+/// Predicates `(p DESIGN FUNCTION)` that are bound to `solves` by default. Explicit bindings add to
+/// them.
 const SOLVES: [&str; 4] = ["fd_solve_f", "fd_solves_f", "inferred-SolvesF", "solvesF"];
 
-/// What a PDDL symbol stands for.
+/// The knowledge-base query that a PDDL symbol is bound to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Query {
-    /// A type: the individuals of a class, by local name or IRI.
+    /// Type: the individuals of a class, given by local name or IRI.
     Class(String),
-    /// A predicate `(p DESIGN FUNCTION)`.
+    /// Predicate `(p DESIGN FUNCTION)`: the solved functions of each design.
     Solves,
-    /// A predicate `(p DESIGN)`.
+    /// Predicate `(p DESIGN)`: the available designs.
     Available,
-    /// A predicate `(p ACTION FUNCTION…)`; for one action only if it is named.
+    /// Predicate `(p ACTION FUNCTION…)`: the required functions of all actions, or of the
+    /// named action.
     Requires(Option<String>),
-    /// A numeric function of a design: the estimated value of an attribute.
+    /// Numeric function of a design: the estimated value of an attribute.
     Estimation(String),
-    /// A numeric function without parameters: the measured value of an attribute.
+    /// Numeric function without parameters: the measured value of an attribute.
     Measured(String),
-    /// A numeric function without parameters of a plain domain: the sum of an attribute over the designs that are
-    /// chosen for an action.
+    /// Numeric function without parameters in a plain domain: the sum of an attribute over the
+    /// designs that are chosen for an action.
     Chosen(String),
-    /// The same over those designs that were not at work before.
+    /// Variant of `Chosen` that sums only over the designs that were not in use before the action.
     Reconfigured(String),
-    /// An action of a plain domain: that action.
+    /// Action of a plain domain: the corresponding action of the knowledge base.
     Action(String),
 }
 
-/// PDDL symbols and what they stand for.
+/// Bindings of PDDL symbols to queries, and of individuals to object names.
 #[derive(Debug, Clone, Default)]
 pub struct Bindings {
     own: BTreeMap<Name, Query>,
-    /// As the manifest has them.
+    /// Explicit bindings as text, for reports.
     written: BTreeMap<String, String>,
-    /// What individuals are called in the problem.
+    /// Object names of individuals.
     names: Names,
 }
 
 impl Bindings {
-    /// The defaults, and on top of them the given ones.
+    /// Returns the default bindings, overridden by the given ones.
     ///
     /// ```
     /// use std::collections::BTreeMap;
@@ -67,7 +71,7 @@ impl Bindings {
     /// ```
     ///
     /// # Errors
-    /// A sentence about the first query that is none.
+    /// Describes the first value that is not a query.
     pub fn with(own: &BTreeMap<String, String>) -> Result<Self, String> {
         let parse =
             |(symbol, query): (&String, &String)| Ok((Name::new(symbol), parse_query(symbol, query)?));
@@ -75,29 +79,30 @@ impl Bindings {
         Ok(Self { own: parsed, written, names: Names::default() })
     }
 
-    /// The same bindings, with names for individuals.
+    /// Returns these bindings with the given object names of individuals.
     #[must_use]
     pub fn naming(self, names: Names) -> Self {
         Self { names, ..self }
     }
 
-    /// What individuals are called in the problem.
+    /// Returns the object names of individuals.
     pub fn names(&self) -> &Names {
         &self.names
     }
 
-    /// Those that are given, as they are written.
+    /// Returns the explicit bindings, as they are written.
     pub fn written(&self) -> &BTreeMap<String, String> {
         &self.written
     }
 
-    /// The predicates that say which design solves which function.
+    /// Returns the predicates that state which design solves which function.
     pub fn solves(&self) -> Vec<Name> {
-        let own = self.own.iter().filter(|(_, query)| **query == Query::Solves).map(|(name, _)| name.clone());
-        own.chain(SOLVES.map(Name::new)).collect()
+        let bound =
+            self.own.iter().filter(|(_, query)| **query == Query::Solves).map(|(name, _)| name.clone());
+        bound.chain(SOLVES.map(Name::new)).collect()
     }
 
-    /// The class that a type stands for, by local name or IRI.
+    /// Returns the class that a type is bound to, by local name or IRI.
     pub(super) fn class(&self, name: &Name) -> Option<String> {
         match self.r#type(name) {
             Some(Query::Class(class)) => Some(class),
@@ -105,17 +110,18 @@ impl Bindings {
         }
     }
 
-    /// Whether a predicate says which functions an action requires.
+    /// Returns `true` if a predicate states which functions an action requires.
     pub(super) fn is_requirement(&self, predicate: &Name) -> bool {
         matches!(self.predicate(predicate), Some(Query::Requires(_)))
     }
 
-    /// Whether a type is that of function designs.
+    /// Returns `true` if a type is bound to the class of function designs.
     pub(super) fn is_design(&self, name: &Name) -> bool {
         self.r#type(name) == Some(Query::Class("FunctionDesign".to_owned()))
     }
 
-    /// Whether an action of a plain domain is an action of the knowledge base, by its local name or what it is called.
+    /// Returns `true` if an action of a plain domain corresponds to an action of the knowledge
+    /// base, by its local name or its object name.
     pub(super) fn is_action(&self, name: &Name, known: &Individual) -> bool {
         both(known).iter().any(|known| match self.own.get(name) {
             Some(Query::Action(own)) => own == known,
@@ -123,7 +129,8 @@ impl Bindings {
         })
     }
 
-    /// Whether a predicate says which functions an action of the knowledge base requires.
+    /// Returns `true` if a predicate states the required functions of an action of the knowledge
+    /// base.
     pub(super) fn says_needs(&self, predicate: &Name, known: &Individual) -> bool {
         match self.predicate(predicate) {
             Some(Query::Requires(None)) => true,
@@ -135,7 +142,7 @@ impl Bindings {
         }
     }
 
-    /// The attribute that a function sums over chosen designs, if that is stated.
+    /// Returns the attribute that a function is explicitly bound to sum over chosen designs.
     pub(super) fn chosen(&self, name: &Name) -> Option<String> {
         match self.own.get(name) {
             Some(Query::Chosen(attribute)) => Some(attribute.clone()),
@@ -143,7 +150,7 @@ impl Bindings {
         }
     }
 
-    /// The attribute that a function sums over changed designs.
+    /// Returns the attribute that a function is bound to sum over changed designs.
     pub(super) fn reconfigured(&self, name: &Name) -> Option<String> {
         match self.own.get(name) {
             Some(Query::Reconfigured(attribute)) => Some(attribute.clone()),
@@ -151,12 +158,13 @@ impl Bindings {
         }
     }
 
-    /// Whether a predicate says which designs are available.
+    /// Returns `true` if a predicate states which designs are available.
     pub fn is_availability(&self, predicate: &Name) -> bool {
         self.predicate(predicate) == Some(Query::Available)
     }
 
-    /// Whether a numeric function without parameters is the measured value of an attribute.
+    /// Returns `true` if a numeric function without parameters is the measured value of an
+    /// attribute.
     pub(super) fn is_measured(&self, declared: &Declaration, attribute: &str) -> bool {
         let query = self.function(declared);
         declared.parameters.is_empty() && matches!(query, Query::Measured(name) if name == attribute)
@@ -198,7 +206,7 @@ impl Bindings {
     }
 }
 
-/// What an individual is called in the problem, and its local name.
+/// Returns the object name and the local name of an individual.
 fn both(known: &Individual) -> [&str; 2] {
     [&known.name, local_name(&known.iri)]
 }
@@ -224,9 +232,11 @@ fn parse_query(symbol: &str, query: &str) -> Result<Query, String> {
     }
 }
 
-/// Adds to a problem the objects, facts and values that the knowledge base has for the domain's symbols. What
-/// the problem says of availability itself is dropped, with a warning, but for its `own` designs; values that it states stay.
-/// What `stands` for designs is declared, too, though the explicit form of a plain domain does without it.
+/// Adds the objects, facts and values that the knowledge base has for the symbols of the domain.
+///
+/// Availability facts of the problem are removed with a warning, except those about its `own`
+/// designs. Values that the problem states take precedence. Symbols for which `stands` returns
+/// `true` count as declared, because the explicit form removes them from a plain domain.
 pub(super) fn fill(
     domain: &Domain,
     problem: &mut Problem,
@@ -235,9 +245,10 @@ pub(super) fn fill(
     own: &BTreeSet<Name>,
     stands: &dyn Fn(&Name) -> bool,
 ) -> Vec<Message> {
-    let known = knowledge.catalogue();
+    let catalogue = knowledge.catalogue();
     let is_known = knowledge.fault().is_none();
-    let mut fill = Fill { problem, view: knowledge.view(), known, is_known, own, warnings: Vec::new() };
+    let mut fill =
+        Fill { problem, view: knowledge.view(), known: catalogue, is_known, own, warnings: Vec::new() };
     let types = domain.types.iter().map(|declared| &declared.identifier.name);
     let symbols = domain.predicates.iter().chain(&domain.functions).map(|declared| &declared.identifier.name);
     let actions = domain.actions.iter().map(|action| &action.identifier.name);
@@ -273,9 +284,9 @@ struct Fill<'a> {
     problem: &'a mut Problem,
     view: View<'a>,
     known: &'a Catalogue,
-    /// Whether it is known what follows.
+    /// `false` if inference has failed, so that the derived facts are unknown.
     is_known: bool,
-    /// Designs about whose availability the problem itself decides.
+    /// Designs whose availability is stated by the problem.
     own: &'a BTreeSet<Name>,
     warnings: Vec<Message>,
 }
@@ -284,7 +295,7 @@ impl Fill<'_> {
     fn objects(&mut self, domain: &Domain, r#type: &Name, class: &str) {
         let members = self.known.members(&self.view, class);
         let present = domain.constants.iter().chain(&self.problem.objects);
-        let mut known: BTreeSet<Name> = present.map(|object| object.identifier.name.clone()).collect();
+        let mut names: BTreeSet<Name> = present.map(|object| object.identifier.name.clone()).collect();
         for Individual { iri, name } in &*members {
             let spelled = Name::new(name);
             if !is_pddl_name(name) {
@@ -292,7 +303,7 @@ impl Fill<'_> {
                     "<{iri}> is left out: `{name}` is not a PDDL name; give it another one under `[bindings.names]`"
                 );
                 self.warnings.push(Message::warning("M201", text));
-            } else if known.insert(spelled.clone()) {
+            } else if names.insert(spelled.clone()) {
                 let alternatives = vec![identifier(r#type)];
                 let r#type = TypeExpression { alternatives };
                 self.problem.objects.push(TypedName { identifier: identifier(&spelled), r#type });
@@ -300,14 +311,14 @@ impl Fill<'_> {
         }
     }
 
-    /// Adds a fact, unless one of its arguments is an individual without a PDDL name.
+    /// Adds a fact, unless an argument is an individual without a PDDL name.
     fn fact(&mut self, predicate: &Name, arguments: &[&str]) {
         if arguments.iter().all(|argument| is_pddl_name(argument)) {
             self.problem.init.push(InitialElement::Fact(atom(predicate, arguments)));
         }
     }
 
-    /// What the problem itself says with a predicate.
+    /// Returns the argument lists of the facts that the problem states with a predicate.
     fn stated(&self, predicate: &Name) -> BTreeSet<Vec<Name>> {
         let arguments = |element: &InitialElement| match element {
             InitialElement::Fact(atom) if atom.predicate.name == *predicate => Some(names(&atom.arguments)),
@@ -330,9 +341,9 @@ impl Fill<'_> {
 
     fn available(&mut self, predicate: &Name) {
         let decides = |atom: &Atom| names(&atom.arguments).iter().any(|design| self.own.contains(design));
-        let own = |element: &InitialElement| matches!(element, InitialElement::Fact(a) if a.predicate.name == *predicate && !decides(a));
-        if self.problem.init.iter().any(own) {
-            self.problem.init.retain(|element| !own(element));
+        let is_overruled = |element: &InitialElement| matches!(element, InitialElement::Fact(a) if a.predicate.name == *predicate && !decides(a));
+        if self.problem.init.iter().any(is_overruled) {
+            self.problem.init.retain(|element| !is_overruled(element));
             let names: Vec<String> = self.own.iter().map(|design| format!("`{design}`")).collect();
             let but = if names.is_empty() {
                 String::new()
@@ -343,14 +354,15 @@ impl Fill<'_> {
                 format!("the problem's own `{predicate}` facts are ignored: the knowledge base decides{but}");
             self.warnings.push(Message::warning("M202", text));
         }
-        // Where it is not known what follows, nothing counts as available.
+        // After failed inference no design may count as available: an unknown failure must not be
+        // planned with.
         let is_known = self.is_known;
         for design in self.known.designs().iter().filter(|design| is_known && design.available) {
             self.fact(predicate, &[&design.individual.name]);
         }
     }
 
-    /// One atom for each action: the action (where the predicate has a place for it) and all its functions.
+    /// Adds a fact per action: the action, followed by all its functions.
     fn requires(&mut self, declared: &Declaration, only: Option<&str>) {
         let stated = self.stated(&declared.identifier.name);
         for action in self.known.actions() {
@@ -361,15 +373,16 @@ impl Fill<'_> {
             }
             let functions: Vec<&str> =
                 action.requires.iter().map(|function| function.name.as_str()).collect();
-            let all: Vec<&str> = std::iter::once(action.individual.name.as_str()).chain(functions).collect();
-            if stated.contains(&all.iter().map(|name| Name::new(name)).collect::<Vec<_>>()) {
-                // The problem says so, too.
-            } else if let Some(name) = all.iter().find(|name| !is_pddl_name(name)) {
+            let symbols: Vec<&str> =
+                std::iter::once(action.individual.name.as_str()).chain(functions).collect();
+            if stated.contains(&symbols.iter().map(|name| Name::new(name)).collect::<Vec<_>>()) {
+                // The problem already states this fact.
+            } else if let Some(name) = symbols.iter().find(|name| !is_pddl_name(name)) {
                 let text =
                     format!("`{}` requires `{name}`, which is not a PDDL name", action.individual.name);
                 self.warnings.push(Message::error("M117", text));
-            } else if all.len() == declared.parameters.len() {
-                self.fact(&declared.identifier.name, &all);
+            } else if symbols.len() == declared.parameters.len() {
+                self.fact(&declared.identifier.name, &symbols);
             } else {
                 let text = format!(
                     "`{}` has {} parameters, but {} requires {} functions; the action is left out",
@@ -432,7 +445,7 @@ pub(super) fn identifier(name: &Name) -> Identifier {
     Identifier { name: name.clone(), span: Span::default() }
 }
 
-/// An atom of constants.
+/// Builds an atom whose arguments are constants.
 pub fn atom(predicate: &Name, arguments: &[&str]) -> Atom {
     let constant = |argument: &&str| Term::Constant(identifier(&Name::new(argument)));
     Atom {

@@ -1,23 +1,24 @@
-//! `[bindings.names]` as it is written: what individuals of the knowledge base are called in the problem.
+//! Entries of `[bindings.names]` and `--name`: object names of individuals of the knowledge base.
 //!
 //! An entry is exact (`fd_spiral_low = "fd_search_low"`), or a pattern with one star on each side
-//! (`"fd_spiral_*" = "fd_search_*"`). What it comes to for a knowledge base and a problem is found out in `names`.
+//! (`"fd_spiral_*" = "fd_search_*"`). Module `names` resolves the entries for a knowledge base and
+//! a problem.
 
 use std::collections::BTreeMap;
 use std::fmt;
 
 use crate::message::Message;
 
-/// Where an entry stands: a file, and a line and column in it.
+/// Source location of an entry: a file, and a line and column in it.
 pub type Place = (String, Option<(usize, usize)>);
 
-/// Names of individuals, and of the objects that they are.
+/// Assignments of object names to individuals.
 #[derive(Clone, Default)]
 pub struct Names {
     entries: Vec<Naming>,
 }
 
-/// An entry.
+/// A single entry.
 #[derive(Debug, Clone)]
 pub(crate) struct Naming {
     /// The local name or IRI of an individual, or a pattern.
@@ -28,17 +29,17 @@ pub(crate) struct Naming {
 }
 
 impl Names {
-    /// Adds an entry; without a place it comes from the command line.
+    /// Adds an entry. An entry without a place originates from the command line.
     pub fn add(&mut self, individual: &str, object: &str, place: Option<Place>) {
         self.entries.push(Naming { individual: individual.to_owned(), object: object.to_owned(), place });
     }
 
-    /// Whether there is none.
+    /// Returns `true` if there are no entries.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
 
-    /// All entries, without their places.
+    /// Returns all entries, without their places.
     pub fn written(&self) -> BTreeMap<String, String> {
         self.entries.iter().map(|entry| (entry.individual.clone(), entry.object.clone())).collect()
     }
@@ -58,7 +59,7 @@ impl From<&BTreeMap<String, String>> for Names {
     }
 }
 
-/// Where the entries stand does not matter: the same names make the same mission.
+/// Omits the places: equal names make equal missions, wherever they are written.
 impl fmt::Debug for Names {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.written().fmt(f)
@@ -66,12 +67,13 @@ impl fmt::Debug for Names {
 }
 
 impl Naming {
-    /// Whether it is for several individuals.
+    /// Returns `true` if the entry applies to several individuals.
     pub(crate) fn is_pattern(&self) -> bool {
         self.individual.contains('*')
     }
 
-    /// What an individual with that name, local or IRI, is called by this entry.
+    /// Returns the object name that this entry gives to an individual with the local name or IRI
+    /// `name`.
     pub(crate) fn call(&self, name: &str) -> Option<String> {
         let Some((head, tail)) = self.individual.split_once('*') else {
             return (self.individual == name).then(|| self.object.clone());
@@ -80,7 +82,7 @@ impl Naming {
         Some(self.object.replacen('*', middle, 1))
     }
 
-    /// What is wrong with its form.
+    /// Describes the syntax error of the entry, if there is one.
     pub(crate) fn fault(&self) -> Option<&'static str> {
         let stars = |text: &str| text.matches('*').count();
         match (stars(&self.individual), stars(&self.object)) {
@@ -91,7 +93,7 @@ impl Naming {
         }
     }
 
-    /// That something is wrong with it.
+    /// Creates an error about the entry.
     pub(crate) fn wrong(&self, code: &str, text: &str) -> Message {
         match &self.place {
             Some((file, place)) => Message::at(code, file, *place, format!("`[bindings.names]`: {text}")),
@@ -99,7 +101,7 @@ impl Naming {
         }
     }
 
-    /// That something about it is questionable.
+    /// Creates a warning about the entry.
     pub(crate) fn questionable(&self, code: &str, text: &str) -> Message {
         match &self.place {
             Some((file, Some(place))) => {

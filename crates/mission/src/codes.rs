@@ -1,6 +1,6 @@
-//! What the codes of messages mean that this crate gives.
+//! Error codes of this crate, with their meaning, cause and remedy.
 
-/// Codes in their order, each with what it means, what causes it, and what to do.
+/// Codes in ascending order, each with meaning, cause and remedy.
 pub const CODES: &[[&str; 4]] = &[
     [
         "M101",

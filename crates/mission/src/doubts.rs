@@ -1,5 +1,5 @@
-//! What makes a mission adapt less than its author expects, though nothing is wrong with any of its files: names that meet
-//! nothing of the other side.
+//! Lints: legal but suspicious missions, which adapt less than their authors expect. Most of these
+//! lints report names of one side without a counterpart on the other side.
 
 use std::collections::BTreeSet;
 
@@ -14,11 +14,13 @@ use crate::knowledge::Knowledge;
 use crate::message::{Message, did_you_mean, nearest};
 
 impl Mission {
-    /// Warnings about names of the knowledge base that nothing stands for, and about values that nothing gives.
+    /// Returns lint warnings about names of the knowledge base without counterpart in PDDL, and
+    /// about functions and attributes without a value.
     pub fn doubts(&self) -> Vec<Message> {
         let Some(knowledge) = &self.knowledge else { return self.functions_without_value() };
         let mut doubts = Vec::new();
-        // In PLANTA's form conditions name the actions of the knowledge base.
+        // PLANTA's form names actions of the knowledge base in conditions, so schemas need no
+        // matching names.
         if self.planta.is_none() {
             doubts.extend(self.actions_without_schema(knowledge));
         }
@@ -31,46 +33,47 @@ impl Mission {
         doubts
     }
 
-    /// Bindings to what the knowledge base does not have.
+    /// Warns about bindings to names that the knowledge base does not have.
     fn idle_bindings(&self, knowledge: &Knowledge) -> Vec<Message> {
-        let (view, known) = (knowledge.view(), knowledge.catalogue());
-        let estimated: BTreeSet<&str> = known.designs().iter().flat_map(estimates).collect();
+        let (view, catalogue) = (knowledge.view(), knowledge.catalogue());
+        let estimated: BTreeSet<&str> = catalogue.designs().iter().flat_map(estimates).collect();
         let measured: BTreeSet<&str> =
-            known.measurements().iter().map(|own| own.attribute.as_str()).collect();
+            catalogue.measurements().iter().map(|measurement| measurement.attribute.as_str()).collect();
         let actions: BTreeSet<&str> =
-            known.actions().iter().map(|action| local_name(&action.individual.iri)).collect();
+            catalogue.actions().iter().map(|action| local_name(&action.individual.iri)).collect();
         let doubt = |symbol: &str, query: &str, lacks: &str, name: &str, names: &BTreeSet<&str>| {
-            let meant = did_you_mean(name, names.iter().copied());
-            let text = format!("`{symbol}` is bound to `{query}`, but {lacks} `{name}`{meant}");
+            let suggestion = did_you_mean(name, names.iter().copied());
+            let text = format!("`{symbol}` is bound to `{query}`, but {lacks} `{name}`{suggestion}");
             Message::warning("M227", text)
         };
         let idle = |(symbol, query): (&String, &String)| {
             let (kind, name) = query.split_once(':')?;
-            let none = BTreeSet::new();
+            let empty = BTreeSet::new();
             let (lacks, names) = match kind {
                 "estimation" | "chosen" | "reconfigured" => ("no design has an estimation of", &estimated),
                 "measured" => ("nothing has been measured of", &measured),
                 "action" | "requires" => ("the knowledge base has no action", &actions),
-                "class" if known.members(&view, name).is_empty() => {
-                    ("the knowledge base has no individuals of", &none)
+                "class" if catalogue.members(&view, name).is_empty() => {
+                    ("the knowledge base has no individuals of", &empty)
                 }
                 _ => return None,
             };
             let plain = name.strip_prefix("fd_").unwrap_or(name);
-            let is_there = [name, plain, &format!("a_{name}")].iter().any(|own| names.contains(*own));
+            let is_there = [name, plain, &format!("a_{name}")].iter().any(|form| names.contains(*form));
             (!is_there).then(|| doubt(symbol, query, lacks, name, names))
         };
         self.bindings.written().iter().filter_map(idle).collect()
     }
 
-    /// Actions of the knowledge base that no schema of the domain stands for.
+    /// Warns about actions of the knowledge base without a corresponding schema of the domain.
     fn actions_without_schema(&self, knowledge: &Knowledge) -> Vec<Message> {
         let schemas: Vec<&Name> = self.domain.actions.iter().map(|action| &action.identifier.name).collect();
-        let predicates: Vec<&Name> = self.domain.predicates.iter().map(|own| &own.identifier.name).collect();
+        let predicates: Vec<&Name> =
+            self.domain.predicates.iter().map(|predicate| &predicate.identifier.name).collect();
         let actions = knowledge.view().actions().into_iter();
-        let wanted = actions.filter(|action| !action.requires.is_empty() || !action.quality.is_empty());
+        let relevant = actions.filter(|action| !action.requires.is_empty() || !action.quality.is_empty());
         let mut doubts = Vec::new();
-        for action in wanted {
+        for action in relevant {
             let name = &action.individual.name;
             let has_schema = schemas.iter().any(|schema| self.bindings.is_action(schema, &action.individual));
             if has_schema
@@ -78,13 +81,13 @@ impl Mission {
             {
                 continue;
             }
-            let known = schemas.iter().map(|schema| schema.as_str());
-            let meant = nearest(name.strip_prefix("a_").unwrap_or(name), known);
-            let meant = meant.map_or_else(String::new, |meant| {
-                format!("; if it is `{meant}`, name it so, or bind `{meant} = \"action:{name}\"`")
+            let candidates = schemas.iter().map(|schema| schema.as_str());
+            let nearest_schema = nearest(name.strip_prefix("a_").unwrap_or(name), candidates);
+            let nearest_schema = nearest_schema.map_or_else(String::new, |nearest_schema| {
+                format!("; if it is `{nearest_schema}`, name it so, or bind `{nearest_schema} = \"action:{name}\"`")
             });
             let text = format!(
-                "no action of the domain stands for <{}>, so what it requires is not asked of any{meant}",
+                "no action of the domain stands for <{}>, so what it requires is not asked of any{nearest_schema}",
                 action.individual.iri
             );
             doubts.push(doubt_about(knowledge, "M205", &action.individual.iri, text));
@@ -92,7 +95,7 @@ impl Mission {
         doubts
     }
 
-    /// Numeric functions that are used, and have no value.
+    /// Warns about numeric functions that are used but have no value.
     fn functions_without_value(&self) -> Vec<Message> {
         if self.domain.functions.is_empty() {
             return Vec::new();
@@ -109,6 +112,7 @@ impl Mission {
             .collect();
         let text = print_domain(&self.domain);
         let is_used = |name: &Name| {
+            // The declaration is an occurrence itself, so a used function occurs at least twice.
             let count = [format!("({name})"), format!("({name} ")];
             count.iter().map(|form| text.matches(form.as_str()).count()).sum::<usize>() > 1
         };
@@ -127,20 +131,20 @@ impl Mission {
                 && !effects.iter().any(|effect| assigns(effect, name))
         });
         let warning = |identifier: &pddl::ast::Identifier| {
-            let who = match self.knowledge {
+            let sources = match self.knowledge {
                 Some(_) => "neither the problem nor the knowledge base, by its name or a binding",
                 None => "the problem does not, and there is no knowledge base",
             };
-            let text = format!("nothing gives `{}` a value: {who}", identifier.name);
-            let found =
+            let text = format!("nothing gives `{}` a value: {sources}", identifier.name);
+            let diagnostic =
                 Diagnostic::new(&self.domain_source, identifier.span, Severity::Warning, "M206", text);
-            Message::from_pddl(&[found], &[&self.domain_source])
+            Message::from_pddl(&[diagnostic], &[&self.domain_source])
         };
         silent.flat_map(warning).collect()
     }
 }
 
-/// The attributes of which a design has an estimation.
+/// Returns the attributes for which a design has an estimation.
 fn estimates(design: &FunctionDesign) -> impl Iterator<Item = &str> {
     design.estimations.keys().map(String::as_str)
 }
@@ -154,37 +158,42 @@ fn assigns(effect: &Effect, name: &Name) -> bool {
     }
 }
 
-/// What is stated of an individual as a subject, and of which it is the object.
+/// Returns the asserted facts with an individual as their subject, and those with it as another
+/// argument.
 fn stated(engine: &Engine, iri: &str) -> (Vec<Fact>, Vec<Fact>) {
     let Some(symbol) = engine.symbols().find_name(iri) else { return (Vec::new(), Vec::new()) };
     let facts = engine.facts().filter(|fact| engine.is_asserted(fact) && fact.arguments.contains(&symbol));
     facts.partition(|fact| fact.arguments.first() == Some(&symbol))
 }
 
-/// Components that are only mentioned, and components that no design requires.
+/// Warns about components that are only mentioned, and about components that no design requires.
 fn components(knowledge: &Knowledge) -> Vec<Message> {
     let (engine, view) = (knowledge.engine(), knowledge.view());
     let designs = view.function_designs();
-    let required: BTreeSet<&str> =
-        designs.iter().flat_map(|design| &design.components).map(|own| own.iri.as_str()).collect();
-    let all = view.components();
-    let names: Vec<String> = all.iter().map(|component| component.individual.name.clone()).collect();
+    let required: BTreeSet<&str> = designs
+        .iter()
+        .flat_map(|design| &design.components)
+        .map(|component| component.iri.as_str())
+        .collect();
+    let components = view.components();
+    let names: Vec<String> = components.iter().map(|component| component.individual.name.clone()).collect();
     let mut doubts = Vec::new();
-    for component in all.iter().map(|component| &component.individual) {
-        let (own, other) = stated(engine, &component.iri);
-        if own.is_empty() {
-            let known = names.iter().map(String::as_str).filter(|name| **name != component.name);
-            let meant = nearest(&component.name, known).map(|name| format!("; did you mean `{name}`?"));
+    for component in components.iter().map(|component| &component.individual) {
+        let (about, referring) = stated(engine, &component.iri);
+        if about.is_empty() {
+            let candidates = names.iter().map(String::as_str).filter(|name| **name != component.name);
+            let suggestion =
+                nearest(&component.name, candidates).map(|name| format!("; did you mean `{name}`?"));
             let text = format!(
                 "the component <{}> is only mentioned, and nothing else is said of it{}",
                 component.iri,
-                meant.unwrap_or_default()
+                suggestion.unwrap_or_default()
             );
             doubts.push(doubt_about(knowledge, "M207", &component.iri, text));
         } else if !required.is_empty()
             && !required.contains(component.iri.as_str())
-            && other.is_empty()
-            && own.iter().all(|fact| is_plain(engine, fact))
+            && referring.is_empty()
+            && about.iter().all(|fact| is_plain(engine, fact))
         {
             let text = format!(
                 "no design requires the component <{}>, so its failure changes nothing",
@@ -196,30 +205,38 @@ fn components(knowledge: &Knowledge) -> Vec<Message> {
     doubts
 }
 
-/// Whether a fact says only what something is, or how it is.
+/// Returns `true` for a class membership or a component status, which give a component no effect on
+/// designs.
 fn is_plain(engine: &Engine, fact: &Fact) -> bool {
     let name = engine.symbols().value(fact.predicate).as_name().unwrap_or_default();
     fact.arguments.len() == 1 || local_name(name) == "c_status"
 }
 
-/// Attributes that nothing gives a value, and bounds of actions on attributes that no design estimates.
+/// Warns about attributes without a value, and about bounds of actions on attributes that no design
+/// estimates.
 fn attributes(knowledge: &Knowledge) -> Vec<Message> {
     let (engine, view) = (knowledge.engine(), knowledge.view());
     let designs = view.function_designs();
     let estimated: BTreeSet<&str> = designs.iter().flat_map(estimates).collect();
-    let bounded: BTreeSet<&str> =
-        designs.iter().flat_map(|design| &design.requirements).map(|own| own.attribute.as_str()).collect();
+    let bounded: BTreeSet<&str> = designs
+        .iter()
+        .flat_map(|design| &design.requirements)
+        .map(|bound| bound.attribute.as_str())
+        .collect();
     let mut doubts = Vec::new();
-    let all = view.attribute_types();
+    let attributes = view.attribute_types();
     let mentioned = |iri: &str| stated(engine, iri).0.is_empty();
-    for kind in all.iter().filter(|kind| mentioned(&kind.iri)) {
-        let others = all.iter().filter(|other| other.iri != kind.iri && !mentioned(&other.iri));
-        let meant = did_you_mean(&kind.name, others.map(|other| other.name.as_str()));
-        let text =
-            format!("the attribute <{}> is only mentioned, and nothing else is said of it{meant}", kind.iri);
+    for kind in attributes.iter().filter(|kind| mentioned(&kind.iri)) {
+        let candidates =
+            attributes.iter().filter(|candidate| candidate.iri != kind.iri && !mentioned(&candidate.iri));
+        let suggestion = did_you_mean(&kind.name, candidates.map(|candidate| candidate.name.as_str()));
+        let text = format!(
+            "the attribute <{}> is only mentioned, and nothing else is said of it{suggestion}",
+            kind.iri
+        );
         doubts.push(doubt_about(knowledge, "M229", &kind.iri, text));
     }
-    for kind in all {
+    for kind in attributes {
         let used = estimated.contains(kind.name.as_str()) || bounded.contains(kind.name.as_str());
         if !used && stated(engine, &kind.iri).1.is_empty() {
             let text = format!("nothing gives the attribute <{}> a value, and nothing bounds it", kind.iri);
@@ -241,9 +258,11 @@ fn attributes(knowledge: &Knowledge) -> Vec<Message> {
     doubts
 }
 
-/// A warning with the place where a document first has the name of an individual, if one of those that were read has it.
+/// Creates a warning at the first occurrence of an individual's local name in the documents, or
+/// without a location.
 pub fn doubt_about(knowledge: &Knowledge, code: &str, iri: &str, text: String) -> Message {
     let name = local_name(iri);
+    // `fd_a` must not match inside `fd_ab`, and a comment is not the place to correct.
     let is_part = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == '-');
     for file in knowledge.documents() {
         let Ok(document) = std::fs::read_to_string(file) else { continue };

@@ -1,5 +1,5 @@
-//! Files to what they are: regular ones of a reasonable size, and of the expected kind. Of a file of another kind nothing is
-//! quoted in a message: a hostile manifest may name any file.
+//! Reads input files and detects their kind. Only regular files of limited size are read. Messages
+//! never quote a file of another kind than expected, because a hostile manifest may name any file.
 
 use std::collections::BTreeMap;
 use std::io::{self, Read as _};
@@ -13,16 +13,16 @@ use crate::message::Message;
 
 mod output;
 
-/// The code of the message that a file is of another kind.
+/// Error code for a file of an unexpected kind.
 pub(crate) const CODE: &str = "M131";
 
-/// Files with more bytes are not read.
+/// Size limit of input files, in bytes.
 const LARGEST: u64 = 1 << 28;
 
-/// Reads a file, which must be a regular one.
+/// Reads a regular file.
 ///
 /// # Errors
-/// As reading does; it is none, or too large.
+/// The file cannot be read, is not regular, or exceeds the size limit.
 pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
     let found = std::fs::metadata(path)?;
     if found.is_dir() {
@@ -32,6 +32,8 @@ pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
         return Err(io::Error::other("it is not a regular file"));
     }
     let mut bytes = Vec::new();
+    // Reading is bounded as well as checked, because the file may grow after the query of its
+    // metadata.
     std::fs::File::open(path)?.take(LARGEST + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > LARGEST {
         return Err(io::Error::other(format!("it has more than {LARGEST} bytes")));
@@ -39,7 +41,7 @@ pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Reads a text file; `-` is standard input.
+/// Reads a text file, or standard input if the path is `-`.
 ///
 /// # Errors
 /// The file cannot be read.
@@ -57,7 +59,7 @@ pub fn source(path: &Path) -> Result<Source, Message> {
     }
 }
 
-/// What a text may be.
+/// Kind of an input file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// A mission's manifest, in TOML.
@@ -71,12 +73,12 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// What a text looks like, by its first words.
+    /// Detects the kind of a text by its first words.
     fn of(text: &str) -> Option<Self> {
         let mut lines = text.lines().map(str::trim_start);
         let first = lines.find(|line| !line.is_empty() && !line.starts_with([';', '#']))?;
-        let rest = &text[text.find(first).unwrap_or(0)..];
-        let words: String = rest.chars().take(200).collect::<String>().to_ascii_lowercase();
+        let content = &text[text.find(first).unwrap_or(0)..];
+        let words: String = content.chars().take(200).collect::<String>().to_ascii_lowercase();
         let words = words.replace('(', " ( ");
         let words: Vec<&str> = words.split_whitespace().take(4).collect();
         match words[..] {
@@ -105,7 +107,7 @@ impl Kind {
     }
 }
 
-/// Whether a line is `key = ...` or `[table]`.
+/// Returns `true` if a line is `key = ...` or `[table]`.
 fn is_toml(line: &str) -> bool {
     let is_key =
         |key: &str| !key.is_empty() && key.chars().all(|c| c.is_alphanumeric() || "_-.\"' ".contains(c));
@@ -115,25 +117,26 @@ fn is_toml(line: &str) -> bool {
     }
 }
 
-/// That a text is of a kind.
+/// Checks that a text is of the expected kind.
 ///
 /// # Errors
-/// What it is instead, and what to do; nothing of the text is quoted.
+/// Names the detected kind and a remedy. The text itself is not quoted.
 pub fn expect(kind: Kind, file: &str, text: &str) -> Result<(), Message> {
-    let found = Kind::of(text);
-    // What has a parenthesis first may be meant as PDDL, and the parser knows better what is wrong with it.
+    let detected = Kind::of(text);
+    // A text that begins with a parenthesis may be malformed PDDL. The parser then reports a more
+    // precise error.
     let trimmed = text.lines().map(str::trim_start).find(|line| !line.is_empty() && !line.starts_with(';'));
     let is_list = trimmed.is_none_or(|line| line.starts_with('('));
     let is_pddl = matches!(kind, Kind::Domain | Kind::Problem);
-    let fits = match found {
-        Some(found) => found == kind,
+    let fits = match detected {
+        Some(detected) => detected == kind,
         None => is_list == is_pddl || trimmed.is_none() || !is_pddl && kind != Kind::Manifest,
     };
     if fits {
         return Ok(());
     }
-    let is = found.map_or_else(|| "something else".to_owned(), |found| found.name().to_owned());
-    let help = match (kind, found) {
+    let is = detected.map_or_else(|| "something else".to_owned(), |detected| detected.name().to_owned());
+    let help = match (kind, detected) {
         (Kind::Manifest, Some(Kind::Domain)) => "; give the problem, too: DOMAIN PROBLEM",
         (Kind::Manifest, Some(Kind::Problem)) => "; give the domain first: DOMAIN PROBLEM",
         (Kind::Manifest, Some(Kind::Knowledge)) => {
@@ -148,29 +151,31 @@ pub fn expect(kind: Kind, file: &str, text: &str) -> Result<(), Message> {
     Err(Message::at(CODE, file, None, text))
 }
 
-/// The first words of a document of a knowledge base, whatever its syntax.
+/// First words of a knowledge-base document, in all supported syntaxes.
 const BEGINNINGS: [&str; 10] =
     ["@", "prefix", "base", "<", "_:", "[", "(", "ontology", "version", "\u{feff}"];
 
-/// Messages about knowledge bases without what a document is quoted for that does not begin like one: it may be any file.
+/// Replaces parse errors of files that do not begin like a knowledge base. Such a file may be any
+/// file of the system, and parse errors quote their input.
 pub(crate) fn discreet(messages: Vec<Message>) -> Vec<Message> {
-    let mut kept: Vec<Message> = Vec::new();
+    let mut result: Vec<Message> = Vec::new();
     for message in messages {
         let file =
             message.file.clone().filter(|file| message.code == "O102" && !is_knowledge(Path::new(file)));
         let Some(file) = file else {
-            kept.push(message);
+            result.push(message);
             continue;
         };
-        if !kept.iter().any(|known| known.code == CODE && known.file.as_ref() == Some(&file)) {
+        if !result.iter().any(|message| message.code == CODE && message.file.as_ref() == Some(&file)) {
             let text = format!("this should be {}, but is something else", Kind::Knowledge.name());
-            kept.push(Message::at(CODE, &file, None, text));
+            result.push(Message::at(CODE, &file, None, text));
         }
     }
-    kept
+    result
 }
 
-/// Messages about documents of knowledge bases with the lines that they are about, where a file begins like one.
+/// Adds source lines to messages about knowledge-base documents, if the file begins like such a
+/// document.
 pub(crate) fn quoted(messages: Vec<Message>) -> Vec<Message> {
     let mut texts: BTreeMap<String, Option<String>> = BTreeMap::new();
     let quoted = |message: Message| {
@@ -178,7 +183,7 @@ pub(crate) fn quoted(messages: Vec<Message>) -> Vec<Message> {
         let text = texts.entry(file).or_insert_with_key(|file| {
             let path = Path::new(file);
             let bytes = is_knowledge(path).then(|| read(path).ok()).flatten()?;
-            // A byte order mark has no column.
+            // A byte order mark does not count as a column.
             let bytes = bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(&bytes);
             String::from_utf8(bytes.to_vec()).ok().filter(|text| !text.contains('\0'))
         });
@@ -190,14 +195,15 @@ pub(crate) fn quoted(messages: Vec<Message>) -> Vec<Message> {
     messages.into_iter().map(quoted).collect()
 }
 
-/// Whether a file begins like a knowledge base. What is not a file, or cannot be read, was given otherwise.
+/// Returns `true` if a file begins like a knowledge base, or cannot be opened. An unreadable file
+/// has not been quoted from disk.
 fn is_knowledge(path: &Path) -> bool {
     let Ok(file) = std::fs::File::open(path) else { return true };
     let mut bytes = Vec::new();
     if file.take(1 << 16).read_to_end(&mut bytes).is_err() {
         return true;
     }
-    // Text of two bytes a character has zeros between.
+    // ASCII text in UTF-16 has a zero byte in each character.
     let text: String = String::from_utf8_lossy(&bytes).chars().filter(|c| *c != '\0').collect();
     let first = text.lines().map(str::trim_start).find(|line| !line.is_empty() && !line.starts_with('#'));
     let first = first.unwrap_or("@").to_ascii_lowercase();
@@ -213,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn kinds_are_told_by_their_first_words() {
+    fn kinds_are_detected_by_their_first_words() {
         check("; a domain\n\n ( define(domain d)", Some(Kind::Domain));
         check("(define (problem p)", Some(Kind::Problem));
         check("# a robot\n@prefix : <http://e.org/> .", Some(Kind::Knowledge));
@@ -225,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_expected_is_taken_and_nothing_else_is_quoted() {
+    fn expected_kinds_are_accepted_and_other_files_are_not_quoted() {
         let secret = "root:*:20228:0:99999:7:::\n";
         for kind in [Kind::Domain, Kind::Problem] {
             let message = expect(kind, "f", secret).expect_err("no PDDL").text().to_owned();

@@ -1,4 +1,4 @@
-//! A mission: what the robot is (a knowledge base) and what it has to do (PDDL), joined.
+//! [`Mission`]: a knowledge base joined with a PDDL domain and problem.
 
 use std::collections::{BTreeSet, HashSet};
 
@@ -14,10 +14,10 @@ use crate::names::{self, Meeting, NeverNamed};
 use crate::native::CoAdaptation;
 use crate::planta::Planta;
 
-/// A mission that can be planned.
+/// A mission that is ready for planning.
 #[derive(Debug, Clone)]
 pub struct Mission {
-    /// Its name.
+    /// Name of the mission.
     pub name: String,
     pub(super) knowledge: Option<Knowledge>,
     pub(super) bindings: Bindings,
@@ -26,19 +26,20 @@ pub struct Mission {
     pub(super) domain: Domain,
     pub(super) problem: Problem,
     pub(super) adaptation: Option<CoAdaptation>,
-    /// Designs about whose availability the problem itself decides.
+    /// Designs whose availability is stated by the problem, not inferred from the knowledge base.
     pub(super) own: BTreeSet<Name>,
-    /// That the problem does not name all designs of the knowledge base: the IRI of one, and what is to be said.
+    /// Set if the problem does not name all designs of the knowledge base: the IRI of the first
+    /// unnamed design and the text of the warning.
     pub(super) never_named: NeverNamed,
     pub(super) planta: Option<Planta>,
     warnings: Vec<Message>,
 }
 
 impl Mission {
-    /// Joins a knowledge base, if there is one, with a domain and a problem.
+    /// Joins a domain and a problem with a knowledge base, if there is one.
     ///
     /// # Errors
-    /// All that is wrong with any of them.
+    /// All errors of the knowledge base, the domain, the problem and the bindings.
     pub fn new(
         name: &str,
         knowledge: Option<Result<Knowledge, Errors>>,
@@ -64,7 +65,8 @@ impl Mission {
         for (kind, source) in [(Kind::Domain, &domain_source), (Kind::Problem, &problem_source)] {
             errors.extend(file::expect(kind, source.name(), source.text()).err());
         }
-        // Of what is not PDDL nothing is shown.
+        // The PDDL parser quotes its input. A file of another kind may contain secrets, so it is
+        // never parsed.
         if errors.iter().any(|error| error.code == file::CODE) {
             return Err(errors.into());
         }
@@ -84,8 +86,9 @@ impl Mission {
             warnings.extend(more);
             Some(planta)
         });
-        let (own, never_named) = match &mut knowledge {
-            // A template names what the knowledge base has.
+        let (problem_designs, never_named) = match &mut knowledge {
+            // PLANTA's form completes the domain with the names of the knowledge base, so there is
+            // nothing to align.
             Some(knowledge) if planta.is_none() => {
                 let files = ((&domain, &domain_source), (&problem, &problem_source));
                 joined_names(files, knowledge, &bindings, &mut warnings)?
@@ -98,7 +101,9 @@ impl Mission {
             }
             _ => None,
         };
-        let domain = adaptation.as_ref().map_or_else(|| domain.clone(), |own| own.explicit(&domain));
+        let domain = adaptation
+            .as_ref()
+            .map_or_else(|| domain.clone(), |problem_designs| problem_designs.explicit(&domain));
         let name = name.to_owned();
         Ok(Self {
             name,
@@ -109,29 +114,31 @@ impl Mission {
             domain,
             problem,
             adaptation,
-            own,
+            own: problem_designs,
             never_named,
             planta,
             warnings,
         })
     }
 
-    /// What is questionable about the files.
+    /// Returns the warnings about the input files.
     pub fn warnings(&self) -> impl Iterator<Item = &Message> {
         self.warnings.iter().chain(self.knowledge.iter().flat_map(Knowledge::warnings))
     }
 
-    /// Changes the warnings of joining, to add what only who has read the mission knows.
+    /// Replaces the warnings of the mission by the result of `change`. The caller can thus adapt
+    /// them to a context that this crate does not have.
     pub fn change_warnings(&mut self, change: impl FnOnce(Vec<Message>) -> Vec<Message>) {
         self.warnings = change(std::mem::take(&mut self.warnings));
     }
 
-    /// Adds [`Mission::doubts`] to the warnings, once the situation is complete.
+    /// Adds [`Mission::doubts`] to the warnings. To be called after all settings and failures are
+    /// applied.
     pub fn note_doubts(&mut self) {
         self.warnings.extend(self.doubts());
     }
 
-    /// The knowledge base, if the mission has one.
+    /// Returns the knowledge base, if the mission has one.
     pub fn knowledge(&self) -> Option<&Knowledge> {
         self.knowledge.as_ref()
     }
@@ -139,7 +146,7 @@ impl Mission {
     /// Marks a component as failed.
     ///
     /// # Errors
-    /// There is no such component, or no knowledge base that could have one.
+    /// The knowledge base has no such component, or the mission has no knowledge base.
     pub fn fail(&mut self, component: &str) -> Result<(), Message> {
         match &mut self.knowledge {
             Some(knowledge) => knowledge.fail(component),
@@ -150,9 +157,10 @@ impl Mission {
         }
     }
 
-    /// Changes the goal: the last argument of its first atom with this predicate.
+    /// Replaces the last argument of the first goal atom with this predicate.
     pub fn aim(&mut self, predicate: &str, object: &str) {
         let mut parts = vec![&mut self.problem.goal];
+        // Popping from a stack with reversed pushes visits the atoms in their textual order.
         while let Some(part) = parts.pop() {
             match part {
                 Condition::And(more) => parts.extend(more.iter_mut().rev()),
@@ -167,10 +175,11 @@ impl Mission {
         }
     }
 
-    /// The problem as it is to be planned: with what the knowledge base contributes.
+    /// Returns the problem completed with the objects, facts and values from the knowledge base,
+    /// and warnings.
     ///
     /// # Errors
-    /// What the knowledge base contributes does not fit the domain.
+    /// The contributions of the knowledge base do not fit the domain.
     pub fn filled(&self) -> Result<(Problem, Vec<Message>), Errors> {
         let _span = info_span!("fill").entered();
         let mut problem = self.problem.clone();
@@ -178,18 +187,19 @@ impl Mission {
         if warnings.iter().any(Message::is_error) {
             return Err(warnings.into());
         }
-        let found = pddl::check(&self.domain, &self.domain_source, &problem, &self.problem_source);
+        let diagnostics = pddl::check(&self.domain, &self.domain_source, &problem, &self.problem_source);
         let (errors, questionable): (Vec<_>, Vec<_>) =
-            found.into_iter().partition(|diagnostic| diagnostic.severity == Severity::Error);
+            diagnostics.into_iter().partition(|diagnostic| diagnostic.severity == Severity::Error);
         let sources = [&self.domain_source, &self.problem_source];
         if errors.is_empty() {
             warnings.extend(Message::from_pddl(&questionable, &sources));
             return Ok((problem, warnings));
         }
-        // What settings and the knowledge base have contributed stands in no file.
-        let (contributed, own): (Vec<_>, Vec<_>) =
+        // Contributions of settings and of the knowledge base have no source location. Their
+        // messages must not point into a file.
+        let (contributed, located): (Vec<_>, Vec<_>) =
             errors.into_iter().partition(|diagnostic| diagnostic.span == pddl::ast::Span::default());
-        let mut messages = Message::from_pddl(&own, &sources);
+        let mut messages = Message::from_pddl(&located, &sources);
         if self.planta.is_some() && messages.iter().any(|message| message.code == "P134") {
             messages.retain(|message| message.code != "P134");
             messages.extend(Planta::unknown(&self.domain));
@@ -201,52 +211,56 @@ impl Mission {
         Err(messages.into())
     }
 
-    /// The predicates about which the knowledge base says something, if it completes the domain (PLANTA's form); none otherwise.
+    /// Returns the predicates that the knowledge base adds to the domain in PLANTA's form, or
+    /// `None` for other missions.
     pub fn completed_predicates(&self) -> Option<&HashSet<Name>> {
         self.planta.as_ref().map(Planta::known)
     }
 
-    /// A condition as it is shown to people: a plain domain is completed with predicates that its author does not know. That a design
-    /// meets a requirement is `(meets DESIGN REQUIREMENT)`.
+    /// Rewrites a condition for display: predicates that only the explicit form has are replaced.
+    /// "A design meets a requirement" becomes `(meets DESIGN REQUIREMENT)`.
     pub fn spoken(&self, condition: &str) -> String {
-        self.adaptation.as_ref().map_or_else(|| condition.to_owned(), |own| own.spoken(condition))
+        self.adaptation
+            .as_ref()
+            .map_or_else(|| condition.to_owned(), |adaptation| adaptation.spoken(condition))
     }
 
-    /// What the knowledge base adds to the actions of a plain domain; none if the domain is explicit.
+    /// Returns the additions of the knowledge base to the actions of a plain domain, or `None` if
+    /// the domain is explicit.
     pub fn adaptation(&self) -> Option<&CoAdaptation> {
         self.adaptation.as_ref()
     }
 
-    /// The bindings.
+    /// Returns the bindings.
     pub fn bindings(&self) -> &Bindings {
         &self.bindings
     }
 
-    /// The domain as its file has it.
+    /// Returns the source text of the domain file.
     pub fn domain_source(&self) -> &Source {
         &self.domain_source
     }
 
-    /// The problem as its file has it.
+    /// Returns the source text of the problem file.
     pub fn problem_source(&self) -> &Source {
         &self.problem_source
     }
 
-    /// The predicates that say which design solves which function.
+    /// Returns the predicates `(p DESIGN FUNCTION)` that state which design solves which function.
     pub fn solves(&self) -> Vec<Name> {
         self.bindings.solves()
     }
 
-    /// The domain, in explicit form if its file is plain.
+    /// Returns the domain, in explicit form if its file is plain.
     pub fn domain(&self) -> &Domain {
         &self.domain
     }
 
-    /// An objective from its text: an expression as it stands in a metric, or the name of a function without
+    /// Parses an objective: an expression as in a PDDL metric, or the name of a function without
     /// parameters.
     ///
     /// # Errors
-    /// All that is wrong with it.
+    /// All syntax and type errors of the expression.
     pub fn objective(&self, problem: &Problem, text: &str) -> Result<Metric, Errors> {
         let text = text.trim();
         let is_word = !text.starts_with('(') && !text.eq_ignore_ascii_case("total-time");
@@ -257,11 +271,13 @@ impl Mission {
     }
 }
 
-/// Gives individuals the names that the bindings say, and compares the names of both sides; returns the designs about whose
-/// availability the problem itself decides, and those that it never names.
+/// Renames individuals according to the bindings and aligns the names of both sides. Returns the
+/// designs whose availability is stated by the problem, and the designs that the problem never
+/// names.
 ///
 /// # Errors
-/// Names that cannot be given, and functions of which no design is known to both sides.
+/// Invalid entries of `[bindings.names]`, and required functions without a design that both sides
+/// know.
 fn joined_names(
     (domain, problem): ((&Domain, &Source), (&Problem, &Source)),
     knowledge: &mut Knowledge,
@@ -270,14 +286,15 @@ fn joined_names(
 ) -> Result<(BTreeSet<Name>, NeverNamed), Errors> {
     let (called, more) = names::resolve(domain.0, problem.0, knowledge, bindings)?;
     warnings.extend(more);
+    // The alignment compares names, so the renaming must be complete before it.
     knowledge.call(called);
-    let Meeting { own, errors, warnings: more, never_named } =
+    let Meeting { own: problem_designs, errors, warnings: more, never_named } =
         names::meet(domain, problem, knowledge, bindings);
     if !errors.is_empty() {
         return Err(errors.into_iter().chain(more).collect());
     }
     warnings.extend(more);
-    Ok((own, never_named))
+    Ok((problem_designs, never_named))
 }
 
 fn parse(domain: &Source, problem: &Source) -> Result<(Domain, Problem, Vec<Message>), Errors> {

@@ -1,7 +1,10 @@
-//! What the robot is (a knowledge base) and what it has to do (PDDL), joined.
+//! Joins a knowledge base, which describes the robot, with a PDDL domain and problem, which
+//! describe its task.
 //!
-//! The PDDL problem gets its functions, designs and actions, which designs are available, and the values of quality attributes
-//! from the knowledge base, by the bindings of the mission. Nothing plans here: who checks a plan joins the two as who makes it.
+//! The PDDL problem receives its functions, its designs with their availability, its actions and
+//! the values of quality attributes from the knowledge base, according to the bindings of the
+//! mission. This crate contains no planner, so that the certificate checker fills a problem with
+//! the same code as the planner.
 //!
 #![doc = include_str!("../README.md")]
 

@@ -1,4 +1,5 @@
-//! A mission under way: the problem changes with what the robot does and reports, and the knowledge with it.
+//! State of a running mission: changes of the problem and the knowledge base as the robot acts and
+//! reports.
 
 use std::borrow::Cow;
 
@@ -13,7 +14,8 @@ use crate::knowledge::Knowledge;
 use crate::message::{Errors, Message};
 
 impl Mission {
-    /// Adds to a problem of this mission what the knowledge base contributes now; returns warnings.
+    /// Adds the current contributions of the knowledge base to a problem of this mission. Returns
+    /// warnings.
     pub fn fill(&self, problem: &mut Problem) -> Vec<Message> {
         self.knowledge.as_ref().map_or_else(Vec::new, |knowledge| {
             if let Some(planta) = &self.planta {
@@ -23,33 +25,35 @@ impl Mission {
             if let Some(adaptation) = &self.adaptation {
                 adaptation.fill(problem, knowledge.catalogue().designs());
             }
-            let stands = |name: &Name| self.stands_for_designs(name);
-            binding::fill(&self.domain, problem, knowledge, &self.bindings, &self.own, &stands)
+            let is_replaced = |name: &Name| self.stands_for_designs(name);
+            binding::fill(&self.domain, problem, knowledge, &self.bindings, &self.own, &is_replaced)
         })
     }
 
-    /// Whether a function of a plain domain stands for the chosen designs, or for those that a change has brought.
+    /// Returns `true` if a function of a plain domain is a sum over the chosen designs or over the
+    /// changed designs.
     pub(crate) fn stands_for_designs(&self, function: &Name) -> bool {
-        self.adaptation.as_ref().is_some_and(|own| own.stands_for_designs(function))
+        self.adaptation.as_ref().is_some_and(|adaptation| adaptation.stands_for_designs(function))
     }
 
-    /// The knowledge base, to change it.
+    /// Returns the knowledge base for modification.
     pub fn knowledge_mut(&mut self) -> Option<&mut Knowledge> {
         self.knowledge.as_mut()
     }
 
-    /// The problem as it is believed now, without what the knowledge base contributes.
+    /// Returns the problem in its current state, without the contributions of the knowledge base.
     pub fn problem(&self) -> &Problem {
         &self.problem
     }
 
-    /// Whether a measured attribute, by local name, gives a function of the problem its value, and which.
+    /// Returns the function of the problem whose value is a measured attribute, given by local
+    /// name.
     pub fn fed_by(&self, attribute: &str) -> Option<String> {
         let fed = |declared: &&Declaration| self.bindings.is_measured(declared, attribute);
         self.domain.functions.iter().find(fed).map(|declared| declared.identifier.name.to_string())
     }
 
-    /// Whether the problem has a numeric function of that name and number of arguments.
+    /// Returns `true` if the problem has a numeric function of that name and number of arguments.
     pub fn is_function(&self, name: &str) -> bool {
         let mut words = name.split_whitespace();
         let symbol = words.next().map(Name::new);
@@ -60,7 +64,7 @@ impl Mission {
             .any(|d| Some(&d.identifier.name) == symbol.as_ref() && d.parameters.len() == arguments)
     }
 
-    /// Whether the problem states a fact, as `predicate arguments`.
+    /// Returns `true` if the problem states a fact, given as `predicate arguments`.
     pub fn holds(&self, fact: &str) -> bool {
         let words: Vec<Name> = fact.split_whitespace().map(Name::new).collect();
         self.problem.init.iter().any(|element| match element {
@@ -72,7 +76,8 @@ impl Mission {
         })
     }
 
-    /// The functions without parameters that have a value in the problem, and it.
+    /// Returns the functions without parameters that have a value in the problem, with their
+    /// values.
     pub fn values(&self) -> Vec<(String, BigRational)> {
         let values = self.problem.init.iter().filter_map(|element| match element {
             InitialElement::Value(atom, value, _) if atom.arguments.is_empty() => {
@@ -83,7 +88,7 @@ impl Mission {
         values.collect()
     }
 
-    /// The value of a function that the problem states, by name and arguments.
+    /// Returns the value that the problem states for a function, given by name and arguments.
     pub fn value(&self, name: &str) -> Option<BigRational> {
         let words: Vec<&str> = name.split_whitespace().collect();
         self.problem.init.iter().find_map(|element| match element {
@@ -92,25 +97,27 @@ impl Mission {
         })
     }
 
-    /// Whether the problem itself says if a design is available: the knowledge base knows neither it nor a function that it
-    /// solves.
+    /// Returns `true` if the availability of a design is stated by the problem, because the
+    /// knowledge base has neither the design nor a function that it solves.
     pub fn decides_on(&self, design: &str) -> bool {
         self.own.contains(&Name::new(design))
     }
 
-    /// Whether a design that the problem decides on is available now, as far as the problem says.
+    /// Returns `true` if the problem decides on a design and states that it is available.
     pub fn provides(&self, design: &str) -> bool {
         let declared = self.domain.predicates.iter().map(|declared| &declared.identifier.name);
         let mut predicates = declared.filter(|name| self.bindings.is_availability(name));
         self.decides_on(design) && predicates.any(|predicate| self.holds(&format!("{predicate} {design}")))
     }
 
-    /// Says anew which designs of a filled problem are available: those that `allowed` answers with yes, asked with the
-    /// name of each design of the knowledge base and whether it is available. Designs that the problem decides on stay. Returns the
-    /// domain for that problem.
+    /// Replaces the available designs of a filled problem and returns the domain for that problem.
+    ///
+    /// `allowed` is called with the name of each design of the knowledge base and its availability.
+    /// Designs whose availability is stated by the problem are kept.
     pub fn allow(&self, problem: &mut Problem, allowed: &dyn Fn(&str, bool) -> bool) -> Cow<'_, Domain> {
         let designs = self.knowledge.iter().flat_map(|knowledge| knowledge.catalogue().designs());
         let designs = designs.map(|design| (design.individual.name.as_str(), design.available));
+        // PLANTA's form expresses availability in derived predicates, which are part of the domain.
         if let Some(planta) = &self.planta {
             let says = designs.map(|(design, available)| (design, allowed(design, available)));
             return Cow::Owned(planta.allow(&self.domain, problem, says));
@@ -131,7 +138,8 @@ impl Mission {
         Cow::Borrowed(&self.domain)
     }
 
-    /// How many arguments an action has in the domain's file, if the knowledge base has added some.
+    /// Returns the number of arguments of an action in the domain file, if the knowledge base has
+    /// added parameters.
     pub fn written_arguments(&self, action: &str) -> Option<usize> {
         self.adaptation.as_ref().and_then(|adaptation| adaptation.parameters(action))
     }
@@ -146,27 +154,30 @@ impl Mission {
         self.problem.goal = goal;
     }
 
-    /// A goal from its text, checked against the domain and all objects.
+    /// Parses a goal and checks it against the domain and all objects.
     ///
     /// # Errors
-    /// All that is wrong with it.
+    /// All syntax and type errors of the goal.
     pub fn goal(&self, text: &str) -> Result<Condition, Errors> {
         let text = format!("(define (problem goal) (:domain {}) (:goal {text}))", self.domain.name.name);
         let source = Source::new("goal", text);
         let (tree, diagnostics) = pddl::parse_problem_of(&self.domain, &source);
-        let errors = Message::from_pddl(&diagnostics, &[&source]);
-        let Some(tree) = tree.filter(|_| !pddl::has_errors(&diagnostics)) else { return Err(errors.into()) };
+        let messages = Message::from_pddl(&diagnostics, &[&source]);
+        let Some(tree) = tree.filter(|_| !pddl::has_errors(&diagnostics)) else {
+            return Err(messages.into());
+        };
         let mut problem = self.problem.clone();
         problem.goal = tree.goal;
         self.fill(&mut problem);
-        let found = pddl::check(&self.domain, &self.domain_source, &problem, &source);
-        let wrong = found.into_iter().filter(|diagnostic| diagnostic.severity == Severity::Error);
-        // Only the goal has places in this text; all else was checked before.
-        let wrong: Vec<_> = wrong.filter(|diagnostic| diagnostic.file == "goal").collect();
-        if wrong.is_empty() { Ok(problem.goal) } else { Err(Message::from_pddl(&wrong, &[&source]).into()) }
+        let diagnostics = pddl::check(&self.domain, &self.domain_source, &problem, &source);
+        let errors = diagnostics.into_iter().filter(|diagnostic| diagnostic.severity == Severity::Error);
+        // Only the goal is part of this text. Other diagnostics were reported when the mission was
+        // read.
+        let errors: Vec<_> = errors.filter(|diagnostic| diagnostic.file == "goal").collect();
+        if errors.is_empty() { Ok(problem.goal) } else { Err(Message::from_pddl(&errors, &[&source]).into()) }
     }
 
-    /// The functions of the knowledge base that have designs, in alphabetical order.
+    /// Returns the functions of the knowledge base that have designs, in alphabetical order.
     pub fn functions(&self) -> Vec<String> {
         let designs = self.knowledge.iter().flat_map(|knowledge| knowledge.catalogue().designs());
         let names: std::collections::BTreeSet<String> =
@@ -174,14 +185,15 @@ impl Mission {
         names.into_iter().collect()
     }
 
-    /// The designs that solve a function, as the problem calls them, whether or not they are available.
+    /// Returns the designs that solve a function, by their object names, including unavailable
+    /// designs.
     pub fn designs_of(&self, function: &str) -> Vec<String> {
         let Some(knowledge) = &self.knowledge else { return Vec::new() };
         let solves = |design: &&FunctionDesign| design.solves.iter().any(|solved| solved.name == function);
         let designs = knowledge.catalogue().designs().iter().filter(solves);
         let designs = designs.map(|design| design.individual.name.clone());
         let function = Name::new(function);
-        let own = self.own.iter().filter(|design| {
+        let problem_designs = self.own.iter().filter(|design| {
             self.problem.init.iter().any(|element| match element {
                 InitialElement::Fact(atom) => {
                     let named: Vec<&Name> = atom.arguments.iter().map(name_of).collect();
@@ -190,7 +202,7 @@ impl Mission {
                 _ => false,
             })
         });
-        designs.chain(own.map(ToString::to_string)).collect()
+        designs.chain(problem_designs.map(ToString::to_string)).collect()
     }
 }
 
@@ -201,12 +213,12 @@ fn name_of(term: &Term) -> &Name {
 }
 
 fn is_named(atom: &Atom, words: &[&str]) -> bool {
-    let same = |(term, word): (&Term, &&str)| match term {
+    let is_equal = |(term, word): (&Term, &&str)| match term {
         Term::Constant(identifier) | Term::Variable(identifier) => identifier.name == Name::new(word),
     };
     words.split_first().is_some_and(|(symbol, arguments)| {
         atom.predicate.name == Name::new(symbol)
             && atom.arguments.len() == arguments.len()
-            && atom.arguments.iter().zip(arguments).all(same)
+            && atom.arguments.iter().zip(arguments).all(is_equal)
     })
 }

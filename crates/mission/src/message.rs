@@ -1,4 +1,5 @@
-//! What went wrong or is questionable, from whatever room it came, in one form for people and programs.
+//! [`Message`]: errors and warnings of all crates in a single form, printed for users and
+//! serialised for programs.
 
 use std::fmt;
 
@@ -7,7 +8,7 @@ use serde::Serialize;
 
 use crate::visible::visible;
 
-/// Everything that is wrong with an input.
+/// All errors of an input.
 pub type Errors = diagnostics::Errors<Message>;
 
 /// A message about an input.
@@ -55,7 +56,7 @@ pub struct Details {
 }
 
 impl Details {
-    /// As a terminal shows it, its parts changed by a function.
+    /// Formats the message for a terminal, after applying `part` to each of its texts.
     fn shown(&self, color: bool, part: impl Fn(&str) -> String) -> String {
         let place = self.file.as_ref().map(|file| match (self.line, self.column) {
             (Some(line), Some(column)) => format!("{file}:{line}:{column}"),
@@ -77,12 +78,12 @@ impl Details {
 }
 
 impl Message {
-    /// An error that is about no place in a file.
+    /// Creates an error without a source location.
     pub fn error(code: &str, message: impl Into<String>) -> Self {
         Self::plain("error", code, message.into(), None)
     }
 
-    /// A fault of the program, from what a panic has said.
+    /// Creates the error that reports a panic as a fault of the program.
     pub fn of_panic(panic: &(dyn std::any::Any + Send)) -> Self {
         let reason = panic.downcast_ref::<String>().map(String::as_str);
         let reason = reason.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or_default();
@@ -90,17 +91,17 @@ impl Message {
         Self::error("M170", text)
     }
 
-    /// A warning that is about no place in a file.
+    /// Creates a warning without a source location.
     pub fn warning(code: &str, message: impl Into<String>) -> Self {
         Self::plain("warning", code, message.into(), None)
     }
 
-    /// A warning about a line and column of a file.
+    /// Creates a warning at a line and column of a file.
     pub fn warning_at(code: &str, file: &str, place: (usize, usize), message: impl Into<String>) -> Self {
         Self::plain("warning", code, message.into(), Some((file.to_owned(), Some(place))))
     }
 
-    /// An error about a file as a whole, or about a line and column in it.
+    /// Creates an error about a file, optionally at a line and column.
     pub fn at(code: &str, file: &str, place: Option<(usize, usize)>, message: impl Into<String>) -> Self {
         Self::plain("error", code, message.into(), Some((file.to_owned(), place)))
     }
@@ -131,7 +132,7 @@ impl Message {
         Self(Box::new(details))
     }
 
-    /// The same with the line that it is about, from the text of its file.
+    /// Adds the source line of the message, taken from the text of its file.
     #[must_use]
     pub fn with_source(mut self, text: &str) -> Self {
         let details = &mut *self.0;
@@ -142,7 +143,7 @@ impl Message {
         self
     }
 
-    /// The same with what would be right.
+    /// Adds a hint that describes a remedy.
     #[must_use]
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.0.help = Some(help.into());
@@ -150,7 +151,7 @@ impl Message {
         self
     }
 
-    /// Messages of the PDDL front end, with the source lines that they are about.
+    /// Converts diagnostics of the PDDL front end, including the source lines.
     pub fn from_pddl(diagnostics: &[Diagnostic], sources: &[&Source]) -> Vec<Self> {
         let details = |diagnostic: &Diagnostic| Details {
             severity: if diagnostic.severity == Severity::Error { "error" } else { "warning" },
@@ -166,24 +167,24 @@ impl Message {
         diagnostics.iter().map(|diagnostic| Self::of(details(diagnostic))).collect()
     }
 
-    /// An error of reading a knowledge base.
+    /// Converts an error of the ontology crate.
     pub fn from_ontology(error: &ontology::Error) -> Self {
         match error {
             ontology::Error::Engine(error) => Self::from_rules(error),
             ontology::Error::Unknown { name, known, .. } => {
-                let meant = did_you_mean(name, known.iter().map(String::as_str));
-                Self::from_text("error", error.code(), &(error.to_string() + &meant))
+                let suggestion = did_you_mean(name, known.iter().map(String::as_str));
+                Self::from_text("error", error.code(), &(error.to_string() + &suggestion))
             }
             _ => Self::from_text("error", error.code(), &error.to_string()),
         }
     }
 
-    /// A warning of reading or lowering a knowledge base.
+    /// Converts a warning of reading or lowering a knowledge base.
     pub fn from_ontology_warning(warning: &ontology::Warning) -> Self {
         Self::from_text("warning", warning.code(), &warning.to_string())
     }
 
-    /// An error in rules.
+    /// Converts an error in rules.
     pub fn from_rules(error: &rules::Error) -> Self {
         let (text, code) = (error.to_string(), error.code());
         let sentence = text.split_once(&format!("{code} ")).map_or(text.as_str(), |(_, sentence)| sentence);
@@ -191,12 +192,14 @@ impl Message {
         Self::plain("error", code, sentence.to_owned(), place)
     }
 
-    /// A message from `[FILE:[LINE:COLUMN:]] [SEVERITY[CODE]:] SENTENCE`, the form in which libraries print theirs.
+    /// Parses a message of the form `[FILE:[LINE:COLUMN:]] [SEVERITY[CODE]:] SENTENCE`, in which
+    /// libraries format theirs.
     fn from_text(severity: &'static str, code: &str, text: &str) -> Self {
         let marks = [format!("{severity}[{code}]: "), format!("{code} ")];
         let cut = marks.iter().find_map(|mark| text.find(mark.as_str()).map(|at| (at, at + mark.len())));
         let (place, message) = cut.map_or(("", text), |(start, end)| (&text[..start], &text[end..]));
         let place = place.trim().trim_end_matches(':');
+        // File names may contain colons, so the parts are split from the right.
         let mut parts = place.rsplitn(3, ':');
         let (column, line, file) = (parts.next(), parts.next(), parts.next());
         let number = |part: Option<&str>| part.and_then(|part| part.parse::<usize>().ok());
@@ -208,24 +211,25 @@ impl Message {
         Self::plain(severity, code, message.to_owned(), place)
     }
 
-    /// Whether it is an error.
+    /// Returns `true` for an error, `false` for a warning.
     pub fn is_error(&self) -> bool {
         self.severity == "error"
     }
 
-    /// As a terminal shows it, with a line break at its end.
+    /// Returns the message formatted for a terminal, with a line break at its end.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// The same with colours, as ANSI escapes; what would change a terminal is escaped as by [`visible`].
+    /// Formats the message with ANSI colours. Control characters of its texts are escaped as by
+    /// [`visible`].
     pub fn colored(&self) -> String {
         self.shown(true, |part| visible(part).into_owned())
     }
 }
 
 impl fmt::Display for Message {
-    /// As [`Message::text`], without the line break at its end.
+    /// Writes [`Message::text`] without the line break at its end.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.text().trim_end())
     }
@@ -247,28 +251,32 @@ pub struct ErrorAnswer<'a> {
 }
 
 impl<'a> ErrorAnswer<'a> {
-    /// With all messages.
+    /// Creates an answer with all messages.
     pub fn new(messages: &'a [Message]) -> Self {
         Self { format: ERROR_FORMAT, messages }
     }
 }
 
-/// A message as one line: a name or a value with a line break in it must not look like another message.
+/// Escapes line breaks. Otherwise a name or a value with a line break could imitate another
+/// message.
 fn one_line(text: &str) -> String {
     text.replace('\r', "\\r").replace('\n', "\\n")
 }
 
-/// `; did you mean ...?` with the known name that is most like what was written, or nothing.
+/// Returns `; did you mean ...?` with the known name that is most similar to `written`, or an empty
+/// text.
 pub fn did_you_mean<'n>(written: &str, known: impl IntoIterator<Item = &'n str>) -> String {
     nearest(written, known).map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
 }
 
-/// The known name that is most like what was written, if one is: at most a third of its letters differ, and three.
+/// Returns the known name with the smallest edit distance to `written`. At most a third of its
+/// letters and at most three may differ.
 pub(crate) fn nearest<'n>(written: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
     let written = written.to_lowercase();
     let length = written.chars().count();
     let distance = |name: &str| strsim::osa_distance(&written, &name.to_lowercase());
     let near = known.into_iter().map(|name| (distance(name), name));
+    // A single letter is within distance 1 of every other letter, so it has no suggestion.
     let near = near.filter(|(distance, _)| length > 1 && *distance <= (length / 3).clamp(1, 3));
     near.min_by_key(|(distance, _)| *distance).map(|(_, name)| name)
 }

@@ -1,4 +1,5 @@
-//! `--set NAME=VALUE`: measured attributes of the knowledge base, and fluents and facts of the problem.
+//! Overrides (`--set NAME=VALUE`) of measured attributes of the knowledge base, and of fluents and
+//! facts of the problem.
 
 use num_rational::BigRational;
 use pddl::ast::{InitialElement, Name, Span, Term};
@@ -9,15 +10,16 @@ use crate::knowledge::Knowledge;
 use crate::message::{Message, did_you_mean};
 
 impl Mission {
-    /// Sets a value, by the first of these that fits:
-    /// a measured attribute of the knowledge base (`ambient_light=0.9`);
-    /// a numeric function of the problem, arguments after its name (`battery=30`, `travel_time wp1 wp2=3`);
-    /// a predicate with all its arguments, true or false (`pipeline_found pl1=true`);
-    /// a predicate with all arguments but the last, which becomes the value (`robot_at=wp2`): it replaces all
-    /// facts that differ in the last argument only.
+    /// Sets a value. The first matching case applies:
+    /// - a measured attribute of the knowledge base (`ambient_light=0.9`);
+    /// - a numeric function of the problem with its arguments (`battery=30`, `travel_time wp1
+    ///   wp2=3`);
+    /// - a predicate with all its arguments, set to true or false (`pipeline_found pl1=true`);
+    /// - a predicate without its last argument, which becomes the value (`robot_at=wp2`): it
+    ///   replaces all facts that differ in the last argument only.
     ///
     /// # Errors
-    /// Nothing fits.
+    /// No case matches.
     pub fn set(&mut self, name: &str, value: &str) -> Result<(), Message> {
         let value = value.trim();
         if let Some(knowledge) = &mut self.knowledge
@@ -34,10 +36,11 @@ impl Mission {
         self.set_in_problem(name, value)
     }
 
-    /// As [`Mission::set`], without the knowledge base.
+    /// Sets a fluent or fact of the problem, as [`Mission::set`] does, but ignores the knowledge
+    /// base.
     ///
     /// # Errors
-    /// Nothing of the problem fits.
+    /// No symbol of the problem matches.
     pub fn set_in_problem(&mut self, name: &str, value: &str) -> Result<(), Message> {
         let value = value.trim();
         let words: Vec<&str> = name.split_whitespace().collect();
@@ -77,32 +80,32 @@ impl Mission {
             ));
         };
         let target = atom(function, arguments);
-        let same = |element: &InitialElement| matches!(element, InitialElement::Value(a, _, _) if same_atom(a, function, arguments));
-        self.problem.init.retain(|element| !same(element));
+        let is_target = |element: &InitialElement| matches!(element, InitialElement::Value(a, _, _) if same_atom(a, function, arguments));
+        self.problem.init.retain(|element| !is_target(element));
         self.problem.init.push(InitialElement::Value(target, number, Span::default()));
         Ok(())
     }
 
     fn set_fact(&mut self, predicate: &Name, arguments: &[&str], holds: bool) {
-        let same = |element: &InitialElement| match element {
+        let is_target = |element: &InitialElement| match element {
             InitialElement::Fact(a) | InitialElement::NegatedFact(a) => same_atom(a, predicate, arguments),
             _ => false,
         };
-        self.problem.init.retain(|element| !same(element));
+        self.problem.init.retain(|element| !is_target(element));
         if holds {
             self.problem.init.push(InitialElement::Fact(atom(predicate, arguments)));
         }
     }
 
     fn replace_last(&mut self, predicate: &Name, prefix: &[&str], last: &str) {
-        let same = |element: &InitialElement| match element {
+        let is_target = |element: &InitialElement| match element {
             InitialElement::Fact(a) => {
                 let shorter = &a.arguments[..a.arguments.len().saturating_sub(1)];
                 a.predicate.name == *predicate && same_terms(shorter, prefix)
             }
             _ => false,
         };
-        self.problem.init.retain(|element| !same(element));
+        self.problem.init.retain(|element| !is_target(element));
         let arguments: Vec<&str> = prefix.iter().copied().chain([last]).collect();
         self.problem.init.push(InitialElement::Fact(atom(predicate, &arguments)));
     }
@@ -110,13 +113,14 @@ impl Mission {
     fn unknown_setting(&self, name: &str) -> Message {
         let attributes = self.knowledge.iter().flat_map(|knowledge| knowledge.view().attribute_types());
         let attributes: Vec<_> = attributes.map(|attribute| attribute.name).collect();
-        // What a plain domain is completed with is not there to be set.
+        // The user cannot set symbols that only the explicit form of a plain domain has.
         let adaptation = self.adaptation.as_ref();
-        let own =
-            |d: &&pddl::ast::Declaration| adaptation.is_none_or(|own| !own.is_added(&d.identifier.name));
+        let is_settable = |d: &&pddl::ast::Declaration| {
+            adaptation.is_none_or(|is_settable| !is_settable.is_added(&d.identifier.name))
+        };
         let declared = |all: &[pddl::ast::Declaration]| {
             let each = |d: &pddl::ast::Declaration| d.identifier.name.to_string();
-            all.iter().filter(own).map(each).collect::<Vec<_>>().join(", ")
+            all.iter().filter(is_settable).map(each).collect::<Vec<_>>().join(", ")
         };
         let text = format!(
             "`{name}` is neither an attribute of the knowledge base ({}), nor a numeric function ({}) with its arguments, \
@@ -125,11 +129,12 @@ impl Mission {
             declared(&self.domain.functions),
             declared(&self.domain.predicates),
         );
-        let declared = self.domain.functions.iter().chain(&self.domain.predicates).filter(own);
-        let known =
-            declared.map(|own| own.identifier.name.as_str()).chain(attributes.iter().map(String::as_str));
+        let declared = self.domain.functions.iter().chain(&self.domain.predicates).filter(is_settable);
+        let names = declared
+            .map(|symbol| symbol.identifier.name.as_str())
+            .chain(attributes.iter().map(String::as_str));
         let symbol = name.split_whitespace().next().unwrap_or(name);
-        Message::error("M106", text + &did_you_mean(symbol, known))
+        Message::error("M106", text + &did_you_mean(symbol, names))
     }
 }
 
@@ -138,18 +143,18 @@ fn same_atom(atom: &pddl::ast::Atom, predicate: &Name, arguments: &[&str]) -> bo
 }
 
 fn same_terms(terms: &[Term], arguments: &[&str]) -> bool {
-    let same = |(term, argument): (&Term, &&str)| match term {
+    let is_equal = |(term, argument): (&Term, &&str)| match term {
         Term::Constant(identifier) | Term::Variable(identifier) => identifier.name == Name::new(argument),
     };
-    terms.len() == arguments.len() && terms.iter().zip(arguments).all(same)
+    terms.len() == arguments.len() && terms.iter().zip(arguments).all(is_equal)
 }
 
-/// An exact number from a decimal: `-12`, `0.25`, `1e2`.
+/// Parses a decimal as an exact number: `-12`, `0.25`, `1e2`.
 fn decimal(text: &str) -> Option<BigRational> {
     rules::Literal::parse(text, Some("http://www.w3.org/2001/XMLSchema#decimal"), None).as_rational()
 }
 
-/// Whether an attribute is measured, or bounds what designs can be used.
+/// Returns `true` if an attribute is measured, or bounded by the requirements of a design.
 fn is_measured(knowledge: &Knowledge, attribute: &str) -> bool {
     let view = knowledge.view();
     let local = ontology::vocab::local_name(attribute);

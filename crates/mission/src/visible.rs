@@ -1,20 +1,21 @@
-//! Text as a terminal shows it, with nothing that is not seen.
+//! Escapes characters that are invisible on a terminal or change its state.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
 use serde::Serialize;
 
-/// The text with everything escaped that would change what a terminal shows, in which order, or without being seen: control
-/// characters but line breaks and tabs, marks of bidirectional text, and characters that take no room. Names come from files that
-/// may be hostile. Joiners are left, since some languages are written with them.
+/// Escapes control characters except line breaks and tabs, marks of bidirectional text, and
+/// characters of zero width. Such characters could change what a terminal displays. They are
+/// escaped because names originate from files that may be hostile. Joiners are kept, because some
+/// languages need them.
 pub fn visible(text: &str) -> Cow<'_, str> {
     escaped(text, |character, all| {
         let _ = write!(all, "\\u{{{:x}}}", u32::from(character));
     })
 }
 
-/// The same for JSON, in which such characters are in strings only.
+/// Escapes the same characters in JSON text, where they can only occur within strings.
 pub fn visible_json(text: &str) -> Cow<'_, str> {
     escaped(text, |character, all| {
         for unit in character.encode_utf16(&mut [0; 2]) {
@@ -23,13 +24,13 @@ pub fn visible_json(text: &str) -> Cow<'_, str> {
     })
 }
 
-/// An answer for programs as text, with a line break at its end.
+/// Serialises an answer as indented JSON with a line break at its end.
 pub fn pretty(answer: &impl Serialize) -> String {
-    // Texts, numbers and lists of them are always data.
+    // Serialisation cannot fail: answers consist of texts, numbers and lists.
     serde_json::to_string_pretty(answer).unwrap_or_default() + "\n"
 }
 
-/// Whether a character is not seen as itself.
+/// Returns `true` if a character is not displayed as itself.
 fn hides(character: char) -> bool {
     let is_unseen = matches!(
         character,
@@ -48,15 +49,15 @@ fn escaped(text: &str, escape: impl Fn(char, &mut String)) -> Cow<'_, str> {
     if text.bytes().all(is_plain) || !text.contains(hides) {
         return Cow::Borrowed(text);
     }
-    let mut all = String::with_capacity(text.len());
+    let mut result = String::with_capacity(text.len());
     for character in text.chars() {
         if hides(character) {
-            escape(character, &mut all);
+            escape(character, &mut result);
         } else {
-            all.push(character);
+            result.push(character);
         }
     }
-    Cow::Owned(all)
+    Cow::Owned(result)
 }
 
 #[cfg(test)]
@@ -68,13 +69,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_seen_is_escaped() {
+    fn invisible_characters_are_escaped() {
         check("a\tb\n", "a\tb\n", "a\tb\n");
         check("naïve Ελλάδα می\u{200c}خواهم", "naïve Ελλάδα می\u{200c}خواهم", "naïve Ελλάδα می\u{200c}خواهم");
         check("\u{1b}[2J", "\\u{1b}[2J", "\\u001b[2J");
         check("\u{202e}x\u{feff}", "\\u{202e}x\\u{feff}", "\\u202ex\\ufeff");
         check("\u{200b}\u{2028}", "\\u{200b}\\u{2028}", "\\u200b\\u2028");
-        // Two units of UTF-16.
+        // This character has two UTF-16 code units.
         check("\u{e0041}", "\\u{e0041}", "\\udb40\\udc41");
     }
 }

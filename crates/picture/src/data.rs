@@ -1,31 +1,31 @@
-//! What is drawn: names and numbers, and nothing of where they come from.
+//! Input data of pictures: names and numbers, independent of their source.
 
-/// A plan, and what led to it.
+/// A plan and the search that found it.
 #[derive(Debug, Clone, Default)]
 pub struct Plan {
-    /// In one sentence: the cost, and what proves that it is the least.
+    /// The cost and its proof of optimality, in a sentence.
     pub verdict: String,
-    /// What is done, by start.
+    /// Executed actions, ordered by start.
     pub steps: Vec<Step>,
-    /// In which direction pictures run.
+    /// Quantity of the horizontal axis.
     pub axis: Axis,
-    /// All numbers that actions change, and the cost.
+    /// All numeric fluents that actions change, and the cost.
     pub curves: Vec<Curve>,
-    /// The places that something moves between, if there are any.
+    /// The places between which an object moves, if there are any.
     pub map: Option<Map>,
-    /// How the planner came to the answer.
+    /// Progress of the search.
     pub search: Vec<Progress>,
     /// All designs of the knowledge base.
     pub designs: Vec<Design>,
 }
 
-/// What runs from left to right.
+/// Quantity of the horizontal axis.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Axis {
-    /// Time, in the domain's unit.
+    /// Time, in the unit of the domain.
     #[default]
     Time,
-    /// Steps, each as long as another: where actions take no time.
+    /// Steps of equal length, for actions without durations.
     Steps,
 }
 
@@ -34,78 +34,79 @@ pub enum Axis {
 pub struct Step {
     /// The action with its arguments, without functions and designs.
     pub label: String,
-    /// Where it begins on the axis.
+    /// Start on the axis.
     pub start: f64,
-    /// Where it ends on the axis.
+    /// End on the axis.
     pub end: f64,
-    /// When it starts, as text.
+    /// Start as text.
     pub start_text: String,
-    /// How long it takes, as text.
+    /// Duration as text.
     pub duration_text: String,
-    /// What it adds to the metric, as text.
+    /// Contribution to the metric as text.
     pub cost_text: String,
-    /// Functions, and the design of each.
+    /// Functions with their designs.
     pub configuration: Vec<(String, String)>,
-    /// Functions that change their design, with the one before.
+    /// Functions that change their design, with the former design.
     pub reconfigured: Vec<(String, String)>,
-    /// From which place to which, as positions in [`Map::places`].
+    /// Origin and destination of a move, as positions in [`Map::places`].
     pub way: Option<(usize, usize)>,
 }
 
-/// A number over the plan.
+/// A numeric fluent over the plan.
 #[derive(Debug, Clone, Default)]
 pub struct Curve {
-    /// What it is called.
+    /// Name of the fluent.
     pub name: String,
-    /// Where on the axis it changes, and what it is from there on; the first at the beginning.
+    /// Points of change on the axis, each with the new value. The first point is the beginning.
     pub points: Vec<(f64, f64)>,
-    /// What has to hold of it.
+    /// Bounds that conditions impose.
     pub bounds: Vec<Bound>,
 }
 
-/// What an action or the goal demands of a number.
+/// A bound that an action or the goal imposes on a number.
 #[derive(Debug, Clone, Default)]
 pub struct Bound {
-    /// From where on the axis.
+    /// Start on the axis.
     pub from: f64,
-    /// Until where.
+    /// End on the axis.
     pub to: f64,
-    /// The number that it is compared with.
+    /// Limit with which the number is compared.
     pub value: f64,
-    /// In words: `step 3 needs battery >= 14`.
+    /// Description: `step 3 needs battery >= 14`.
     pub text: String,
 }
 
-/// Places, and ways between them.
+/// Places and the ways between them.
 #[derive(Debug, Clone, Default)]
 pub struct Map {
     /// The places.
     pub places: Vec<Place>,
-    /// Which of them neighbour each other; each pair once.
+    /// Pairs of neighbouring places, each once.
     pub ways: Vec<(usize, usize)>,
 }
 
 /// A place.
 #[derive(Debug, Clone, Default)]
 pub struct Place {
-    /// What it is called.
+    /// Name of the place.
     pub name: String,
-    /// Where it lies, x to the right and y upwards; places without that are laid out by their ways.
+    /// Coordinates, x to the right and y upwards. If they are missing, the places are laid out by
+    /// their ways.
     pub position: Option<(f64, f64)>,
-    /// Whether something is there in the beginning.
+    /// `true` if an object is at the place initially.
     pub is_start: bool,
-    /// Whether something is to be there in the end.
+    /// `true` if an object must be at the place finally.
     pub is_goal: bool,
 }
 
-/// What was known at some time of the search.
+/// State of a search at a point in time.
 #[derive(Debug, Clone, Default)]
 pub struct Progress {
-    /// The metric of the best plan so far.
+    /// Metric of the best known plan.
     pub cost: Option<f64>,
-    /// No plan has a better metric than this.
+    /// Lower bound on the metric of every plan.
     pub lower_bound: f64,
-    /// Both as text.
+    /// Both numbers as text.
     pub text: String,
 }
 
@@ -116,116 +117,116 @@ pub struct Design {
     pub name: String,
     /// The functions that it solves.
     pub functions: Vec<String>,
-    /// Whether it can be selected.
+    /// `true` if the design can be selected.
     pub available: bool,
     /// Estimated values: `battery_usage 4`.
     pub estimations: Vec<String>,
-    /// What it needs, with its state: `c_kinect (failed)`, `ambient_light at most 0.8 (now 0.3)`.
+    /// Requirements with their state: `c_kinect (failed)`, `ambient_light at most 0.8 (now 0.3)`.
     pub needs: Vec<String>,
-    /// The steps that use it, from 1.
+    /// Numbers of the steps that use the design, from 1.
     pub steps: Vec<usize>,
-    /// Why it is available or not.
+    /// Derivation of its availability.
     pub because: Vec<Reason>,
 }
 
-/// Why something holds.
+/// Derivation of a fact.
 #[derive(Debug, Clone, Default)]
 pub struct Reason {
-    /// What holds, and by what.
+    /// The fact and its justification.
     pub text: String,
-    /// What that rests on.
+    /// Derivations of the premises.
     pub supports: Vec<Reason>,
 }
 
-/// What differs between two situations.
+/// A difference between two situations.
 #[derive(Debug, Clone, Default)]
 pub struct Change {
-    /// In a sentence.
+    /// Description in a sentence.
     pub text: String,
-    /// Why.
+    /// Derivations of the difference.
     pub because: Vec<Reason>,
 }
 
-/// What came of checking a certificate.
+/// Result of checking a certificate.
 #[derive(Debug, Clone, Default)]
 pub struct Checked {
-    /// Whether all of it holds.
+    /// `true` if all parts hold.
     pub verified: bool,
-    /// In one sentence.
+    /// Result in a sentence.
     pub verdict: String,
-    /// Its parts: name, whether it holds, and what was found.
+    /// Parts of the check: name, success and finding.
     pub parts: Vec<(String, bool, String)>,
 }
 
-/// All that a page about a plan shows.
+/// Contents of the page about a plan.
 #[derive(Debug, Clone, Default)]
 pub struct Report {
-    /// The mission's name.
+    /// Name of the mission.
     pub name: String,
-    /// What it is about.
+    /// Description of the mission.
     pub description: String,
-    /// What is different from the mission's files, each in a few words.
+    /// Differences from the files of the mission, each in a few words.
     pub situation: Vec<String>,
-    /// The answer without that, if there is a difference.
+    /// The plan without these differences, if there are any.
     pub before: Option<Plan>,
-    /// The answer.
+    /// The plan.
     pub plan: Plan,
-    /// What differs between the two.
+    /// Differences between the two plans.
     pub changes: Vec<Change>,
-    /// What was verified of a certificate.
+    /// Result of checking the certificate.
     pub checked: Option<Checked>,
 }
 
-/// What a loop did.
+/// Record of an adaptation loop.
 #[derive(Debug, Clone, Default)]
 pub struct Log {
-    /// What it is called.
+    /// Name of the record.
     pub name: String,
-    /// Whether it can be used, in a sentence.
+    /// Usability of the record, in a sentence.
     pub verdict: String,
-    /// What it consists of, each in a sentence.
+    /// Contents of the record, each in a sentence.
     pub parts: Vec<String>,
-    /// What is wrong with it.
+    /// Errors of the record.
     pub messages: Vec<String>,
-    /// All that happened, in the order of time.
+    /// All events, in chronological order.
     pub happenings: Vec<Happening>,
 }
 
-/// Something that a loop heard or decided.
+/// An input or a decision of a loop.
 #[derive(Debug, Clone)]
 pub struct Happening {
-    /// The record that it stands in.
+    /// Number of the record that contains the event.
     pub record: u64,
-    /// When, in seconds since the beginning.
+    /// Time in seconds since the beginning.
     pub time: f64,
-    /// What kind of thing it is.
+    /// Kind of the event.
     pub kind: Kind,
-    /// In a sentence.
+    /// Description in a sentence.
     pub text: String,
-    /// Why, or what belongs to it.
+    /// Derivation or details.
     pub because: Vec<Reason>,
 }
 
-/// A kind of happening.
+/// Kind of a [`Happening`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// The robot reported something.
+    /// A report of the robot.
     Event,
-    /// Something follows, or does no more.
+    /// A change of the inferred facts.
     Inference,
-    /// A plan was asked for, found, kept or not found.
+    /// A plan was requested, found, kept or not found.
     Plan,
-    /// The robot is to do something.
+    /// A command for the robot.
     Effect,
-    /// Something was refused, or seen before.
+    /// A refused or repeated input.
     Refusal,
 }
 
 impl Kind {
-    /// All of them, causes before what they lead to.
+    /// All kinds, causes before effects.
     pub const ALL: [Self; 5] = [Self::Event, Self::Inference, Self::Plan, Self::Effect, Self::Refusal];
 
-    /// What several of them are called.
+    /// Plural name of the kind.
     pub fn name(self) -> &'static str {
         match self {
             Self::Event => "events",
@@ -237,16 +238,16 @@ impl Kind {
     }
 }
 
-/// A page of parts, for answers that are not a single plan.
+/// Page of parts, for answers other than a single plan.
 #[derive(Debug, Clone, Default)]
 pub struct Sheet {
-    /// What it is about.
+    /// Subject of the page.
     pub name: String,
-    /// The same in a sentence.
+    /// Subject in a sentence.
     pub description: String,
-    /// The answer in a sentence.
+    /// Answer in a sentence.
     pub verdict: String,
-    /// What it shows, in order.
+    /// Contents of the page, in order.
     pub parts: Vec<Part>,
 }
 
@@ -255,50 +256,50 @@ pub struct Sheet {
 pub enum Part {
     /// A heading.
     Heading(String),
-    /// Sentences, with what they rest on.
+    /// Sentences with their derivations.
     Sentences(Vec<Change>),
-    /// Points in two directions.
+    /// Scatter plot.
     Points(Points),
-    /// How values are distributed, a row for each group.
+    /// Distributions of values, a row per group.
     Rows(Rows),
     /// A table: its name, its heading and its rows.
     Table(String, Vec<String>, Vec<Vec<String>>),
-    /// Plans that unfold, each with its title.
+    /// Expandable plans, each with its title.
     Plans(Vec<(String, Plan)>),
 }
 
-/// Points in two directions.
+/// Scatter plot.
 #[derive(Debug, Clone, Default)]
 pub struct Points {
-    /// What it shows.
+    /// Title of the plot.
     pub title: String,
-    /// What the directions are: to the right and upwards.
+    /// Names of the horizontal and the vertical axis.
     pub axes: [String; 2],
-    /// The points that are joined by a line, in its order.
+    /// Vertices of the connecting line, in order.
     pub line: Vec<(f64, f64)>,
-    /// The points: a short name, what they are, and where they are.
+    /// Points: short name, description, coordinates.
     pub points: Vec<(String, String, f64, f64)>,
 }
 
-/// How values are distributed.
+/// Distributions of values, a row per group.
 #[derive(Debug, Clone, Default)]
 pub struct Rows {
-    /// What it shows.
+    /// Title of the plot.
     pub title: String,
-    /// What the values are, with their unit.
+    /// Name of the quantity with its unit.
     pub axis: String,
     /// The groups.
     pub groups: Vec<Group>,
 }
 
-/// Values that belong together.
+/// A group of values.
 #[derive(Debug, Clone, Default)]
 pub struct Group {
-    /// What they are of.
+    /// Name of the group.
     pub name: String,
-    /// Each value, and what it is of.
+    /// Values with their descriptions.
     pub values: Vec<(f64, String)>,
-    /// Their mean, and half the width of its interval.
+    /// Mean, and half the width of its confidence interval.
     pub mean: Option<(f64, f64)>,
     /// Text shown for a group without values, such as `0 of 20 accomplished`.
     pub nothing: String,

@@ -7,29 +7,30 @@ use maud::{Markup, html};
 use crate::data::{Axis, Plan};
 use crate::scale::{Scale, number, px, range, width};
 
-/// The margin at the right.
+/// Right margin in pixels.
 pub(crate) const RIGHT: f64 = 16.0;
-/// The greatest width of what is drawn.
+/// Maximum width of a drawing in pixels.
 const WIDEST: f64 = 16_000.0;
-/// The height of a name above its row.
+/// Height in pixels of a name above its row.
 const NAME: f64 = 14.0;
 
 /// Dimensions of a picture. All lengths are in pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Canvas {
-    /// The width of the picture, if it does not have to be wider.
+    /// Width of the picture, unless its contents need more.
     pub(crate) width: f64,
     /// Left edge of the drawing area. The numbers of vertical axes are to its left.
     pub(crate) left: f64,
-    /// Whether the names of rows are above them instead of to their left, which leaves more width.
+    /// `true` if the names of rows are above the rows instead of to their left, which leaves more
+    /// width.
     pub(crate) has_names_above: bool,
-    /// The least width of a step of a plan.
+    /// Minimum width of a step of a plan.
     pub(crate) step: f64,
-    /// The least distance of neighbouring places of a map.
+    /// Minimum distance of neighbouring places of a map.
     pub(crate) apart: f64,
 }
 
-/// A picture in a file of its own.
+/// Canvas of a picture in a separate file.
 pub(crate) const FILE: Canvas =
     Canvas { width: 826.0, left: 170.0, has_names_above: false, step: 60.0, apart: 46.0 };
 /// Canvases of the pictures in a page, the widest first. The first one that fits its column is shown. `page.css` has
@@ -37,7 +38,7 @@ pub(crate) const FILE: Canvas =
 pub(crate) const PAGE: [Canvas; 3] = [WIDE, COLUMN, TELEPHONE];
 /// Canvases of the pictures of two plans that a page shows side by side.
 pub(crate) const PAIR: [Canvas; 2] = [COLUMN, TELEPHONE];
-/// The whole width of a page.
+/// Full width of a page.
 const WIDE: Canvas = Canvas { width: 1146.0, left: 170.0, has_names_above: false, step: 4.0, apart: 20.0 };
 /// Half the width of a page.
 const COLUMN: Canvas = Canvas { width: 560.0, left: 60.0, has_names_above: true, step: 4.0, apart: 20.0 };
@@ -45,12 +46,12 @@ const COLUMN: Canvas = Canvas { width: 560.0, left: 60.0, has_names_above: true,
 const TELEPHONE: Canvas = Canvas { width: 328.0, left: 60.0, has_names_above: true, step: 4.0, apart: 20.0 };
 
 impl Canvas {
-    /// The width between the margins.
+    /// Width between the margins.
     pub(crate) fn inner(&self) -> f64 {
         self.width - self.left - RIGHT
     }
 
-    /// The height that a name above its row takes.
+    /// Height of a name above its row.
     pub(crate) fn name_height(&self) -> f64 {
         if self.has_names_above { NAME } else { 0.0 }
     }
@@ -79,9 +80,9 @@ pub(crate) struct NamePlace {
 pub(crate) struct Span {
     /// Number of steps of the plan with most steps.
     steps: usize,
-    /// The latest end.
+    /// Latest end of the plans.
     until: f64,
-    /// The least and the greatest value of each number, bounds included.
+    /// Minimum and maximum of each number, including bounds.
     values: BTreeMap<String, (f64, f64)>,
 }
 
@@ -94,37 +95,37 @@ impl Span {
         }
     }
 
-    /// The range of a number in all plans.
+    /// Returns the range of a number in all plans.
     pub(crate) fn values(&self, name: &str) -> (f64, f64) {
         self.values.get(name).copied().unwrap_or((0.0, 1.0))
     }
 }
 
-/// The range of each number of some plans.
+/// Computes the range of each number in some plans.
 fn values(plans: &[&Plan]) -> BTreeMap<String, (f64, f64)> {
-    let mut all: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    let mut by_name: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for curve in plans.iter().flat_map(|plan| &plan.curves) {
         let values = curve.points.iter().map(|(_, value)| *value);
         let values = values.chain(curve.bounds.iter().map(|bound| bound.value));
-        all.entry(curve.name.clone()).or_default().extend(values);
+        by_name.entry(curve.name.clone()).or_default().extend(values);
     }
-    all.into_iter().map(|(name, values)| (name, range(values))).collect()
+    by_name.into_iter().map(|(name, values)| (name, range(values))).collect()
 }
 
-/// Where a plan ends on its axis.
+/// End of a plan on its axis.
 fn end(plan: &Plan) -> f64 {
     plan.steps.iter().map(|step| step.end).fold(0.0, f64::max)
 }
 
-/// The axis of a plan.
+/// Horizontal axis of a plan.
 pub(crate) struct Frame {
     pub(crate) canvas: Canvas,
     pub(crate) scale: Scale,
-    /// Where the plan ends.
+    /// End of the plan.
     pub(crate) end: f64,
-    /// Where the axis does.
+    /// End of the axis.
     until: f64,
-    /// Of the whole picture.
+    /// Width of the whole picture.
     pub(crate) width: f64,
     label: &'static str,
 }
@@ -141,13 +142,13 @@ impl Frame {
         Self { canvas, scale, end: end(plan), until: span.until, width, label }
     }
 
-    /// The axis below everything, with lines up to `top`.
+    /// Draws the axis below all rows, with grid lines up to `top`.
     pub(crate) fn axis(&self, top: f64, bottom: f64) -> Markup {
         let widest = width(&number(self.until)) + 24.0;
-        let most = ((self.width - self.canvas.left - RIGHT) / widest.max(60.0)) as usize;
+        let max_ticks = ((self.width - self.canvas.left - RIGHT) / widest.max(60.0)) as usize;
         html! {
             g class="axis" {
-                @for tick in self.scale.ticks(most.clamp(2, 200)) {
+                @for tick in self.scale.ticks(max_ticks.clamp(2, 200)) {
                     @let (x, text) = (self.scale.at(tick), number(tick));
                     line class="grid" x1=(px(x)) x2=(px(x)) y1=(px(top)) y2=(px(bottom)) {}
                     text x=(px(x.min(self.width - width(&text) / 2.0))) y=(px(bottom + 15.0)) text-anchor="middle" { (text) }

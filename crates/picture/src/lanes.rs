@@ -1,6 +1,7 @@
-//! Intervals to rows, so that nothing lies on top of another.
+//! Assigns intervals to rows without overlaps.
 
-/// The row of each interval, from 0; each comes into the first row that has room for it, in the order of their starts.
+/// Returns the row of each interval, from 0. Greedy interval partitioning: in the order of starts,
+/// each interval takes the first free row.
 pub(crate) fn rows(intervals: &[(f64, f64)]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..intervals.len()).collect();
     order.sort_by(|left, right| intervals[*left].0.total_cmp(&intervals[*right].0).then(left.cmp(right)));
@@ -23,7 +24,7 @@ mod tests {
     use super::rows;
 
     #[test]
-    fn what_overlaps_has_rows_of_its_own() {
+    fn overlapping_intervals_have_different_rows() {
         assert_eq!(rows(&[(0.0, 1.0), (1.0, 2.0), (2.0, 3.0)]), [0, 0, 0]);
         assert_eq!(rows(&[(0.0, 3.0), (1.0, 2.0), (2.0, 4.0), (3.0, 4.0)]), [0, 1, 1, 0]);
     }

@@ -1,18 +1,20 @@
-//! Places without coordinates to coordinates, so that places lie as far apart as the shortest way between them is long.
+//! Graph layout for places without coordinates: distances in the picture approximate the numbers of
+//! ways on shortest paths.
 //!
-//! Stress majorization (E. Gansner, Y. Koren, S. North: Graph drawing by stress majorization, GD 2004) from a start that depends on
-//! nothing but the ways: distances from two places that lie far apart, and from a third one.
+//! Stress majorization (E. Gansner, Y. Koren, S. North: Graph drawing by stress majorization, GD
+//! 2004). The start is deterministic: distances from two places that are far apart, and from a
+//! third one.
 
 use std::collections::VecDeque;
 
-/// Distances are as many as this at most; a larger map keeps the start.
+/// Limit on the number of pairwise distances. Larger maps keep the start layout.
 const DISTANCES: usize = 4_000_000;
-/// Updates of a place by another one.
+/// Limit on the number of updates of a place by another one.
 const WORK: usize = 30_000_000;
-/// Rounds at most; hardly anything moves any more.
+/// Limit on the number of rounds, after which the layout hardly changes.
 const ROUNDS: usize = 300;
 
-/// Coordinates for so many places, with an edge of about 1.
+/// Computes coordinates for `places` places, with ways of length about 1.
 pub(crate) fn layout(places: usize, ways: &[(usize, usize)]) -> Vec<(f64, f64)> {
     let mut neighbours = vec![Vec::new(); places];
     for &(one, other) in ways.iter().filter(|(one, other)| one != other && *one.max(other) < places) {
@@ -22,10 +24,11 @@ pub(crate) fn layout(places: usize, ways: &[(usize, usize)]) -> Vec<(f64, f64)> 
     let mut points = vec![(0.0, 0.0); places];
     let mut right = 0.0_f64;
     for component in components(&neighbours) {
-        let own = placed(&component, &neighbours);
-        let (low, high) =
-            own.iter().fold((f64::MAX, f64::MIN), |(low, high), (x, _)| (low.min(*x), high.max(*x)));
-        for (place, (x, y)) in component.iter().zip(&own) {
+        let component_points = placed(&component, &neighbours);
+        let (low, high) = component_points
+            .iter()
+            .fold((f64::MAX, f64::MIN), |(low, high), (x, _)| (low.min(*x), high.max(*x)));
+        for (place, (x, y)) in component.iter().zip(&component_points) {
             points[*place] = (right + x - low, *y);
         }
         right += high - low + 1.0;
@@ -33,7 +36,7 @@ pub(crate) fn layout(places: usize, ways: &[(usize, usize)]) -> Vec<(f64, f64)> 
     points
 }
 
-/// Places that are joined, each group in its order.
+/// Returns the connected components, each in ascending order.
 fn components(neighbours: &[Vec<usize>]) -> Vec<Vec<usize>> {
     let mut seen = vec![false; neighbours.len()];
     let mut groups = Vec::new();
@@ -50,7 +53,7 @@ fn components(neighbours: &[Vec<usize>]) -> Vec<Vec<usize>> {
     groups
 }
 
-/// How many ways it takes from a place to each other one.
+/// Returns the breadth-first distances from a place.
 fn distances(from: usize, neighbours: &[Vec<usize>]) -> Vec<Option<u32>> {
     let mut distances = vec![None; neighbours.len()];
     let mut queue = VecDeque::from([(from, 0)]);
@@ -66,11 +69,11 @@ fn distances(from: usize, neighbours: &[Vec<usize>]) -> Vec<Option<u32>> {
     distances
 }
 
-/// Coordinates for places that are joined.
+/// Computes coordinates for a connected component.
 fn placed(group: &[usize], neighbours: &[Vec<usize>]) -> Vec<(f64, f64)> {
     let of = |from: usize| -> Vec<f64> {
-        let all = distances(from, neighbours);
-        group.iter().map(|place| f64::from(all[*place].unwrap_or(0))).collect()
+        let distances_from = distances(from, neighbours);
+        group.iter().map(|place| f64::from(distances_from[*place].unwrap_or(0))).collect()
     };
     let farthest = |distances: &[f64]| {
         let order = (0..distances.len())
@@ -83,7 +86,7 @@ fn placed(group: &[usize], neighbours: &[Vec<usize>]) -> Vec<(f64, f64)> {
     let least: Vec<f64> = from_first.iter().zip(&from_last).map(|(one, other)| one.min(*other)).collect();
     let from_side = of(group[farthest(&least)]);
     let start = (0..group.len()).map(|place| {
-        // What would lie at one point is pulled apart, by a little.
+        // Coincident points have no direction in which majorization could separate them.
         let little = 0.05 * (place as f64 * 0.754_877_666).fract();
         (
             from_first[place] - from_last[place] + little,
@@ -93,31 +96,33 @@ fn placed(group: &[usize], neighbours: &[Vec<usize>]) -> Vec<(f64, f64)> {
     let mut points: Vec<(f64, f64)> = start.collect();
     let count = group.len();
     if count * count <= DISTANCES {
-        let all: Vec<Vec<f64>> = group.iter().map(|place| of(*place)).collect();
+        let pairwise: Vec<Vec<f64>> = group.iter().map(|place| of(*place)).collect();
         for _ in 0..ROUNDS.min(WORK / (count * count).max(1)) {
-            points = majorized(&points, &all);
+            points = majorized(&points, &pairwise);
         }
     }
     turned(&points)
 }
 
-/// One round: each place to the mean of where the others want it, near ones more than far ones.
+/// Performs a round of majorization: each place moves to the weighted mean of the positions that
+/// the other places prefer. Near places have more weight.
 fn majorized(points: &[(f64, f64)], distances: &[Vec<f64>]) -> Vec<(f64, f64)> {
-    let place = |own: usize| {
+    let place = |moved: usize| {
         let (mut x, mut y, mut weights) = (0.0, 0.0, 0.0);
-        for (other, distance) in distances[own].iter().enumerate().filter(|(other, _)| *other != own) {
-            let (dx, dy) = (points[own].0 - points[other].0, points[own].1 - points[other].1);
+        for (other, distance) in distances[moved].iter().enumerate().filter(|(other, _)| *other != moved) {
+            let (dx, dy) = (points[moved].0 - points[other].0, points[moved].1 - points[other].1);
             let (weight, pull) = (1.0 / (distance * distance), distance / dx.hypot(dy).max(1e-6));
             x += weight * (points[other].0 + dx * pull);
             y += weight * (points[other].1 + dy * pull);
             weights += weight;
         }
-        if weights > 0.0 { (x / weights, y / weights) } else { points[own] }
+        if weights > 0.0 { (x / weights, y / weights) } else { points[moved] }
     };
     (0..points.len()).map(place).collect()
 }
 
-/// The same places with the longest extent from left to right, and the first place at the left and above.
+/// Rotates the points so that the longest extent is horizontal, with the first place at the upper
+/// left.
 fn turned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let count = points.len() as f64;
     let sum = points.iter().fold((0.0, 0.0), |(x, y), point| (x + point.0, y + point.1));
@@ -126,7 +131,7 @@ fn turned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
         let (dx, dy) = (point.0 - x, point.1 - y);
         (xx + dx * dx, xy + dx * dy, yy + dy * dy)
     });
-    // Of what extends as far one way as the other, as a square does, every direction is as good.
+    // For a symmetric extent such as a square, every direction is equally good.
     let angle = 0.5 * (2.0 * moments.1).atan2(moments.0 - moments.2);
     let (sin, cos) = angle.sin_cos();
     let mut turned: Vec<(f64, f64)> = points
@@ -143,8 +148,8 @@ fn turned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     turned
 }
 
-/// Moves points that are at one position, or nearer to each other than `same`, to a ring around it, at least `apart` from each other. All other points stay
-/// where they are.
+/// Moves points at equal positions, or closer to each other than `same`, to a ring around their
+/// position, at least `apart` from each other. All other points are unchanged.
 pub(crate) fn spread(points: &mut [(f64, f64)], same: f64, apart: f64) {
     let mut groups: Vec<((f64, f64), Vec<usize>)> = Vec::new();
     for (index, (x, y)) in points.iter().enumerate() {
@@ -181,7 +186,7 @@ mod tests {
         }
     }
 
-    /// The ways of a grid.
+    /// Edges of a square grid.
     fn grid(side: usize) -> Vec<(usize, usize)> {
         let at = |row: usize, column: usize| row * side + column;
         let rows =

@@ -1,7 +1,9 @@
-//! Pictures of plans: timelines, maps, numbers and searches as SVG, and pages of them that need nothing else.
+//! Pictures of plans: timelines, maps, charts and search progress as SVG, and self-contained HTML
+//! pages.
 //!
-//! Data goes in ([`Report`], [`Plan`]) and text comes out; the same data gives the same bytes. Nothing is known here of planning, of PDDL
-//! or of knowledge bases, and there are no files, no clock and no network. Names may be hostile: `maud` escapes all of them.
+//! Input is data ([`Report`], [`Plan`]), output is text, and equal data gives identical bytes. This
+//! crate has no planning, no PDDL and no knowledge bases, and accesses neither files, clock nor
+//! network. Names may be hostile; `maud` escapes all of them.
 
 mod chart;
 mod data;

@@ -1,4 +1,4 @@
-//! A page about what a loop did: what it heard, concluded, planned and asked for, on one axis of time.
+//! Page about an adaptation loop: its inputs, inferences, plans and commands on a time axis.
 
 use std::collections::BTreeMap;
 
@@ -10,22 +10,23 @@ use crate::page::{page, reasons, shown, table};
 use crate::scale::{Scale, number, px, width};
 use crate::svg::Picture;
 
-/// The names of lanes are no wider than this, in pixels.
+/// Maximum width of the names of lanes in pixels.
 const NAMES: f64 = 90.0;
-/// The height of a lane.
+/// Height of a lane in pixels.
 const LANE: f64 = 24.0;
 const TOP: f64 = 6.0;
-/// What happens within so many pixels is one mark.
+/// Width in pixels of the interval whose events share a mark.
 const MARK: f64 = 4.0;
-/// A mark names so many of its happenings.
+/// Maximum number of events in the title of a mark.
 const NAMED: usize = 5;
-/// So many happenings stand in the list; a page with all of a long journal would not open.
+/// Maximum number of listed events. The page of a long journal would otherwise be too large for
+/// browsers.
 const LISTED: usize = 1000;
 
 impl Log {
-    /// The page as HTML.
+    /// Renders the page as HTML.
     pub fn html(&self) -> String {
-        let marked = self.happenings.iter().filter(|own| own.kind != Kind::Event).count();
+        let marked = self.happenings.iter().filter(|happening| happening.kind != Kind::Event).count();
         let body = html! {
             p class="verdict" { (self.verdict) }
             ul { @for part in &self.parts { li { (part) } } }
@@ -46,12 +47,12 @@ impl Log {
         page(&self.name, "What a loop heard, concluded, planned and asked for.", &body)
     }
 
-    /// The picture of the page as a file.
+    /// Renders the picture of the page as an SVG file.
     pub fn svg(&self) -> String {
         self.picture(PAGE[0]).file()
     }
 
-    /// What stands in the list, in the order of time.
+    /// Returns the listed events in chronological order.
     fn listed(&self) -> Vec<&Happening> {
         if self.happenings.len() <= LISTED {
             return self.happenings.iter().collect();
@@ -64,7 +65,7 @@ impl Log {
     }
 
     fn picture(&self, canvas: Canvas) -> Picture {
-        let last = self.happenings.last().map_or(0.0, |own| own.time);
+        let last = self.happenings.last().map_or(0.0, |happening| happening.time);
         let (left, right) = (canvas.left.max(NAMES), canvas.width - RIGHT);
         let scale = Scale::new((0.0, last), (left, right));
         let lanes = Kind::ALL.map(|kind| (kind, self.marks(kind, &scale)));
@@ -88,11 +89,11 @@ impl Log {
         Picture { width: canvas.width, height: bottom + 24.0, title, description, body }
     }
 
-    /// The happenings of a kind by where they are drawn.
+    /// Groups the events of a kind by their position in pixels.
     fn marks(&self, kind: Kind, scale: &Scale) -> BTreeMap<i64, Vec<&Happening>> {
         let mut marks: BTreeMap<i64, Vec<&Happening>> = BTreeMap::new();
-        for own in self.happenings.iter().filter(|own| own.kind == kind) {
-            marks.entry((scale.at(own.time) / MARK).floor() as i64).or_default().push(own);
+        for happening in self.happenings.iter().filter(|happening| happening.kind == kind) {
+            marks.entry((scale.at(happening.time) / MARK).floor() as i64).or_default().push(happening);
         }
         marks
     }
@@ -113,10 +114,13 @@ fn draw(kind: Kind, marks: &BTreeMap<i64, Vec<&Happening>>, (left, right): (f64,
     }
 }
 
-/// What a mark stands for.
-fn titled(own: &[&Happening]) -> String {
-    let named = own.iter().take(NAMED).map(|own| format!("{} s: {}", number(own.time), own.text));
-    let more = (own.len() > NAMED).then(|| format!("and {} more", own.len() - NAMED));
+/// Title of a mark: its first events.
+fn titled(marked: &[&Happening]) -> String {
+    let named = marked
+        .iter()
+        .take(NAMED)
+        .map(|happening| format!("{} s: {}", number(happening.time), happening.text));
+    let more = (marked.len() > NAMED).then(|| format!("and {} more", marked.len() - NAMED));
     named.chain(more).collect::<Vec<_>>().join("\n")
 }
 

@@ -1,6 +1,7 @@
-//! The places of a mission, the ways between them, and the way that a plan takes, coloured by configuration.
+//! Map of the places of a mission with the moves of a plan, coloured by configuration.
 //!
-//! Ways there and back are drawn side by side. Each has an arrow, with the numbers of its steps on the outer side.
+//! Moves in opposite directions are drawn side by side. Each move has an arrow, with the numbers of
+//! its steps on the outer side.
 
 use std::collections::BTreeMap;
 
@@ -13,46 +14,46 @@ use crate::palette::{Palette, configuration};
 use crate::scale::{px, range, width};
 use crate::svg::Picture;
 
-/// The margins at the sides of a map, which hold names of places: of the width, and at most.
+/// Side margins for the names of places: maximum in pixels, and as a fraction of the width.
 const MARGIN: f64 = 70.0;
 const MARGIN_PART: f64 = 0.12;
-/// The margins above and below.
+/// Upper and lower margin.
 const UPPER_MARGIN: f64 = 35.0;
-/// The least height of a map without its margins, and the greatest one that it is scaled to.
+/// Minimum height of a map without its margins, and the maximum to which it is scaled.
 const LEAST_HEIGHT: f64 = 60.0;
 const HEIGHT: f64 = 420.0;
-/// Neighbouring places do not lie further apart than this, so that small maps stay small.
+/// Maximum distance of neighbouring places, which keeps small maps small.
 const FARTHEST: f64 = 130.0;
 const LARGEST: f64 = 4_000.0;
-/// The radius of a place.
+/// Radius of a place.
 const RADIUS: f64 = 7.0;
-/// The height of a label.
+/// Height of a label.
 const LINE: f64 = 13.0;
-/// The distance of a move from the middle of its way: there and back lie on different sides.
+/// Offset of a move from the line of its way, so that opposite moves are on different sides.
 const ASIDE: f64 = 2.5;
-/// An arrow from its middle to its tip and to its sides.
+/// Distances from the middle of an arrow to its tip and to its sides.
 const TIP: f64 = 7.0;
 const SIDE: f64 = 6.0;
-/// The radius of the loop of a move that ends where it begins.
+/// Radius of the loop of a move that ends at its origin.
 const LOOP: f64 = 10.0;
-/// Places that are drawn nearer to each other than this are at one position.
+/// Distance below which places count as being at the same position.
 const SAME: f64 = 2.0;
-/// The margin that a loop needs.
+/// Margin for loops.
 const LOOP_MARGIN: f64 = 58.0;
-/// The distance of names that have no room near their place.
+/// Additional distance of names without space near their place.
 const FARTHER: f64 = 9.0;
-/// The length of a dash, where steps with several configurations take one way.
+/// Length of a dash of a move with several configurations.
 const DASH: f64 = 9.0;
 
 type Point = (f64, f64);
 
-/// A rectangle that is taken: left, top, right, bottom.
+/// An occupied rectangle: left, top, right, bottom.
 type Taken = (f64, f64, f64, f64);
 
-/// From one point to another.
+/// Start and end of a line.
 type Line = (Point, Point);
 
-/// All moves of a plan from one place to another.
+/// All moves of a plan from a place to another one.
 struct Leg {
     from: usize,
     to: usize,
@@ -74,7 +75,7 @@ struct Shape {
     outwards: Point,
 }
 
-/// Draws a map with a plan's way.
+/// Draws a map with the moves of a plan.
 pub(crate) fn map(plan: &Plan, map: &Map, palette: &Palette, canvas: Canvas) -> Picture {
     let has_loops = plan.steps.iter().any(|step| step.way.is_some_and(|(from, to)| from == to));
     let (points, drawn_width, drawn_height) = pixels(map, canvas, has_loops);
@@ -86,10 +87,11 @@ pub(crate) fn map(plan: &Plan, map: &Map, palette: &Palette, canvas: Canvas) -> 
     let dots = points.iter().map(|point| square(*point, RADIUS + 2.0));
     let loops = legs.iter().filter_map(|leg| leg.shape.centre).map(|centre| square(centre, LOOP));
     let arrows = legs.iter().map(|leg| square(leg.shape.arrow, SIDE));
-    let mut taken: Vec<Taken> = dots.chain(loops).chain(arrows).collect();
+    let mut occupied: Vec<Taken> = dots.chain(loops).chain(arrows).collect();
     // Numbers have fewer possible positions than names, so they are placed first.
-    let numbers: Vec<_> = legs.iter().map(|leg| number(leg, &legs, (limits, &lines), &mut taken)).collect();
-    let labels = names(map, &points, &legs, (limits, &lines), &mut taken);
+    let numbers: Vec<_> =
+        legs.iter().map(|leg| number(leg, &legs, (limits, &lines), &mut occupied)).collect();
+    let labels = names(map, &points, &legs, (limits, &lines), &mut occupied);
     let moves: usize = legs.iter().map(|leg| leg.steps.len()).sum();
     let title =
         format!("{} places, {} ways, and the {moves} moves of the plan", map.places.len(), map.ways.len());
@@ -118,7 +120,7 @@ pub(crate) fn map(plan: &Plan, map: &Map, palette: &Palette, canvas: Canvas) -> 
     Picture { width: drawn_width, height: drawn_height, title, description, body }
 }
 
-/// The moves of a plan, one leg for each pair of places, in the order of the pairs.
+/// Collects the moves of a plan: a leg per pair of places, in the order of the pairs.
 fn legs(plan: &Plan, map: &Map, points: &[Point]) -> Vec<Leg> {
     let mut moves: BTreeMap<(usize, usize), (Vec<usize>, Vec<String>)> = BTreeMap::new();
     for (step, number) in plan.steps.iter().zip(1..) {
@@ -145,20 +147,21 @@ fn legs(plan: &Plan, map: &Map, points: &[Point]) -> Vec<Leg> {
     legs.collect()
 }
 
-/// A move between two points, on the right-hand side of its way.
+/// Shape of a move between two points, on the right-hand side of its way.
 fn straight((x1, y1): Point, (x2, y2): Point) -> Shape {
     let length = (x2 - x1).hypot(y2 - y1).max(1e-6);
     let along = ((x2 - x1) / length, (y2 - y1) / length);
     let outwards = (-along.1, along.0);
     let (sx, sy) = (outwards.0 * ASIDE, outwards.1 * ASIDE);
-    // Beyond the middle, so that the arrow of the way back is somewhere else, on short ways, too.
+    // The arrow is beyond the middle, so that the arrows of opposite moves do not meet, even on
+    // short ways.
     let part = (0.5 + TIP / length).clamp(0.62, 0.75);
     let arrow = (x1 + (x2 - x1) * part + sx, y1 + (y2 - y1) * part + sy);
     Shape { line: ((x1 + sx, y1 + sy), (x2 + sx, y2 + sy)), centre: None, arrow, along, outwards }
 }
 
-/// A move that ends where it begins: a loop at a side of the place without ways, above or below it if possible, where its numbers need least
-/// room.
+/// Shape of a move that ends at its origin: a loop at a side of the place without ways. Above and
+/// below are preferred, because the numbers need least space there.
 fn looped((x, y): Point, neighbours: &[Point]) -> Shape {
     let diagonal = std::f64::consts::FRAC_1_SQRT_2;
     let upright = [(0.0, -1.0), (0.0, 1.0)];
@@ -168,7 +171,7 @@ fn looped((x, y): Point, neighbours: &[Point]) -> Shape {
         let parts = neighbours
             .iter()
             .map(|(nx, ny)| ((nx - x) * dx + (ny - y) * dy) / (nx - x).hypot(ny - y).max(1e-6));
-        // What is at a right angle or more is far enough.
+        // All angles of at least 90 degrees are equally good.
         parts.fold(0.0, f64::max)
     };
     let best = directions.min_by(|one, other| nearness(*one).total_cmp(&nearness(*other)));
@@ -178,7 +181,7 @@ fn looped((x, y): Point, neighbours: &[Point]) -> Shape {
     Shape { line: (centre, arrow), centre: Some(centre), arrow, along: (-dy, dx), outwards: (dx, dy) }
 }
 
-/// The numbers of a leg, as text.
+/// Step numbers of a leg as text.
 fn numbers(leg: &Leg) -> String {
     let numbers: Vec<String> = leg.steps.iter().take(3).map(ToString::to_string).collect();
     numbers.join(",") + if leg.steps.len() > 3 { "…" } else { "" }
@@ -208,18 +211,18 @@ fn number(
     });
     let is_own = |(x, y): &Point| {
         let distance = |shape: &Shape| (shape.arrow.0 - x).hypot(shape.arrow.1 - y);
-        let own = distance(&leg.shape);
-        legs.iter().all(|other| std::ptr::eq(other, leg) || own + 1.0 < distance(&other.shape))
+        let own_distance = distance(&leg.shape);
+        legs.iter().all(|other| std::ptr::eq(other, leg) || own_distance + 1.0 < distance(&other.shape))
     };
     let places = centres
         .filter(is_own)
         .map(|(x, y)| (x - half_width, y - half_height, x + half_width, y + half_height));
-    let own = leg.shape.line;
-    let others: Vec<Line> = lines.iter().copied().filter(|line| *line != own).collect();
-    choose(places, (limits, &others), taken)
+    let own_line = leg.shape.line;
+    let other_lines: Vec<Line> = lines.iter().copied().filter(|line| *line != own_line).collect();
+    choose(places, (limits, &other_lines), taken)
 }
 
-/// The names of places: those that matter most come first.
+/// Places the names of places, the most important ones first.
 fn names(
     map: &Map,
     points: &[Point],
@@ -243,7 +246,8 @@ fn names(
     labels
 }
 
-/// Draws a leg: a line, in dashes of several colours where its steps have several configurations, the arrow, and the numbers.
+/// Draws a leg: the arrow, the numbers, and a line that is dashed in several colours if its steps
+/// have several configurations.
 fn draw_leg(leg: &Leg, map: &Map, palette: &Palette, number: Option<Point>) -> Markup {
     let mut names: Vec<&String> = Vec::new();
     for name in leg.names.iter().filter(|name| !name.is_empty()) {
@@ -286,15 +290,16 @@ fn draw_leg(leg: &Leg, map: &Map, palette: &Palette, number: Option<Point>) -> M
     }
 }
 
-/// Where a text of this width can stand beside a point without touching what is there, and if possible no line: the left end of its base
-/// line. `reach` is how far the point itself goes. The room is taken then.
+/// Finds a position for a text of this width near a point and marks it as occupied. The text
+/// touches nothing that is already placed, and no line if possible. `reach` is the radius of the
+/// point. Returns the left end of the base line.
 fn room(
     (x, y): Point,
     (reach, width): (f64, f64),
     (limits, lines): (Taken, &[Line]),
     taken: &mut Vec<Taken>,
 ) -> Option<Point> {
-    // Farther away only where a line would cross a nearby name.
+    // The greater distance is used only if a line crosses all nearby positions.
     let places = [reach, reach + FARTHER].into_iter().flat_map(|reach| {
         let beside = [(x + reach, y), (x - reach - width, y)];
         let across = [y - reach - LINE / 2.0, y + reach + LINE / 2.0].into_iter();
@@ -329,7 +334,7 @@ fn choose(
     Some((chosen.0 + 1.0, f64::midpoint(chosen.1, chosen.3) + 4.0))
 }
 
-/// Whether a line comes into a rectangle, by what is left of it between the sides (Liang and Barsky, 1984).
+/// Returns `true` if a line intersects a rectangle (line clipping by Liang and Barsky, 1984).
 fn crosses(((x1, y1), (x2, y2)): Line, (left, top, right, bottom): Taken) -> bool {
     let (dx, dy) = (x2 - x1, y2 - y1);
     let (mut from, mut to) = (0.0_f64, 1.0_f64);
@@ -347,21 +352,21 @@ fn crosses(((x1, y1), (x2, y2)): Line, (left, top, right, bottom): Taken) -> boo
     from <= to
 }
 
-/// Where the places are drawn, and how wide and high the picture is.
+/// Computes the positions of the places in pixels, and the width and height of the picture.
 fn pixels(map: &Map, canvas: Canvas, has_loops: bool) -> (Vec<Point>, f64, f64) {
-    let known: Option<Vec<Point>> = map.places.iter().map(|place| place.position).collect();
-    let points = known.unwrap_or_else(|| layout(map.places.len(), &map.ways));
+    let positions: Option<Vec<Point>> = map.places.iter().map(|place| place.position).collect();
+    let points = positions.unwrap_or_else(|| layout(map.places.len(), &map.ways));
     let ((left, right), (low, high)) = (range(points.iter().map(|p| p.0)), range(points.iter().map(|p| p.1)));
     let (across, upwards) = ((right - left).max(1e-9), (high - low).max(1e-9));
     let lengths = map
         .ways
         .iter()
         .map(|(one, other)| (points[*one].0 - points[*other].0).hypot(points[*one].1 - points[*other].1));
-    // Ways between places at one position do not count: these are spread.
+    // Ways between places at equal positions are ignored, because these places are spread later.
     let shortest = across.max(upwards) * SAME / LARGEST;
     let mut lengths: Vec<f64> = lengths.filter(|length| *length > shortest).collect();
     lengths.sort_by(f64::total_cmp);
-    // The shortest ways but for a few decide.
+    // The 5 % quantile is used, so that a few very short ways do not enlarge the whole map.
     let shortest = lengths.get(lengths.len() / 20).copied().unwrap_or(across);
     let least_margin = if has_loops { LOOP_MARGIN } else { 0.0 };
     let margin = (canvas.width * MARGIN_PART).min(MARGIN).max(least_margin);

@@ -1,4 +1,4 @@
-//! The frame of all pages: one file that needs nothing else, asks nothing of a network, and says so to the browser.
+//! Frame of all pages: a self-contained file whose content security policy forbids network access.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -6,20 +6,20 @@ use crate::data::Reason;
 use crate::frame::{Canvas, PAGE};
 use crate::svg::{Picture, clean};
 
-/// The style of pages and of the pictures in them.
+/// Style sheet of pages and their pictures.
 pub const STYLE: &str = concat!(include_str!("picture.css"), include_str!("page.css"));
-/// The only script; a page is whole without it.
+/// The only script. A page is complete without it.
 const SCRIPT: &str = include_str!("page.js");
-/// Its digest: browsers run no other script in a page.
+/// Digest of the script, the only one that the content security policy admits.
 const DIGEST: &str = "sha256-fZ3YNffJKRqSukU6Y8OoyeJ/9kokzwiOieJxn4wpNoc=";
 
-/// Classes of pictures by the columns that they are shown in, in the order of [`PAGE`].
+/// CSS classes by the columns in which pictures are shown, in the order of [`PAGE`].
 const COLUMNS: [&str; 3] = ["in-wide", "in-half", "in-narrow"];
 
-/// How deep derivations unfold.
+/// Maximum depth of expandable derivations.
 const DEPTH: usize = 24;
 
-/// A whole page.
+/// Renders a complete page.
 pub(crate) fn page(title: &str, description: &str, body: &Markup) -> String {
     let policy =
         format!("default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src '{DIGEST}'");
@@ -52,8 +52,9 @@ pub(crate) fn page(title: &str, description: &str, body: &Markup) -> String {
     clean(&page.into_string()) + "\n"
 }
 
-/// A picture in a page: drawn for each of these canvases, the widest first, and shown on the widest that fits its column. A picture that
-/// outgrows its canvas, such as the timeline of a thousand steps, is scrolled, also by keyboard, and is not drawn for narrower ones.
+/// Renders a picture for several canvases, the widest first. The page shows the widest drawing that
+/// fits its column. A picture that exceeds its canvas, such as the timeline of a thousand steps, is
+/// scrolled and not drawn for narrower canvases.
 pub(crate) fn shown(name: &str, canvases: &[Canvas], draw: &dyn Fn(Canvas) -> Picture) -> Markup {
     let mut drawn: Vec<(f64, Picture)> = Vec::new();
     for canvas in canvases {
@@ -65,7 +66,7 @@ pub(crate) fn shown(name: &str, canvases: &[Canvas], draw: &dyn Fn(Canvas) -> Pi
         }
     }
     let fits = |column: f64| drawn.iter().position(|(width, _)| *width <= column);
-    // The column that each canvas of a page is made for, and the picture that is shown in it.
+    // Column for which each canvas is made, with the drawing shown in it.
     let columns = PAGE.iter().zip(COLUMNS);
     let columns = columns.map(|(canvas, class)| (fits(canvas.width).unwrap_or(drawn.len() - 1), class));
     let columns: Vec<(usize, &str)> = columns.collect();
@@ -85,7 +86,7 @@ pub(crate) fn shown(name: &str, canvases: &[Canvas], draw: &dyn Fn(Canvas) -> Pi
     }
 }
 
-/// A table that may be wider than the screen.
+/// Table that can be scrolled horizontally.
 pub(crate) fn table(name: &str, header: &[&str], rows: &Markup) -> Markup {
     html! {
         div class="scroll" tabindex="0" role="group" aria-label=(name) {
@@ -97,7 +98,7 @@ pub(crate) fn table(name: &str, header: &[&str], rows: &Markup) -> Markup {
     }
 }
 
-/// Reasons, each with what it rests on.
+/// Derivations with their premises.
 pub(crate) fn reasons(reasons: &[Reason]) -> Markup {
     unfolding(reasons, 0)
 }
@@ -128,7 +129,7 @@ mod tests {
     use super::{DIGEST, SCRIPT};
 
     #[test]
-    fn browsers_are_told_which_script_is_ours() {
+    fn content_security_policy_has_the_digest_of_the_script() {
         let digest = base64::engine::general_purpose::STANDARD.encode(Sha256::digest(SCRIPT));
         assert_eq!(DIGEST, format!("sha256-{digest}"));
     }

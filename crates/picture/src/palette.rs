@@ -1,20 +1,21 @@
-//! Which colour a name has, so that it has the same one in all pictures of a page.
+//! Colours of names, identical in all pictures of a page.
 
 use std::collections::BTreeMap;
 
 use crate::data::{Plan, Step};
 
-/// How many colours there are; more names begin again.
+/// Number of colours, which are reused for further names.
 pub(crate) const COLOURS: usize = 10;
 
-/// Names to colours.
+/// Assignment of colours to names.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Palette {
     colours: BTreeMap<String, usize>,
 }
 
 impl Palette {
-    /// The designs of all plans in the order in which they are used, and then the configurations of several designs.
+    /// Assigns colours to the designs of all plans in the order of use, then to configurations of
+    /// several designs.
     pub(crate) fn of(plans: &[&Plan]) -> Self {
         let mut palette = Self::default();
         let steps = || plans.iter().flat_map(|plan| &plan.steps);
@@ -32,7 +33,7 @@ impl Palette {
         self.colours.entry(name.to_owned()).or_insert(next);
     }
 
-    /// The class that gives shapes the colour of a name.
+    /// CSS class for the colour of a name.
     pub(crate) fn class(&self, name: &str) -> String {
         match self.colours.get(name) {
             Some(colour) if !name.is_empty() => format!("c{}", colour % COLOURS),
@@ -41,7 +42,7 @@ impl Palette {
     }
 }
 
-/// The designs of a step as one name: `fd_a + fd_b`.
+/// Name of the configuration of a step: `fd_a + fd_b`.
 pub(crate) fn configuration(step: &Step) -> String {
     let designs: Vec<&str> = step.configuration.iter().map(|(_, design)| design.as_str()).collect();
     designs.join(" + ")

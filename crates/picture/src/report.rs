@@ -1,4 +1,4 @@
-//! A page about a plan, or about two: without and with what is different.
+//! Page about a plan, or about two plans: without and with a difference.
 
 use maud::{Markup, html};
 
@@ -12,7 +12,7 @@ use crate::svg::clean;
 use crate::timeline::timeline;
 
 impl Report {
-    /// The page as HTML.
+    /// Renders the page as HTML.
     pub fn html(&self) -> String {
         let palette = self.palette();
         let body = html! {
@@ -36,12 +36,12 @@ impl Report {
         page(&self.name, &self.description, &body)
     }
 
-    /// The pictures of the page as files: their names, and the SVG texts.
+    /// Renders the pictures of the page as SVG files. Returns their names and texts.
     pub fn pictures(&self) -> Vec<(String, String)> {
         let palette = self.palette();
         let before = self.before.iter().map(|plan| ("before-", plan));
-        let own = std::iter::once(("", &self.plan));
-        own.chain(before).flat_map(|(prefix, plan)| plan_pictures(plan, prefix, &palette)).collect()
+        let current = std::iter::once(("", &self.plan));
+        current.chain(before).flat_map(|(prefix, plan)| plan_pictures(plan, prefix, &palette)).collect()
     }
 
     fn palette(&self) -> Palette {
@@ -51,12 +51,13 @@ impl Report {
 }
 
 impl Plan {
-    /// The timeline as a file.
+    /// Renders the timeline as an SVG file.
     pub fn svg(&self) -> String {
         timeline(self, &Palette::of(&[self]), &Span::of(&[self]), FILE).file()
     }
 
-    /// The plan as a part of somebody else's page, which has the style [`crate::STYLE`].
+    /// Renders the plan as part of another page, which must contain the style sheet
+    /// [`crate::STYLE`].
     pub fn part(&self) -> String {
         let body = html! {
             @if !self.verdict.is_empty() { p { (self.verdict) } }
@@ -82,16 +83,16 @@ fn plan_pictures(plan: &Plan, prefix: &str, palette: &Palette) -> Vec<(String, S
 
 /// Axis ranges of two plans that are shown side by side: shared if both have the same kind of axis.
 fn spans(before: &Plan, after: &Plan) -> [Span; 2] {
-    let both = [before, after];
-    both.map(|own| if before.axis == after.axis { Span::of(&both) } else { Span::of(&[own]) })
+    let plans = [before, after];
+    plans.map(|plan| if before.axis == after.axis { Span::of(&plans) } else { Span::of(&[plan]) })
 }
 
-/// All about a plan that has the page for itself; `name` tells it from others there.
+/// Renders a plan over the full width of the page. `name` is a unique identifier on the page.
 pub(crate) fn alone(own: &Plan, name: &str, palette: &Palette) -> Markup {
     plan(own, name, palette, (&Span::of(&[own]), &PAGE))
 }
 
-/// All about a plan, drawn on these canvases.
+/// Renders a plan on these canvases.
 fn plan(plan: &Plan, name: &str, palette: &Palette, (span, canvases): (&Span, &[Canvas])) -> Markup {
     html! {
         @if plan.steps.is_empty() {
@@ -134,15 +135,15 @@ fn plan(plan: &Plan, name: &str, palette: &Palette, (span, canvases): (&Span, &[
     }
 }
 
-/// Which colour is which configuration.
+/// Legend of the colours of configurations.
 fn legend(plan: &Plan, palette: &Palette) -> Markup {
     let mut names: Vec<String> =
         plan.steps.iter().flat_map(|step| &step.configuration).map(|(_, design)| design.clone()).collect();
     if plan.map.is_some() {
         names.extend(plan.steps.iter().filter(|step| step.way.is_some()).map(configuration));
     }
-    let mut seen = std::collections::BTreeSet::new();
-    names.retain(|name| !name.is_empty() && seen.insert(name.clone()));
+    let mut listed = std::collections::BTreeSet::new();
+    names.retain(|name| !name.is_empty() && listed.insert(name.clone()));
     html! {
         ul class="legend" {
             @for name in &names {

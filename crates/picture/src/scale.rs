@@ -1,9 +1,9 @@
-//! Numbers to places on a picture, round numbers for axes, and how much room a text takes.
+//! Scales, axis ticks, number formats and text widths.
 
-/// Pixels that a character takes at most in the fixed-width font of the pictures, at 11 pixels.
+/// Maximum width in pixels of a character in the fixed-width font of the pictures, at 11 pixels.
 const CHARACTER: f64 = 6.75;
 
-/// From a range of numbers to a range of pixels.
+/// Linear map from a range of numbers to a range of pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Scale {
     from: (f64, f64),
@@ -11,7 +11,7 @@ pub(crate) struct Scale {
 }
 
 impl Scale {
-    /// A range without length is widened.
+    /// Creates a scale. An empty range is widened to length 1.
     pub(crate) fn new(from: (f64, f64), to: (f64, f64)) -> Self {
         let is_point = (from.1 - from.0).abs() < f64::EPSILON * from.0.abs().max(1.0);
         Self { from: if is_point { (from.0, from.0 + 1.0) } else { from }, to }
@@ -22,7 +22,7 @@ impl Scale {
         self.to.0 + part * (self.to.1 - self.to.0)
     }
 
-    /// Round numbers in the range, at most about so many, ascending.
+    /// Returns round numbers in the range in ascending order, about `most` of them at most.
     pub(crate) fn ticks(&self, most: usize) -> Vec<f64> {
         if most == 0 {
             return Vec::new();
@@ -34,7 +34,7 @@ impl Scale {
     }
 }
 
-/// The next of 1, 2 and 5 times a power of ten.
+/// Rounds up to 1, 2 or 5 times a power of ten.
 pub(crate) fn round_step(least: f64) -> f64 {
     let power = 10_f64.powf(least.max(f64::MIN_POSITIVE).log10().floor());
     let factors = [1.0, 2.0, 5.0, 10.0];
@@ -42,7 +42,7 @@ pub(crate) fn round_step(least: f64) -> f64 {
     enough.unwrap_or(10.0) * power
 }
 
-/// The range of some numbers; from 0 to 1 of none.
+/// Range of the finite numbers; 0 to 1 without finite numbers.
 pub(crate) fn range(numbers: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let finite = numbers.into_iter().filter(|number| number.is_finite());
     let range = finite.fold(None, |range: Option<(f64, f64)>, number| {
@@ -51,12 +51,12 @@ pub(crate) fn range(numbers: impl IntoIterator<Item = f64>) -> (f64, f64) {
     range.unwrap_or((0.0, 1.0))
 }
 
-/// A coordinate, to a tenth of a pixel.
+/// Formats a coordinate, rounded to a tenth of a pixel.
 pub(crate) fn px(value: f64) -> String {
     number((value * 10.0).round() / 10.0)
 }
 
-/// A number as short as it can be, to ten digits.
+/// Formats a number as briefly as possible, with up to ten digits.
 pub(crate) fn number(value: f64) -> String {
     let digits = 9 - value.abs().max(1.0).log10().floor() as i32;
     let text = format!("{value:.*}", digits.clamp(0, 9) as usize);
@@ -64,18 +64,18 @@ pub(crate) fn number(value: f64) -> String {
     if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
-/// A number in at most seven characters or so, for an axis.
+/// Formats a number for an axis, with about seven characters at most.
 pub(crate) fn compact(value: f64) -> String {
     let text = number(value);
     if text.len() <= 7 { text } else { format!("{value:.1e}") }
 }
 
-/// How much room a text takes, in pixels.
+/// Width of a text in pixels.
 pub(crate) fn width(text: &str) -> f64 {
     text.chars().map(|character| if character.is_ascii() { CHARACTER } else { 2.0 * CHARACTER }).sum()
 }
 
-/// The text, or as much of its beginning as there is room for, in pixels.
+/// Truncates a text to a width in pixels.
 pub(crate) fn fit(text: &str, room: f64) -> String {
     if width(text) <= room {
         return text.to_owned();

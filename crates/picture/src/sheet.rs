@@ -1,4 +1,5 @@
-//! Pages of fronts, comparisons and simulations: points, distributions, tables, and plans that unfold.
+//! Pages about Pareto fronts, comparisons and simulations: scatter plots, distributions, tables,
+//! and expandable plans.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,17 +13,17 @@ use crate::report::alone;
 use crate::scale::{Scale, compact, fit, number, px, range};
 use crate::svg::Picture;
 
-/// The height of the area of points.
+/// Height of the area of a scatter plot.
 const HEIGHT: f64 = 300.0;
 const TOP: f64 = 24.0;
-/// The height of a row of a distribution.
+/// Height of a row of a distribution.
 const ROW: f64 = 46.0;
-/// Values that are nearer than this are drawn above each other, up to this height.
+/// Distance in pixels below which values are stacked, and the maximum height of a stack.
 const NEAR: f64 = 6.0;
 const HIGHEST: f64 = 28.0;
 
 impl Sheet {
-    /// The page as HTML.
+    /// Renders the page as HTML.
     pub fn html(&self) -> String {
         let plans: Vec<&Plan> = self.plans().collect();
         let palette = Palette::of(&plans);
@@ -33,7 +34,7 @@ impl Sheet {
         page(&self.name, &self.description, &body)
     }
 
-    /// The pictures of the page as files: their names, and the SVG texts.
+    /// Renders the pictures of the page as SVG files. Returns their names and texts.
     pub fn pictures(&self) -> Vec<(String, String)> {
         let pictures = self.parts.iter().filter_map(|part| match part {
             Part::Points(own) => Some(points(own, FILE)),
@@ -87,7 +88,7 @@ fn drawn(part: &Part, number: i32, palette: &Palette) -> Markup {
     }
 }
 
-/// A scale for these values with a margin.
+/// Creates a scale for these values with a margin.
 fn scale(values: impl Iterator<Item = f64>, to: (f64, f64)) -> Scale {
     let (low, high) = range(values);
     let margin = ((high - low) * 0.08).max(high.abs() * 1e-6);
@@ -102,12 +103,12 @@ fn points(own: &Points, canvas: Canvas) -> Picture {
         scale(own.points.iter().map(|own| own.3).chain(own.line.iter().map(|own| own.1)), (bottom, TOP));
     let line: Vec<String> =
         own.line.iter().map(|(x, y)| format!("{} {}", px(across.at(*x)), px(upwards.at(*y)))).collect();
-    // Points at one place have one label, with each name once.
+    // Points at the same position share a label, in which each name occurs once.
     let mut labels: BTreeMap<(String, String), BTreeSet<&str>> = BTreeMap::new();
     for (short, _, x, y) in &own.points {
         labels.entry((px(across.at(*x)), px(upwards.at(*y)))).or_default().insert(short);
     }
-    let mut taken: Vec<(f64, f64, f64)> = Vec::new();
+    let mut occupied: Vec<(f64, f64, f64)> = Vec::new();
     let body = html! {
         g class="axis" {
             @for tick in across.ticks(ticks(canvas)) {
@@ -132,7 +133,7 @@ fn points(own: &Points, canvas: Canvas) -> Picture {
             }
         }
         @for ((x, y), names) in &labels {
-            @if let Some((x, y, text)) = label(x, y, &names.iter().copied().collect::<Vec<_>>().join(", "), right, &mut taken) {
+            @if let Some((x, y, text)) = label(x, y, &names.iter().copied().collect::<Vec<_>>().join(", "), right, &mut occupied) {
                 text x=(px(x)) y=(px(y)) { (text) }
             }
         }
@@ -141,7 +142,7 @@ fn points(own: &Points, canvas: Canvas) -> Picture {
     Picture { width: right + RIGHT, height: bottom + 40.0, title: own.title.clone(), description, body }
 }
 
-/// Where the label of a point has room, if it has: above it, or below.
+/// Finds space for the label of a point, above or below it, and marks it as occupied.
 fn label(
     x: &str,
     y: &str,
@@ -162,7 +163,7 @@ fn label(
     Some((left, place, text))
 }
 
-/// The number of ticks of an axis that there is room for.
+/// Number of axis ticks that fit.
 fn ticks(canvas: Canvas) -> usize {
     (canvas.inner() / 75.0).min(8.0) as usize
 }
@@ -209,7 +210,7 @@ fn rows(own: &Rows, canvas: Canvas) -> Picture {
     Picture { width: canvas.width, height: bottom + 40.0, title: own.title.clone(), description, body }
 }
 
-/// How high each value is drawn, in pixels, so that values that are near stand above each other.
+/// Heights in pixels that stack nearby values.
 fn heights(values: &[(f64, String)], across: &Scale) -> Vec<f64> {
     let mut counts: BTreeMap<i64, usize> = BTreeMap::new();
     let mut place = |(value, _): &(f64, String)| {

@@ -1,25 +1,26 @@
-//! A picture, as a part of a page or as a file of its own.
+//! SVG pictures, as part of a page or as a file.
 
 use maud::{Markup, PreEscaped, html};
 
 use crate::scale::px;
 
-/// The style of pictures on white paper; pages add that for dark screens.
+/// Style sheet for a white background. Pages add styles for dark screens.
 const STYLE: &str = include_str!("picture.css");
 
-/// What is drawn, in pixels.
+/// Contents of a picture; lengths are in pixels.
 pub(crate) struct Picture {
     pub(crate) width: f64,
     pub(crate) height: f64,
-    /// What it shows, in a few words.
+    /// Title in a few words.
     pub(crate) title: String,
-    /// How it is to be read.
+    /// Instructions for reading the picture.
     pub(crate) description: String,
     pub(crate) body: Markup,
 }
 
 impl Picture {
-    /// The picture in a page; `name` tells it from all others there, and `classes` say in which columns it is shown.
+    /// Renders the picture for a page. `name` is a unique identifier on the page, and `classes`
+    /// determine the columns in which the picture is shown.
     pub(crate) fn inline(&self, name: &str, classes: &str) -> Markup {
         let (title, description) = (format!("{name}-title"), format!("{name}-description"));
         html! {
@@ -32,7 +33,7 @@ impl Picture {
         }
     }
 
-    /// The picture as a file: texts are texts, and there is no script.
+    /// Renders the picture as a file with real text and without scripts.
     pub(crate) fn file(&self) -> String {
         let picture = html! {
             svg xmlns="http://www.w3.org/2000/svg" class="picture" role="img"
@@ -48,7 +49,7 @@ impl Picture {
     }
 }
 
-/// Text without the characters that XML does not have.
+/// Removes the characters that XML does not admit.
 pub(crate) fn clean(text: &str) -> String {
     let allowed = |character: char| {
         matches!(character, '\n' | '\t' | '\r')
@@ -57,7 +58,7 @@ pub(crate) fn clean(text: &str) -> String {
     text.chars().map(|character| if allowed(character) { character } else { '\u{fffd}' }).collect()
 }
 
-/// What was there before, behind what is there now.
+/// Formats the former value behind a changed one.
 pub(crate) fn alternative(before: &str) -> String {
     if before.is_empty() { " (changed)".to_owned() } else { format!(" (changed, before: {before})") }
 }

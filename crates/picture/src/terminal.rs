@@ -1,19 +1,19 @@
-//! A plan as lines of a terminal: a row for the actions, and one for the design of each function.
+//! Plan as text for a terminal: a row for the actions, and a row per function for its designs.
 
 use std::collections::BTreeMap;
 
 use crate::data::{Axis, Plan, Step};
 use crate::scale::number;
 
-/// Fewer columns than this are too few for a picture.
+/// Minimum number of columns for a picture.
 const LEAST: usize = 60;
-/// A step has at least so many columns.
+/// Minimum number of columns of a step.
 const COLUMN: usize = 4;
 /// Minimum number of columns of a step in a picture that is not to scale, including the mark of its beginning.
 const NARROW: usize = 7;
 /// Maximum number of bands below each other; more would give no overview.
 const BANDS: usize = 6;
-/// Names of lanes are shortened to this.
+/// Maximum length of the names of lanes.
 const NAME: usize = 24;
 
 /// Steps of one line, each with the columns at which it begins and ends.
@@ -90,11 +90,11 @@ impl Plan {
     /// Places steps side by side with their minimum widths, and distributes the remaining columns by their durations.
     fn widened(&self, steps: std::ops::Range<usize>, room: usize) -> Columns {
         let duration = |index: usize| (self.steps[index].end - self.steps[index].start).max(0.0);
-        let all: f64 = steps.clone().map(duration).sum();
-        let left = room.saturating_sub(steps.len() * NARROW) as f64;
+        let total: f64 = steps.clone().map(duration).sum();
+        let spare = room.saturating_sub(steps.len() * NARROW) as f64;
         let (mut places, mut passed) = (Vec::new(), 0.0);
         let column = |number: usize, passed: f64| {
-            number * NARROW + if all > 0.0 { (passed / all * left).floor() as usize } else { 0 }
+            number * NARROW + if total > 0.0 { (passed / total * spare).floor() as usize } else { 0 }
         };
         for (number, index) in steps.enumerate() {
             let from = column(number, passed);
@@ -123,7 +123,7 @@ impl Plan {
         line
     }
 
-    /// Where steps begin, and where the last one ends.
+    /// Draws the starts of steps and the end of the last one.
     fn ticks(&self, places: &Columns, room: usize) -> String {
         let last = places.last().map(|(index, (_, to))| (*to, self.steps[*index].end));
         let marks = places.iter().map(|(index, (from, _))| (*from, self.steps[*index].start)).chain(last);
@@ -146,7 +146,7 @@ fn length(text: &str) -> usize {
     text.chars().count()
 }
 
-/// The text in so many characters.
+/// Truncates a text to `most` characters.
 fn short(text: &str, most: usize) -> String {
     if length(text) <= most {
         return text.to_owned();

@@ -1,4 +1,5 @@
-//! A plan as a timeline: a lane for the actions, one for the design of each function, and marks where a function changes its design.
+//! Timeline of a plan: a lane for the actions, a lane per function for its designs, and marks at
+//! changes of designs.
 
 use std::collections::BTreeMap;
 
@@ -11,14 +12,14 @@ use crate::palette::Palette;
 use crate::scale::{fit, px, width};
 use crate::svg::{Picture, alternative};
 
-/// The height of a row, and of the bars in it.
+/// Heights of a row and of its bars.
 const ROW: f64 = 26.0;
 const BAR: f64 = 20.0;
-/// Between lanes.
+/// Gap between lanes.
 const GAP: f64 = 8.0;
-/// What stands above the lanes.
+/// Margin above the lanes.
 const TOP: f64 = 6.0;
-/// What takes no time is drawn so wide.
+/// Width of steps without duration.
 const LEAST: f64 = 3.0;
 /// Minimum number of characters of a shortened name, including the ellipsis.
 const SHORTEST: usize = 5;
@@ -34,7 +35,7 @@ struct Bar<'p> {
     is_changed: bool,
 }
 
-/// A lane: its name, its bars, and for each of these its row.
+/// A lane: its name, its bars, and the row of each bar.
 struct Lane<'p> {
     name: &'p str,
     bars: Vec<Bar<'p>>,
@@ -63,7 +64,7 @@ pub(crate) fn timeline(plan: &Plan, palette: &Palette, span: &Span, canvas: Canv
         tops.push(bottom);
         bottom += lane.height() + GAP;
     }
-    // Lines of changes leave out names between lanes.
+    // The lines of changes are interrupted where names are between lanes.
     let marked: Vec<(f64, f64)> = if canvas.has_names_above {
         lanes.iter().zip(&tops).map(|(lane, top)| (*top, top + lane.height())).collect()
     } else {
@@ -88,11 +89,11 @@ pub(crate) fn timeline(plan: &Plan, palette: &Palette, span: &Span, canvas: Canv
     Picture { width: frame.width, height: bottom + 24.0, title, description, body }
 }
 
-/// The actions, and each function in the order of its name.
+/// Creates the lanes: the actions, then the functions in alphabetical order.
 fn lanes<'p>(plan: &'p Plan, frame: &Frame) -> Vec<Lane<'p>> {
     let place = |step: &Step| {
         let from = frame.scale.at(step.start);
-        // A short step keeps its place by the scale, so that steps one after another stay in one row.
+        // A short step is placed by its true end, so that consecutive steps share a row.
         (from, if step.end > step.start { frame.scale.at(step.end) } else { from + LEAST })
     };
     let mut functions: BTreeMap<&str, Vec<Bar<'p>>> = BTreeMap::new();
@@ -162,7 +163,7 @@ fn draw_bar(bar: &Bar<'_>, top: f64, (class, is_action): (&str, bool), about: &s
     }
 }
 
-/// What a bar stands for, in words.
+/// Description of a bar in words.
 fn about(bar: &Bar<'_>, step: &Step, lane: &str, is_action: bool) -> String {
     let number = bar.step + 1;
     if is_action {

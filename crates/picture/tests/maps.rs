@@ -1,4 +1,4 @@
-//! Maps: each number is at the arrow of its own direction, whatever way a plan takes.
+//! Maps: each number is at the arrow of its own direction, for all ways of a plan.
 
 use metaplan_picture::{Map, Place, Plan, Report, Step};
 use roxmltree::{Document, Node};

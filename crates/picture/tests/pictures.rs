@@ -1,4 +1,4 @@
-//! What is drawn: everything that the data have, whatever names they have, and the same bytes each time.
+//! Pictures contain all data with arbitrary names, and are identical for identical data.
 
 use std::time::Instant;
 
@@ -10,7 +10,7 @@ use roxmltree::Document;
 
 const HOSTILE: &str = "</title></text><script>alert(1)</script>\"'&\u{1}\u{202e}";
 
-/// A plan of so many steps around a ring of places, with names that begin as given.
+/// Creates a plan of `steps` steps around a ring of places, with names that begin as given.
 fn plan(steps: usize, name: &str) -> Plan {
     let count = steps.max(3);
     let step = |index: usize| Step {
@@ -156,7 +156,7 @@ fn a_thousand_steps_are_drawn_at_once() {
     let begun = Instant::now();
     let page = report.html();
     assert!(page.contains("data-step=\"1000\""));
-    // Debug builds are several times slower than what users have.
+    // Debug builds are several times slower than release builds.
     assert!(begun.elapsed().as_secs_f64() < 10.0, "{:?}", begun.elapsed());
 }
 
@@ -371,7 +371,7 @@ fn nothing_is_said_in_words() {
     assert_eq!(some.pictures()[0].1.matches("none of its 20").count(), 1);
 }
 
-/// A journal of so many events, each tenth with a decision.
+/// Creates a journal with the given number of events, each tenth with a decision.
 fn log(events: u64, name: &str) -> Log {
     let happening = |record: u64| Happening {
         record,

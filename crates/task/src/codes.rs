@@ -1,6 +1,6 @@
 //! Error codes of this crate with meaning, cause and remedy.
 
-/// Codes in their order, each with what it means, what causes it, and what to do.
+/// Codes in ascending order, each with meaning, cause and remedy.
 pub const CODES: &[[&str; 4]] = &[
     [
         "E301",

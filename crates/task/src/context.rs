@@ -4,7 +4,7 @@ use crate::limits::Limits;
 use crate::number::Int;
 use crate::task::Task;
 
-/// The task that is planned for, and when to stop.
+/// The ground task and the limits of planning.
 #[derive(Debug)]
 pub struct Context<'a, N = Int> {
     pub task: &'a Task<N>,

@@ -3,7 +3,7 @@
 use crate::limits::Interrupted;
 use pddl::ast::Span;
 
-/// Which of the two PDDL files a place lies in.
+/// The PDDL file that contains a place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum File {
     /// The domain file.
@@ -12,70 +12,70 @@ pub enum File {
     Problem,
 }
 
-/// A place in one of the two PDDL files.
+/// A source location in one of the two PDDL files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Place {
     /// The file.
     pub file: File,
-    /// The region of its text.
+    /// Text range.
     pub span: Span,
 }
 
-/// Everything that is wrong with a task.
+/// All errors of a task.
 pub type Errors = diagnostics::Errors<Error>;
 
-/// Why a task cannot be grounded or encoded.
+/// Reason why a task cannot be grounded or encoded.
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A construct that the planner does not handle (the parser and the validator may).
+    /// A construct that the planner does not support, although the parser and the validator may.
     #[error("{construct} cannot be planned with: {instead}")]
     Unsupported {
-        /// What the file uses.
+        /// The construct in the file.
         construct: String,
-        /// What would be accepted.
+        /// A supported alternative.
         instead: String,
-        /// Where.
+        /// Source location.
         place: Place,
     },
-    /// A numeric fluent that is read, and has no value at first.
+    /// A numeric fluent that is read but has no initial value.
     #[error("`{name}` without an initial value cannot be planned with: a value for it in `:init`")]
     NoValue {
-        /// The function.
+        /// Name of the function.
         name: String,
-        /// Where it is read.
+        /// Source location of the reading expression.
         place: Place,
     },
-    /// A name that the checker would have refused.
+    /// An undeclared name, which `pddl::check` would have rejected.
     #[error("unknown {kind} `{name}`")]
     Unknown {
         /// `predicate`, `function`, `object`, `type` or `variable`.
         kind: &'static str,
-        /// The name.
+        /// The undeclared name.
         name: String,
-        /// Where.
+        /// Source location.
         place: Place,
     },
     /// A product or quotient that is not linear in the fluents.
     #[error("the expression is not linear in the fluents that actions change")]
     NonLinear {
-        /// Where.
+        /// Source location.
         place: Place,
     },
-    /// A number that does not fit the exact integer arithmetic of the encoder.
+    /// A number that exceeds the exact integer arithmetic of the encoder.
     #[error(
         "{what}: a number exceeds 2^118 after scaling to integers, or has fractions that no scale makes integers"
     )]
     Overflow {
-        /// The quantity.
+        /// Description of the quantity.
         what: String,
-        /// The action or the metric, where it is one that is too much.
+        /// The action or the metric that contains the number, if known.
         place: Option<Place>,
     },
-    /// A limit was reached before the task was ground.
+    /// A limit was reached before grounding was complete.
     #[error("a limit was reached while grounding")]
     Interrupted,
-    /// A rule of the relaxed reachability program that the rule engine refuses.
+    /// A rule of the relaxed reachability program that the rule engine rejects.
     #[error("grounding: {0}")]
     Rules(String),
 }
@@ -93,28 +93,28 @@ impl From<Interrupted> for Errors {
 }
 
 impl Error {
-    /// That numbers do not fit, wherever they stand.
+    /// Creates an overflow error without a location.
     pub fn overflow(what: &str) -> Self {
         Self::Overflow { what: what.to_owned(), place: None }
     }
 
-    /// The same error, if numbers are too large, with where they are.
+    /// Adds a location to an overflow error without one; returns other errors unchanged.
     #[must_use]
     pub fn within(self, name: &str, place: Option<Place>) -> Self {
         match self {
-            Self::Overflow { what, place: known } => {
-                Self::Overflow { what: format!("{what} ({name})"), place: known.or(place) }
+            Self::Overflow { what, place: existing } => {
+                Self::Overflow { what: format!("{what} ({name})"), place: existing.or(place) }
             }
             other => other,
         }
     }
 
-    /// Whether a fluent is read that has no value at first.
+    /// Returns `true` if a fluent is read that has no initial value.
     pub fn is_value_missing(&self) -> bool {
         matches!(self, Self::NoValue { .. })
     }
 
-    /// The stable code of the cause.
+    /// Returns the stable error code.
     pub fn code(&self) -> &'static str {
         match self {
             Self::Unsupported { .. } | Self::NoValue { .. } => "E301",
@@ -126,7 +126,7 @@ impl Error {
         }
     }
 
-    /// Where the cause stands, if it stands in a file.
+    /// Returns the source location, if there is one.
     pub fn place(&self) -> Option<Place> {
         match self {
             Self::Unsupported { place, .. }

@@ -16,7 +16,7 @@ use crate::thresholds::Thresholds;
 #[derive(Debug, Clone, Default)]
 pub struct Limits {
     deadline: Option<Instant>,
-    /// The time from the start to the deadline.
+    /// Time from the start to the deadline.
     time: Duration,
     interrupt: Arc<AtomicBool>,
     room: Option<usize>,
@@ -27,16 +27,16 @@ pub struct Limits {
 /// that a command may take, since the process has to start and to print.
 const GRACE: Duration = Duration::from_millis(120);
 
-/// What a search may store, in bytes, unless it is told.
+/// Default memory limit of a search in bytes.
 const DEFAULT_MEMORY: usize = 1 << 31;
 
 impl Limits {
-    /// No limit but the flag.
+    /// Returns limits without deadline; only the interrupt flag applies.
     pub fn none() -> Self {
         Self::default()
     }
 
-    /// Stops after this long, counted from now.
+    /// Sets the deadline to this long from now.
     #[must_use]
     pub fn with_time(mut self, time: Duration) -> Self {
         self.deadline = Instant::now().checked_add(time);
@@ -48,9 +48,9 @@ impl Limits {
     /// shared.
     #[must_use]
     pub fn half(&self) -> Self {
-        let left = self.deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
-        match left {
-            Some(left) => self.clone().with_time(left.mul_f64(0.5)),
+        let remaining = self.deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
+        match remaining {
+            Some(remaining) => self.clone().with_time(remaining.mul_f64(0.5)),
             None => self.clone(),
         }
     }
@@ -58,15 +58,15 @@ impl Limits {
     /// Returns the same limits with a deadline at most this long from now.
     #[must_use]
     pub fn within(&self, time: Duration) -> Self {
-        let own = self.clone().with_time(time);
+        let limits = self.clone().with_time(time);
         match self.deadline {
-            Some(deadline) if own.deadline.is_none_or(|own| deadline < own) => self.clone(),
-            _ => own,
+            Some(deadline) if limits.deadline.is_none_or(|sooner| deadline < sooner) => self.clone(),
+            _ => limits,
         }
     }
 
-    /// Returns limits for the completion of an answer: the deadline is a tenth of the time and a little more later, and
-    /// neither the flag nor the memory counts.
+    /// Returns limits for the completion of an answer. The deadline is later by a tenth of the time
+    /// limit and [`GRACE`]; flag and memory limit do not apply.
     #[must_use]
     pub fn extended(&self) -> Self {
         let grace = self.time.mul_f64(0.1).saturating_add(GRACE);
@@ -74,14 +74,14 @@ impl Limits {
         Self { deadline, time: self.time, ..Self::default() }
     }
 
-    /// Lets a search store so many bytes, as it estimates them.
+    /// Sets the memory limit of a search, in bytes of its own estimate.
     #[must_use]
     pub fn with_room(mut self, bytes: usize) -> Self {
         self.room = Some(bytes);
         self
     }
 
-    /// Lets parts of the search begin at other sizes than usual.
+    /// Overrides the task sizes from which parts of the search are active.
     #[doc(hidden)]
     #[must_use]
     pub fn with_thresholds(mut self, thresholds: Thresholds) -> Self {
@@ -89,40 +89,40 @@ impl Limits {
         self
     }
 
-    /// The sizes at which parts of the search begin.
+    /// Returns the task sizes from which parts of the search are active.
     pub fn thresholds(&self) -> &Thresholds {
         &self.thresholds
     }
 
-    /// How many bytes a search may store.
+    /// Returns the memory limit of a search in bytes.
     pub fn room(&self) -> usize {
         self.room.unwrap_or(DEFAULT_MEMORY)
     }
 
-    /// The flag that stops the run when it is set.
+    /// Returns the interrupt flag of the run.
     pub fn interrupt(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.interrupt)
     }
 
-    /// An error once a limit is reached.
+    /// Checks the limits.
     ///
     /// # Errors
-    /// Fails when a limit is reached.
+    /// [`Interrupted`] if a limit is reached.
     pub fn check(&self) -> Result<(), Interrupted> {
         if self.reached() { Err(Interrupted) } else { Ok(()) }
     }
 
-    /// Each item, as long as no limit is reached; then the error, and nothing more.
+    /// Iterates over the items while no limit is reached, then yields a single error and ends.
     pub fn watch<I: IntoIterator>(&self, items: I) -> LimitedIter<'_, I::IntoIter> {
         LimitedIter { items: items.into_iter(), pulse: self.pulse(), is_over: false }
     }
 
-    /// For loops that go through nothing that could be watched.
+    /// Returns a poll of the limits for loops without an iterator.
     pub fn pulse(&self) -> LimitPoll<'_> {
         LimitPoll { limits: self, left: 0, stride: 1, last: None }
     }
 
-    /// Whether the run has to stop.
+    /// Returns `true` if a limit is reached.
     pub fn reached(&self) -> bool {
         self.interrupt.load(Ordering::Relaxed)
             || self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
@@ -137,31 +137,31 @@ impl From<&Limits> for Interrupt {
     }
 }
 
-/// That a limit was reached: what was being worked out is not known.
+/// A limit was reached, so the computation has no result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Interrupted;
 
-/// Looks at the limits every so many beats: often where a beat takes long, seldom where looking would take longer than
-/// what lies between.
+/// Polls the limits at an adaptive stride: on every beat if beats are slow, rarely if the clock
+/// would cost more than the beats.
 #[derive(Debug)]
 pub struct LimitPoll<'a> {
     limits: &'a Limits,
-    /// Beats until the clock is looked at again.
+    /// Number of beats until the next check of the clock.
     left: u32,
     stride: u32,
     last: Option<Instant>,
 }
 
-/// Beats between two looks at the clock, at most.
+/// Maximum number of beats between two checks of the clock.
 const LONGEST_STRIDE: u32 = 1 << 14;
-/// The time between two looks at the clock that is aimed at.
+/// Target time between two checks of the clock.
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
 
 impl LimitPoll<'_> {
-    /// An error once a limit is reached.
+    /// Counts a beat and checks the limits if the stride has passed.
     ///
     /// # Errors
-    /// Fails when a limit is reached.
+    /// [`Interrupted`] if a limit is reached.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "above 0 where it is taken from; a stride is at most twice the longest"
@@ -217,16 +217,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_watched_ends_with_an_error_and_never_early_without_one() {
+    fn watched_iterators_end_with_an_error_and_never_early_without_one() {
         let limits = Limits::none();
         assert_eq!(limits.watch(0..100_000).filter_map(Result::ok).count(), 100_000);
         let mut watched = limits.watch(0..);
         assert_eq!(watched.next(), Some(Ok(0)));
         limits.interrupt().store(true, Ordering::Relaxed);
-        // A stride of beats may pass before the flag is looked at; then there is the error, once.
-        let rest: Vec<_> = watched.collect();
-        assert_eq!(rest.iter().filter(|item| item.is_err()).count(), 1);
-        assert_eq!(rest.last(), Some(&Err(Interrupted)));
+        // The flag may be noticed only after a stride; then a single error follows.
+        let results: Vec<_> = watched.collect();
+        assert_eq!(results.iter().filter(|item| item.is_err()).count(), 1);
+        assert_eq!(results.last(), Some(&Err(Interrupted)));
         let late = Limits::none().with_time(Duration::ZERO);
         assert_eq!(late.watch(0..3).collect::<Vec<_>>(), [Err(Interrupted)]);
     }

@@ -2,10 +2,10 @@
 
 use crate::number::dense;
 
-/// Lists of numbers, one after the other.
+/// Lists of numbers, stored consecutively.
 #[derive(Debug, Clone, Default)]
 pub struct Lists {
-    /// Where each list ends.
+    /// End of each list.
     ends: Vec<u32>,
     items: Vec<u32>,
 }
@@ -31,7 +31,7 @@ impl Lists {
         (0..dense(self.count())).map(|index| self.of(index))
     }
 
-    /// For each number below `count` the lists that have it.
+    /// Returns for each number below `count` the indices of the lists that contain it.
     #[must_use]
     pub fn inverse(&self, count: usize) -> Self {
         let mut ends = vec![0_u32; count];
@@ -46,10 +46,10 @@ impl Lists {
             *end = sum;
         }
         let mut items = vec![0; self.items.len()];
-        for (list, own) in self.iter().zip(0..) {
+        for (list, index) in self.iter().zip(0..) {
             for item in list {
                 let place = &mut next[*item as usize];
-                items[*place as usize] = own;
+                items[*place as usize] = index;
                 *place = place.saturating_add(1);
             }
         }

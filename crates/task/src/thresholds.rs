@@ -1,33 +1,36 @@
 //! Task sizes at which parts of a search begin.
 
-/// Sizes at which parts of the search begin that small tasks do without. Answers do not depend on them: tests lower them, so that small
-/// tasks, of which the answer is known by brute force, reach every pruning.
+/// Sizes from which optional parts of the search are active. Answers do not depend on them. Tests
+/// lower them, so that small tasks, whose answers are known by brute force, reach every pruning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Thresholds {
-    /// Number of stored states without a plan after which A\* is joined by a greedy search, and then by stubborn sets, the exchange of
-    /// objects and landmarks, where nothing else takes turns with it. `Config::head_start` of the planner is the number for
-    /// the planner as a whole.
+    /// Number of stored states without a plan after which A\* is joined by a greedy search, and
+    /// then by stubborn sets, object symmetries and landmarks, if no other component takes turns
+    /// with it. `Config::head_start` of the planner is the corresponding number for the planner as
+    /// a whole.
     pub states: usize,
-    /// Number of stored states at which A\* first compares its progress with the memory that there is.
+    /// Number of stored states at which A\* first compares its progress with the available memory.
     pub progress: usize,
-    /// Work, in steps of a computer, after which the search that is behind the other one gets half as much.
+    /// Work, in work units, after which the lagging search gets half of its share.
     pub behind: u64,
-    /// Number of states after which stubborn sets are given up if they leave out too little.
+    /// Number of states after which stubborn sets are disabled if they prune too little.
     pub stubborn: u64,
-    /// Number of evaluated states after which the satisficing search looks for pairs of facts.
+    /// Number of evaluated states after which the satisficing search computes h² mutexes.
     pub pairs: u64,
-    /// Number of labels that are not dominated above which a front is a tree, and above which a leaf of that tree is split.
+    /// Number of non-dominated labels above which a front is stored as a tree, and above which a
+    /// leaf of this tree is split.
     pub front: usize,
-    /// Number of labels at which the graph of all cheapest plans is first searched for enough plans.
+    /// Number of labels at which the graph of all optimal plans is first searched for alternatives.
     pub alternatives: usize,
-    /// Number of situations after which the greedy search and the search for sequential plans take turns with the exact search, where
-    /// actions overlap.
+    /// Number of nodes after which the greedy search and the search for sequential plans take turns
+    /// with the exact temporal search.
     pub concurrent: usize,
-    /// Length of the first turn of the greedy search, in situations; those of the other searches are in proportion.
+    /// Length of the first turn of the greedy search in nodes; turns of the other searches are
+    /// proportional.
     pub turn: usize,
-    /// Number of sequences after which the exhaustive search takes turns with others, where durations are chosen, and the length of the
-    /// first turn.
+    /// Number of sequences after which the exhaustive search with chosen durations takes turns with
+    /// others, and length of its first turn.
     pub chosen: u64,
 }
 
@@ -49,7 +52,7 @@ impl Default for Thresholds {
 }
 
 impl Thresholds {
-    /// Everything begins at once, and stubborn sets are never given up.
+    /// All parts are active from the start, and stubborn sets are never disabled.
     pub const NONE: Self = Self {
         states: 0,
         progress: 0,

@@ -1,6 +1,6 @@
 //! Names of the variants of enumerations, in text and in documents.
 
-/// A word that stands for none of the variants.
+/// Error about a word that names no variant.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("unknown {what} `{word}`: it must be one of {}", .known.join(", "))]
 pub struct UnknownWord {
@@ -15,12 +15,13 @@ impl UnknownWord {
     }
 }
 
-/// `as_str`, `Display`, `FromStr`, `Serialize` and `Deserialize` by the words of the variants.
+/// Implements `as_str`, `Display`, `FromStr`, `Serialize` and `Deserialize` by the words of the
+/// variants.
 #[macro_export]
 macro_rules! words {
     ($type:ident, $what:literal: $($variant:ident = $word:literal),+ $(,)?) => {
         impl $type {
-            /// The word for it, which stays the same.
+            /// Returns the stable word of the variant.
             pub fn as_str(self) -> &'static str {
                 match self { $(Self::$variant => $word),+ }
             }

@@ -1,4 +1,5 @@
-//! Two robots in a directory, without a server: they enrol, one of them loses its Kinect, and both get their decisions in order.
+//! Two robots in a directory, without a server: both enrol, one loses its Kinect, and both receive
+//! their decisions in order.
 
 #![expect(clippy::print_stdout, reason = "an example prints")]
 

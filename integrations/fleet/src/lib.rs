@@ -1,10 +1,13 @@
-//! The adaptation loops of many robots, on more than one machine: NATS JetStream is the journal, workers are stateless programs.
+//! Adaptation loops of many robots on several machines, with NATS JetStream as the journal and
+//! stateless workers.
 //!
-//! A robot says what it sees on the subject `ev.PARTITION.ROBOT`, and hears what it is to do on `dec.PARTITION.ROBOT`. Both are streams:
-//! nothing is forgotten, and the stream of events is the journal. A worker leases partitions, and runs the [loops](metaplan::mapek::Loop)
-//! of their robots. Every event leads to exactly one decision, which is appended only *behind the decision before it*
-//! (compare-and-set by the last sequence of the subject). So a worker that was away, and believes that it still has its lease,
-//! cannot decide anything twice: leases make it fast, the chain of decisions makes it right.
+//! Robots append events to the subject `ev.PARTITION.ROBOT`, and receive decisions on
+//! `dec.PARTITION.ROBOT`. Both are persistent streams, and the stream of events is the journal. A
+//! worker leases partitions and runs the [loops](metaplan::mapek::Loop) of their robots. Every
+//! event leads to exactly one decision, which is appended only if the robot's previous decision is
+//! still the last one (compare-and-set on the last sequence of the subject). A worker that still
+//! relies on an expired lease therefore cannot decide an event twice: leases are for efficiency,
+//! and the chain of decisions guarantees correctness.
 //!
 //! ```
 //! use std::{path::Path, sync::Arc, time::Duration};
@@ -43,11 +46,12 @@
 //! # }
 //! ```
 //!
-//! - [`store`]: what is needed of a log; NATS JetStream, or a directory without a server.
-//! - [`robot`]: one robot: an event in, a decision out; no clock and no network.
-//! - [`partition`]: the robots of one partition: recovery, order, snapshots.
-//! - [`worker`]: leases, their fair share, metrics, the end.
-//! - [`robots`](mod@robots): what robots and people do: append events, follow decisions, look at the fleet.
+//! - [`store`]: the required interface of a log, implemented by NATS JetStream and by a local
+//!   directory.
+//! - [`robot`]: a single robot: an event in, a decision out, without clock and network.
+//! - [`partition`]: the robots of a partition: recovery, order, snapshots.
+//! - [`worker`]: leases and their balance, metrics, shutdown.
+//! - [`robots`](mod@robots): clients: append events, follow decisions, query the fleet.
 
 pub mod missions;
 pub mod partition;

@@ -1,4 +1,4 @@
-//! Lines in and out.
+//! Standard input and output of the program, as lines.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write as _};
@@ -19,7 +19,7 @@ use serde_json::{Value, json};
 use tokio::io::{AsyncBufReadExt as _, BufReader, stdin};
 use tokio::sync::{mpsc, watch};
 
-/// Lines that wait to be stored, for each robot.
+/// Maximum number of unsent lines per robot.
 const AHEAD: usize = 1024;
 
 fn fault(fault: &Fault) -> Message {
@@ -30,7 +30,8 @@ fn unwritten(error: &io::Error) -> Message {
     Message::error("N313", format!("standard output cannot be written: {error}"))
 }
 
-/// Reads lines `ROBOT EVENT` to their end, or until `stop`; gives the number of those that were stored.
+/// Stores lines `ROBOT EVENT` until the end of input or `stop`. Returns the number of stored
+/// events.
 async fn feed<S: Store>(store: &S, session: &str, mut stop: watch::Receiver<bool>) -> Result<u64, Message> {
     let mut robots: BTreeMap<String, mpsc::Sender<String>> = BTreeMap::new();
     let mut senders = tokio::task::JoinSet::new();
@@ -75,7 +76,7 @@ async fn feed<S: Store>(store: &S, session: &str, mut stop: watch::Receiver<bool
             robots.insert(robot.to_owned(), tell);
         }
         if let Some(tell) = robots.get(robot) {
-            // It is there for as long as we are.
+            // The receiver lives as long as this sender.
             let _ = tell.send(event.to_owned()).await;
         }
     }
@@ -98,13 +99,13 @@ fn say(message: &Message) {
     eprint!("{}", message.text());
 }
 
-/// Stores what comes from standard input.
+/// Stores events from standard input.
 pub(crate) async fn send<S: Store>(store: S, session: &str) -> Result<(), Message> {
     let (_goes_on, stop) = watch::channel(false);
     feed(&store, session, stop).await.map(|_| ())
 }
 
-/// A decision as a line.
+/// Formats a decision as a line.
 fn line(message: &Stored) -> Option<(String, String)> {
     let address = Address::parse(&message.subject)?;
     let decided = Decided::parse(&message.payload)?;
@@ -118,7 +119,7 @@ fn line(message: &Stored) -> Option<(String, String)> {
     Some((address.robot, line.to_string()))
 }
 
-/// Writes decisions for as long as somebody reads them.
+/// Writes decisions until the output is closed.
 pub(crate) async fn follow<S: Store>(
     store: S,
     robot: Option<&str>,
@@ -132,7 +133,7 @@ pub(crate) async fn follow<S: Store>(
     write_decisions(&store, robot, &reached).await
 }
 
-/// From where on decisions are written: as asked for, or those that are new.
+/// Returns the sequences after which decisions are written: the given one, or the current ends.
 async fn beginning<S: Store>(
     store: &S,
     partitions: Vec<u32>,
@@ -140,16 +141,16 @@ async fn beginning<S: Store>(
 ) -> Result<BTreeMap<u32, u64>, Message> {
     let mut reached = BTreeMap::new();
     for partition in partitions {
-        let own = match after {
+        let start = match after {
             Some(after) => after,
-            None => store.end(Stream::Decisions, partition).await.map_err(|own| fault(&own))?,
+            None => store.end(Stream::Decisions, partition).await.map_err(|start| fault(&start))?,
         };
-        reached.insert(partition, own);
+        reached.insert(partition, start);
     }
     Ok(reached)
 }
 
-/// Writes decisions of partitions after those that are reached, for as long as somebody reads them.
+/// Writes the decisions after the given sequences until the output is closed.
 async fn write_decisions<S: Store>(
     store: &S,
     robot: Option<&str>,
@@ -165,13 +166,13 @@ async fn write_decisions<S: Store>(
         }
         let mut decisions = select_all(streams);
         while let Some((partition, message)) = decisions.next().await {
-            // Where reading was interrupted, it goes on.
+            // An interrupted subscription is resumed.
             let Ok(message) = message else { break };
-            if let Some((own, text)) = line(&message)
-                && robot.is_none_or(|robot| robot == own)
+            if let Some((name, text)) = line(&message)
+                && robot.is_none_or(|robot| robot == name)
             {
                 let mut out = io::stdout().lock();
-                match writeln!(out, "{own} {text}").and_then(|()| out.flush()) {
+                match writeln!(out, "{name} {text}").and_then(|()| out.flush()) {
                     Err(error) if error.kind() == io::ErrorKind::BrokenPipe => return Ok(()),
                     other => other.map_err(|error| unwritten(&error))?,
                 }
@@ -183,15 +184,15 @@ async fn write_decisions<S: Store>(
     }
 }
 
-/// A fleet in a directory, from standard input to standard output.
+/// Runs a fleet in a directory, from standard input to standard output.
 pub(crate) async fn up(
     shared: Arc<Shared<Local>>,
     after: Option<u64>,
     mut stop: watch::Receiver<bool>,
 ) -> Result<(), Message> {
     let store = shared.store.clone();
-    let all = (0..store.partitions()).collect();
-    let written = Arc::new(Mutex::new(beginning(&store, all, after).await?));
+    let partitions = (0..store.partitions()).collect();
+    let written = Arc::new(Mutex::new(beginning(&store, partitions, after).await?));
     let mut notices = store.notices();
     tokio::spawn(async move {
         while let Ok((subject, text)) = notices.recv().await {
@@ -201,11 +202,12 @@ pub(crate) async fn up(
     });
     let (order, orders) = watch::channel(false);
     let working = tokio::spawn(worker::run(Arc::clone(&shared), orders));
-    let (reader, own) = (store.clone(), Arc::clone(&written));
-    let writing = tokio::spawn(async move { write_decisions(&reader, None, &own).await });
+    let (reader, progress) = (store.clone(), Arc::clone(&written));
+    let writing = tokio::spawn(async move { write_decisions(&reader, None, &progress).await });
     let session = format!("{:016x}.", fastrand::u64(..));
     let fed = feed(&store, &session, stop.clone()).await;
-    // What was stored is decided and written before it ends, unless it was asked to end, or nobody reads.
+    // All stored events are decided and written before the end, unless the program is stopped or
+    // the output closed.
     while !*stop.borrow_and_update() && !writing.is_finished() && !is_done(&shared, &written).await? {
         tokio::select! {
             _ = stop.changed() => {}
@@ -213,7 +215,7 @@ pub(crate) async fn up(
         }
     }
     order.send_replace(true);
-    // A worker has nothing to say at its end.
+    // A worker has no result.
     let _ = working.await;
     writing.abort();
     if let Ok(outcome) = writing.await {
@@ -222,7 +224,7 @@ pub(crate) async fn up(
     fed.map(|_| ())
 }
 
-/// Whether all events are decided or refused, and written.
+/// Returns `true` if all events are decided or refused, and all decisions are written.
 async fn is_done(shared: &Shared<Local>, written: &Mutex<BTreeMap<u32, u64>>) -> Result<bool, Message> {
     let store = &shared.store;
     for partition in 0..store.partitions() {
@@ -238,7 +240,7 @@ async fn is_done(shared: &Shared<Local>, written: &Mutex<BTreeMap<u32, u64>>) ->
     Ok(true)
 }
 
-/// Writes what is known of a fleet.
+/// Writes the status of a fleet.
 pub(crate) fn status(status: &Status, as_json: bool) -> Result<(), Message> {
     let text = if as_json {
         format!("{}\n", serde_json::to_string(status).unwrap_or_default())

@@ -1,6 +1,7 @@
-//! The missions that a worker knows: each manifest of a directory, read once, with a loop that all robots of that mission begin as.
+//! Missions of a worker: the manifests of a directory are read once, each with an initial loop for
+//! its robots.
 //!
-//! A loop shares what it does not change with the one that it was cloned from: knowledge base, domain and ground task.
+//! Cloned loops share their constant parts: knowledge base, domain and ground task.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,12 +10,12 @@ use metaplan::mapek::Loop;
 use metaplan::message::{Errors, Message};
 use metaplan::setup::Setup;
 
-/// A mission as a loop that has not begun.
+/// A mission with its initial loop.
 #[derive(Debug, Clone)]
 pub struct Template {
-    /// The loop.
+    /// The initial loop.
     pub control: Loop,
-    /// The checksum of files and settings.
+    /// Checksum of files and settings.
     pub digest: String,
 }
 
@@ -26,7 +27,7 @@ impl Missions {
     /// Reads all manifests `*.toml` of a directory.
     ///
     /// # Errors
-    /// The directory cannot be read or has none, or a manifest is wrong; all that is wrong with all of them.
+    /// The directory cannot be read or has no manifests, or all errors of the manifests.
     pub fn read(directory: &Path) -> Result<Self, Errors> {
         let failed = |error: std::io::Error| {
             Errors::from(vec![Message::error("N300", format!("{}: {error}", directory.display()))])
@@ -62,12 +63,12 @@ impl Missions {
         Ok(Self(missions))
     }
 
-    /// The mission of that name.
+    /// Returns the mission of that name.
     pub fn get(&self, name: &str) -> Option<&Template> {
         self.0.get(name)
     }
 
-    /// Their names, sorted.
+    /// Returns the names of the missions, sorted.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.0.keys().map(String::as_str)
     }

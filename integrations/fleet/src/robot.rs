@@ -1,5 +1,5 @@
-//! One robot: an event in, a decision out. There is no clock, no thread and no network here: the same events at the same times give the
-//! same decisions.
+//! State of a single robot: an event in, a decision out. Without clock, threads and network, so
+//! that equal events at equal times lead to equal decisions.
 
 use std::time::Duration;
 
@@ -10,46 +10,46 @@ use crate::missions::Missions;
 use crate::store::Stored;
 use crate::wire::{Decided, FORMAT, Saved};
 
-/// What a robot is, apart from what waits for it.
+/// State of a robot, without its pending events.
 #[derive(Debug, Default)]
 pub struct Robot {
-    /// Its mission; none where it is not enrolled, or not any more.
+    /// Mission of the robot; `None` if it is not enrolled.
     pub mission: Option<String>,
-    /// When it was enrolled, in microseconds since 1970.
+    /// Time of enrolment in microseconds since 1970.
     pub enrolled: u64,
-    /// The last event that it contains.
+    /// Sequence of the last event that the state contains.
     pub event: u64,
     control: Control,
 }
 
-/// Its loop.
+/// Loop of a robot.
 #[derive(Debug, Default)]
 enum Control {
     #[default]
     None,
-    /// Ready to go on.
+    /// Loaded and ready.
     Warm(Box<Loop>),
-    /// As a snapshot, compressed: a few kilobytes.
+    /// Compressed snapshot of a few kilobytes.
     Cold(Vec<u8>),
 }
 
-/// Why an event changes nothing.
+/// Reason for refusing an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Refused {
     /// The robot is not enrolled.
     Unknown,
-    /// The robot is enrolled already.
+    /// The robot is already enrolled.
     Enrolled,
     /// There is no mission of that name.
     Mission,
     /// The message id names another robot.
     Forged,
-    /// The subject is not that of the robot's partition.
+    /// The subject is not of the robot's partition.
     Misplaced,
 }
 
 impl Refused {
-    /// A word for metrics.
+    /// Name of the reason in metrics.
     pub fn name(self) -> &'static str {
         match self {
             Self::Unknown => "not_enrolled",
@@ -60,7 +60,7 @@ impl Refused {
         }
     }
 
-    /// A sentence for whoever has sent it.
+    /// Description of the reason for the sender.
     pub fn sentence(self) -> &'static str {
         match self {
             Self::Unknown => {
@@ -76,22 +76,22 @@ impl Refused {
     }
 }
 
-/// What an event asks for.
+/// Request of an event.
 enum Request<'a> {
     Enrol(&'a str),
     Retire,
     Observe,
 }
 
-/// Why a robot cannot go on.
+/// Reason why a robot cannot continue.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Faulted(pub String);
 
 impl Robot {
-    /// A robot as it was saved.
+    /// Restores a robot from its saved state.
     ///
     /// # Errors
-    /// Its mission is not the one that it was saved with.
+    /// The mission has changed since the state was saved.
     pub fn restore(saved: &Saved, missions: &Missions) -> Result<Self, Faulted> {
         let mut robot = Self {
             mission: saved.mission.clone(),
@@ -100,10 +100,10 @@ impl Robot {
             control: Control::None,
         };
         if let Some(name) = &saved.mission {
-            let known = missions
+            let saved_loop = missions
                 .get(name)
                 .ok_or_else(|| Faulted(format!("there is no mission `{name}` in the directory")))?;
-            if known.digest != saved.digest {
+            if saved_loop.digest != saved.digest {
                 let text = format!(
                     "the files or settings of mission `{name}` are not those that it was enrolled with"
                 );
@@ -114,9 +114,9 @@ impl Robot {
         Ok(robot)
     }
 
-    /// It as it is saved, after a decision.
+    /// Returns the state to save after a decision.
     pub fn save(&self, missions: &Missions, decision: u64) -> Saved {
-        let known = match &self.control {
+        let snapshot = match &self.control {
             Control::None => Value::Null,
             Control::Warm(control) => control.snapshot().0,
             Control::Cold(bytes) => decompressed(bytes),
@@ -128,26 +128,27 @@ impl Robot {
             enrolled: self.enrolled,
             event: self.event,
             decision,
-            known,
+            known: snapshot,
         }
     }
 
-    /// Whether its loop is ready, and takes up the memory for that.
+    /// Returns `true` if the loop is loaded in memory.
     pub fn is_warm(&self) -> bool {
         matches!(self.control, Control::Warm(_))
     }
 
-    /// Keeps its loop as a snapshot only.
+    /// Replaces a loaded loop by its compressed snapshot.
     pub fn cool(&mut self) {
         if let Control::Warm(control) = &self.control {
             self.control = Control::Cold(compressed(&control.snapshot().0));
         }
     }
 
-    /// What an event leads to. With `before`, what it has led to once: its plans are taken over, and the answers must be the same.
+    /// Decides an event. In recovery, `before` is the decision that a former owner has made: its
+    /// plans are used, and the answers must be equal.
     ///
     /// # Errors
-    /// The robot cannot go on; it is as it was before, or its worth is lost and must be recovered.
+    /// The robot cannot continue. Its state is unchanged, or is invalid and must be recovered.
     pub fn decide(
         &mut self,
         event: &Stored,
@@ -178,8 +179,8 @@ impl Robot {
                     Some(before) => control.deliberate_again(&before.plans),
                     None => control.start(),
                 };
-                let made = control.decision(&answers);
-                (decided.answers, decided.plans) = (made.answers, made.plans);
+                let decision = control.decision(&answers);
+                (decided.answers, decided.plans) = (decision.answers, decision.plans);
                 decided.enrolled = Some(name.to_owned());
                 (self.mission, self.enrolled) = (Some(name.to_owned()), event.time);
                 self.control = Control::Warm(Box::new(control));
@@ -202,8 +203,8 @@ impl Robot {
                     Some(before) => control.handle_again(&observation, now, &before.plans),
                     None => control.handle(&observation, now),
                 };
-                let made = control.decision(&answers);
-                (decided.answers, decided.plans) = (made.answers, made.plans);
+                let decision = control.decision(&answers);
+                (decided.answers, decided.plans) = (decision.answers, decision.plans);
             }
         }
         self.event = event.sequence;
@@ -239,7 +240,8 @@ fn request(head: &Value) -> Request<'_> {
     }
 }
 
-/// Whether two decisions say the same; explanations may differ in words, as in a journal.
+/// Returns `true` if two decisions are equal except for the wording of explanations, as in a
+/// journal.
 fn is_same(left: &Decided, right: &Decided) -> bool {
     left.enrolled == right.enrolled && left.retired == right.retired && left.decision().agrees(&right.answers)
 }
@@ -248,7 +250,7 @@ fn compressed(known: &Value) -> Vec<u8> {
     lz4_flex::compress_prepend_size(known.to_string().as_bytes())
 }
 
-/// What [`compressed`] has made.
+/// Inverse of [`compressed`].
 fn decompressed(bytes: &[u8]) -> Value {
     let text = lz4_flex::decompress_size_prepended(bytes).unwrap_or_default();
     serde_json::from_slice(&text).unwrap_or_default()

@@ -1,4 +1,4 @@
-//! What robots and people do with a fleet: say what happens, hear what is to be done, and look at it.
+//! Clients of a fleet: append events, follow decisions, and query the status.
 
 use std::collections::BTreeMap;
 
@@ -8,37 +8,38 @@ use crate::partition::pause;
 use crate::store::{Bucket, Entry, Fault, Message, Store, Stream};
 use crate::wire::{Address, Presence, Progress};
 
-/// Says what happens to one robot, one event after the other: each is stored before the next one is sent, so that order is kept and none is
-/// lost or there twice.
+/// Appends the events of a robot, one at a time. Each is stored before the next one is sent, which
+/// preserves their order, and none is lost or duplicated.
 #[derive(Debug)]
 pub struct Sender<S> {
     store: S,
     address: Address,
-    /// What ids begin with behind the robot's name: nothing where the robot numbers its events itself.
+    /// Part of message ids after the robot's name; empty if the robot numbers its events itself.
     session: String,
     number: u64,
 }
 
 impl<S: Store> Sender<S> {
-    /// For one robot. Of two senders with the same session, the second one repeats what the first one has said.
+    /// Creates a sender for a robot. A second sender with the same session repeats the messages of
+    /// the first.
     pub fn new(store: S, robot: &str, session: &str) -> Self {
         let address = Address::of(robot, store.partitions());
         Self { store, address, session: session.to_owned(), number: 0 }
     }
 
-    /// Where the robot is.
+    /// Returns the address of the robot.
     pub fn address(&self) -> &Address {
         &self.address
     }
 
-    /// Appends an event; gives its sequence when it is durable. It is tried until then, with growing pauses.
+    /// Appends an event, retrying with growing pauses until it is durable. Returns its sequence.
     ///
     /// # Errors
-    /// The event is longer than the server takes.
+    /// The event exceeds the server's limit.
     pub async fn send(&mut self, event: &str) -> Result<u64, Fault> {
         self.number += 1;
         let subject = self.address.to_string();
-        // Somebody else's message may have the id that ours was to have; then another one is taken.
+        // Another client may have used our message id. Then a different id is chosen.
         for spare in 0_u32.. {
             let mut id = format!("{}:{}{}", self.address.robot, self.session, self.number);
             if spare > 0 {
@@ -53,13 +54,14 @@ impl<S: Store> Sender<S> {
         Err(Fault::Conflict)
     }
 
-    /// Whether the message of a sequence, which has our id, says what we say, in our place.
+    /// Returns `true` if the stored message with our id is our own: same subject and payload.
     async fn is_own(&self, subject: &str, sequence: u64, event: &str) -> bool {
         for attempt in 1.. {
             match self.store.at(Stream::Events, sequence).await {
                 Ok(found) => {
-                    return found
-                        .is_some_and(|own| own.subject == subject && own.payload == event.as_bytes());
+                    return found.is_some_and(|stored| {
+                        stored.subject == subject && stored.payload == event.as_bytes()
+                    });
                 }
                 Err(_) => pause(attempt).await,
             }
@@ -78,29 +80,29 @@ async fn until_there<S: Store>(store: &S, message: Message<'_>) -> Result<crate:
     Err(Fault::Conflict)
 }
 
-/// A fleet, as it is seen from outside.
+/// Status of a fleet.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Status {
-    /// Each partition.
+    /// All partitions.
     pub partitions: Vec<PartitionStatus>,
-    /// Each worker by its name.
+    /// Workers by name.
     pub workers: BTreeMap<String, Presence>,
 }
 
-/// A partition.
+/// Status of a partition.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct PartitionStatus {
-    /// Its number.
+    /// Number of the partition.
     pub partition: u32,
-    /// Who has it, if somebody has.
+    /// Name of the owner, if there is one.
     pub worker: Option<String>,
-    /// How often it was taken.
+    /// Number of ownership changes.
     pub epoch: u64,
-    /// Up to which event it is saved.
+    /// Sequence up to which events are saved.
     pub events: u64,
 }
 
-/// Looks at a fleet.
+/// Reads the status of a fleet.
 ///
 /// # Errors
 /// The log cannot be read.
@@ -114,9 +116,9 @@ pub async fn status<S: Store>(store: &S) -> Result<Status, Fault> {
         .collect();
     let partitions = (0..store.partitions()).map(|partition| {
         let key = partition.to_string();
-        let known = progress.get(&key).cloned().unwrap_or_default();
+        let position = progress.get(&key).cloned().unwrap_or_default();
         let worker = leases.get(&key).cloned();
-        PartitionStatus { partition, worker, epoch: known.epoch, events: known.events }
+        PartitionStatus { partition, worker, epoch: position.epoch, events: position.events }
     });
     let presence = |entry: Entry| Some((entry.key, serde_json::from_slice(&entry.value).ok()?));
     Ok(Status {

@@ -1,4 +1,4 @@
-//! What is written into streams and buckets, and how subjects are spelled.
+//! Data formats of streams and buckets, and the syntax of subjects.
 
 use std::fmt;
 
@@ -6,20 +6,22 @@ use metaplan::mapek::Decision;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// The version of what is written.
+/// Version of the data format.
 pub const FORMAT: &str = "metaplan-fleet/1";
 
-/// The longest name of a robot, in bytes.
+/// Maximum length of a robot's name in bytes.
 const LONGEST_NAME: usize = 64;
 
-/// A robot's name is one token of a subject: letters, digits, `-` and `_`, at most 64 of them.
+/// Returns `true` if a text is a valid name of a robot: a token of a subject with at most 64
+/// letters, digits, `-` and `_`.
 pub fn is_name(name: &str) -> bool {
     !name.is_empty()
         && name.len() <= LONGEST_NAME
         && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || matches!(byte, b'-' | b'_'))
 }
 
-/// The partition that a robot belongs to: the CRC-32 (ISO-HDLC, as zlib has it) of its name modulo their number.
+/// Returns the partition of a robot: the CRC-32 (ISO-HDLC, as in zlib) of its name modulo the
+/// number of partitions.
 ///
 /// ```
 /// assert_eq!(metaplan_fleet::wire::partition_of("ugv-1", 64), 47);
@@ -28,22 +30,22 @@ pub fn partition_of(robot: &str, partitions: u32) -> u32 {
     crc32fast::hash(robot.as_bytes()) % partitions.max(1)
 }
 
-/// A partition and a robot, as the end of a subject.
+/// Partition and robot, as the end of a subject.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Address {
-    /// From 0.
+    /// Partition number, from 0.
     pub partition: u32,
-    /// The robot's name.
+    /// Name of the robot.
     pub robot: String,
 }
 
 impl Address {
-    /// Where a robot is.
+    /// Returns the address of a robot.
     pub fn of(robot: &str, partitions: u32) -> Self {
         Self { partition: partition_of(robot, partitions), robot: robot.to_owned() }
     }
 
-    /// Reads `PARTITION.ROBOT`.
+    /// Parses `PARTITION.ROBOT`.
     pub fn parse(text: &str) -> Option<Self> {
         let (partition, robot) = text.split_once('.')?;
         let address = Self { partition: partition.parse().ok()?, robot: robot.to_owned() };
@@ -57,94 +59,95 @@ impl fmt::Display for Address {
     }
 }
 
-/// What one event has led to, as it is appended to the robot's decisions.
+/// Decision about an event, as appended to the robot's decisions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Decided {
     /// [`FORMAT`].
     pub format: String,
-    /// The sequence of the event in the stream of events.
+    /// Sequence of the event in the stream of events.
     pub event: u64,
-    /// The time since the robot was enrolled, in microseconds.
+    /// Time since enrolment in microseconds.
     pub now: u64,
-    /// The mission that the robot has from now on, if this event has enrolled it.
+    /// Name of the mission, if this event has enrolled the robot.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub enrolled: Option<String>,
-    /// Whether this event has retired the robot.
+    /// `true` if this event has retired the robot.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub retired: bool,
-    /// The answers, as `metaplan run` gives them.
+    /// Answers in the format of `metaplan run`.
     pub answers: Vec<Value>,
-    /// The plans that were made, for whoever takes over.
+    /// Plans made for the decision, for recovery by another worker.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub plans: Vec<Value>,
-    /// Who has decided, and in which term of its lease.
+    /// Name of the deciding worker.
     pub worker: String,
-    /// Grows with every change of the lease.
+    /// Counter of lease changes of the partition.
     pub epoch: u64,
 }
 
 impl Decided {
-    /// Answers and plans, as the loop has them.
+    /// Returns the answers and plans as a decision of the loop.
     pub fn decision(&self) -> Decision {
         Decision { answers: self.answers.clone(), plans: self.plans.clone() }
     }
 
-    /// Reads a message of the stream of decisions.
+    /// Parses a message of the stream of decisions.
     pub fn parse(payload: &[u8]) -> Option<Self> {
         serde_json::from_slice(payload).ok().filter(|decided: &Self| decided.format == FORMAT)
     }
 }
 
-/// How far a partition has come: what a new owner begins with. Its revision in the bucket fences former owners.
+/// Saved position of a partition, from which a new owner starts. Its revision in the bucket fences
+/// former owners.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Progress {
-    /// Grows with every change of the lease.
+    /// Counter of lease changes.
     pub epoch: u64,
-    /// All events up to this sequence are contained in snapshots.
+    /// Sequence up to which all events are contained in snapshots.
     pub events: u64,
-    /// All decisions up to this sequence are contained in snapshots.
+    /// Sequence up to which all decisions are contained in snapshots.
     pub decisions: u64,
-    /// The revision of the last snapshot; who reads snapshots reads at least up to it.
+    /// Revision of the last snapshot. Readers of snapshots must read at least up to it.
     pub snapshots: u64,
 }
 
-/// A robot as it was after an event.
+/// Saved state of a robot after an event.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Saved {
-    /// Its mission; none where it was retired.
+    /// Mission of the robot; `None` if it was retired.
     pub mission: Option<String>,
-    /// The checksum of the mission's files and settings.
+    /// Checksum of the mission's files and settings.
     #[serde(default)]
     pub digest: String,
-    /// When it was enrolled, in microseconds since 1970.
+    /// Time of enrolment in microseconds since 1970.
     pub enrolled: u64,
-    /// The last event that it contains.
+    /// Sequence of the last event that the state contains.
     pub event: u64,
-    /// The last decision that it contains.
+    /// Sequence of the last decision that the state contains.
     pub decision: u64,
-    /// All that its loop knows.
+    /// Snapshot of the loop.
     #[serde(default)]
     pub known: Value,
 }
 
-/// What a worker says of itself.
+/// Published status of a worker.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Presence {
-    /// Partitions that it has.
+    /// Number of owned partitions.
     pub partitions: u32,
-    /// Robots in them.
+    /// Number of their robots.
     pub robots: u64,
-    /// Robots that are kept ready, not only as snapshots.
+    /// Number of robots loaded in memory.
     pub warm: u64,
-    /// Events that it has read and not decided.
+    /// Number of events that are read but not decided.
     pub waiting: u64,
-    /// Events decided since it began.
+    /// Number of decided events since the start.
     pub decided: u64,
-    /// Events refused since it began.
+    /// Number of refused events since the start.
     pub refused: u64,
-    /// The share of its threads' time that loops have taken in the last seconds, from 0 to 1.
+    /// Share of the threads' time used by loops in the last seconds, from 0 to 1.
     pub load: f64,
-    /// Whether it takes no more partitions.
+    /// `true` if the worker takes no more partitions.
     pub draining: bool,
 }
 
@@ -153,7 +156,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn addresses_are_spelled_one_way() {
+    fn addresses_have_a_unique_spelling() {
         assert_eq!(Address::parse("3.ugv-1"), Some(Address { partition: 3, robot: "ugv-1".to_owned() }));
         for wrong in ["", "3", "3.", "03.x", "+3.x", "3.x.y", "x.3", "3.a b", "3.a*", "3.>", "-1.x", "3.ö"] {
             assert_eq!(Address::parse(wrong), None, "{wrong}");

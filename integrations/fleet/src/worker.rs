@@ -1,7 +1,8 @@
-//! Leases: which worker has which partitions.
+//! Leases of partitions by workers.
 //!
-//! A lease is a value that is gone when it is not renewed. A worker takes partitions that nobody has, up to its share: their number divided
-//! by that of the workers, rounded up. Who has more gives some back, saved and in order. Nothing rests on leases but speed.
+//! A lease is a value that expires unless it is renewed. A worker takes free partitions up to its
+//! share: the number of partitions divided by the number of workers, rounded up. A worker with more
+//! partitions saves and returns some. Leases affect efficiency only, not correctness.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,10 +17,10 @@ use crate::partition::{End, Order, Shared, serve};
 use crate::store::{Bucket, Entry, Fault, Store};
 use crate::wire::{Presence, partition_of};
 
-/// A partition that a worker has.
+/// A leased partition.
 struct Held {
     revision: u64,
-    /// When the lease was renewed last.
+    /// Time of the last renewal.
     renewed: Instant,
     orders: watch::Sender<Order>,
     task: JoinHandle<End>,
@@ -30,13 +31,13 @@ struct Worker<S> {
     shared: Arc<Shared<S>>,
     lease: Duration,
     held: BTreeMap<u32, Held>,
-    /// The revision of its presence.
+    /// Revision of its presence.
     presence: u64,
-    /// When it was present last, and the busy time until then.
+    /// Time of the last presence, and the busy time until then.
     looked: (Instant, u64),
 }
 
-/// Runs a worker until `stop` is true; partitions are then given back, saved and in order.
+/// Runs a worker until `stop` is true. Its partitions are then saved and returned.
 pub async fn run<S: Store>(shared: Arc<Shared<S>>, mut stop: watch::Receiver<bool>) {
     let lease = shared.store.lease();
     let mut worker =
@@ -46,7 +47,7 @@ pub async fn run<S: Store>(shared: Arc<Shared<S>>, mut stop: watch::Receiver<boo
     loop {
         tokio::select! {
             _ = tick.tick() => {}
-            // Whoever could stop it is gone: so is the reason to go on.
+            // A dropped sender is treated like a request to stop.
             changed = stop.changed() => if changed.is_err() || *stop.borrow_and_update() { break },
         }
         worker.round(false).await;
@@ -55,7 +56,8 @@ pub async fn run<S: Store>(shared: Arc<Shared<S>>, mut stop: watch::Receiver<boo
 }
 
 impl<S: Store> Worker<S> {
-    /// Says that it is there, renews its leases, and takes or gives back what its share asks for.
+    /// Publishes the presence, renews the leases, and takes or returns partitions according to the
+    /// share.
     async fn round(&mut self, draining: bool) {
         self.present(draining).await;
         self.renew().await;
@@ -100,7 +102,7 @@ impl<S: Store> Worker<S> {
         let (store, name) = (&self.shared.store, &self.shared.worker);
         self.presence = match store.put(Bucket::Workers, name, &value, self.presence).await {
             Ok(revision) => revision,
-            // It had expired, or was written without our knowing.
+            // The value had expired, or an unacknowledged write succeeded.
             Err(Fault::Conflict) => match store.get(Bucket::Workers, name).await {
                 Ok(entry) => entry.map_or(0, |entry| entry.revision),
                 Err(_) => self.presence,
@@ -115,7 +117,7 @@ impl<S: Store> Worker<S> {
             let key = partition.to_string();
             let begun = Instant::now();
             let outcome = match store.put(Bucket::Leases, &key, name, held.revision).await {
-                // A renewal that was not acknowledged may have been written.
+                // An unacknowledged renewal may have succeeded.
                 Err(Fault::Conflict) => match store.get(Bucket::Leases, &key).await {
                     Ok(Some(entry)) if entry.value == name => Ok(entry.revision),
                     Ok(_) => Err(Fault::Conflict),
@@ -136,21 +138,26 @@ impl<S: Store> Worker<S> {
         }
     }
 
-    /// Looks after partitions that have ended.
+    /// Handles partitions that have ended.
     async fn collect(&mut self) {
-        let ended: Vec<u32> =
-            self.held.iter().filter(|(_, held)| held.task.is_finished()).map(|(own, _)| *own).collect();
+        let ended: Vec<u32> = self
+            .held
+            .iter()
+            .filter(|(_, held)| held.task.is_finished())
+            .map(|(partition, _)| *partition)
+            .collect();
         for partition in ended {
             let Some(held) = self.held.remove(&partition) else { continue };
             let order = *held.orders.borrow();
             let end = held.task.await;
             match (end, order) {
-                // Somebody has written what only we write, and the lease is ours: it is read again.
+                // Another worker has written what only the owner writes, although the lease is
+                // ours. The partition is recovered again.
                 (Ok(End::Fenced) | Err(_), Order::Go) => {
                     tracing::warn!(partition, "somebody else has written in it: it is read again");
                     metrics::counter!("metaplan_fleet_fenced_total").increment(1);
-                    let own = self.serve(partition, held.revision, held.renewed);
-                    self.held.insert(partition, own);
+                    let restarted = self.serve(partition, held.revision, held.renewed);
+                    self.held.insert(partition, restarted);
                 }
                 (_, Order::Abandon) => {
                     tracing::warn!(partition, "the lease is lost");
@@ -158,7 +165,7 @@ impl<S: Store> Worker<S> {
                 }
                 _ => {
                     tracing::info!(partition, "given back");
-                    // A lease that is not taken away expires.
+                    // A lease that is not removed expires.
                     let key = partition.to_string();
                     let _ = self.shared.store.remove(Bucket::Leases, &key, held.revision).await;
                 }
@@ -175,31 +182,31 @@ impl<S: Store> Worker<S> {
 
     async fn acquire(&mut self, share: usize, leases: &[Entry]) {
         let store = &self.shared.store;
-        let all = store.partitions();
-        let first = partition_of(&self.shared.worker, all);
-        let taken: Vec<u32> = leases.iter().filter_map(|lease| lease.key.parse().ok()).collect();
-        let free = (0..all).map(|offset| (first + offset) % all);
-        let free = free.filter(|own| !taken.contains(own) && !self.held.contains_key(own));
-        let wanted: Vec<u32> = free.take(share.saturating_sub(self.held.len())).collect();
-        for partition in wanted {
+        let partition_count = store.partitions();
+        let first = partition_of(&self.shared.worker, partition_count);
+        let leased: Vec<u32> = leases.iter().filter_map(|lease| lease.key.parse().ok()).collect();
+        let free = (0..partition_count).map(|offset| (first + offset) % partition_count);
+        let free = free.filter(|partition| !leased.contains(partition) && !self.held.contains_key(partition));
+        let missing: Vec<u32> = free.take(share.saturating_sub(self.held.len())).collect();
+        for partition in missing {
             let begun = Instant::now();
             let name = self.shared.worker.as_bytes();
             if let Ok(revision) = self.shared.store.put(Bucket::Leases, &partition.to_string(), name, 0).await
             {
                 tracing::info!(partition, "taken");
-                let held = self.serve(partition, revision, begun);
-                self.held.insert(partition, held);
+                let lease = self.serve(partition, revision, begun);
+                self.held.insert(partition, lease);
             }
         }
     }
 
     fn serve(&self, partition: u32, revision: u64, renewed: Instant) -> Held {
-        let (orders, heard) = watch::channel(Order::Go);
-        let task = tokio::spawn(serve(Arc::clone(&self.shared), partition, heard));
+        let (orders, receiver) = watch::channel(Order::Go);
+        let task = tokio::spawn(serve(Arc::clone(&self.shared), partition, receiver));
         Held { revision, renewed, orders, task }
     }
 
-    /// Gives everything back.
+    /// Returns all partitions.
     async fn drain(&mut self, mut tick: tokio::time::Interval) {
         for held in self.held.values() {
             held.orders.send_if_modified(|order| {
@@ -225,7 +232,7 @@ fn lose(held: &mut Held) {
     held.orders.send_replace(Order::Abandon);
 }
 
-/// How many partitions a worker is to have.
+/// Returns the number of partitions that a worker should have.
 fn share(workers: &[Entry], own: &str, partitions: u32) -> usize {
     let takes = |entry: &&Entry| {
         entry.key != own

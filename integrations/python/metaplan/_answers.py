@@ -226,7 +226,7 @@ class Plan(Answer):
         return head + (self.svg() or "").partition("?>\n")[2]
 
     def __getstate__(self) -> dict[str, Any]:
-        # The native object cannot be pickled, and it is needed for the picture only.
+        # The native object cannot be pickled. Only the picture needs it.
         return {**self.__dict__, "_svg": self.svg(), "_planned": None}
 
 
@@ -367,7 +367,8 @@ class LoopAnswer:
         return dict(self.fields)
 
     def __getattr__(self, name: str) -> Any:
-        # Copies are made without `__init__`, and ask for special methods before they have fields.
+        # Copies are created without `__init__`, and look up special methods before they have
+        # fields.
         fields = self.__dict__.get("fields", {})
         if name not in fields:
             raise AttributeError(f"an answer {self.__dict__.get('kind')!r} has no {name!r}")

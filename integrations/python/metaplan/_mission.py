@@ -86,7 +86,7 @@ class Mission:
 
     def __init__(self, native: _native.Mission, source: _Source, changes: Iterable[tuple[str, ...]] = ()) -> None:
         self._native = native
-        # How to make the mission again: native objects cannot be pickled.
+        # Recipe for recreating the mission, because native objects cannot be pickled.
         self._source = source
         self._changes = list(changes)
         self._lock = threading.Lock()

@@ -35,7 +35,7 @@ class Knowledge:
         self.path = Path(path)
         """Path of the document, in N-Triples."""
         text = graph.serialize(format="nt", encoding="utf-8")
-        # The same graph gives the same document.
+        # Equal graphs must give equal documents.
         self.path.write_bytes(b"".join(sorted(text.splitlines(keepends=True))))
 
     def __fspath__(self) -> str:

@@ -51,7 +51,8 @@ SEPARATION = "0.001"
 
 _FEATURES: dict[str, tuple[str, ...]] = {
     "problem_class": ("ACTION_BASED",),
-    # Of general numeric problems, products of changing numbers are refused when they are read: the kind does not show them.
+    # Products of changing numbers are not visible in the problem kind, so they are rejected on
+    # reading.
     "problem_type": ("SIMPLE_NUMERIC_PLANNING", "GENERAL_NUMERIC_PLANNING"),
     "time": ("CONTINUOUS_TIME", "DISCRETE_TIME"),
     "expression_duration": ("STATIC_FLUENTS_IN_DURATIONS", "INT_TYPE_DURATIONS", "REAL_TYPE_DURATIONS"),
@@ -159,7 +160,7 @@ class _Writer(PDDLWriter):
             problem.clear_quality_metrics()
             manager = problem.environment.expression_manager
             for goal, gain in metric.goals.items():
-                # A goal that costs something is one that had better not hold.
+                # A goal with a cost is a goal that should be violated.
                 goal = manager.auto_promote(goal)[0]
                 self._optional.append((goal, Fraction(gain)) if gain >= 0 else (manager.Not(goal), -Fraction(gain)))
         PDDLWriter.__init__(self, problem, rewrite_bool_assignments=True)
@@ -187,7 +188,8 @@ class _Written:
         self.timed = _is_timed(problem.kind)
         self.separation = SEPARATION if problem.epsilon is None else str(problem.epsilon)
         self._back: list[Callable[[ActionInstance], ActionInstance | None]] = []
-        # PDDL has no bounds: they become conditions. Fluents with objects as values become predicates.
+        # PDDL has no bounds, so they become conditions. Fluents with objects as values become
+        # predicates.
         if problem.kind.has_object_fluents():
             problem = self._compiled(UsertypeFluentsRemover(), problem, CompilationKind.USERTYPE_FLUENTS_REMOVING)
         if problem.kind.has_bounded_types():
@@ -329,7 +331,8 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
         if self.skip_checks:
             supported = supported.union(_kind({"time": _UNDECLARED[:1], "expression_duration": _UNDECLARED[1:]}))
         if refusals := _refusals(problem.kind, supported):
-            # Other features not even with `skip_checks`: the PDDL of such a problem is another problem.
+            # Other features are rejected even with `skip_checks`, because the PDDL would be a
+            # different problem.
             return self._none(PlanGenerationResultStatus.UNSUPPORTED_PROBLEM, f"not supported: {'; '.join(refusals)}")
         options = dict(self._options)
         try:
@@ -339,7 +342,7 @@ class MetaplanEngine(Engine, OneshotPlannerMixin, AnytimePlannerMixin):
                 options["concurrent"] = written.separation
                 options.pop("certificate")
             if not problem.quality_metrics:
-                # Nothing is better than another plan.
+                # Without a metric, all plans are equally good.
                 options["on_improvement"] = lambda *_: False
             found = mission.plan(time_limit=timeout, **options)
         except Error as error:

@@ -1,4 +1,4 @@
-//! Questions without a mission: certificates, knowledge bases, models, codes.
+//! Functions without a mission: verification, knowledge bases, models, error codes.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -22,7 +22,7 @@ fn json(answer: &impl serde::Serialize) -> String {
     serde_json::to_string(answer).unwrap_or_default()
 }
 
-/// What came of a verification: JSON and text.
+/// Verifies a certificate. Returns JSON and text.
 #[pyfunction]
 #[pyo3(signature = (directory, mission=None, time_limit=None))]
 pub(crate) fn verify(
@@ -46,7 +46,7 @@ pub(crate) fn verify(
     stopped.map_or_else(|| Ok((json(&VerificationAnswer::new(&report)), report.to_string())), Err)
 }
 
-/// What follows from knowledge bases and rules, as JSON.
+/// Queries knowledge bases and rules. Returns JSON.
 #[pyfunction]
 #[pyo3(signature = (documents, rules, fail, set))]
 pub(crate) fn reason(
@@ -70,7 +70,7 @@ pub(crate) fn reason(
     py.detach(concluded).map_err(|messages| raise(py, &messages))
 }
 
-/// The value of a property of a PRISM model, as JSON.
+/// Computes the value of a property of a PRISM model. Returns JSON.
 #[pyfunction]
 #[pyo3(signature = (name, model, property, constants, exact=None))]
 pub(crate) fn check(
@@ -88,9 +88,9 @@ pub(crate) fn check(
     };
     let answered = || -> Result<String, Error> {
         let read = prism::parse(model)?;
-        let asked = property::parse(property)?;
+        let parsed_property = property::parse(property)?;
         let options = Options::default().with_settings(constants).with_exactness(exactness);
-        Ok(json(&CheckAnswer::new(property, &checked(&read, &asked, &options)?)))
+        Ok(json(&CheckAnswer::new(property, &checked(&read, &parsed_property, &options)?)))
     };
     py.detach(answered).map_err(|error| {
         let (file, text) =
@@ -109,7 +109,7 @@ pub(crate) fn check(
     })
 }
 
-/// What a code of a message means, as JSON.
+/// Explains an error code. Returns JSON.
 #[pyfunction]
 pub(crate) fn explain_code(code: &str) -> PyResult<String> {
     codes::find(code)

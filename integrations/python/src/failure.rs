@@ -1,28 +1,28 @@
-//! Errors as exceptions: `metaplan.Error` with all messages.
+//! Conversion of errors to the exception `metaplan.Error` with all messages.
 
 use metaplan::answers::ErrorAnswer;
 use metaplan::message::Message;
 use pyo3::prelude::*;
 
-/// The exception for messages; it is made of the JSON that the command line writes.
+/// Creates the exception for messages, from the JSON that the command line writes.
 pub(crate) fn raise(py: Python<'_>, messages: &[Message]) -> PyErr {
     let json = serde_json::to_string(&ErrorAnswer::new(messages)).unwrap_or_default();
-    let made = py
+    let exception = py
         .import("metaplan._errors")
         .and_then(|module| module.getattr("Error"))
         .and_then(|class| class.call_method1("_of", (json,)));
-    match made {
+    match exception {
         Ok(error) => PyErr::from_value(error),
         Err(error) => error,
     }
 }
 
-/// The exception for one message.
+/// Creates the exception for a single message.
 pub(crate) fn raise_one(py: Python<'_>, message: Message) -> PyErr {
     raise(py, &[message])
 }
 
-/// Messages that are not errors, as JSON: a list of objects.
+/// Serialises warnings as a JSON list.
 pub(crate) fn listed<'m>(messages: impl IntoIterator<Item = &'m Message>) -> String {
     let messages: Vec<Message> = messages.into_iter().cloned().collect();
     serde_json::to_string(&ErrorAnswer::new(&messages)).unwrap_or_default()

@@ -1,7 +1,8 @@
-//! Metaplan for Python: what the facade has, as JSON and text; `metaplan/*.py` makes objects of it.
+//! Native part of the Python package: the facade as JSON and text, from which `metaplan/*.py`
+//! creates objects.
 //!
-//! Nothing is decided here. The interpreter's lock is released while work goes on; every 20 ms signals are looked at, and Ctrl-C sets the
-//! flag that the planner heeds.
+//! This crate makes no decisions. The interpreter lock is released during work. Signals are checked
+//! every 20 ms, and Ctrl-C sets the interrupt flag of the planner.
 
 mod ask;
 mod failure;
@@ -11,7 +12,7 @@ mod wait;
 
 use pyo3::prelude::*;
 
-/// The native part of `metaplan`.
+/// The native module of `metaplan`.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;

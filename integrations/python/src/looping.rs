@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use crate::failure::raise;
 use crate::mission::{Mission, seconds};
 
-/// The loop of one robot.
+/// The loop of a single robot.
 #[pyclass(module = "metaplan._native", frozen)]
 pub(crate) struct Loop {
     control: Mutex<mapek::Loop>,
@@ -20,7 +20,8 @@ fn lines(answers: &[mapek::Answer]) -> Vec<String> {
 
 #[pymethods]
 impl Loop {
-    /// Takes charge of a mission in its present situation; plans take at most so many seconds, if the manifest does not say otherwise.
+    /// Starts the loop of a mission in its current situation. `time_limit` is the planning time in
+    /// seconds, unless the manifest sets one.
     #[new]
     fn new(py: Python<'_>, mission: &Mission, time_limit: Option<f64>) -> PyResult<Self> {
         let setup = mission.read();
@@ -35,12 +36,12 @@ impl Loop {
         Ok(Self { control: Mutex::new(control) })
     }
 
-    /// The first plan and the first request.
+    /// Returns the answers of the first planning.
     fn start(&self, py: Python<'_>) -> Vec<String> {
         py.detach(|| lines(&self.control.lock().unwrap_or_else(PoisonError::into_inner).start()))
     }
 
-    /// What follows from a line of events, heard at a time since the start.
+    /// Handles a line of events, received at a time since the start.
     fn handle(&self, py: Python<'_>, line: &str, now: f64) -> PyResult<Vec<String>> {
         let now = seconds("now", now)?;
         let observation = Observation::parse(line);

@@ -27,34 +27,36 @@ use serde::Serialize;
 use crate::failure::{listed, raise, raise_one};
 use crate::wait::detached;
 
-/// A mission in its present situation. What has begun with one situation goes on with it when another thread changes the mission.
+/// A mission in its current situation. A running call keeps its situation when another thread
+/// changes the mission.
 #[pyclass(module = "metaplan._native", frozen)]
 pub(crate) struct Mission {
     setup: RwLock<Arc<Setup>>,
 }
 
-/// What was found for a mission.
+/// Result of planning.
 #[pyclass(module = "metaplan._native", frozen)]
 pub(crate) struct Planned {
-    /// The answer in the JSON format of `metaplan plan`, or of `metaplan plan --pareto`.
+    /// The answer in the JSON format of `metaplan plan` or `metaplan plan --pareto`.
     #[pyo3(get)]
     json: String,
-    /// The numbers of the answer as exact texts, in JSON: see [`Numbers`].
+    /// The numbers of the answer as exact texts, in JSON; see [`Numbers`].
     #[pyo3(get)]
     exact: String,
-    /// The plan with a step on each line; nothing if there is none, or for a front.
+    /// The plan with a step per line. `None` without a plan, or for a Pareto front.
     #[pyo3(get)]
     text: Option<String>,
-    /// What is claimed, in a sentence.
+    /// The claim in a sentence.
     #[pyo3(get)]
     verdict: String,
-    /// What may be other than meant, as JSON.
+    /// Warnings as JSON.
     #[pyo3(get)]
     warnings: String,
     seen: Option<Drawable>,
 }
 
-/// The numbers of a plan as texts, a decimal where there is one and else a fraction: a number of JSON cannot be 1/3.
+/// Numbers of a plan as texts: decimals if possible, otherwise fractions. JSON numbers cannot
+/// represent 1/3.
 #[derive(Serialize)]
 struct Numbers {
     cost: Option<String>,
@@ -65,7 +67,7 @@ struct Numbers {
     alternatives: Vec<Vec<[String; 3]>>,
 }
 
-/// The numbers of the plans of a front.
+/// Numbers of the plans of a Pareto front.
 #[derive(Serialize)]
 struct FrontNumbers {
     points: Vec<Numbers>,
@@ -91,7 +93,7 @@ impl Numbers {
     }
 }
 
-/// What a plan is drawn from, when somebody looks.
+/// Data from which a picture of the plan is drawn on demand.
 struct Drawable {
     setup: Arc<Setup>,
     problem: metaplan::pddl::ast::Problem,
@@ -100,7 +102,7 @@ struct Drawable {
 
 #[pymethods]
 impl Planned {
-    /// The plan as a timeline in SVG; nothing if there is none.
+    /// Returns the plan as a timeline in SVG. `None` without a plan.
     fn svg(&self) -> Option<String> {
         let Drawable { setup, problem, solution } = self.seen.as_ref()?;
         let seen = Seen { mission: &setup.mission, problem, positions: &Positions::Unknown };
@@ -108,7 +110,7 @@ impl Planned {
     }
 }
 
-/// What is wanted of a plan.
+/// Planning parameters.
 struct Wanted {
     config: Config,
     minimize: Vec<String>,
@@ -118,17 +120,17 @@ struct Wanted {
     certificate: Option<PathBuf>,
 }
 
-/// A number of a keyword from its text.
+/// Parses a number of a keyword argument.
 fn number(name: &str, text: &str) -> PyResult<Exact> {
     text.parse().map_err(|error| PyValueError::new_err(format!("{name}: {error}")))
 }
 
-/// A word of a keyword.
+/// Parses a word of a keyword argument.
 fn word<T: std::str::FromStr<Err: std::fmt::Display>>(name: &str, text: &str) -> PyResult<T> {
     text.parse().map_err(|error| PyValueError::new_err(format!("{name}: {error}")))
 }
 
-/// Seconds of a keyword.
+/// Parses seconds of a keyword argument.
 pub(crate) fn seconds(name: &str, value: f64) -> PyResult<Duration> {
     Duration::try_from_secs_f64(value)
         .map_err(|_| PyValueError::new_err(format!("{name} must be a number of seconds, not {value}")))
@@ -146,19 +148,20 @@ impl Mission {
 
 #[pymethods]
 impl Mission {
-    /// From a manifest.
+    /// Reads a mission from a manifest.
     #[staticmethod]
     fn load(py: Python<'_>, manifest: PathBuf) -> PyResult<Self> {
         made(py, move || Setup::read(&manifest))
     }
 
-    /// From the text of a manifest, whose paths are relative to a directory.
+    /// Reads a mission from the text of a manifest, whose paths are relative to a directory.
     #[staticmethod]
     fn parse(py: Python<'_>, name: String, text: String, directory: PathBuf) -> PyResult<Self> {
         made(py, move || Setup::parse(&name, &text, &directory))
     }
 
-    /// From a domain and a problem, each a path or a name and a text, and perhaps knowledge bases.
+    /// Reads a mission from a domain and a problem, each a path or a name with a text, and optional
+    /// knowledge bases.
     #[staticmethod]
     fn join(
         py: Python<'_>,
@@ -172,43 +175,44 @@ impl Mission {
         made(py, move || joined(&name, files, knowledge, rules, &bindings, &names))
     }
 
-    /// Another mission in the same situation.
+    /// Returns a copy of the mission in the same situation.
     fn copy(&self) -> Self {
         Self { setup: RwLock::new(self.read()) }
     }
 
-    /// A checksum of all that decisions rest on: knowledge, rules, domain, problem and settings.
+    /// Returns a checksum of all inputs of planning: knowledge, rules, domain, problem and
+    /// settings.
     fn digest(&self, py: Python<'_>) -> PyResult<String> {
         let setup = self.read();
         let control = py.detach(|| Loop::new(setup.mission.clone(), setup.settings.clone()));
         control.map(|control| control.digest()).map_err(|messages| raise(py, &messages))
     }
 
-    /// The mission's name.
+    /// Name of the mission.
     #[getter]
     fn name(&self) -> String {
         self.read().mission.name.clone()
     }
 
-    /// What it is about.
+    /// Description of the mission.
     #[getter]
     fn description(&self) -> String {
         self.read().description.clone()
     }
 
-    /// The names of its scenarios.
+    /// Names of the scenarios.
     #[getter]
     fn scenarios(&self) -> Vec<String> {
         self.read().scenarios.keys().cloned().collect()
     }
 
-    /// What may be other than meant, as JSON.
+    /// Warnings as JSON.
     #[getter]
     fn warnings(&self) -> String {
         listed(self.read().mission.warnings())
     }
 
-    /// The domain and the filled problem as PDDL.
+    /// Returns the domain and the completed problem as PDDL.
     fn pddl(&self, py: Python<'_>) -> PyResult<(String, String)> {
         let setup = self.read();
         let (problem, _) = setup.mission.filled().map_err(|messages| raise(py, &messages))?;
@@ -216,22 +220,22 @@ impl Mission {
         Ok((domain, metaplan::pddl::print_problem(&problem)))
     }
 
-    /// Brings the mission into a scenario of its manifest.
+    /// Applies a scenario of the manifest.
     fn scenario(&self, py: Python<'_>, name: &str) -> PyResult<()> {
         self.change(|setup| setup.apply(name)).map_err(|messages| raise(py, &messages))
     }
 
-    /// A component has failed.
+    /// Marks a component as failed.
     fn fail(&self, py: Python<'_>, component: &str) -> PyResult<()> {
         self.change(|setup| setup.mission.fail(component)).map_err(|message| raise_one(py, message))
     }
 
-    /// A measured attribute, a numeric fluent or a fact has a value.
+    /// Sets a measured attribute, a numeric fluent or a fact.
     fn set(&self, py: Python<'_>, name: &str, value: &str) -> PyResult<()> {
         self.change(|setup| setup.mission.set(name, value)).map_err(|message| raise_one(py, message))
     }
 
-    /// The best plan, or a front.
+    /// Computes the best plan or a Pareto front.
     #[pyo3(signature = (*, minimize, pareto=None, alternatives=None, concurrent=None, horizon=None, engine=None, strategy=None, confirm=false,
         time_limit=None, memory_limit=None, certificate=None, on_improvement=None))]
     #[allow(clippy::too_many_arguments, reason = "keywords")]
@@ -273,14 +277,14 @@ impl Mission {
         let (found, stopped) = detached(py, &interrupt, || planned(&setup, wanted, on_improvement.as_ref()));
         match (found, stopped) {
             (Ok(planned), None) => Ok(planned),
-            // The best plan so far is what Ctrl-C is for.
+            // After Ctrl-C, the best known plan is returned.
             (Ok(planned), Some(_)) if planned.text.is_some() => Ok(planned),
             (_, Some(error)) | (Err(Stop::Raised(error)), None) => Err(error),
             (Err(Stop::Wrong(messages)), None) => Err(raise(py, &messages)),
         }
     }
 
-    /// The plan beside the policies of probabilistic model checking, as JSON.
+    /// Compares the plan with the policies of probabilistic model checking. Returns JSON.
     fn compare(
         &self,
         py: Python<'_>,
@@ -317,7 +321,7 @@ impl Mission {
         })
     }
 
-    /// What the validator says of a plan, as JSON.
+    /// Validates a plan. Returns JSON.
     fn validate(&self, py: Python<'_>, plan: &str, concurrent: bool, tolerance: &str) -> PyResult<String> {
         let tolerance = number("tolerance", tolerance)?.to_rational();
         let setup = self.read();
@@ -332,7 +336,8 @@ impl Mission {
         py.detach(judged).map_err(|messages: Errors| raise(py, &messages))
     }
 
-    /// Why a design is available or not, chosen or not; or what would change the plan. As JSON.
+    /// Explains the availability or choice of a design, or the changes that would alter the plan.
+    /// Returns JSON.
     fn explain(&self, py: Python<'_>, design: Option<String>, time_limit: Option<f64>) -> PyResult<String> {
         let mut limits = Limits::none();
         if let Some(time) = time_limit {
@@ -343,8 +348,8 @@ impl Mission {
         let (found, stopped) = detached(py, &interrupt, || {
             let mission = &setup.mission;
             let json = if let Some(design) = &design {
-                let found = explain::design(mission, design, &limits)?;
-                serde_json::to_string(&DesignAnswer::new(&mission.name, &found))
+                let explanation = explain::design(mission, design, &limits)?;
+                serde_json::to_string(&DesignAnswer::new(&mission.name, &explanation))
             } else {
                 let changes = explain::smallest_changes(mission, &limits, &mut |_| {})?;
                 serde_json::to_string(&ChangesAnswer::new(&mission.name, &changes))
@@ -358,11 +363,11 @@ impl Mission {
     }
 }
 
-/// Reads a mission without the interpreter's lock.
+/// Reads a mission without the interpreter lock.
 fn made(py: Python<'_>, read: impl FnOnce() -> Result<Setup, Errors> + Send) -> PyResult<Mission> {
     let checked = move || {
         let setup = read()?;
-        // What does not fit is told at once, and not when something is asked.
+        // Incompatible inputs are reported immediately, not on later queries.
         setup.mission.filled()?;
         Ok(setup)
     };
@@ -394,7 +399,7 @@ fn joined(
     Ok(missions::Mission::new(name, knowledge, bindings, domain, problem)?.into())
 }
 
-/// Why there is no answer.
+/// Reason for a missing answer.
 enum Stop {
     Wrong(Errors),
     Raised(PyErr),
@@ -413,10 +418,10 @@ fn planned(setup: &Arc<Setup>, wanted: Wanted, on_improvement: Option<&Py<PyAny>
     let tell = |better: &metaplan::planner::Improvement| {
         let Some(listener) = on_improvement else { return ControlFlow::Continue(()) };
         let (cost, bound) = (better.cost.to_string(), better.lower_bound.to_string());
-        let heard = Python::attach(|py| {
+        let outcome = Python::attach(|py| {
             listener.call1(py, (cost, bound, better.gap(), better.horizon)).and_then(|said| said.extract(py))
         });
-        match heard {
+        match outcome {
             Ok(Some(false)) => ControlFlow::Break(()),
             Ok(_) => ControlFlow::Continue(()),
             Err(error) => {
@@ -463,7 +468,7 @@ fn answered(
     let answer: PlanAnswer = found.answer();
     let json = serde_json::to_string(&answer).unwrap_or_default();
     let alternatives = found.alternatives.as_ref().map_or(&[][..], |found| &found.plans);
-    // The values of the problem's own metric are not named, and no part of the answer.
+    // Values of the problem's own metric have no name and are not part of the answer.
     let values = &found.values[..found.values.len().min(found.objectives().len())];
     let makespan = found.solution.plan.as_ref().filter(|_| found.overlaps()).map(Plan::makespan);
     let numbers = Numbers {

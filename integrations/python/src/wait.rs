@@ -1,4 +1,4 @@
-//! Work without the interpreter's lock, and with signals.
+//! Runs work without the interpreter lock and with signal handling.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,13 +8,14 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 
-/// How often signals are looked at.
+/// Interval between checks for signals.
 const INTERVAL: Duration = Duration::from_millis(20);
-/// The stack of a thread that works: as much as a main thread has.
+/// Stack size of working threads, as large as that of a main thread.
 const STACK: usize = 8 << 20;
 
-/// Does some work while other threads of the interpreter go on. Where a signal raises an exception, such as `KeyboardInterrupt`, the flag is
-/// set, and the work is waited for; the exception comes beside what it has found until then.
+/// Runs work while other threads of the interpreter continue. If a signal raises an exception such
+/// as `KeyboardInterrupt`, sets the interrupt flag and waits for the result. The exception is
+/// returned together with the partial result.
 pub(crate) fn detached<T: Send>(
     py: Python<'_>,
     interrupt: &AtomicBool,
@@ -24,9 +25,9 @@ pub(crate) fn detached<T: Send>(
         thread::scope(|scope| {
             let (sender, receiver) = channel();
             let worker = move || {
-                let found = catch_unwind(AssertUnwindSafe(work));
-                // Who listens goes on listening until something comes.
-                let _ = sender.send(found);
+                let outcome = catch_unwind(AssertUnwindSafe(work));
+                // The receiver waits until a result arrives.
+                let _ = sender.send(outcome);
             };
             let started = thread::Builder::new().stack_size(STACK).spawn_scoped(scope, worker);
             let mut stopped = None;

@@ -1,7 +1,7 @@
-//! Files of ROS definitions → interfaces: a message, a service of two parts, an action of three.
+//! Parses ROS definitions to interfaces: a message, a service of two parts, an action of three.
 //!
-//! `PACKAGE/msg/X.msg`, `PACKAGE/srv/X.srv`, `PACKAGE/action/X.action`; what another ROS distribution or version of a package has otherwise
-//! stands below `variants/VARIANT/`.
+//! `PACKAGE/msg/X.msg`, `PACKAGE/srv/X.srv`, `PACKAGE/action/X.action`; definitions that differ in
+//! another ROS distribution or version of a package are below `variants/VARIANT/`.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -12,9 +12,9 @@ use hiroz_codegen::types::{Constant, Field};
 
 /// A structure of an interface.
 pub struct Part {
-    /// What follows the interface's name: nothing, `_Request`, `_Goal`, …
+    /// Suffix of the interface's name: empty, `_Request`, `_Goal`, …
     pub suffix: &'static str,
-    /// In the order of the definition, of which the bytes follow. Never empty.
+    /// Fields in the order of the definition, which is the order of the bytes. Never empty.
     pub fields: Vec<Field>,
     /// Named values.
     pub constants: Vec<Constant>,
@@ -22,30 +22,30 @@ pub struct Part {
 
 /// A message, service or action.
 pub struct Interface {
-    /// The distribution or version that it belongs to, if it is not the default.
+    /// Distribution or version of the interface, if it is not the default.
     pub variant: Option<String>,
-    /// As in `std_msgs`.
+    /// Package, as in `std_msgs`.
     pub package: String,
     /// `msg`, `srv` or `action`.
     pub folder: &'static str,
-    /// As in `String`.
+    /// Name, as in `String`.
     pub name: String,
-    /// One for a message, two for a service, three for an action.
+    /// One structure for a message, two for a service, three for an action.
     pub parts: Vec<Part>,
 }
 
 impl Interface {
-    /// As in `std_msgs/msg/String`.
+    /// Full name, as in `std_msgs/msg/String`.
     pub fn full_name(&self) -> String {
         format!("{}/{}/{}", self.package, self.folder, self.name)
     }
 }
 
-/// Folders, and the parts of what lies there.
+/// Folders with the parts of their interfaces.
 const FOLDERS: [(&str, &[&str]); 3] =
     [("msg", &[""]), ("srv", &["_Request", "_Response"]), ("action", &["_Goal", "_Result", "_Feedback"])];
 
-/// All interfaces below a directory, sorted; those of variants follow the others.
+/// Returns all interfaces below a directory, sorted, with variants last.
 pub fn read(root: &Path) -> Result<Vec<Interface>, Box<dyn Error>> {
     let variants = root.join("variants");
     let mut interfaces = Vec::new();
@@ -110,7 +110,7 @@ fn parts(
         let parsed = parse_msg_string(section, package, file)?;
         let (mut fields, constants) = (parsed.fields, parsed.constants);
         if fields.is_empty() {
-            // As rosidl has it: C structures are not empty.
+            // As in rosidl, because C structures are not empty.
             fields.push(parse_field("uint8 structure_needs_at_least_one_member", package, 0)?);
         }
         Ok(Part { suffix, fields, constants })

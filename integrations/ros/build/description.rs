@@ -1,6 +1,6 @@
 //! Interfaces → type descriptions → type hashes RIHS01.
 //!
-//! A service stands for four types, an action for thirteen: those of its services and of its feedback topic are made here, as rosidl makes
+//! A service consists of four types, an action for thirteen: those of its services and of its feedback topic are made here, as rosidl makes
 //! them [1]. The hash of a type is the SHA-256 of the description of it and of all types that it refers to, in JSON [2].
 //!
 //! `hiroz_codegen` has a resolver of its own, which is not used: it describes `CancelGoal` as a part of an action, and with one field too few.
@@ -18,16 +18,17 @@ use hiroz_codegen::types::{ArrayType, Field};
 
 use crate::definition::Interface;
 
-/// Hashes of the types of a variant, or of none, by their full names.
+/// Returns the hashes of the types of a variant, or of the defaults, by full name.
 pub type Hashes = BTreeMap<(Option<String>, String), String>;
 
-/// Descriptions by full names.
+/// Type descriptions by full name.
 type Descriptions = BTreeMap<String, TypeDescription>;
 
 const TIME: &str = "builtin_interfaces/msg/Time";
 const UUID: &str = "unique_identifier_msgs/msg/UUID";
 
-/// The hashes of all types of all interfaces, those that belong to their services and actions included.
+/// Returns the hashes of all types of all interfaces, including those of their services and
+/// actions.
 pub fn hashes(interfaces: &[Interface]) -> Result<Hashes, Box<dyn Error>> {
     let mut common = Descriptions::new();
     for interface in interfaces.iter().filter(|interface| interface.variant.is_none()) {
@@ -40,7 +41,7 @@ pub fn hashes(interfaces: &[Interface]) -> Result<Hashes, Box<dyn Error>> {
     for interface in interfaces.iter().filter(|interface| interface.variant.is_some()) {
         let mut own = Descriptions::new();
         describe(interface, &mut own)?;
-        // A variant of a type refers to what all have in common.
+        // A variant may refer to common types.
         let mut all = common.clone();
         all.extend(own.clone());
         for name in own.keys() {
@@ -61,7 +62,7 @@ fn hash(name: &str, all: &Descriptions) -> Result<String, Box<dyn Error>> {
     Ok(calculate_hash(&message).to_rihs_string())
 }
 
-/// A type and all that it refers to.
+/// Returns a type with all types that it refers to.
 fn collect(name: &str, all: &Descriptions, found: &mut Descriptions) -> Result<(), Box<dyn Error>> {
     if found.contains_key(name) {
         return Ok(());
@@ -119,7 +120,7 @@ fn add(all: &mut Descriptions, type_name: String, fields: Vec<FieldDescription>)
     all.insert(type_name.clone(), TypeDescription { type_name, fields });
 }
 
-/// The event type of a service, and the service as a type. Request and response are there.
+/// Adds the event type of a service and the service type. Request and response already exist.
 fn service(all: &mut Descriptions, name: &str) {
     let part = |suffix: &str| format!("{name}_{suffix}");
     let at_most_one = |field: &str, suffix: &str| {
@@ -140,7 +141,8 @@ fn service(all: &mut Descriptions, name: &str) {
     add(all, name.to_owned(), whole);
 }
 
-/// The services and the feedback topic of an action, and the action as a type. Goal, result and feedback are there.
+/// Adds the services and the feedback topic of an action and the action type. Goal, result and
+/// feedback already exist.
 fn action(all: &mut Descriptions, name: &str) {
     let part = |suffix: &str| format!("{name}_{suffix}");
     let id = || nested("goal_id", UUID);

@@ -9,13 +9,13 @@ use hiroz_codegen::types::{ArrayType, Constant, Field};
 use crate::definition::{Interface, Part};
 use crate::description::Hashes;
 
-/// Words of Rust that are names of fields.
+/// Rust keywords that are names of fields.
 const KEYWORDS: [&str; 1] = ["type"];
 
 /// Texts of modules, by variant, package and folder.
 type Modules<'i> = BTreeMap<Option<&'i str>, BTreeMap<&'i str, BTreeMap<&'i str, String>>>;
 
-/// The modules of all interfaces.
+/// Returns the modules of all interfaces.
 pub fn modules(interfaces: &[Interface], hashes: &Hashes) -> Result<String, Box<dyn Error>> {
     let mut modules = Modules::new();
     for interface in interfaces {
@@ -68,7 +68,7 @@ pub fn table(interfaces: &[Interface], hashes: &Hashes) -> String {
     format!("&[\n{}\n]", lines.join("\n"))
 }
 
-/// The name of a structure in Rust.
+/// Returns the Rust name of a structure.
 fn rust_name(interface: &Interface, part: &Part) -> String {
     format!("{}{}", interface.name, part.suffix.trim_start_matches('_'))
 }
@@ -125,7 +125,7 @@ fn constants(text: &mut String, name: &str, constants: &[Constant]) -> Result<()
     Ok(())
 }
 
-/// What is said of a message, service or action as a whole.
+/// Writes the implementation for a message, service or action as a whole.
 fn whole(text: &mut String, interface: &Interface, hashes: &Hashes) -> Result<(), Box<dyn Error>> {
     let Interface { package, folder, name, .. } = interface;
     let of = |suffix: &str| hash(hashes, interface, suffix);
@@ -180,7 +180,7 @@ fn primitive(name: &str) -> Option<&'static str> {
     })
 }
 
-/// Bounds are not seen in the bytes, and not in the type.
+/// Bounds are part of neither the bytes nor the type.
 fn rust_type(field: &Field, interface: &Interface, all: &[Interface]) -> Result<String, Box<dyn Error>> {
     let kind = &field.field_type;
     let known = primitive(&kind.base_type).map(str::to_owned);
@@ -193,7 +193,8 @@ fn rust_type(field: &Field, interface: &Interface, all: &[Interface]) -> Result<
     })
 }
 
-/// The path to a message that an interface refers to: the variant's own, or the common one.
+/// Returns the path of a message that an interface refers to: that of the variant, or the common
+/// one.
 fn nested_type(
     name: &str,
     package: Option<&str>,

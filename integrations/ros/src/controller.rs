@@ -1,14 +1,15 @@
-//! The mission of PlanSys2, controlled from here: its experts say what is to be done, the knowledge base says with which designs it can be
-//! done, and PlanSys2's executor does it.
+//! Controller of a PlanSys2 mission. PlanSys2's experts provide domain, problem and goal, the knowledge
+//! base restricts the designs, and PlanSys2's executor carries out the plan.
 //!
 //! ```text
 //! ASK --domain_expert/get_domain, problem_expert/get_problem--> PLAN --a plan--> EXECUTE (action execute_plan)
-//! EXECUTE --it succeeds--> end     EXECUTE --it fails--> ASK
-//! EXECUTE --a design of the plan is no longer available--> it is cancelled --> ASK
-//! PLAN --no plan--> said, and asked again when the knowledge base has changed, or after some seconds
+//! EXECUTE --success--> end     EXECUTE --failure--> ASK
+//! EXECUTE --a design of the plan becomes unavailable--> cancel --> ASK
+//! PLAN --no plan--> report, then ASK when the knowledge base has changed, or after some seconds
 //! ```
 //!
-//! What was done stays done: PlanSys2's problem expert knows it.
+//! Effects of completed actions persist between plans, because PlanSys2's problem expert records them.
+
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -29,34 +30,34 @@ use crate::planner::{
     Chosen, DOMAIN, Found, Joint, NoPlan, PROBLEM, Request, Told, on_a_thread, plan_message, solve,
 };
 
-/// So long the experts are waited for.
+/// Timeout for requests to the experts.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// So long nothing is tried again, unless the knowledge base changes.
+/// Pause before the next attempt, unless the knowledge base changes.
 const PAUSE: Duration = Duration::from_secs(5);
 
-/// So long after a failure.
+/// Pause after a failure.
 const BREATH: Duration = Duration::from_secs(1);
 
-/// So often is looked whether something has changed.
+/// Polling interval of the knowledge base.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// After so many failures on end nothing is tried again.
+/// Number of consecutive failures after which the controller gives up.
 const MOST_FAILURES: usize = 5;
 
-/// What is controlled.
+/// Options of the controller.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// The manifest of the mission whose knowledge base joins in.
+    /// Manifest of the mission whose knowledge base restricts the designs.
     pub mission: PathBuf,
-    /// The executor's types.
+    /// Version of the executor's message types.
     pub version: PlanVersion,
 }
 
-/// Has PlanSys2's goal reached; returns when it is, or when told to stop.
+/// Runs until PlanSys2's goal is reached or `stop` is set.
 ///
 /// # Errors
-/// The mission or a parameter of the command line is wrong, or nothing that was tried has succeeded.
+/// The mission or a parameter of the command line is wrong, or all attempts have failed.
 pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Errors> {
     let setup = Setup::read(&options.mission)?;
     for warning in setup.mission.warnings() {
@@ -80,11 +81,11 @@ struct Controller {
     told: Told,
 }
 
-/// What has come of a plan.
+/// Outcome of executing a plan.
 enum Outcome {
     Done,
     Failed(String),
-    /// It was cancelled, for these designs.
+    /// The plan was cancelled, because these designs are no longer available.
     Lost(Vec<String>),
     Stopped,
 }
@@ -99,20 +100,20 @@ impl Controller {
                 }
                 None
             };
-            let found = match smol::future::or(stopped, async { Some(self.find().await) }).await {
-                Some(Some(found)) => found,
+            let solution = match smol::future::or(stopped, async { Some(self.find().await) }).await {
+                Some(Some(solution)) => solution,
                 Some(None) => {
                     self.pause(PAUSE, stop).await;
                     continue;
                 }
                 None => return Ok(()),
             };
-            let plan = found.plans.first().map(|lines| plan_message(lines)).unwrap_or_default();
+            let plan = solution.plans.first().map(|lines| plan_message(lines)).unwrap_or_default();
             if plan.items.is_empty() {
                 self.node.log(Severity::Info, "the goal holds");
                 return Ok(());
             }
-            match self.execute(plan, &found, stop).await {
+            match self.execute(plan, &solution, stop).await {
                 Outcome::Done => {
                     self.node.log(Severity::Info, "the plan is executed");
                     return Ok(());
@@ -138,7 +139,7 @@ impl Controller {
         Ok(())
     }
 
-    /// The best plan for what PlanSys2 has now; why there is none is told.
+    /// Returns the best plan for PlanSys2's current problem. Without a plan, publishes the reason.
     async fn find(&self) -> Option<Found> {
         match self.ask().await {
             Ok((domain, problem)) => self.plan(domain, problem).await.ok(),
@@ -149,7 +150,7 @@ impl Controller {
         }
     }
 
-    /// The domain and the problem as PlanSys2 has them now.
+    /// Requests the current domain and problem from PlanSys2.
     async fn ask(&self) -> Result<(String, String), String> {
         let domain = self.node.caller::<GetDomain>("domain_expert/get_domain");
         let domain =
@@ -166,20 +167,20 @@ impl Controller {
 
     async fn plan(&self, domain: String, problem: String) -> Result<Found, NoPlan> {
         let (mission, manner) = (self.joint.mission(), self.manner.get());
-        let (sender, found) = smol::channel::bounded(1);
+        let (sender, receiver) = smol::channel::bounded(1);
         let work = move || {
             let (domain, problem) = (Source::new(DOMAIN, domain), Source::new(PROBLEM, problem));
             let _ = sender.try_send(solve(Request { domain, problem, joint: Some(&mission) }, &manner));
         };
         on_a_thread("plan", work)
             .map_err(|error| NoPlan::None(format!("there is no further thread: {error}")))?;
-        let found =
-            found.recv().await.unwrap_or_else(|_| Err(NoPlan::Fault("the planner has ended".to_owned())));
-        self.told.tell(&found);
-        found
+        let outcome =
+            receiver.recv().await.unwrap_or_else(|_| Err(NoPlan::Fault("the planner has ended".to_owned())));
+        self.told.tell(&outcome);
+        outcome
     }
 
-    /// Has a plan executed as long as its designs are available.
+    /// Executes a plan while its designs are available.
     async fn execute(&self, plan: Plan, found: &Found, stop: &AtomicBool) -> Outcome {
         let used: BTreeSet<String> =
             found.configuration.iter().flatten().map(|(_, design)| design.to_lowercase()).collect();
@@ -220,7 +221,7 @@ impl Controller {
         self.node.log(Severity::Debug, &(done + text));
     }
 
-    /// Waits until the knowledge base has changed, or for some seconds.
+    /// Waits for a change of the knowledge base, at most for `time`.
     async fn pause(&self, time: Duration, stop: &AtomicBool) {
         let (begun, available) = (Instant::now(), self.joint.available());
         while begun.elapsed() < time && !stop.load(Ordering::Relaxed) && self.joint.available() == available {

@@ -1,5 +1,5 @@
-//! `/diagnostics` to lines of events: what MROS's, ROSA's and PLANTA's monitors say of components and attributes, and what the rules
-//! of `ros.toml` make of the diagnostics of drivers.
+//! Translates `/diagnostics` to input lines of the loop: statuses of the monitors of MROS, ROSA and
+//! PLANTA, and diagnostics of drivers by the rules of `ros.toml`.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -14,14 +14,14 @@ use crate::node::{Node, keep_all};
 /// Upper limit on the number of warnings about statuses that nothing uses.
 const MAX_UNUSED: usize = 20;
 
-/// What was diagnosed and not yet handled: of each thing the last that was said of it, so that nobody falls behind who is told faster than
-/// he can follow.
+/// Diagnostics that are not handled yet. Only the latest status of each subject is kept, so that a
+/// slow loop does not fall behind.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Diagnosed {
     waiting: Arc<Mutex<Waiting>>,
 }
 
-/// What waits, by what it is about, with the header of the last message.
+/// Pending statuses by subject, with the header of the last message.
 #[derive(Debug, Default)]
 struct Waiting {
     header: Header,
@@ -29,15 +29,16 @@ struct Waiting {
 }
 
 impl Diagnosed {
-    /// Subscribes; calls `waits` when something waits and nothing waited before. What says the same as before does not wait. A status at
-    /// level WARN or above that nothing uses is reported once, with a rule that would use it.
+    /// Subscribes to diagnostics and calls `waits` when the first status becomes pending. Repeated
+    /// statuses are ignored. An unused status at level WARN or above is reported once, with a rule
+    /// that would use it.
     pub(crate) fn hear(
         node: &Arc<Node>,
         rules: &[DiagnosticRule],
         waits: impl Fn() + Send + 'static,
     ) -> Result<Self, Message> {
-        let own = Self::default();
-        let waiting = Arc::clone(&own.waiting);
+        let diagnosed = Self::default();
+        let waiting = Arc::clone(&diagnosed.waiting);
         let rules = rules.to_vec();
         let weak = Arc::downgrade(node);
         let own_name = node.full_name().trim_start_matches('/').to_owned();
@@ -71,31 +72,32 @@ impl Diagnosed {
                 waits();
             }
         })?;
-        Ok(own)
+        Ok(diagnosed)
     }
 
-    /// What waits, as a line of events.
+    /// Returns the pending statuses as an input line and clears them.
     pub(crate) fn line(&self) -> String {
         let Waiting { header, statuses } =
             std::mem::take(&mut *self.waiting.lock().unwrap_or_else(PoisonError::into_inner));
         let status = statuses.into_iter().map(|(_, status)| status).collect();
-        // Texts and numbers are always data.
+        // Serialisation cannot fail: the message consists of texts and numbers.
         serde_json::to_string(&DiagnosticArray { header, status }).unwrap_or_default()
     }
 }
 
-/// Statuses that the loop understands: the status itself if a monitor of MROS has published it, and what rules make of it.
+/// Translates a status to the loop's statuses: itself if a monitor of MROS has published it, and
+/// the results of matching rules.
 fn translated(rules: &[DiagnosticRule], status: &DiagnosticStatus) -> Vec<DiagnosticStatus> {
     let mut statuses: Vec<DiagnosticStatus> =
         rules.iter().filter_map(|rule| rule.translate(status)).collect();
     let spelling =
-        [MEASUREMENT, COMPONENT].into_iter().find(|known| status.message.eq_ignore_ascii_case(known));
+        [MEASUREMENT, COMPONENT].into_iter().find(|message| status.message.eq_ignore_ascii_case(message));
     statuses
         .extend(spelling.map(|message| DiagnosticStatus { message: message.to_owned(), ..status.clone() }));
     statuses
 }
 
-/// A warning about a status that nothing uses.
+/// Warns about an unused status and proposes a rule.
 fn suggestion(status: &DiagnosticStatus) -> String {
     let level = match status.level {
         DiagnosticStatus::WARN => "WARN",

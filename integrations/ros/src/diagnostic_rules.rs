@@ -23,7 +23,7 @@ pub struct DiagnosticRule {
     target: Target,
 }
 
-/// What a selected status says.
+/// Target of a selected status.
 #[derive(Debug, Clone, PartialEq)]
 enum Target {
     /// A component has failed at this level and above, and works below it.
@@ -39,7 +39,8 @@ struct Conversion {
     offset: f64,
 }
 
-/// Level of a diagnostic status. STALE counts as the highest: nothing is known of the device any more.
+/// Level of a diagnostic status. STALE counts as the highest level, because the state of the device
+/// is then unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
 enum Level {
@@ -116,7 +117,7 @@ impl DiagnosticRule {
                 let number = leading_number(text)?;
                 let value = match conversion {
                     Some(Conversion { scale, offset }) => (number * scale + offset).to_string(),
-                    // All digits stay as they were written.
+                    // The digits are copied unchanged, because a float would round them.
                     None if text.parse::<f64>().is_ok() => text.to_owned(),
                     None => number.to_string(),
                 };
@@ -141,7 +142,7 @@ fn leading_number(text: &str) -> Option<f64> {
     number.ok().filter(|number: &f64| number.is_finite())
 }
 
-/// A text in which `*` stands for any number of characters. The default matches everything.
+/// A pattern in which `*` matches any number of characters. The default matches everything.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(transparent)]
 struct Pattern(String);
@@ -156,15 +157,15 @@ impl Pattern {
     fn matches(&self, text: &str) -> bool {
         let mut parts = self.0.split('*');
         let first = parts.next().unwrap_or_default();
-        let Some(mut rest) = text.strip_prefix(first) else { return false };
+        let Some(mut remaining) = text.strip_prefix(first) else { return false };
         let mut parts: Vec<&str> = parts.collect();
         // Without a star the whole text must be equal.
-        let Some(last) = parts.pop() else { return rest.is_empty() };
+        let Some(last) = parts.pop() else { return remaining.is_empty() };
         for part in parts {
-            let Some(at) = rest.find(part) else { return false };
-            rest = &rest[at + part.len()..];
+            let Some(at) = remaining.find(part) else { return false };
+            remaining = &remaining[at + part.len()..];
         }
-        rest.ends_with(last)
+        remaining.ends_with(last)
     }
 }
 

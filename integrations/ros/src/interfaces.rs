@@ -1,19 +1,21 @@
-//! The messages, services and actions of ROS 2 that this package speaks, as Rust types.
+//! Rust types of the ROS 2 messages, services and actions that this package uses.
 //!
-//! They are made by the build script of the definitions below `interfaces/`: `diagnostic_msgs/msg/DiagnosticArray` is
-//! [`diagnostic_msgs::msg::DiagnosticArray`], a service `X` is the structures `XRequest` and `XResponse` and the type `X` with the trait
-//! [`Service`], an action `X` is `XGoal`, `XResult`, `XFeedback` and the type `X` with the trait [`Action`].
+//! The build script generates them from the definitions below `interfaces/`:
+//! `diagnostic_msgs/msg/DiagnosticArray` is [`diagnostic_msgs::msg::DiagnosticArray`]; a service
+//! `X` is the structures `XRequest` and `XResponse` and the type `X` with the trait [`Service`]; an
+//! action `X` is `XGoal`, `XResult`, `XFeedback` and the type `X` with the trait [`Action`].
 //!
-//! Fields stand in the order of the definition: CDR is positional, and carries no names. The types are those of ROS 2 Jazzy; what another
-//! distribution or version has otherwise stands in a module of its name:
+//! Fields have the order of the definition, because CDR is positional and has no names. The types
+//! are those of ROS 2 Jazzy. Types that differ in another distribution or version are in a module
+//! of its name:
 //!
-//! | type | variant | what differs |
+//! | type | variant | difference |
 //! |---|---|---|
 //! | `lifecycle_msgs/TransitionEvent` | [`lyrical`] | `Time stamp` in place of `uint64 timestamp` |
 //! | `nav2_msgs/NavigateToPose` | [`humble`] | the result is an `Empty` |
 //! | | [`iron`] | the result has no `error_msg` |
-//! | | [`rolling`] | the feedback has two tracking errors more |
-//! | `plansys2_msgs/ExecutePlan` | [`plansys2_1`] | the goal is an `Empty`, the feedback tells of one action |
+//! | | [`rolling`] | the feedback has two additional tracking errors |
+//! | `plansys2_msgs/ExecutePlan` | [`plansys2_1`] | the goal is an `Empty`, the feedback is about a single action |
 
 #![allow(
     clippy::struct_excessive_bools,

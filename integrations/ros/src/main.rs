@@ -94,10 +94,10 @@ fn start() -> Result<(), Errors> {
         node.log(Severity::Warn, warning.text().trim_end());
     }
     let stop = Arc::new(AtomicBool::new(false));
-    let asked = Arc::clone(&stop);
-    // A second signal ends the program at once.
+    let flag = Arc::clone(&stop);
+    // A second signal ends the program immediately.
     let handler = move || {
-        if asked.swap(true, Ordering::Relaxed) {
+        if flag.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
     };

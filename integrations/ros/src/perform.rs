@@ -1,9 +1,10 @@
-//! Who carries out the actions of a plan, on a robot.
+//! Interface of performers, which execute the actions of a plan on a robot.
 //!
-//! A manager of plans hands each action to whoever is configured for its name, hears how it goes, and may ask for its end:
+//! A manager of plans passes each action to the performer that is configured for its name, receives
+//! its progress, and may cancel it:
 //!
 //! ```toml
-//! # The file of `--settings`: a table for each action that somebody else carries out.
+//! # The file of `--settings`: a table per action with a performer.
 //! [actions.move]                    # (move r1 kitchen hall) is a goal for Nav2 …
 //! by = "navigate_to_pose"
 //! server = "/navigate_to_pose"      # … here (the default)
@@ -11,7 +12,7 @@
 //! types = "jazzy"                   # humble, iron, jazzy or rolling: they differ
 //! behavior_tree = ""                # as Nav2 takes it
 //!
-//! [actions.inspect]                 # a performer of PlanSys2 does it
+//! [actions.inspect]                 # executed by a performer of PlanSys2
 //! by = "actions_hub"
 //!
 //! [actions.search_pipeline]         # done when a Bool on a topic is true
@@ -27,35 +28,35 @@
 //! by = "recharge_battery"
 //! server = "/recharge_battery"
 //!
-//! [poses]                           # where things are
+//! [poses]                           # poses of objects
 //! frame = "map"
 //! hall = { x = 1.0, y = -2.5, yaw = 1.57 }
 //!
-//! [offers.reconfigure]              # with `--as planner`: what PlanSys2's executor asks for is done here
+//! [offers.reconfigure]              # with `--as planner`: actions performed for PlanSys2's executor
 //! by = "change_mode"
 //! ```
 //!
-//! An action without a table is done as soon as it is begun: its effects are not in the world, but in the plan.
+//! An action without a table ends immediately with success: its effects exist only in the plan.
 
 use std::collections::BTreeMap;
 
 use smol::channel;
 
-/// An action that is to be carried out.
+/// An action to be executed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Call {
-    /// As the plan names it.
+    /// Name in the plan.
     pub action: String,
-    /// Its arguments, in the order of the domain.
+    /// Arguments in the order of the domain.
     pub arguments: Vec<String>,
-    /// The design of each function that it needs.
+    /// Design of each function that the action requires.
     pub configuration: BTreeMap<String, String>,
-    /// As planned, in seconds; 0 where the domain has no durations.
+    /// Planned duration in seconds; 0 if the domain has no durations.
     pub duration: f64,
 }
 
 impl Call {
-    /// As in PDDL and in PlanSys2: `(move r1 kitchen hall)`.
+    /// Formats the action as in PDDL and PlanSys2: `(move r1 kitchen hall)`.
     pub fn text(&self) -> String {
         let words: Vec<&str> =
             std::iter::once(&self.action).chain(&self.arguments).map(String::as_str).collect();
@@ -63,32 +64,32 @@ impl Call {
     }
 }
 
-/// What is heard of an action that is carried out.
+/// A message about a running action.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Progress {
-    /// How it goes.
+    /// Intermediate feedback.
     Feedback {
-        /// From 0 to 1, where that is known.
+        /// Completed share from 0 to 1, if it is known.
         completion: Option<f32>,
-        /// For people.
+        /// Description for users.
         text: String,
     },
-    /// How it has ended; nothing follows.
+    /// The action has ended. This is the last message.
     Ended(End),
 }
 
-/// How an action has ended.
+/// Outcome of an action.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum End {
-    /// As it should.
+    /// The action was completed.
     Succeeded,
-    /// Because that was asked for.
+    /// The action was cancelled on request.
     Canceled,
-    /// Otherwise: why.
+    /// The action failed for this reason.
     Failed(String),
 }
 
-/// An action that is carried out. It goes on when this is dropped.
+/// A running action. Dropping this handle does not stop it.
 #[derive(Debug, Clone)]
 pub struct Running {
     events: channel::Receiver<Progress>,
@@ -96,22 +97,22 @@ pub struct Running {
 }
 
 impl Running {
-    /// The two ends: for the manager, and for whoever carries out the action.
+    /// Creates both ends of the channel: for the manager, and for the performer of the action.
     pub fn pair() -> (Self, Performance) {
         let (progress, events) = channel::unbounded();
         let (cancel, canceled) = channel::bounded(1);
         (Self { events, cancel }, Performance { progress, canceled })
     }
 
-    /// What is heard next; the last is [`Progress::Ended`].
+    /// Waits for the next message. The last message is [`Progress::Ended`].
     pub async fn next(&self) -> Progress {
         let lost = || Progress::Ended(End::Failed("whoever carried it out is gone".to_owned()));
         self.events.recv().await.unwrap_or_else(|_| lost())
     }
 
-    /// Asks for an early end, which is heard of as any other.
+    /// Requests cancellation, which is reported like any other end.
     pub fn cancel(&self) {
-        // Asked twice is asked.
+        // A full channel means that cancellation was already requested.
         let _ = self.cancel.try_send(());
     }
 }
@@ -124,23 +125,23 @@ pub struct Performance {
 }
 
 impl Performance {
-    /// Says how it goes.
+    /// Reports intermediate feedback.
     pub fn feedback(&self, completion: Option<f32>, text: impl Into<String>) {
         self.tell(Progress::Feedback { completion, text: text.into() });
     }
 
-    /// Hands on what is heard.
+    /// Forwards a message.
     pub(crate) fn tell(&self, progress: Progress) {
-        // Nobody may listen.
+        // The receiver may have been dropped.
         let _ = self.progress.try_send(progress);
     }
 
-    /// Says how it has ended.
+    /// Reports the end of the action.
     pub fn end(self, end: End) {
         self.tell(Progress::Ended(end));
     }
 
-    /// Returns when an early end is asked for, and otherwise never.
+    /// Waits for a request to cancel, possibly forever.
     pub async fn canceled(&self) {
         if self.canceled.recv().await.is_err() {
             futures::future::pending::<()>().await;
@@ -148,9 +149,9 @@ impl Performance {
     }
 }
 
-/// Somebody who carries out actions.
+/// A performer of actions.
 pub trait Perform: Send + Sync {
-    /// Begins an action. Whatever goes wrong is heard as its end.
+    /// Starts an action. All errors are reported as its end.
     fn start(&self, call: Call) -> Running;
 }
 
@@ -161,7 +162,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn who_drops_an_action_has_failed() {
+    fn dropping_a_performance_is_a_failure() {
         let (running, performance) = Running::pair();
         performance.feedback(Some(0.5), "half");
         drop(performance);
@@ -175,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn an_early_end_is_heard_once_and_not_without_being_asked_for() {
+    fn cancellation_is_received_once_and_only_on_request() {
         let (running, performance) = Running::pair();
         running.cancel();
         running.cancel();

@@ -1,8 +1,10 @@
-//! In the place of POPF, for PlanSys2's plugin: `popf [ARGUMENTS] DOMAIN PROBLEM > plan`, with exit status 0 whatever comes of it.
+//! Replacement of POPF for PlanSys2's plugin: `popf [ARGUMENTS] DOMAIN PROBLEM > plan`. The exit
+//! status is always 0.
 //!
-//! The plugin looks for a line with `Solution Found`, and reads each line behind it that does not begin with `;` as an action. Whether a
-//! domain is valid it asks with a problem that has neither an initial state nor a goal, and that names some other domain: the answer is
-//! `Solution Found` without any action.
+//! The plugin searches for a line with `Solution Found`, and parses each later line that does not
+//! begin with `;` as an action. It validates a domain with a problem that has neither an initial
+//! state nor a goal and names another domain. The answer is then `Solution Found` without any
+//! action.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -16,39 +18,39 @@ use metaplan::setup::Setup;
 
 use crate::planner::{self, DOMAIN, Manner, NoPlan, PROBLEM, Request};
 
-/// PlanSys2 waits 15 s.
+/// PlanSys2 waits for 15 s.
 const TIME_LIMIT: Duration = Duration::from_secs(10);
 
-/// What a run says.
+/// Output of a run.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Said {
-    /// What the plugin reads.
+    /// Standard output, which the plugin parses.
     pub out: String,
-    /// For people.
+    /// Standard error, for users.
     pub error: String,
 }
 
 impl Said {
-    /// Says why there is no plan, where the plugin does not see it, and people do.
+    /// Reports why there is no plan, in comments that the plugin ignores.
     fn reason(text: &str) -> Self {
-        let comment = text.lines().fold(String::new(), |all, line| all + "; " + line + "\n");
+        let comment = text.lines().fold(String::new(), |comment, line| comment + "; " + line + "\n");
         Self { out: comment, error: text.to_owned() + "\n" }
     }
 }
 
-/// What is asked for.
+/// Parsed arguments.
 #[derive(Debug)]
 struct Asked {
     domain: PathBuf,
     problem: PathBuf,
     mission: Option<PathBuf>,
     manner: Manner,
-    /// Arguments that POPF may know.
+    /// Arguments of POPF without meaning here.
     ignored: Vec<String>,
 }
 
-/// Does what the arguments say. The environment has defaults: `METAPLAN_METRIC`, `METAPLAN_MISSION`, `METAPLAN_TIME_LIMIT`,
-/// `METAPLAN_OVERLAP`.
+/// Runs the planner for these arguments. Environment variables are defaults: `METAPLAN_METRIC`,
+/// `METAPLAN_MISSION`, `METAPLAN_TIME_LIMIT`, `METAPLAN_OVERLAP`.
 pub fn run(
     arguments: impl IntoIterator<Item = String>,
     environment: impl Fn(&str) -> Option<String>,
@@ -81,7 +83,7 @@ fn asked(
     let mut arguments = arguments.into_iter();
     while let Some(argument) = arguments.next() {
         let (option, value) = argument.split_once('=').unwrap_or((&argument, ""));
-        let own = match option {
+        let target = match option {
             "--metric" => &mut metric,
             "--mission" => &mut mission,
             "--time-limit" => &mut time_limit,
@@ -96,19 +98,19 @@ fn asked(
             }
         };
         let value = if argument.contains('=') { Some(value.to_owned()) } else { arguments.next() };
-        *own = Some(value.ok_or_else(|| format!("`{option}` lacks its value\n{USAGE}"))?);
+        *target = Some(value.ok_or_else(|| format!("`{option}` lacks its value\n{USAGE}"))?);
     }
-    let given = |value: Option<String>| value.filter(|value| !value.is_empty());
-    let overlap = match given(overlap).as_deref() {
+    let non_empty = |value: Option<String>| value.filter(|value| !value.is_empty());
+    let overlap = match non_empty(overlap).as_deref() {
         None | Some("auto") => None,
         Some("yes" | "1" | "true") => Some(true),
         Some("no" | "0" | "false") => Some(false),
         Some(other) => return Err(format!("`--overlap {other}` is neither `yes` nor `no`")),
     };
-    let time_limit = given(time_limit).map_or(Ok(TIME_LIMIT), |text| seconds(&text))?;
-    let manner = Manner { metric: given(metric), time_limit, overlap, alternatives: 0 };
-    let mission = given(mission).map(PathBuf::from);
-    // Values of POPF's own arguments stand before the files.
+    let time_limit = non_empty(time_limit).map_or(Ok(TIME_LIMIT), |text| seconds(&text))?;
+    let manner = Manner { metric: non_empty(metric), time_limit, overlap, alternatives: 0 };
+    let mission = non_empty(mission).map(PathBuf::from);
+    // Values of POPF's own arguments precede the files.
     match files.len().checked_sub(2).map(|first| files.split_off(first)).as_deref() {
         Some([domain, problem]) => {
             ignored.extend(files.iter().map(|file| file.display().to_string()));
@@ -124,7 +126,7 @@ fn seconds(text: &str) -> Result<Duration, String> {
     Duration::try_from_secs_f64(value).ok().filter(|time| !time.is_zero()).ok_or_else(wrong)
 }
 
-/// The text for the plugin, or why there is none.
+/// Returns the text for the plugin, or the reason why there is no plan.
 fn solve(asked: &Asked) -> Result<String, String> {
     let domain = read(&asked.domain, DOMAIN)?;
     let problem = read(&asked.problem, PROBLEM)?;
@@ -135,14 +137,14 @@ fn solve(asked: &Asked) -> Result<String, String> {
     let setup = asked.mission.as_deref().map(Setup::read).transpose().map_err(|messages| all(&messages))?;
     let joint = setup.as_ref().map(|setup| &setup.mission);
     let request = Request { domain, problem, joint };
-    let found = planner::solve(request, &asked.manner).map_err(|none| none.text())?;
-    let mut text = format!("; cost {}\n; {}\n", found.cost, found.verdict.replace('\n', "\n; "));
-    let best = found.plans.first().map(Vec::as_slice).unwrap_or_default();
+    let solution = planner::solve(request, &asked.manner).map_err(|reason| reason.text())?;
+    let mut text = format!("; cost {}\n; {}\n", solution.cost, solution.verdict.replace('\n', "\n; "));
+    let best = solution.plans.first().map(Vec::as_slice).unwrap_or_default();
     if best.is_empty() {
-        // The plugin takes a plan without actions for none, as it does POPF's.
+        // The plugin treats a plan without actions as no plan, as it does for POPF.
         text += "; nothing has to be done: the goal holds already\n";
     }
-    for (line, configuration) in best.iter().zip(&found.configuration) {
+    for (line, configuration) in best.iter().zip(&solution.configuration) {
         let designs: Vec<_> = configuration.iter().map(|(f, design)| format!("{f} = {design}")).collect();
         if !designs.is_empty() {
             let _ = writeln!(text, "; {} with {}", line.action, designs.join(", "));
@@ -160,7 +162,7 @@ fn all(messages: &[Message]) -> String {
     messages.iter().map(Message::text).collect::<Vec<_>>().join("\n")
 }
 
-/// Whether a problem asks for nothing but a look at the domain.
+/// Returns `true` if a problem serves only to validate the domain.
 fn is_void(problem: &str) -> bool {
     let code: String = problem.lines().map(|line| line.split(';').next().unwrap_or_default()).collect();
     let code = code.to_ascii_lowercase();

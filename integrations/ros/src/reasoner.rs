@@ -1,9 +1,10 @@
-//! In the place of MROS's reasoner (`mros2_reasoner` \[1\]): functions are asked for as goals of the action `/mros/objective`, and get the
-//! best design that can be had now.
+//! Replacement of MROS's reasoner (`mros2_reasoner` \[1\]). Functions are requested as goals of the
+//! action `/mros/objective`, and receive the best available design.
 //!
-//! Designs are chosen by [`metaplan::configure`], as MROS chooses them, and asked for by `/mros/request_configuration`, or by
-//! `/<function>/change_mode` where nobody serves that. What is told of an objective is told as soon as it changes, and each
-//! `reasoning_period` besides. A goal is cancelled once its function has given up its design.
+//! Designs are selected by [`metaplan::configure`], as in MROS, and requested by
+//! `/mros/request_configuration`, or by `/<function>/change_mode` if that service has no server.
+//! The status of an objective is published on changes and every `reasoning_period`. A goal is
+//! cancelled once its function has released its design.
 //!
 //! \[1\] Bozhinoski et al., MROS: Runtime Adaptation For Robot Control Architectures, Advanced Robotics 36, 2022.
 
@@ -26,36 +27,40 @@ use keeping::Keeping;
 use memory::MemoryFile;
 use network::Network;
 
-/// So long a choice may take.
+/// Time limit of a design selection.
 const LIMIT: std::time::Duration = std::time::Duration::from_secs(1);
 
-/// What the reasoner is started with.
+/// Options of the reasoner.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// A mission's manifest, of which the knowledge base counts.
+    /// Manifest of the mission, of which only the knowledge base is used.
     pub mission: PathBuf,
-    /// What functions and designs are called on the robot; a file `ros.toml` beside the mission unless said otherwise.
+    /// Names of functions and designs on the robot; by default a file `ros.toml` beside the
+    /// mission.
     pub settings: Option<PathBuf>,
-    /// Where is kept what has to be known after a restart.
+    /// Directory of the state that must survive a restart.
     pub journal: Option<PathBuf>,
 }
 
-/// Serves objectives until told to stop.
+/// Serves objectives until `stop` is set.
 ///
 /// # Errors
-/// The mission or its settings are wrong, or a topic or service cannot be made.
+/// The mission or its settings are wrong, or a topic or service cannot be created.
 pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Errors> {
-    let one = |message: Message| Errors::from(message);
+    let to_errors = |message: Message| Errors::from(message);
     let Setup { mission, .. } = Setup::read(&options.mission)?;
-    let settings = Settings::read(options.settings.as_deref(), &options.mission).map_err(one)?;
+    let settings = Settings::read(options.settings.as_deref(), &options.mission).map_err(to_errors)?;
     let knowledge = mission.knowledge().cloned().ok_or_else(|| {
-        one(Message::error("N140", "the mission has no knowledge base, from which designs could be chosen"))
+        to_errors(Message::error(
+            "N140",
+            "the mission has no knowledge base, from which designs could be chosen",
+        ))
     })?;
     for warning in knowledge.warnings() {
         node.log(Severity::Warn, warning.text().trim_end());
     }
     let configurator = Configurator::new(knowledge, Wishes::default())?;
     let keeping = Keeping::new(Keeper::new(configurator, Some(LIMIT)), settings.functions);
-    let memory = options.journal.as_deref().map(MemoryFile::open).transpose().map_err(one)?;
-    Network::connect(node, keeping, &settings.diagnostics, memory)?.run(stop).map_err(one)
+    let memory = options.journal.as_deref().map(MemoryFile::open).transpose().map_err(to_errors)?;
+    Network::connect(node, keeping, &settings.diagnostics, memory)?.run(stop).map_err(to_errors)
 }

@@ -48,7 +48,7 @@ fn a_diagnostic_array() {
     );
 }
 
-/// Doubles begin at multiples of eight; an empty sequence has its length and nothing else, also before doubles.
+/// Doubles are aligned to eight bytes. An empty sequence has only its length, also before doubles.
 #[test]
 fn a_parameter_value() {
     use rcl_interfaces::msg::{ParameterType, ParameterValue};
@@ -112,7 +112,7 @@ fn arrays_have_no_length_and_empty_structures_have_a_byte() {
     check(&suave_msgs::action::SpiralSearchGoal::default(), &[&[0]]);
 }
 
-/// `i16` and `i8` before strings, a sequence of strings, a `f32` behind a Boolean.
+/// `i16` and `i8` before strings, a sequence of strings, an `f32` after a Boolean.
 #[test]
 fn an_action_execution() {
     use plansys2_msgs::msg::ActionExecution;
@@ -147,7 +147,7 @@ fn a_variant_has_its_own_fields() {
     let common = lifecycle_msgs::msg::TransitionEvent { timestamp: 1, ..Default::default() };
     let stamp = Time { sec: 0, nanosec: 1 };
     let lyrical = lyrical::lifecycle_msgs::msg::TransitionEvent { stamp, ..Default::default() };
-    // A byte stands anywhere, the length of a string at multiples of four.
+    // Bytes have no alignment, the length of a string is aligned to four bytes.
     let states = [0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0];
     check(&common, &[&[1, 0, 0, 0, 0, 0, 0, 0], &states]);
     check(&lyrical, &[&[0, 0, 0, 0, 1, 0, 0, 0], &states]);
@@ -188,8 +188,8 @@ fn hashes_of_messages_are_those_of_rosidl() {
     }
 }
 
-/// ROS 2 announces on the topics of a service the hashes of the request and of the response, not the hash of the service. Expected values:
-/// as in [`hashes_of_messages_are_those_of_rosidl`].
+/// ROS 2 announces the hashes of request and response on the topics of a service, not the hash of
+/// the service. Expected values: as in [`hashes_of_messages_are_those_of_rosidl`].
 #[test]
 fn topics_of_services_have_the_hashes_of_their_messages() {
     use mros2_msgs::action::ControlQos;

@@ -1,6 +1,7 @@
-//! `popf` as PlanSys2's plugin calls it: what the plugin's own way of reading makes of the answers.
+//! `popf` as called by PlanSys2's plugin, with the plugin's parser applied to the output.
 //!
-//! The files of PlanSys2's tests are read from `../shared`; where they are not there, their cases say so and end.
+//! The files of PlanSys2's tests are read from `../shared`. If they are missing, their cases report
+//! it and end.
 
 #![allow(clippy::print_stderr)] // a skipped test says so
 
@@ -9,7 +10,7 @@ use std::process::{Command, Output};
 
 use metaplan_ros::interfaces::plansys2_msgs::msg::PlanItem;
 
-/// The problem by which the plugin asks whether a domain is valid.
+/// The problem by which the plugin validates a domain.
 const VOID: &str = "(define (problem void) (:domain plansys2))";
 
 const DOMAIN: &str = "(define (domain d) (:requirements :durative-actions :typing)
@@ -18,7 +19,7 @@ const DOMAIN: &str = "(define (domain d) (:requirements :durative-actions :typin
     :condition (and (at start (at ?r ?a)) (at start (way ?a ?b)))
     :effect (and (at start (not (at ?r ?a))) (at end (at ?r ?b)) (at end (increase (spent) (price ?a ?b))))))";
 
-/// The direct way is short and dear.
+/// The direct way is short and expensive.
 const PROBLEM: &str = "(define (problem p) (:domain d) (:objects r s - robot a b c - place)
   (:init (at r a) (at s a) (way a b) (way b c) (way a c) (= (price a b) 1) (= (price b c) 1) (= (price a c) 5) (= (spent) 0))
   (:goal (and (at r c) (at s b))))";
@@ -32,8 +33,8 @@ fn popf(arguments: &[&str], environment: &[(&str, &str)]) -> Output {
         .expect("the program")
 }
 
-/// As the plugin reads the file that it has redirected the output to. It indexes into each line without looking whether it has what is
-/// looked for; here that is a failure of the test.
+/// Parses the redirected output like the plugin, which indexes into each line without a check. An
+/// index error is a test failure here.
 fn read_as_the_plugin(output: &Output) -> Option<Vec<PlanItem>> {
     assert_eq!(output.status.code(), Some(0), "{output:?}");
     let text = String::from_utf8(output.stdout.clone()).expect("text");
@@ -60,7 +61,7 @@ fn actions(items: &[PlanItem]) -> Vec<&str> {
     items.iter().map(|item| item.action.as_str()).collect()
 }
 
-/// Two files in a directory of their own.
+/// Writes two files to a new directory.
 fn files(domain: &str, problem: &str) -> (tempfile::TempDir, [String; 2]) {
     let directory = tempfile::tempdir().expect("a directory");
     let paths = [("domain.pddl", domain), ("problem.pddl", problem)].map(|(name, text)| {
@@ -108,7 +109,7 @@ fn the_metric_that_plansys2_leaves_out_counts() {
         found.sort_unstable();
         assert_eq!(found, expected, "{arguments:?}");
     }
-    // The problem's own counts more.
+    // The problem's own metric takes precedence.
     let text = PROBLEM.replace("(:goal", "(:metric minimize (total-time)) (:goal");
     let (_directory, [domain, problem]) = files(DOMAIN, &text);
     let items = read_as_the_plugin(&popf(&[&domain, &problem], &[("METAPLAN_METRIC", "(spent)")]));
@@ -176,7 +177,8 @@ fn a_domain_is_checked_by_a_problem_that_asks_for_nothing() {
     }
 }
 
-/// With a mission's knowledge base the domain's own actions get designs, of which PlanSys2 knows nothing.
+/// With a mission's knowledge base, the domain's actions get designs, which are unknown to
+/// PlanSys2.
 #[test]
 fn the_knowledge_base_of_a_mission_joins_in() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -207,7 +209,7 @@ fn the_overlay_is_where_ros2_run_looks() {
     assert!(!Command::new(script).arg("nothing").output().expect("the script").status.success());
 }
 
-/// Domains of PlanSys2's own tests; those that it calls an error are.
+/// Domains of PlanSys2's own tests, including those that its tests declare invalid.
 #[test]
 fn domains_of_plansys2_are_valid() {
     let (_directory, [_, void]) = files("", VOID);
@@ -228,7 +230,8 @@ fn domains_of_plansys2_are_valid() {
     }
 }
 
-/// Problems of PlanSys2's own tests: how many actions its tests expect of POPF, or that there is no plan.
+/// Problems of PlanSys2's own tests, with the number of actions that its tests expect of POPF, or
+/// without a plan.
 #[test]
 fn problems_of_plansys2_are_solved() {
     for (domain, problem, expected) in [

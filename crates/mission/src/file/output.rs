@@ -1,9 +1,11 @@
-//! Output files. A regular file is replaced as a whole, by renaming a temporary file, and keeps its mode and owner. What is not a
-//! regular file (a device, a FIFO, a socket's descriptor) is written through, and a symbolic link is followed: neither is ever replaced.
+//! Writes output files atomically. A regular file is replaced by renaming a temporary file over it,
+//! and keeps its mode and owner. Any other file (device, FIFO, socket descriptor) is opened and
+//! written. A symbolic link is followed. Neither a special file nor a link is ever replaced.
 //!
-//! A file is overwritten in place where a rename would change more than its content: it has other hard links, its owner cannot be
-//! kept, its directory is not writable, it is a mount point, or it is named by a descriptor (`/dev/fd/3`). Vim's `backupcopy=auto`
-//! draws the same line. If overwriting fails, the former content is restored.
+//! A file is overwritten in place if a rename would change more than its content: it has other hard
+//! links, its owner cannot be kept, its directory is not writable, it is a mount point, or the path
+//! is a descriptor (`/dev/fd/3`). Vim's `backupcopy=auto` follows the same rule. If overwriting
+//! fails, the former content is restored.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Read as _, Seek as _, Write as _};
@@ -13,17 +15,17 @@ use tempfile::{NamedTempFile, TempDir, TempPath};
 
 use crate::message::Message;
 
-/// The name of standard output.
+/// Path that denotes standard output.
 const STDOUT: &str = "-";
 
-/// More symbolic links than this in a row are a loop, as for Linux.
+/// Limit on consecutive symbolic links, as in Linux; more are treated as a loop.
 const MAX_LINKS: usize = 40;
 
-/// Writes a text to a file, which is either whole or untouched; `-` is standard output. A reader that has closed its end of a pipe is
-/// not a fault.
+/// Writes a text to a file atomically, or to standard output if the path is `-`. A closed pipe is
+/// not an error.
 ///
 /// # Errors
-/// M109: it cannot be written.
+/// M109: the file cannot be written.
 pub fn write(path: &Path, text: &str) -> Result<(), Message> {
     let written = create(path).and_then(|(mut file, pending)| {
         file.write_all(text.as_bytes())?;
@@ -39,18 +41,18 @@ pub fn write(path: &Path, text: &str) -> Result<(), Message> {
     }
 }
 
-/// Returns `true` if the path is `-`, or names what standard output is, as `/dev/stdout` does.
+/// Returns `true` if the path is `-` or denotes the file of standard output, as `/dev/stdout` does.
 pub fn is_stdout(path: &Path) -> bool {
     path.as_os_str() == STDOUT || std::fs::metadata(path).is_ok_and(|named| is_same(&named, stdout().ok()))
 }
 
-/// Opens a file for writing. What is written to a regular file is visible once it is committed.
+/// Opens a file for writing. The content of a regular file becomes visible on [`Pending::commit`].
 ///
 /// # Errors
-/// The file cannot be written.
+/// The file cannot be opened for writing.
 pub fn create(path: &Path) -> io::Result<(File, Pending)> {
     if is_stdout(path) {
-        // What was printed before comes first.
+        // Text that was printed before must precede the new content.
         io::stdout().flush()?;
         return Ok((stdout()?, Pending::written()));
     }
@@ -67,7 +69,8 @@ pub fn create(path: &Path) -> io::Result<(File, Pending)> {
     let Some(existing) = existing else {
         return Ok(pending(temporary(&target)?, target, None));
     };
-    // A file that is protected against writing is not replaced either.
+    // Replacement needs write access to the directory only. Opening the file enforces its own
+    // protection as well.
     let mut writable = OpenOptions::new();
     writable.write(true);
     let old = writable.clone().read(true).open(path).or_else(|_| writable.open(path))?;
@@ -79,12 +82,12 @@ pub fn create(path: &Path) -> io::Result<(File, Pending)> {
     })
 }
 
-/// A file that is written, and not yet visible under its name.
+/// A written file that is not yet visible under its name.
 #[derive(Debug)]
 #[must_use = "a regular file has its content once it is committed"]
 pub struct Pending(Option<(TempPath, PathBuf, Option<InPlace>)>);
 
-/// A file to overwrite: in any case, or only where it cannot be replaced.
+/// An existing file to overwrite: always if `is_certain`, otherwise only if replacing it fails.
 #[derive(Debug)]
 struct InPlace {
     old: File,
@@ -92,23 +95,24 @@ struct InPlace {
 }
 
 impl Pending {
-    /// An output that is already complete: committing it does nothing.
+    /// Returns an output that is already complete. Committing it has no effect.
     fn written() -> Self {
         Self(None)
     }
 
-    /// Gives the file its name.
+    /// Moves the content to its final path.
     ///
     /// # Errors
-    /// It cannot be written. The former content, if there is any, is unchanged then.
+    /// The file cannot be written. Former content is then unchanged.
     pub fn commit(self) -> io::Result<()> {
         let Some((temporary, target, existing)) = self.0 else { return Ok(()) };
+        // The content must reach the disk before the rename, or a crash could leave an empty file.
         File::open(&temporary)?.sync_all()?;
         match existing {
             Some(InPlace { old, is_certain: true }) => overwrite(old, &temporary),
             Some(InPlace { old, is_certain: false }) => match temporary.persist(target) {
                 Ok(()) => Ok(()),
-                // A mount point cannot be replaced.
+                // The rename fails for mount points.
                 Err(refused) => overwrite(old, &refused.path),
             },
             None => temporary.persist(target).map_err(|refused| refused.error),
@@ -121,7 +125,7 @@ fn pending(file: NamedTempFile, target: PathBuf, old: Option<InPlace>) -> (File,
     (file, Pending(Some((temporary, target, old))))
 }
 
-/// Overwrites a file with the content of another one. If that fails, the former content is restored.
+/// Overwrites a file with the content of `source`. On failure the former content is restored.
 fn overwrite(mut file: File, source: &Path) -> io::Result<()> {
     let mut former = Vec::new();
     let is_kept = file.read_to_end(&mut former).is_ok();
@@ -133,13 +137,14 @@ fn overwrite(mut file: File, source: &Path) -> io::Result<()> {
     };
     let written = File::open(source).and_then(|mut source| fill(&mut source));
     if written.is_err() && is_kept {
-        // The first error is reported.
+        // The result of restoring is ignored, because the first error is the one to report.
         let _ = fill(&mut &former[..]);
     }
     written
 }
 
-/// The path behind all symbolic links, whether or not there is something, and whether a link is a descriptor of a process.
+/// Resolves all symbolic links of a path, whose target need not exist. Also returns whether a link
+/// is a descriptor of a process.
 fn followed(path: &Path) -> io::Result<(PathBuf, bool)> {
     let (mut path, mut is_descriptor) = (path.to_owned(), false);
     for _ in 0..MAX_LINKS {
@@ -155,29 +160,31 @@ fn directory(path: &Path) -> &Path {
     path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// A file in the directory of another one, with the permissions that the process gives to new files.
+/// Creates a temporary file in the directory of `path`, with the default permissions of the
+/// process.
 fn temporary(path: &Path) -> io::Result<NamedTempFile> {
     let mut temporary = tempfile::Builder::new();
-    // Temporary files are for their owner alone; the process's mask applies to these, too.
+    // Temporary files are private by default. The umask of the process still applies to this mode.
     #[cfg(unix)]
     temporary.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     temporary.tempfile_in(directory(path))
 }
 
-/// A directory that is filled, and not yet visible under its name.
+/// A directory that is being filled and is not yet visible under its name.
 #[derive(Debug)]
 #[must_use = "the directory has its files once it is committed"]
 pub struct PendingDirectory {
     files: TempDir,
     target: PathBuf,
-    /// Whether it is there already, and empty.
+    /// `true` if the target already exists; it is then empty.
     exists: bool,
 }
 
-/// Begins a directory, which must not be there yet or be empty. One that is there keeps its mode and owner, and may be a mount point.
+/// Starts a new directory. The target must be absent or empty. An existing target keeps its mode
+/// and owner, and may be a mount point.
 ///
 /// # Errors
-/// It is there and not empty, or cannot be written.
+/// The target is not empty, or cannot be written.
 pub fn create_directory(path: &Path) -> io::Result<PendingDirectory> {
     let (target, _) = followed(path)?;
     let exists = target.is_dir();
@@ -186,7 +193,7 @@ pub fn create_directory(path: &Path) -> io::Result<PendingDirectory> {
     }
     let mut builder = tempfile::Builder::new();
     builder.prefix(".metaplan-");
-    // As for files.
+    // The umask of the process still applies.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
     let files = builder.tempdir_in(if exists { &target } else { directory(&target) })?;
@@ -194,19 +201,19 @@ pub fn create_directory(path: &Path) -> io::Result<PendingDirectory> {
 }
 
 impl PendingDirectory {
-    /// The directory to write the files into.
+    /// Returns the temporary directory into which the files are to be written.
     pub fn path(&self) -> &Path {
         self.files.path()
     }
 
-    /// Gives the directory its name.
+    /// Moves the directory to its final path.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The directory cannot be written.
     pub fn commit(self) -> io::Result<()> {
         if !self.exists {
             std::fs::rename(self.path(), &self.target)?;
-            // The temporary name is gone, so there is nothing to remove.
+            // The rename has removed the temporary name, so the guard must not delete it.
             let _ = self.files.keep();
             return Ok(());
         }
@@ -233,7 +240,7 @@ mod system {
         io::stderr().as_fd().try_clone_to_owned().map(File::from)
     }
 
-    /// Returns `true` if the metadata are those of an open file.
+    /// Returns `true` if the metadata belong to an open file.
     pub(super) fn is_same(named: &Metadata, open: Option<File>) -> bool {
         let open = open.and_then(|file| file.metadata().ok());
         open.is_some_and(|open| (named.dev(), named.ino()) == (open.dev(), open.ino()))
@@ -243,10 +250,10 @@ mod system {
         file.nlink() > 1
     }
 
-    /// Gives a file the owner, the group and the mode of another one.
+    /// Gives `file` the owner, the group and the mode of another one.
     pub(super) fn adopt(file: &File, other: &Metadata) -> io::Result<()> {
-        let own = file.metadata()?;
-        if (own.uid(), own.gid()) != (other.uid(), other.gid()) {
+        let current = file.metadata()?;
+        if (current.uid(), current.gid()) != (other.uid(), other.gid()) {
             fchown(file, Some(other.uid()), Some(other.gid()))?;
         }
         file.set_permissions(std::fs::Permissions::from_mode(other.mode() & 0o7777))
@@ -267,17 +274,17 @@ mod system {
         io::stderr().as_handle().try_clone_to_owned().map(File::from)
     }
 
-    /// No path names a standard stream.
+    /// Returns `false`: on Windows no path denotes a standard stream.
     pub(super) fn is_same(_: &Metadata, _: Option<File>) -> bool {
         false
     }
 
-    /// The standard library does not count them.
+    /// Returns `false`: the standard library does not report hard links on Windows.
     pub(super) fn has_other_links(_: &Metadata) -> bool {
         false
     }
 
-    /// New files inherit the rights of their directory.
+    /// Does nothing: new files inherit the permissions of their directory.
     #[expect(clippy::unnecessary_wraps, reason = "as on other systems, where it can fail")]
     pub(super) fn adopt(_: &File, _: &Metadata) -> io::Result<()> {
         Ok(())

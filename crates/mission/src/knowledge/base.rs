@@ -1,4 +1,5 @@
-//! A knowledge base at run time: OWL documents and rule files in an engine, kept in step with the robot.
+//! A knowledge base at run time: OWL documents and rule files in an engine, updated with reports of
+//! the robot.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -21,33 +22,33 @@ use crate::knowledge::waiting::Waiting;
 use crate::message::{Errors, Message};
 use crate::planta::Terms;
 
-/// From so many names of one individual on, not all of their pairs are listed.
+/// Number of equal names of an individual from which not all of their pairs are listed.
 const MANY_NAMES: usize = 32;
 
-/// Knowledge about a robot: what is stated, and what follows.
+/// Knowledge about a robot: assertions and the facts inferred from them.
 #[derive(Debug, Clone)]
 pub struct Knowledge {
     pub(super) runtime: Runtime,
-    /// What was last read of `runtime`, in step with it.
+    /// Cached queries, kept consistent with `runtime`.
     pub(super) catalogue: OnceLock<Arc<Catalogue>>,
-    /// What was told and nothing follows from yet.
+    /// Reports without inferred consequences so far.
     pub(super) waiting: Waiting,
-    /// As it was read; shares with `runtime` what has not changed since.
+    /// State after reading. Shares all unchanged data with `runtime`.
     origin: Runtime,
     rule_count: usize,
     warnings: Vec<Message>,
     pub(super) sources: Sources,
-    /// What individuals are called in place of their local names.
+    /// Object names of individuals that replace their local names.
     pub(super) called: Arc<CalledNames>,
     entities: Arc<[(EntityKind, Iri)]>,
-    /// The names of all documents, those that are imported among them.
+    /// Names of all documents, including imported ones.
     documents: Arc<[String]>,
     annotations: Arc<[(Iri, Annotation)]>,
-    /// What the documents add to a domain in PLANTA's form, if they were read for one.
+    /// Translated terminology for a domain in PLANTA's form.
     terms: Option<Arc<Terms>>,
-    /// What the documents and rule files state.
+    /// Assertions and axioms of the documents and rule files.
     documented: Arc<ontology::Stated>,
-    /// What is stated, if what holds is not told apart from it by the engine.
+    /// Assertions, if the engine does not distinguish them from inferred facts.
     stated: Option<Arc<[Fact]>>,
 }
 
@@ -65,24 +66,25 @@ impl Knowledge {
     /// Reads documents and rules.
     ///
     /// # Errors
-    /// All that is wrong with them.
+    /// All errors of the sources.
     pub fn read(sources: &Sources) -> Result<Self, Errors> {
         Self::read_as(sources, Equality::Owl)
     }
 
-    /// As [`Knowledge::read`], where two names may stand for one individual, as in OWL, or never.
+    /// Reads documents and rules, as [`Knowledge::read`] does, with the given semantics of
+    /// equality.
     ///
     /// # Errors
-    /// All that is wrong with the sources.
+    /// All errors of the sources.
     pub fn read_as(sources: &Sources, equality: Equality) -> Result<Self, Errors> {
         Self::of_stated(sources, Stated::read(sources, equality)?)
     }
 
-    /// As [`Knowledge::read`], for a domain: if it is in PLANTA's form, what the documents add to it is kept, and every name is
-    /// an individual of its own.
+    /// Reads documents and rules for a domain, as [`Knowledge::read`] does. For a domain in
+    /// PLANTA's form, keeps the translated terminology and assumes unique names.
     ///
     /// # Errors
-    /// All that is wrong with the sources.
+    /// All errors of the sources.
     pub fn read_for(sources: &Sources, domain: &str) -> Result<Self, Errors> {
         Self::of_stated(sources, Stated::read_for(sources, domain)?)
     }
@@ -95,7 +97,7 @@ impl Knowledge {
             .map_err(|errors| errors.iter().map(Message::from_rules).collect::<Vec<_>>())?;
         let mistakes = ontology::tomasys::check(&ontology, &engine);
         let mistakes = mistakes.iter().map(Message::from_ontology_warning);
-        // With names that are all different, two values of a functional property are not taken for one.
+        // Under unique names, several values of a functional property are not inferred to be equal.
         warnings.extend(mistakes.filter(|warning| terms.is_none() || warning.code != "O404"));
         let runtime = Runtime::new(engine, Mode::Retract);
         let (sources, entities) = (sources.clone(), ontology.entities.as_slice().into());
@@ -111,7 +113,7 @@ impl Knowledge {
         })
     }
 
-    /// Knowledge of what holds, with no rules to conclude anything: what a proof says that follows is stated.
+    /// Creates knowledge without rules, from all facts of a proof, asserted and inferred.
     ///
     /// # Errors
     /// The facts refer to other symbols.
@@ -124,19 +126,20 @@ impl Knowledge {
         Ok(Self::of(runtime, 0, Vec::new(), sources, entities))
     }
 
-    /// As [`Knowledge::closed`], of what was read for a domain in PLANTA's form: with what the documents add to it, and what of
-    /// all that holds is stated.
+    /// Adds to [`Knowledge::closed`] the translated terminology for a domain in PLANTA's form, and
+    /// its asserted facts.
     #[must_use]
     pub fn with_terms(self, terms: Option<Arc<Terms>>, stated: &[Fact]) -> Self {
         Self { terms, stated: Some(stated.into()), ..self }
     }
 
-    /// What the documents add to a domain in PLANTA's form, if they were read for one.
+    /// Returns the translated terminology, if the documents were read for a domain in PLANTA's
+    /// form.
     pub(crate) fn terms(&self) -> Option<&Arc<Terms>> {
         self.terms.as_ref()
     }
 
-    /// What is stated now.
+    /// Returns the current assertions.
     pub(crate) fn stated(&self) -> Vec<Fact> {
         let engine = self.engine();
         match &self.stated {
@@ -172,69 +175,69 @@ impl Knowledge {
         }
     }
 
-    /// What is questionable about the documents.
+    /// Returns the warnings about the documents.
     pub fn warnings(&self) -> &[Message] {
         &self.warnings
     }
 
-    /// The classes, properties and individuals that the documents name.
+    /// Returns the classes, properties and individuals of the documents.
     pub fn entities(&self) -> &[(EntityKind, Iri)] {
         &self.entities
     }
 
-    /// What the documents say in annotations of entities.
+    /// Returns the annotations of entities.
     pub fn annotations(&self) -> &[(Iri, Annotation)] {
         &self.annotations
     }
 
-    /// What it was read from.
+    /// Returns the sources of the knowledge base.
     pub fn sources(&self) -> &Sources {
         &self.sources
     }
 
-    /// The names of the documents that were read: paths of files, imported ones among them.
+    /// Returns the names of the documents: file paths, including those of imported files.
     pub fn documents(&self) -> &[String] {
         &self.documents
     }
 
-    /// How many rules there are: those of each document, and those of rule files; axioms do not count.
+    /// Number of rules in documents and rule files, without axioms.
     pub fn rule_count(&self) -> usize {
         self.rule_count
     }
 
-    /// The typed view on what holds now.
+    /// Returns a typed view of the current facts.
     pub fn view(&self) -> View<'_> {
         self.runtime.view().calling(&self.called)
     }
 
-    /// Calls individuals, by IRI, otherwise than by their local names from now on.
+    /// Sets the object names of individuals, by IRI.
     pub(crate) fn call(&mut self, called: CalledNames) {
         self.called = Arc::new(called);
         self.catalogue = OnceLock::new();
     }
 
-    /// The engine, to ask for facts and derivations.
+    /// Returns the engine, for queries of facts and derivations.
     pub fn engine(&self) -> &Engine {
         self.runtime.engine()
     }
 
-    /// What the robot reports, as updates of the engine.
+    /// Returns the runtime, which translates reports of the robot to updates of the engine.
     pub fn runtime(&self) -> &Runtime {
         &self.runtime
     }
 
-    /// As [`Knowledge::runtime`], to change it.
+    /// Returns the runtime for modification. Cached queries are discarded.
     pub fn runtime_mut(&mut self) -> &mut Runtime {
         self.catalogue = OnceLock::new();
         &mut self.runtime
     }
 
-    /// What planning asks for again and again.
+    /// Returns the cached results of the queries of planning.
     pub fn catalogue(&self) -> &Catalogue {
         self.catalogue.get_or_init(|| Arc::new(Catalogue::new(&self.view())))
     }
 
-    /// Keeps the catalogue in step with what holds.
+    /// Updates the query cache after a change of facts, or discards it.
     pub(super) fn follow(&mut self, delta: &Delta) {
         let engine = self.runtime.engine();
         if self.catalogue.get_mut().is_some_and(|own| !Arc::make_mut(own).follow(delta, engine)) {
@@ -242,36 +245,42 @@ impl Knowledge {
         }
     }
 
-    /// The outcome of a change.
+    /// Converts the result of an update, after updating the query cache.
     fn changed(&mut self, outcome: Result<Delta, ontology::Error>) -> Result<Delta, Message> {
         let delta = outcome.map_err(|error| Message::from_ontology(&error))?;
         self.follow(&delta);
         Ok(delta)
     }
 
-    /// The individual that is called so, by IRI.
+    /// Returns the IRI of the individual with this object name.
     fn called_so(&self, name: &str) -> Option<&str> {
         let is_so = |(_, own): &(&String, &String)| own.eq_ignore_ascii_case(name);
         self.called.iter().find(is_so).map(|(iri, _)| iri.as_str())
     }
 
-    /// The local name of a component that is named by IRI or local name, or as the problem calls it, if there is one.
+    /// Returns the local name of a component, given by IRI, local name or object name.
     pub fn known_component(&self, name: &str) -> Option<String> {
         let name = self.component(name);
-        let components = self.runtime.view().components().into_iter().map(|own| own.individual);
-        components.into_iter().find(|own| own.name == name || own.iri == name).map(|own| own.name)
+        let components = self.runtime.view().components().into_iter().map(|component| component.individual);
+        components
+            .into_iter()
+            .find(|component| component.name == name || component.iri == name)
+            .map(|component| component.name)
     }
 
-    /// A component as the knowledge base names it: what it has no component of that name for may be the name of an object.
+    /// Resolves the name of a component. Object names are considered only if no component has the
+    /// name.
     pub(super) fn component(&self, name: &str) -> String {
         let iri = self.called_so(name).filter(|_| {
-            let own = self.runtime.view().components();
-            !own.iter().any(|own| own.individual.name == name || own.individual.iri == name)
+            let components = self.runtime.view().components();
+            !components
+                .iter()
+                .any(|component| component.individual.name == name || component.individual.iri == name)
         });
         iri.unwrap_or(name).to_owned()
     }
 
-    /// Marks a component, named by IRI or local name, or as the problem calls it, as failed.
+    /// Marks a component as failed, given by IRI, local name or object name.
     ///
     /// # Errors
     /// There is no such component.
@@ -279,18 +288,18 @@ impl Knowledge {
         self.report(component, Status::Failed).map(|_| ())
     }
 
-    /// A component, named by IRI or local name, or as the problem calls it, has a status from now on; returns what holds since, and what no more. What
-    /// was reported holds whatever follows from it: see [`Knowledge::contradictions`].
+    /// Sets the status of a component, given by IRI, local name or object name. Returns the change
+    /// of all facts. The report is asserted even if it causes [`Knowledge::contradictions`].
     ///
     /// # Errors
-    /// There is no such component, or a rule runs away.
+    /// There is no such component, or inference exceeds its limits.
     pub fn report(&mut self, component: &str, status: Status) -> Result<Delta, Message> {
         let outcome = self.runtime.report_component(&self.component(component), status);
         self.changed(outcome)
     }
 
-    /// Sets the measured value of an attribute, named by the IRI or local name of its type; returns what holds since,
-    /// and what no more.
+    /// Sets the measured value of an attribute, given by the IRI or local name of its type. Returns
+    /// the change of all facts.
     ///
     /// # Errors
     /// There is no such attribute, or the value is not a number.
@@ -306,19 +315,20 @@ impl Knowledge {
         self.changed(outcome)
     }
 
-    /// An attribute has a measured value from now on; returns what holds since, and what no more. What was measured holds
-    /// whatever follows from it: see [`Knowledge::contradictions`].
+    /// Sets the measured value of an attribute to a number. Returns the change of all facts. The
+    /// report is asserted even if it causes [`Knowledge::contradictions`].
     ///
     /// # Errors
-    /// There is no such attribute, or a rule runs away.
+    /// There is no such attribute, or inference exceeds its limits.
     pub fn observe(&mut self, attribute: &str, value: &BigRational) -> Result<Delta, Message> {
         let literal = Literal::Decimal(rules::Decimal::from_rational(value));
         let outcome = self.runtime.measure(attribute, literal);
         self.changed(outcome)
     }
 
-    /// Makes functions, and no others, the objectives of the robot, each grounded with a design; both as the problem calls them.
-    /// Objectives of a function are named `o_<function>`. What components have reported stays as it is.
+    /// Replaces the objectives of the robot. `configuration` has the functions, each with the
+    /// design that grounds it, by their object names. The objective of a function is named
+    /// `o_<function>`. Component statuses are unchanged.
     ///
     /// # Errors
     /// There is no such function or design.
@@ -337,19 +347,19 @@ impl Knowledge {
         for objective in &objectives {
             let function = objective.function.as_ref().map(|function| function.name.as_str());
             let ours = function.is_some_and(|function| objective.individual.name == name(function));
-            let wanted = configuration.iter().any(|(wanted, _)| Some(wanted.as_str()) == function);
-            if ours && !wanted {
+            let is_objective = configuration.iter().any(|(name, _)| Some(name.as_str()) == function);
+            if ours && !is_objective {
                 let delta = self.runtime.remove_objective(&objective.individual.iri)?;
                 self.follow(&delta);
             }
         }
         for (function, design) in &configuration {
             let objective = name(function);
-            let known = objectives.iter().find(|known| known.individual.name == objective);
-            let grounded = known.is_some_and(|known| {
-                known.groundings.iter().any(|g| g.design.as_ref().is_some_and(|d| d.name == *design))
+            let existing = objectives.iter().find(|existing| existing.individual.name == objective);
+            let grounded = existing.is_some_and(|existing| {
+                existing.groundings.iter().any(|g| g.design.as_ref().is_some_and(|d| d.name == *design))
             });
-            if known.is_none() {
+            if existing.is_none() {
                 let new = NewObjective {
                     name: &objective,
                     function,
@@ -367,7 +377,7 @@ impl Knowledge {
         Ok(())
     }
 
-    /// What is stated now and was not when the documents were read, and what is stated no more; sorted.
+    /// Returns the differences between the current assertions and those of the documents, sorted.
     pub fn statements(&self) -> Statements {
         let stated = |runtime: &Runtime| -> BTreeSet<Statement> {
             let engine = runtime.engine();
@@ -381,11 +391,11 @@ impl Knowledge {
         }
     }
 
-    /// Knowledge as it was read, changed by these statements. All that the history since has left behind is forgotten,
-    /// such as names of values that were measured once.
+    /// Resets the knowledge to the documents and applies the differences. Everything else since
+    /// reading is discarded, such as names of former measured values.
     ///
     /// # Errors
-    /// A rule runs away; nothing has changed then.
+    /// Inference exceeds its limits; the knowledge is then unchanged.
     pub fn restore(&mut self, statements: &Statements) -> Result<(), Message> {
         let mut runtime = self.origin.clone();
         let mut facts = |statements: &[Statement]| -> Vec<Fact> {
@@ -400,39 +410,41 @@ impl Knowledge {
         Ok(())
     }
 
-    /// How many names and values have been interned since the documents were read.
+    /// Number of names and values that were interned since the documents were read.
     pub fn growth(&self) -> usize {
         let count = |runtime: &Runtime| runtime.engine().symbols().len();
         count(&self.runtime).saturating_sub(count(&self.origin))
     }
 
-    /// Whether some attribute type has this local name or IRI.
+    /// Returns `true` if an attribute type has this local name or IRI.
     pub fn has_attribute(&self, name: &str) -> bool {
         self.view().attribute_types().iter().any(|attribute| attribute.name == name || attribute.iri == name)
     }
 
-    /// Inserts and deletes stated facts.
+    /// Inserts and deletes assertions.
     ///
     /// # Errors
-    /// A rule runs away.
+    /// Inference exceeds its limits.
     pub fn apply(&mut self, delta: Delta) -> Result<(), Message> {
         let outcome = self.runtime.apply(delta);
         self.changed(outcome).map(|_| ())
     }
 
-    /// States what the first documents say, and no more what the second ones say: assertions, axioms and rules. Afterwards
-    /// everything holds that holds if the one remaining document is read. What both say is stated. Imports of these
-    /// documents are not followed. Returns what is questionable about them, which [`Knowledge::warnings`] has from now on, too.
+    /// Adds the assertions, axioms and rules of the documents in `asserted` and removes those in
+    /// `retracted`. The result equals the knowledge read from the combined document. A statement
+    /// that occurs in both is kept. Imports of these documents are not followed. Returns the
+    /// warnings, which are also added to [`Knowledge::warnings`].
     ///
     /// # Errors
-    /// All that is wrong with the documents; one retracts what has no name; a rule runs away. Nothing has changed then.
+    /// All errors of the documents, a retracted anonymous individual, or exceeded limits of
+    /// inference. The knowledge is then unchanged.
     pub fn revise(&mut self, asserted: &[PathBuf], retracted: &[PathBuf]) -> Result<Vec<Message>, Errors> {
         let read = self.documented.change(asserted, retracted, self.runtime.engine_mut());
         let change = read.map_err(|errors| {
             let messages = errors.iter().map(Message::from_ontology).collect();
             Errors::from(quoted(discreet(messages)))
         })?;
-        // Restored snapshots start from what the documents say, so that these documents become part of it.
+        // Snapshots are restored relative to `origin`, so it must be revised as well.
         let (mut runtime, mut origin) = (self.runtime.clone(), self.origin.clone());
         origin.engine_mut().adopt_symbols(self.runtime.engine());
         for runtime in [&mut runtime, &mut origin] {
@@ -450,13 +462,13 @@ impl Knowledge {
         Ok(warnings)
     }
 
-    /// What follows and is not stated, in an order that depends on what was read only. That names stand for one individual is said of an
-    /// individual of more than 32 names by the pairs with its first name.
+    /// Returns the inferred facts in an order that depends only on the sources. The equality of an
+    /// individual with more than 32 names is listed only by the pairs with its first name.
     pub fn inferred(&self) -> Vec<Fact> {
         self.engine().inferred_in_brief(MANY_NAMES)
     }
 
-    /// All contradictions; empty if the knowledge is consistent.
+    /// Returns all contradictions; empty if the knowledge is consistent.
     pub fn contradictions(&self) -> Vec<Contradiction> {
         let symbols = self.engine().symbols();
         let violations = self.engine().violations().into_iter();
@@ -469,7 +481,8 @@ impl Knowledge {
     }
 }
 
-/// A fact as text; that an individual is a member of a group is in words.
+/// Formats a fact. The membership in an internal group of exclusive individuals is written in
+/// words.
 fn shown(fact: &Fact, symbols: &Symbols) -> String {
     let name = symbols.value(fact.predicate).as_name().unwrap_or_default();
     match fact.arguments[..] {

@@ -1,8 +1,8 @@
-//! What planning asks of the knowledge base again and again, kept from one event to the next.
+//! Cache for the knowledge-base queries of planning, kept across events.
 //!
-//! An event mostly changes whether designs are available, a measured value, or the status of an objective. These are
-//! followed one by one; whatever else changes makes the whole be read anew. So the catalogue is always equal to what
-//! [`View`] reads.
+//! Most events change the availability of designs, a measured value or the status of an objective.
+//! These changes are applied incrementally. All other changes rebuild the cache. The cache always
+//! equals the results of [`View`].
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -11,24 +11,24 @@ use ontology::tomasys::{Action, FunctionDesign, Individual, Measurement, View};
 use ontology::vocab::{local_name, pddl_tomasys, tomasys};
 use rules::{Delta, Engine, Fact, Literal, Symbol};
 
-/// Functions' designs, actions and measured values; and the members of classes that were asked for.
+/// Designs, actions and measured values, and the members of queried classes.
 #[derive(Debug, Clone)]
 pub struct Catalogue {
     designs: Vec<FunctionDesign>,
     actions: Vec<Action>,
     measurements: Vec<Measurement>,
-    /// Shared by copies: a change of a class makes a new catalogue.
+    /// Shared by copies, which is safe because a change of a class replaces the whole cache.
     classes: Arc<Mutex<BTreeMap<String, Arc<[Individual]>>>>,
 }
 
-/// Properties that say whether a design is available.
+/// Properties that determine the availability of a design.
 const AVAILABILITY: [&str; 3] =
     [tomasys::FD_REALISABILITY, pddl_tomasys::FD_REALISABILITY, tomasys::FD_AVAILABLE];
-/// Properties that say a value.
+/// Properties of an attribute value.
 const VALUES: [&str; 2] = [tomasys::HAS_VALUE, pddl_tomasys::QA_HAS_VALUE];
-/// Properties from a design to a value.
+/// Properties from a design to an estimated value.
 const ESTIMATIONS: [&str; 2] = [tomasys::HAS_QA_ESTIMATION, pddl_tomasys::HAS_QA_ESTIMATION];
-/// Properties that the catalogue has nothing of.
+/// Properties that do not affect the cache.
 const OTHERS: [&str; 12] = [
     tomasys::C_STATUS,
     pddl_tomasys::C_STATUS,
@@ -43,11 +43,11 @@ const OTHERS: [&str; 12] = [
     tomasys::HAS_NFR,
     tomasys::FD_ERROR_LOG,
 ];
-/// Classes that the catalogue has nothing of, unless somebody asks for their members.
+/// Classes that do not affect the cache, unless their members were queried.
 const OTHER_CLASSES: [&str; 2] = [tomasys::OBJECTIVE, tomasys::FUNCTION_GROUNDING];
 
 impl Catalogue {
-    /// Reads everything.
+    /// Runs all queries.
     pub(super) fn new(view: &View<'_>) -> Self {
         Self {
             designs: view.function_designs(),
@@ -57,26 +57,26 @@ impl Catalogue {
         }
     }
 
-    /// As [`View::function_designs`].
+    /// Returns the cached [`View::function_designs`].
     pub fn designs(&self) -> &[FunctionDesign] {
         &self.designs
     }
 
-    /// As [`View::actions`].
+    /// Returns the cached [`View::actions`].
     pub(crate) fn actions(&self) -> &[Action] {
         &self.actions
     }
 
-    /// As [`View::measurements`].
+    /// Returns the cached [`View::measurements`].
     pub(crate) fn measurements(&self) -> &[Measurement] {
         &self.measurements
     }
 
-    /// The members of a class by its IRI, or of all classes with that local name.
+    /// Returns the members of a class given by its IRI, or of all classes with that local name.
     pub fn members(&self, view: &View<'_>, class: &str) -> Arc<[Individual]> {
         let mut classes = self.classes.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = classes.get(class) {
-            return Arc::clone(known);
+        if let Some(members) = classes.get(class) {
+            return Arc::clone(members);
         }
         let members = if class.contains(':') {
             view.individuals_of(class)
@@ -88,7 +88,7 @@ impl Catalogue {
         members
     }
 
-    /// Follows a change of what holds; false where the catalogue has to be read anew.
+    /// Applies a change of facts. Returns `false` if the cache must be rebuilt.
     pub(super) fn follow(&mut self, delta: &Delta, engine: &Engine) -> bool {
         delta.insert.iter().chain(&delta.delete).all(|fact| self.follow_fact(fact, engine))
     }
@@ -109,17 +109,18 @@ impl Catalogue {
         }
         if VALUES.contains(&property) {
             let is_estimation = |property: &&str| {
-                let found = engine.symbols().find_name(property);
-                found.is_some_and(|found| engine.matching(found, &[None, Some(individual)]).next().is_some())
+                let symbol = engine.symbols().find_name(property);
+                symbol
+                    .is_some_and(|symbol| engine.matching(symbol, &[None, Some(individual)]).next().is_some())
             };
             let place = self.measurements.binary_search_by(|own| own.individual.iri.as_str().cmp(subject));
             let (Ok(place), false) = (place, ESTIMATIONS.iter().any(is_estimation)) else { return false };
-            let mut found: Vec<&Literal> =
+            let mut literals: Vec<&Literal> =
                 VALUES.iter().flat_map(|property| values(engine, individual, property)).collect();
-            if found.len() > 1 {
-                found.sort_by_cached_key(ToString::to_string);
+            if literals.len() > 1 {
+                literals.sort_by_cached_key(ToString::to_string);
             }
-            self.measurements[place].value = found.into_iter().find_map(Literal::as_rational);
+            self.measurements[place].value = literals.into_iter().find_map(Literal::as_rational);
             return true;
         }
         if OTHER_CLASSES.contains(&property) {
@@ -130,7 +131,7 @@ impl Catalogue {
     }
 }
 
-/// The literals that are values of a property of an individual.
+/// Returns the literal values of a property of an individual.
 fn values<'a>(engine: &'a Engine, subject: Symbol, property: &str) -> impl Iterator<Item = &'a Literal> {
     let symbols = engine.symbols();
     let rows: Vec<Symbol> = symbols.find_name(property).map_or_else(Vec::new, |property| {
@@ -147,45 +148,50 @@ mod tests {
 
     use crate::knowledge::{COADAPTATION, Knowledge, Sources};
 
-    /// Whatever is reported and pursued, the catalogue is what the view reads.
+    /// Applies random reports and objectives, and compares the cache with the view after each of
+    /// them.
     #[test]
-    fn the_catalogue_keeps_in_step() {
+    fn the_query_cache_equals_the_view_after_every_event() {
         for name in ["ugv", "uuv", "camara_like"] {
             let document =
                 Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../ontology/kb/{name}.ttl"));
             let rules = vec![COADAPTATION.to_owned()];
             let sources = Sources { documents: vec![document], rules, ..Sources::default() };
-            let mut own = Knowledge::read(&sources).expect("the knowledge base is read");
-            let components =
-                own.view().components().into_iter().map(|known| known.individual.name).collect::<Vec<_>>();
+            let mut knowledge = Knowledge::read(&sources).expect("the knowledge base is read");
+            let components = knowledge
+                .view()
+                .components()
+                .into_iter()
+                .map(|known| known.individual.name)
+                .collect::<Vec<_>>();
             let attributes =
-                own.view().attribute_types().into_iter().map(|kind| kind.name).collect::<Vec<_>>();
+                knowledge.view().attribute_types().into_iter().map(|kind| kind.name).collect::<Vec<_>>();
             let mut random = fastrand::Rng::with_seed(11);
-            let mut kept = 0;
+            let mut kept_count = 0;
             for _ in 0..300 {
                 match random.u32(..8) {
                     0..=3 => {
                         let statuses = [Status::Failed, Status::Recovered, Status::Working];
                         let component = &components[random.usize(..components.len())];
-                        own.report(component, statuses[random.usize(..3)]).expect("it is known");
+                        knowledge.report(component, statuses[random.usize(..3)]).expect("it is known");
                     }
                     4..=6 if !attributes.is_empty() => {
                         let attribute = &attributes[random.usize(..attributes.len())];
-                        own.measure(attribute, &random.u32(..100).to_string()).expect("it is known");
+                        knowledge.measure(attribute, &random.u32(..100).to_string()).expect("it is known");
                     }
                     _ => {
-                        let designs = own.view().function_designs();
+                        let designs = knowledge.view().function_designs();
                         let design = &designs[random.usize(..designs.len())];
                         let pairs = design
                             .solves
                             .first()
                             .map(|function| (function.name.clone(), design.individual.name.clone()));
                         let pairs: Vec<_> = pairs.into_iter().filter(|_| random.bool()).collect();
-                        own.pursue(&pairs).expect("they are known");
+                        knowledge.pursue(&pairs).expect("they are known");
                     }
                 }
-                kept += usize::from(own.catalogue.get().is_some());
-                let (catalogue, view) = (own.catalogue(), own.view());
+                kept_count += usize::from(knowledge.catalogue.get().is_some());
+                let (catalogue, view) = (knowledge.catalogue(), knowledge.view());
                 assert_eq!(catalogue.designs(), view.function_designs());
                 assert_eq!(catalogue.actions(), view.actions());
                 assert_eq!(catalogue.measurements(), view.measurements());
@@ -195,7 +201,7 @@ mod tests {
                     }
                 }
             }
-            assert!(kept > 150, "{name}: it is read anew too often: kept {kept} times");
+            assert!(kept_count > 150, "{name}: the cache survived only {kept_count} of 300 events");
         }
     }
 }

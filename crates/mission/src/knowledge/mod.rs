@@ -1,4 +1,4 @@
-//! What is known about a robot: documents and rules, what follows from them, and what is reported.
+//! Knowledge about a robot: documents and rules, inferred facts, and reports.
 
 mod base;
 mod catalogue;

@@ -1,9 +1,8 @@
-//! Reports of the robot, and what becomes of them where a rule runs away: they stay, and nothing follows until rules come
-//! to an end again.
+//! Reports of the robot, including their handling when a rule exceeds its limits.
 //!
-//! An update after which a rule runs away leaves the engine as it was. So the report is kept beside it, with all that come
-//! later, and with each new report all of them are told at once: what follows then is what follows for whoever hears the
-//! last word on everything.
+//! An update that exceeds the limits leaves the engine unchanged. The report and all later ones are
+//! then kept as pending. Each new report retries all pending reports in a single update, which is
+//! equivalent to applying the last report on each subject.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,12 +13,13 @@ use crate::knowledge::waiting::{Fault, RobotReport, Waiting, fault};
 use crate::message::Message;
 
 impl Knowledge {
-    /// Why it is not known what follows, if it is not: no design counts as available then.
+    /// Returns the reason why the consequences are unknown, if inference has failed. No design then
+    /// counts as available.
     pub fn fault(&self) -> Option<&Fault> {
         self.waiting.fault.as_ref()
     }
 
-    /// Takes a report over; returns what holds since, and what no more.
+    /// Applies a report. Returns the change of all facts.
     ///
     /// # Errors
     /// There is no such component or attribute.
@@ -27,7 +27,7 @@ impl Knowledge {
         let component = self.component(name);
         let name = if matches!(report, RobotReport::Component(_)) { component.as_str() } else { name };
         let mut reports = self.waiting.reports.clone();
-        reports.retain(|(known, other)| known != name || !other.is_alike(&report));
+        reports.retain(|(subject, earlier)| subject != name || !earlier.is_alike(&report));
         reports.push((name.to_owned(), report));
         let delta = self.update(&reports).map_err(|error| Message::from_ontology(&error))?;
         match self.runtime.apply(delta) {
@@ -48,7 +48,7 @@ impl Knowledge {
         }
     }
 
-    /// The update that tells several reports at once, of which later ones count.
+    /// Combines several reports into an update, in which later reports take precedence.
     fn update(&mut self, reports: &[(String, RobotReport)]) -> Result<Delta, ontology::Error> {
         let engine = self.runtime.engine_mut();
         if let [(name, report)] = reports {
@@ -78,7 +78,8 @@ impl Knowledge {
         Ok(Delta { insert: insert.into_iter().collect(), delete: delete.into_iter().collect() })
     }
 
-    /// As [`Knowledge::pursue`], and later, where what follows is not known.
+    /// Sets the objectives as [`Knowledge::pursue`] does. If the consequences are unknown, defers
+    /// the change.
     ///
     /// # Errors
     /// There is no such function or design.
@@ -98,23 +99,23 @@ impl Knowledge {
         Ok(())
     }
 
-    /// What waits, for a snapshot.
+    /// Returns the pending reports, for a snapshot.
     pub fn waiting(&self) -> &Waiting {
         &self.waiting
     }
 
-    /// Lets wait what waited when a snapshot was made.
+    /// Restores the pending reports of a snapshot.
     pub fn set_waiting(&mut self, waiting: Waiting) {
         self.waiting = waiting;
     }
 
-    /// Sets what stops later updates before their end.
+    /// Sets the interrupt that stops later updates.
     pub fn interrupt(&mut self, interrupt: Interrupt) {
         let limits = Limits { interrupt: Some(interrupt), ..self.runtime.engine().limits().clone() };
         self.runtime.engine_mut().set_limits(limits);
     }
 
-    /// From now on an update may take so many steps; see [`rules::Limits`].
+    /// Sets the limit of inference steps per update; see [`rules::Limits`].
     pub fn limit(&mut self, steps: u64) {
         let limits = Limits { steps, ..self.sources.limits.clone() };
         self.runtime.engine_mut().set_limits(limits);

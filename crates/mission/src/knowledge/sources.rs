@@ -1,4 +1,4 @@
-//! What a knowledge base is read from: documents and rule files.
+//! Sources of a knowledge base: documents and rule files.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -12,41 +12,41 @@ use crate::knowledge::statement::Statements;
 use crate::message::{Errors, Message};
 use crate::planta::{self, Terms};
 
-/// The name under which the shipped co-adaptation rules are asked for.
+/// Name of the shipped co-adaptation rules.
 pub const COADAPTATION: &str = "coadaptation";
 
-/// The name under which the shipped rules of the TOMASys metamodel are asked for.
+/// Name of the shipped rules of the TOMASys metamodel.
 pub const TOMASYS: &str = "tomasys";
 
-/// What an engine is built from.
+/// Documents, rule files and limits of a knowledge base.
 #[derive(Debug, Clone, Default)]
 pub struct Sources {
-    /// OWL documents (`-` is standard input); their imports are followed.
+    /// Paths of OWL documents (`-` is standard input). Imports are followed.
     pub documents: Vec<PathBuf>,
     /// Rule files in SWRL's human-readable syntax; `coadaptation` and `tomasys` name the shipped ones.
     pub rules: Vec<String>,
-    /// Where imports are looked for.
+    /// Resolution of imports.
     pub options: ReadOptions,
-    /// How far conclusions are drawn, at once and after each update.
+    /// Limits of inference, initially and for each update.
     pub limits: Limits,
 }
 
-/// What documents and rule files say, before anything is concluded.
+/// Contents of documents and rule files, before inference.
 pub struct Stated {
-    /// Names and values.
+    /// Interned names and values.
     pub symbols: Symbols,
     /// Rules and axioms.
     pub program: Program,
     /// Assertions.
     pub facts: Vec<Fact>,
     pub(super) ontology: Ontology,
-    /// The rules of rule files.
+    /// Rules of the rule files.
     pub(super) rules: Vec<Rule>,
     pub(super) equality: Equality,
-    /// As [`crate::knowledge::Knowledge::rule_count`] has it.
+    /// Number of rules, see [`crate::knowledge::Knowledge::rule_count`].
     pub rule_count: usize,
     pub(super) warnings: Vec<Message>,
-    /// What the documents add to a domain in PLANTA's form, if they were read for one.
+    /// Translated terminology, if the documents were read for a domain in PLANTA's form.
     pub terms: Option<Arc<Terms>>,
 }
 
@@ -54,15 +54,16 @@ impl Stated {
     /// Reads documents and rules.
     ///
     /// # Errors
-    /// All that is wrong with them.
+    /// All errors of the sources.
     pub fn read(sources: &Sources, equality: Equality) -> Result<Self, Errors> {
         Self::read_with(sources, |_| (equality, None))
     }
 
-    /// As [`Stated::read`], for a domain. If it is in PLANTA's form, every name is an individual of its own, as in PDDL.
+    /// Reads documents and rules for a domain. A domain in PLANTA's form implies unique names, as
+    /// in PDDL.
     ///
     /// # Errors
-    /// As [`Stated::read`].
+    /// All errors of the sources.
     pub fn read_for(sources: &Sources, domain: &str) -> Result<Self, Errors> {
         Self::read_with(sources, |ontology| match planta::wanted(ontology, domain) {
             Some(terms) => (Equality::UniqueNames, Some(Arc::new(terms))),
@@ -77,31 +78,31 @@ impl Stated {
         let read = ontology::read_files(&sources.documents, &sources.options);
         let mut errors = Vec::new();
         let mut symbols = Symbols::new();
-        let mut own = Vec::new();
+        let mut rules_of_files = Vec::new();
         match parse_rule_files(&sources.rules, &mut symbols) {
-            Ok(rules) => own.extend(rules),
+            Ok(rules) => rules_of_files.extend(rules),
             Err(more) => errors.extend(more),
         }
         let ontology = match read {
             Ok(ontology) if errors.is_empty() => ontology,
             Ok(_) => return Err(errors.into()),
-            Err(more) => {
-                let more = more.iter().map(Message::from_ontology).collect();
-                errors.extend(quoted(discreet(more)));
+            Err(messages) => {
+                let messages = messages.iter().map(Message::from_ontology).collect();
+                errors.extend(quoted(discreet(messages)));
                 return Err(errors.into());
             }
         };
-        let rule_count = ontology.rules.len() + own.len();
+        let rule_count = ontology.rules.len() + rules_of_files.len();
         let (equality, terms) = meaning(&ontology);
-        let lowered = ontology::lower_together(&ontology, own.clone(), equality, &mut symbols);
+        let lowered = ontology::lower_together(&ontology, rules_of_files.clone(), equality, &mut symbols);
         let warnings =
             ontology.warnings.iter().chain(&lowered.warnings).map(Message::from_ontology_warning).collect();
         let (warnings, program, facts) = (quoted(warnings), lowered.program, lowered.facts);
-        let rules = own;
+        let rules = rules_of_files;
         Ok(Self { symbols, program, facts, ontology, rules, equality, rule_count, warnings, terms })
     }
 
-    /// Changes what is stated.
+    /// Adds and removes assertions.
     pub fn change(&mut self, statements: &Statements) {
         let symbols = &mut self.symbols;
         let removed: BTreeSet<Fact> = statements.removed.iter().map(|own| own.intern(symbols)).collect();
@@ -110,7 +111,7 @@ impl Stated {
     }
 }
 
-/// The text of a rule file, or of shipped rules by their name.
+/// Returns the text of a rule file, or of shipped rules by their name.
 ///
 /// # Errors
 /// The file cannot be read.
@@ -127,7 +128,7 @@ pub fn rule_text(file: &str) -> Result<String, Message> {
     text.map_err(|error| Message::at("M101", file, None, format!("the file cannot be read: {error}")))
 }
 
-/// The rules of all files. What one file asks for, another may conclude.
+/// Parses the rules of all files together, because a rule may use conclusions of another file.
 fn parse_rule_files(files: &[String], symbols: &mut Symbols) -> Result<Vec<Rule>, Errors> {
     let (mut texts, mut errors) = (Vec::new(), Vec::new());
     for file in files {

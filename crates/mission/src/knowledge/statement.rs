@@ -1,15 +1,15 @@
-//! Facts that are stated, in names: as snapshots and certificates keep them.
+//! Assertions by names instead of symbols, for snapshots and certificates.
 
 use rules::{Engine, Fact, Literal, Symbols, Value};
 use serde::{Deserialize, Serialize};
 
-/// A stated fact, with names and values in place of symbols.
+/// An assertion, with names and values in place of symbols.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Statement {
     /// The IRI of the class or property.
     pub predicate: String,
-    /// Names as they are; literals as lexical form, datatype.
+    /// Names, or literals with lexical form and datatype.
     pub arguments: Vec<Part>,
 }
 
@@ -23,13 +23,13 @@ pub enum Part {
     Literal(String, String),
 }
 
-/// How statements differ from those of the documents.
+/// Differences between current assertions and those of the documents.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Statements {
-    /// Stated now, and not in the documents.
+    /// Current assertions that are not in the documents.
     pub added: Vec<Statement>,
-    /// Stated in the documents, and not now.
+    /// Assertions of the documents that no longer hold.
     pub removed: Vec<Statement>,
 }
 

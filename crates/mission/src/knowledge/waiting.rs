@@ -1,4 +1,4 @@
-//! Reports of a robot that are kept until what follows from them is known, and how a snapshot has them.
+//! Pending reports, whose consequences are not known yet, and their serialisation.
 
 use num_rational::BigRational;
 use ontology::tomasys::change::{self, Status};
@@ -7,37 +7,37 @@ use serde_json::{Value, json};
 
 use crate::message::Message;
 
-/// What a robot says.
+/// A report of the robot.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum RobotReport {
-    /// How a component is.
+    /// Status of a component.
     Component(Status),
-    /// What an attribute measures.
+    /// Measured value of an attribute.
     Measured(Literal),
-    /// That nothing is known of what an attribute measures.
+    /// The value of an attribute is unknown.
     Unmeasured,
-    /// Whether a design can be taken, as its function says: not by what follows from its components.
+    /// Realisability of a design, reported for the design itself and independent of its components.
     Design(bool),
 }
 
-/// That what follows is not known.
+/// Reason why the consequences are unknown.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Fault {
-    /// `R301` or `R304`, as for `reason`.
+    /// `R301` or `R304`, from the rules crate.
     pub code: String,
-    /// What has happened, in a sentence.
+    /// Description in a sentence.
     pub message: String,
     /// The rule that was being evaluated.
     pub rule: String,
 }
 
-/// What was told and nothing follows from yet.
+/// Reports and objectives whose consequences are not known yet.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Waiting {
     pub(super) fault: Option<Fault>,
-    /// The name of a component or an attribute with the last word on it.
+    /// Latest report by the name of the component or attribute.
     pub(super) reports: Vec<(String, RobotReport)>,
-    /// Functions with their designs, if the objectives could not be told either.
+    /// Functions with their designs, if the objectives could not be changed either.
     pub(super) objectives: Option<Vec<(String, String)>>,
 }
 
@@ -57,7 +57,7 @@ impl RobotReport {
         }
     }
 
-    /// A number as it is measured.
+    /// Creates the report of a measured number.
     pub fn measured(value: &BigRational) -> Self {
         Self::Measured(Literal::Decimal(rules::Decimal::from_rational(value)))
     }
@@ -90,7 +90,7 @@ impl RobotReport {
 }
 
 impl Waiting {
-    /// For a snapshot; null where nothing waits.
+    /// Serialises pending reports for a snapshot; null if nothing is pending.
     pub fn to_record(&self) -> Value {
         let Some(fault) = &self.fault else { return Value::Null };
         let reports: Vec<Value> = self
@@ -104,7 +104,7 @@ impl Waiting {
         json!([[fault.code, fault.message, fault.rule], reports, self.objectives])
     }
 
-    /// The inverse of [`Waiting::to_record`].
+    /// Deserialises the result of [`Waiting::to_record`].
     pub fn from_record(record: &Value) -> Option<Self> {
         if record.is_null() {
             return Some(Self::default());
@@ -112,8 +112,8 @@ impl Waiting {
         let text = |value: &Value| value.as_str().map(ToOwned::to_owned);
         let pair = |pair: &Value| Some((text(pair.get(0)?)?, text(pair.get(1)?)?));
         let report = |report: &Value| {
-            let own = RobotReport::from_record(report.get(1)?.as_str()?, report.get(2)?.as_str()?)?;
-            Some((text(report.get(0)?)?, own))
+            let robot_report = RobotReport::from_record(report.get(1)?.as_str()?, report.get(2)?.as_str()?)?;
+            Some((text(report.get(0)?)?, robot_report))
         };
         let [fault, reports, objectives] = record.as_array()?.as_slice() else { return None };
         Some(Self {
@@ -131,14 +131,14 @@ impl Waiting {
     }
 }
 
-/// Why it is not known what follows, from the error of the engine.
+/// Describes an error of the engine as a fault.
 pub(super) fn fault(error: &ontology::Error) -> Fault {
-    let said = Message::from_ontology(error);
+    let message = Message::from_ontology(error);
     let rule = match error {
         ontology::Error::Engine(
             rules::Error::BudgetExhausted { rule, .. } | rules::Error::Interrupted { rule },
         ) => rule.label.as_deref().map_or_else(|| rule.to_string(), ToOwned::to_owned),
         _ => String::new(),
     };
-    Fault { code: said.code.clone(), message: said.message.clone(), rule }
+    Fault { code: message.code.clone(), message: message.message.clone(), rule }
 }

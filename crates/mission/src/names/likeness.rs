@@ -1,39 +1,41 @@
-//! Which names of one side may stand for which of the other: by the words that they have in common.
+//! Fuzzy matching of names of both sides, by edit distance and common words.
 
 use std::collections::BTreeMap;
 
 use crate::message::nearest;
 
-/// Names are alike from here on: half of their words are the same.
+/// Threshold of similarity: half of the words are equal.
 const ALIKE: f64 = 0.5;
-/// So many names of a list are shown.
+/// Maximum number of names in a list; the others are only counted.
 const SHOWN: usize = 12;
 
-/// Pairs of names that are alike, the most alike first; each name is in one pair at most.
+/// Returns pairs of similar names, matched greedily by descending similarity. Each name occurs in
+/// at most one pair.
 pub(super) fn pairs<'n>(left: &[&'n str], right: &[&'n str]) -> Vec<(&'n str, &'n str)> {
-    let mut all: Vec<(f64, usize, usize)> = Vec::new();
+    let mut candidates: Vec<(f64, usize, usize)> = Vec::new();
     for (l, one) in left.iter().enumerate() {
         for (r, other) in right.iter().enumerate() {
             let likeness = likeness(one, other);
             if likeness >= ALIKE {
-                all.push((likeness, l, r));
+                candidates.push((likeness, l, r));
             }
         }
     }
-    all.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-    let (mut taken, mut found) = ((vec![false; left.len()], vec![false; right.len()]), Vec::new());
-    for (_, l, r) in all {
-        if !taken.0[l] && !taken.1[r] {
-            (taken.0[l], taken.1[r]) = (true, true);
-            found.push((l, r));
+    candidates.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+    let (mut used, mut matches) = ((vec![false; left.len()], vec![false; right.len()]), Vec::new());
+    for (_, l, r) in candidates {
+        if !used.0[l] && !used.1[r] {
+            (used.0[l], used.1[r]) = (true, true);
+            matches.push((l, r));
         }
     }
-    found.sort_unstable();
-    found.into_iter().map(|(l, r)| (left[l], right[r])).collect()
+    matches.sort_unstable();
+    matches.into_iter().map(|(l, r)| (left[l], right[r])).collect()
 }
 
-/// From 0 to 1: one for names that a slip of the pen tells apart, else the share of words that both have. Words that stand
-/// before all names of a kind, such as `fd`, do not count.
+/// Returns a similarity from 0 to 1: 1 for names within the edit distance of a typing error,
+/// otherwise the share of common words. A common first word such as `fd` does not count, because it
+/// only names the kind.
 fn likeness(one: &str, other: &str) -> f64 {
     if nearest(one, [other]).is_some() {
         return 1.0;
@@ -52,7 +54,8 @@ fn words(name: &str) -> Vec<&str> {
     name.split(['_', '-', '.']).filter(|word| !word.is_empty()).collect()
 }
 
-/// Pairs as entries of `[bindings.names]`: a pattern where several pairs end alike, and exact ones for the others.
+/// Formats pairs as entries of `[bindings.names]`: a pattern for several pairs with the same
+/// beginnings, otherwise exact entries.
 pub(super) fn entries(pairs: &[(&str, &str)]) -> Vec<String> {
     let mut heads: BTreeMap<(&str, &str), usize> = BTreeMap::new();
     let head = |pair: &(&'_ str, &'_ str)| {
@@ -79,13 +82,13 @@ pub(super) fn entries(pairs: &[(&str, &str)]) -> Vec<String> {
     entries
 }
 
-/// A key of TOML.
+/// Formats a TOML key.
 fn key(name: &str) -> String {
     let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if name.chars().all(bare) { name.to_owned() } else { format!("\"{name}\"") }
 }
 
-/// How long the last words are that two names have in common, in bytes.
+/// Length in bytes of the common last words of two names.
 fn ending(one: &str, other: &str) -> usize {
     let mut common = 0;
     for ((at, a), (_, b)) in one.char_indices().rev().zip(other.char_indices().rev()) {
@@ -99,13 +102,13 @@ fn ending(one: &str, other: &str) -> usize {
     common
 }
 
-/// Names as a list; `none` if there are none.
+/// Formats names as a list; an empty list is `none`.
 pub(super) fn list(names: &[&str]) -> String {
-    let shown = names.iter().take(SHOWN).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+    let listed = names.iter().take(SHOWN).map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
     match names.len() {
         0 => "none".to_owned(),
-        count if count > SHOWN => format!("{shown} and {} more", count - SHOWN),
-        _ => shown,
+        count if count > SHOWN => format!("{listed} and {} more", count - SHOWN),
+        _ => listed,
     }
 }
 
@@ -118,20 +121,20 @@ mod tests {
         let left =
             ["fd_spiral_high", "fd_spiral_low", "fd_recover_thrusters", "fd_all_thrusters", "fd_cameera"];
         let right = ["fd_search_low", "fd_search_high", "fd_recover_motion", "fd_camera", "fd_follow"];
-        let found = pairs(&left, &right);
+        let matches = pairs(&left, &right);
         let expected = [
             ("fd_spiral_high", "fd_search_high"),
             ("fd_spiral_low", "fd_search_low"),
             ("fd_recover_thrusters", "fd_recover_motion"),
             ("fd_cameera", "fd_camera"),
         ];
-        assert_eq!(found, expected);
+        assert_eq!(matches, expected);
         let written = [
             "\"fd_spiral_*\" = \"fd_search_*\"",
             "fd_recover_thrusters = \"fd_recover_motion\"",
             "fd_cameera = \"fd_camera\"",
         ];
-        assert_eq!(entries(&found), written);
+        assert_eq!(entries(&matches), written);
         assert_eq!(pairs(&["fd_low", "x"], &["fd_high", ""]), []);
     }
 }

@@ -1,12 +1,14 @@
-//! Which names of the problem the knowledge base does not know, and which of its designs the problem never names.
+//! Alignment of the names in the problem with those in the knowledge base: objects without an
+//! individual, and designs that the problem never names.
 //!
-//! With Metaplan's own missions a problem names no designs, and gets all of them from the knowledge base. Where it does name
-//! designs, those of the other side are a sign that the two were not made for each other. A design whose functions the
-//! knowledge base does not know either is none of its business: the problem itself says whether it is available.
+//! The problems of Metaplan's own missions name no designs and receive all of them from the
+//! knowledge base. If a problem does name designs, names of a single side suggest that the two were
+//! not made for each other. The availability of a design is stated by the problem if the knowledge
+//! base has neither the design nor its functions.
 //!
-//! A function that an action requires can be solved only with a design that both sides know, or with one that is the problem's
-//! own business. Where there is none, every plan would come to nothing for a reason that has nothing to do with the robot;
-//! that is an error.
+//! A function that an action requires can be solved only by a design that both sides know, or by a
+//! design whose availability is stated by the problem. A required function without such a design is
+//! an error, because it makes every plan impossible for a reason that is not about the robot.
 
 use std::collections::BTreeSet;
 
@@ -19,23 +21,24 @@ use crate::binding::Bindings;
 use crate::knowledge::{Catalogue, Knowledge};
 use crate::message::Message;
 
-/// How the names of both sides meet.
+/// Result of the alignment.
 #[derive(Debug, Default)]
 pub(crate) struct Meeting {
-    /// Designs about whose availability the problem itself decides.
+    /// Designs whose availability is stated by the problem.
     pub(crate) own: BTreeSet<Name>,
-    /// Functions of which no design is known to both sides.
+    /// Errors: functions without a design that both sides know.
     pub(crate) errors: Vec<Message>,
-    /// Names of one side only, as warnings about the problem or the domain.
+    /// Warnings about names of a single side.
     pub(crate) warnings: Vec<Message>,
     /// Designs that the problem never names.
     pub(crate) never_named: NeverNamed,
 }
 
-/// Designs that a problem never names, though it names others: the IRI of the first, and what is to be said.
+/// The IRI of the first design that is never named although other designs are, and the text of the
+/// warning.
 pub(crate) type NeverNamed = Option<(String, String)>;
 
-/// Compares the names of both sides.
+/// Aligns the names of both sides.
 pub(crate) fn meet(
     (domain, domain_source): (&Domain, &Source),
     (problem, problem_source): (&Problem, &Source),
@@ -43,19 +46,21 @@ pub(crate) fn meet(
     bindings: &Bindings,
 ) -> Meeting {
     let roles = Roles::new(domain, problem, knowledge, bindings);
-    let known = knowledge.catalogue();
-    let comparison = Comparison { domain, problem, bindings, known, roles: &roles };
-    let own = comparison.own_designs();
-    let errors = comparison.unsolved(&own);
-    let mut meeting = Meeting { own, ..Meeting::default() };
+
+    let comparison = Comparison { domain, problem, bindings, known: knowledge.catalogue(), roles: &roles };
+    let problem_designs = comparison.own_designs();
+    let errors = comparison.unsolved(&problem_designs);
+    let mut meeting = Meeting { own: problem_designs, ..Meeting::default() };
     let message = |finding: Finding, severity: Severity, code: &'static str| {
         let source = if finding.in_domain { domain_source } else { problem_source };
-        let mut found = Diagnostic::new(source, finding.span, severity, code, finding.text);
-        found.help = finding.help;
-        Message::from_pddl(&[found], &[source])
+        let mut diagnostic = Diagnostic::new(source, finding.span, severity, code, finding.text);
+        diagnostic.help = finding.help;
+        Message::from_pddl(&[diagnostic], &[source])
     };
     let is_error = !errors.is_empty();
-    meeting.errors = errors.into_iter().flat_map(|own| message(own, Severity::Error, "M222")).collect();
+    meeting.errors =
+        errors.into_iter().flat_map(|finding| message(finding, Severity::Error, "M222")).collect();
+    // Warnings about designs would repeat the errors.
     for role in roles.all().iter().filter(|role| role.class != DESIGN || !is_error) {
         match comparison.one_sided(role, &meeting.own) {
             OneSided::Objects(finding) => {
@@ -68,7 +73,7 @@ pub(crate) fn meet(
     meeting
 }
 
-/// Something to be said about a place of the problem, or of the domain.
+/// Text of an error or warning, with its location in the problem or in the domain.
 struct Finding {
     in_domain: bool,
     span: Span,
@@ -76,11 +81,11 @@ struct Finding {
     help: Option<String>,
 }
 
-/// Names of a role that the other side does not have.
+/// Names of a role without a counterpart on the other side.
 enum OneSided {
-    /// Objects, and perhaps individuals.
+    /// Objects without individuals, and possibly individuals without objects.
     Objects(Finding),
-    /// Individuals only: the IRI of the first.
+    /// Only individuals without objects: the IRI of the first and the text of the warning.
     Individuals(String, String),
     Nothing,
 }
@@ -94,7 +99,7 @@ struct Comparison<'a> {
 }
 
 impl Comparison<'_> {
-    /// Pairs of a design and a function that it solves, as the problem says.
+    /// Returns the pairs of a design and a solved function that the problem states.
     fn stated(&self) -> Vec<(&Name, &Name, Span)> {
         let solves = self.bindings.solves();
         let pair = |atom| match arguments(atom)[..] {
@@ -106,7 +111,8 @@ impl Comparison<'_> {
         facts(self.problem).filter_map(pair).collect()
     }
 
-    /// Designs that the knowledge base does not know, and whose functions it does not know either.
+    /// Returns the designs that are unknown to the knowledge base and solve no function that it
+    /// knows.
     fn own_designs(&self) -> BTreeSet<Name> {
         let (designs, functions) = (self.roles.of(DESIGN), self.roles.of(FUNCTION));
         let stated = self.stated();
@@ -121,7 +127,8 @@ impl Comparison<'_> {
             .collect()
     }
 
-    /// Functions that actions require, each with the place where the problem says so if it does.
+    /// Returns the functions that actions require, with the source location if the problem states
+    /// the requirement.
     fn required(&self) -> Vec<(Name, Option<Span>)> {
         let functions = self.roles.of(FUNCTION);
         let mut required: Vec<(Name, Option<Span>)> = Vec::new();
@@ -137,11 +144,11 @@ impl Comparison<'_> {
             }
         }
         for action in self.known.actions() {
-            let known = &action.individual;
+            let individual = &action.individual;
             let mut schemas = self.domain.actions.iter().map(|schema| &schema.identifier.name);
             let mut predicates = self.domain.predicates.iter().map(|declared| &declared.identifier.name);
-            let stands = schemas.any(|own| self.bindings.is_action(own, known))
-                || predicates.any(|own| self.bindings.says_needs(own, known));
+            let stands = schemas.any(|own| self.bindings.is_action(own, individual))
+                || predicates.any(|own| self.bindings.says_needs(own, individual));
             for function in action.requires.iter().filter(|_| stands) {
                 add(&Name::new(&function.name), None);
             }
@@ -149,10 +156,12 @@ impl Comparison<'_> {
         required
     }
 
-    /// Required functions that no design can solve, because no name of one is known to both sides.
+    /// Returns an error for each required function that no design can solve for lack of a common
+    /// name.
     fn unsolved(&self, own: &BTreeSet<Name>) -> Vec<Finding> {
         let is_availability =
             |declared: &Declaration| self.bindings.is_availability(&declared.identifier.name);
+        // Without an availability predicate the knowledge base does not restrict the designs.
         if !self.domain.predicates.iter().any(is_availability) {
             return Vec::new();
         }
@@ -160,31 +169,31 @@ impl Comparison<'_> {
         required.iter().filter_map(|(function, span)| self.fault(function, *span, own)).collect()
     }
 
-    /// Why a function has no design, if it has none.
+    /// Returns the error for a function if no design can solve it.
     fn fault(&self, function: &Name, span: Option<Span>, own: &BTreeSet<Name>) -> Option<Finding> {
         let (designs, functions) = (self.roles.of(DESIGN), self.roles.of(FUNCTION));
-        let all = self.stated();
-        let stated: Vec<_> = all.iter().filter(|(_, solved, _)| *solved == function).collect();
+        let solutions = self.stated();
+        let stated: Vec<_> = solutions.iter().filter(|(_, solved, _)| *solved == function).collect();
         let is_met = |object: &&Object| designs.knows(&object.name);
-        let known: Vec<&str> = self
+        let base_designs: Vec<&str> = self
             .known
             .designs()
             .iter()
-            .filter(|design| design.solves.iter().any(|own| Name::new(&own.name) == *function))
+            .filter(|design| design.solves.iter().any(|solved| Name::new(&solved.name) == *function))
             .map(|design| design.individual.name.as_str())
             .collect();
         let here = |name: &Name| stated.iter().any(|(design, ..)| *design == name);
-        let named = |object: &Object| known.iter().any(|name| Name::new(name) == object.name);
+        let named = |object: &Object| base_designs.iter().any(|name| Name::new(name) == object.name);
         let is_solved = designs.objects.iter().any(|object| {
             named(object)
                 || here(&object.name) && (designs.knows(&object.name) || self.is_usable(object, own))
         });
-        // Designs of which the problem does not say what they solve may be meant for anything.
-        let says_nothing = |object: &&Object| !all.iter().any(|(design, ..)| **design == object.name);
-        let strange = || designs.objects.iter().filter(|object| !is_met(object));
-        let mut only_here: Vec<&Object> = strange().filter(|object| here(&object.name)).collect();
+        // Designs without a stated function may be intended for this function.
+        let says_nothing = |object: &&Object| !solutions.iter().any(|(design, ..)| **design == object.name);
+        let unknown = || designs.objects.iter().filter(|object| !is_met(object));
+        let mut only_here: Vec<&Object> = unknown().filter(|object| here(&object.name)).collect();
         if only_here.is_empty() && stated.is_empty() {
-            only_here = strange().filter(says_nothing).collect();
+            only_here = unknown().filter(says_nothing).collect();
         }
         let is_known = functions.knows(function);
         if is_solved || is_known && only_here.is_empty() {
@@ -201,12 +210,13 @@ impl Comparison<'_> {
             "no design of the required function `{function}` is known to both sides; in the problem only: {}; in the knowledge \
              base only: {}",
             list(&only_here),
-            list(&known),
+            list(&base_designs),
         );
         let help = if is_known {
-            suggestion(&known, &only_here, true)
+            suggestion(&base_designs, &only_here, true)
         } else {
-            let names: Vec<&str> = functions.individuals.iter().map(|own| own.name.as_str()).collect();
+            let names: Vec<&str> =
+                functions.individuals.iter().map(|individual| individual.name.as_str()).collect();
             let meant = pairs(&names, &[function.as_str()]);
             Some(match suggested(&meant) {
                 Some(entries) => format!(
@@ -222,56 +232,61 @@ impl Comparison<'_> {
         Some(Finding { in_domain, span, text, help })
     }
 
-    /// Whether a design is the problem's own, and available as it says.
+    /// Returns `true` if the problem states that a design is available, and may decide on it.
     fn is_usable(&self, object: &Object, own: &BTreeSet<Name>) -> bool {
         let mut available =
             facts(self.problem).filter(|atom| self.bindings.is_availability(&atom.predicate.name));
         own.contains(&object.name) && available.any(|atom| arguments(atom) == [&object.name])
     }
 
-    /// Objects of a role that the knowledge base does not know, and designs that the problem never names.
+    /// Compares the members of a role: objects that the knowledge base does not have, and designs
+    /// that the problem never names.
     fn one_sided(&self, role: &Role, own: &BTreeSet<Name>) -> OneSided {
         let always = [FUNCTION, DESIGN].contains(&role.class.as_str());
         if !always && role.individuals.is_empty() {
             return OneSided::Nothing;
         }
-        let strange: Vec<&Object> = role.objects.iter().filter(|object| !role.knows(&object.name)).collect();
-        let unnamed = role.individuals.iter().filter(|own| !role.has(&Name::new(&own.name)));
+        let unknown: Vec<&Object> = role.objects.iter().filter(|object| !role.knows(&object.name)).collect();
+        let unnamed = role.individuals.iter().filter(|individual| !role.has(&Name::new(&individual.name)));
         let unnamed: Vec<_> = match role.class.as_str() {
-            // What the problem takes from the knowledge base as a whole it does not name.
+            // A problem without designs of its own receives all designs from the knowledge base, so
+            // none needs a name.
             DESIGN if role.objects.iter().all(|object| object.in_domain) => Vec::new(),
             DESIGN => unnamed.filter(|design| self.is_of_named_function(&design.iri)).collect(),
             _ => unnamed.collect(),
         };
         let (here, there): (Vec<&str>, Vec<&str>) = (
-            strange.iter().map(|object| object.name.as_str()).collect(),
+            unknown.iter().map(|object| object.name.as_str()).collect(),
             unnamed.iter().map(|individual| individual.name.as_str()).collect(),
         );
-        let what = noun(&role.class);
+        let members = noun(&role.class);
         let lists =
             format!("in the problem only: {}; in the knowledge base only: {}", list(&here), list(&there));
-        match (strange.first(), unnamed.first()) {
+        match (unknown.first(), unnamed.first()) {
             (Some(first), _) => {
-                let text = format!("the knowledge base does not know all {what} of the problem; {lists}");
+                let text = format!("the knowledge base does not know all {members} of the problem; {lists}");
                 let help = suggestion(&there, &here, false);
                 let ours: Vec<&str> =
                     here.iter().copied().filter(|name| own.contains(&Name::new(name))).collect();
                 let decides = (!ours.is_empty()).then(|| {
                     format!("the problem itself decides whether {} can be used, whose functions the knowledge base does not know", list(&ours))
                 });
-                let help =
-                    [help, decides].into_iter().flatten().reduce(|one, other| format!("{one}; {other}"));
+                let help = [help, decides]
+                    .into_iter()
+                    .flatten()
+                    .reduce(|first, second| format!("{first}; {second}"));
                 OneSided::Objects(Finding { in_domain: first.in_domain, span: first.span, text, help })
             }
             (None, Some(first)) if role.class == DESIGN => {
-                let text = format!("the problem names {what}, but not all of the knowledge base; {lists}");
+                let text = format!("the problem names {members}, but not all of the knowledge base; {lists}");
                 OneSided::Individuals(first.iri.clone(), text)
             }
             _ => OneSided::Nothing,
         }
     }
 
-    /// Whether a design solves a function that the problem names, or the problem names none.
+    /// Returns `true` if a design solves a function that the problem names, or if the problem names
+    /// no function.
     fn is_of_named_function(&self, iri: &str) -> bool {
         let functions = self.roles.of(FUNCTION);
         let design = self.known.designs().iter().find(|design| design.individual.iri == iri);
@@ -282,27 +297,28 @@ impl Comparison<'_> {
     }
 }
 
-/// Members of a class, in words.
+/// Noun for the members of a class in messages.
 fn noun(class: &str) -> String {
     match class {
         FUNCTION => "functions".to_owned(),
         DESIGN => "designs".to_owned(),
         ACTION => "actions".to_owned(),
-        other => format!("members of the class {other}"),
+        class => format!("members of the class {class}"),
     }
 }
 
-/// Entries for names that are alike; where `all` are for the same thing and one is left on each side, for these, too.
+/// Suggests entries for similar names. If `all` names belong to one function and a single name
+/// remains on each side, these two are paired as well.
 fn suggestion<'n>(known: &[&'n str], here: &[&'n str], all: bool) -> Option<String> {
-    let mut meant = pairs(known, here);
-    let left: Vec<&str> =
-        known.iter().copied().filter(|own| meant.iter().all(|pair| pair.0 != *own)).collect();
-    let right: Vec<&str> =
-        here.iter().copied().filter(|own| meant.iter().all(|pair| pair.1 != *own)).collect();
-    if let ([one], [other], true) = (&left[..], &right[..], all) {
-        meant.push((one, other));
+    let mut matches = pairs(known, here);
+    let base_names: Vec<&str> =
+        known.iter().copied().filter(|name| matches.iter().all(|pair| pair.0 != *name)).collect();
+    let object_names: Vec<&str> =
+        here.iter().copied().filter(|name| matches.iter().all(|pair| pair.1 != *name)).collect();
+    if let ([base_name], [object_name], true) = (&base_names[..], &object_names[..], all) {
+        matches.push((base_name, object_name));
     }
-    let entries = suggested(&meant);
+    let entries = suggested(&matches);
     match (entries, all) {
         (Some(entries), _) => {
             Some(format!("did you mean the same? Then write in `[bindings.names]`: {entries}"))

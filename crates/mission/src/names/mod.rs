@@ -1,8 +1,10 @@
-//! Names of the knowledge base and names of the problem: which of them mean the same, and which meet nothing.
+//! Names of the knowledge base and names of the problem: resolution of `[bindings.names]` and
+//! alignment.
 //!
-//! An individual and an object are one thing if they have the same name, or if `[bindings.names]` says so. Objects are looked
-//! at only in *roles* that a knowledge base speaks about: functions, designs, actions, and members of other classes that a
-//! type of the domain is bound to. A waypoint is none of these, and nobody has to know it.
+//! An individual and an object are identical if they have the same name, or if `[bindings.names]`
+//! says so. Objects are compared only in *roles* that occur in a knowledge base: functions,
+//! designs, actions, and members of other classes to which a type of the domain is bound. A
+//! waypoint has no role, so the knowledge base need not contain it.
 
 mod likeness;
 mod meet;

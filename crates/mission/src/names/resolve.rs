@@ -1,4 +1,5 @@
-//! `[bindings.names]` against a knowledge base and a problem: which individual is called what, and what is wrong with the entries.
+//! Resolves `[bindings.names]` for a knowledge base and a problem: computes the object names of
+//! individuals and reports invalid entries.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,14 +14,14 @@ use crate::called::Naming;
 use crate::knowledge::Knowledge;
 use crate::message::{Errors, Message, did_you_mean};
 
-/// What individuals are called, by IRI, and warnings.
+/// Object names of individuals by IRI, and warnings.
 pub(crate) type Resolved = (CalledNames, Vec<Message>);
 
-/// Finds out what individuals are called. An exact entry counts before a pattern.
+/// Computes the object names of individuals. Exact entries take precedence over patterns.
 ///
 /// # Errors
-/// All entries that are malformed, that meet no individual or no object, or an object of another type; and objects that would be
-/// several individuals.
+/// All malformed entries; entries without an individual, without an object or with an object of
+/// another type; and objects that several individuals would share.
 pub(crate) fn resolve(
     domain: &Domain,
     problem: &Problem,
@@ -50,10 +51,10 @@ pub(crate) fn resolve(
             resolving.errors.push(entry.wrong("M223", fault));
         }
     }
-    let sound = || entries.iter().filter(|entry| entry.fault().is_none());
-    sound().filter(|entry| !entry.is_pattern()).for_each(|entry| resolving.exact(entry));
+    let well_formed = || entries.iter().filter(|entry| entry.fault().is_none());
+    well_formed().filter(|entry| !entry.is_pattern()).for_each(|entry| resolving.exact(entry));
     let exact: BTreeSet<String> = resolving.called.keys().map(|iri| (*iri).to_owned()).collect();
-    sound().filter(|entry| entry.is_pattern()).for_each(|entry| resolving.pattern(entry, &exact));
+    well_formed().filter(|entry| entry.is_pattern()).for_each(|entry| resolving.pattern(entry, &exact));
     resolving.clashes();
     let Resolving { called, errors, warnings, .. } = resolving;
     if errors.is_empty() {
@@ -68,7 +69,7 @@ struct Resolving<'a> {
     types: TypeHierarchy,
     individuals: BTreeSet<&'a Individual>,
     objects: BTreeMap<&'a Name, &'a TypedName>,
-    /// The name of an individual by IRI, and the entry that says so.
+    /// The object name of an individual by IRI, and the entry that gives it.
     called: BTreeMap<&'a str, (String, &'a Naming)>,
     errors: Vec<Message>,
     warnings: Vec<Message>,
@@ -76,11 +77,13 @@ struct Resolving<'a> {
 
 impl<'a> Resolving<'a> {
     fn exact(&mut self, entry: &'a Naming) {
-        let is_meant = |own: &&&Individual| entry.individual == own.name || entry.individual == own.iri;
-        let meant: Vec<&Individual> = self.individuals.iter().filter(is_meant).copied().collect();
-        match meant[..] {
+        let matches_entry = |candidate: &&&Individual| {
+            entry.individual == candidate.name || entry.individual == candidate.iri
+        };
+        let matches: Vec<&Individual> = self.individuals.iter().filter(matches_entry).copied().collect();
+        match matches[..] {
             [] => {
-                let names = || self.individuals.iter().map(|own| own.name.as_str());
+                let names = || self.individuals.iter().map(|individual| individual.name.as_str());
                 let text = format!(
                     "the knowledge base has no function, design, action, component or member of a bound class `{}`{}",
                     entry.individual,
@@ -93,7 +96,7 @@ impl<'a> Resolving<'a> {
                 Err(text) => self.errors.push(entry.wrong("M224", &text)),
             },
             _ => {
-                let iris: Vec<&str> = meant.iter().map(|own| own.iri.as_str()).collect();
+                let iris: Vec<&str> = matches.iter().map(|individual| individual.iri.as_str()).collect();
                 let text = format!(
                     "`{}` may be each of {}; write the IRI that is meant",
                     entry.individual,
@@ -105,25 +108,26 @@ impl<'a> Resolving<'a> {
     }
 
     fn pattern(&mut self, entry: &'a Naming, exact: &BTreeSet<String>) {
-        let (mut met, mut lost) = (0, Vec::new());
+        let (mut match_count, mut unmatched) = (0, Vec::new());
         let mut reason = None;
         for individual in self.individuals.clone() {
             let image = entry.call(&individual.name).or_else(|| entry.call(&individual.iri));
             let Some(image) = image.filter(|_| !exact.contains(&individual.iri)) else { continue };
             match self.fits(individual, &image) {
                 Ok(name) => {
-                    met += 1;
+                    match_count += 1;
                     self.call(individual, name, entry);
                 }
                 Err(text) => {
-                    lost.push(individual.name.as_str());
+                    unmatched.push(individual.name.as_str());
                     reason.get_or_insert(text);
                 }
             }
         }
         match reason {
-            None if met == 0 => {
-                let names: Vec<&str> = self.individuals.iter().map(|own| own.name.as_str()).collect();
+            None if match_count == 0 => {
+                let names: Vec<&str> =
+                    self.individuals.iter().map(|individual| individual.name.as_str()).collect();
                 let text = format!(
                     "the pattern `{}` meets no individual that has not a name of its own here; there are: {}",
                     entry.individual,
@@ -131,34 +135,38 @@ impl<'a> Resolving<'a> {
                 );
                 self.errors.push(entry.wrong("M223", &text));
             }
-            Some(reason) if met == 0 => self.errors.push(entry.wrong("M224", &reason)),
+            Some(reason) if match_count == 0 => self.errors.push(entry.wrong("M224", &reason)),
             Some(reason) => {
-                let text =
-                    format!("the pattern leaves {} as they are, without an object: {reason}", list(&lost));
+                let text = format!(
+                    "the pattern leaves {} as they are, without an object: {reason}",
+                    list(&unmatched)
+                );
                 self.warnings.push(entry.questionable("M226", &text));
             }
             None => {}
         }
     }
 
-    /// The object of that name as it is written, if an individual can be it.
+    /// Returns the object of that name in its original spelling, if its type admits the individual.
     fn fits(&self, individual: &Individual, name: &str) -> Result<String, String> {
         let Some(object) = self.objects.get(&Name::new(name)) else {
-            let known = self.objects.keys().map(|name| name.as_str());
+            let names = self.objects.keys().map(|name| name.as_str());
             return Err(format!(
                 "there is no object `{name}`, neither in the problem nor among the domain's constants{}",
-                did_you_mean(name, known)
+                did_you_mean(name, names)
             ));
         };
         let bound = self.roles.all().iter().filter(|role| !role.types.alternatives.is_empty());
-        let own: Vec<_> = bound.filter(|role| role.individuals.contains(individual)).collect();
-        if own.is_empty() || own.iter().any(|role| self.types.fits(&object.r#type, &role.types)) {
+        let roles: Vec<_> = bound.filter(|role| role.individuals.contains(individual)).collect();
+        if roles.is_empty() || roles.iter().any(|role| self.types.fits(&object.r#type, &role.types)) {
             return Ok(object.identifier.name.as_str().to_owned());
         }
-        let classes: Vec<&str> = own.iter().map(|role| role.class.as_str()).collect();
-        let types = own.iter().flat_map(|role| &role.types.alternatives);
+        let classes: Vec<&str> = roles.iter().map(|role| role.class.as_str()).collect();
+        let types = roles.iter().flat_map(|role| &role.types.alternatives);
         let types: Vec<&str> = types.map(|r#type| r#type.name.as_str()).collect();
-        let given: Vec<&str> = object.r#type.alternatives.iter().map(|own| own.name.as_str()).collect();
+        let given: Vec<&str> =
+            object.r#type.alternatives.iter().map(|alternative| alternative.name.as_str()).collect();
+        // PDDL types an object without a type as `object`.
         let given = if given.is_empty() { vec!["object"] } else { given };
         Err(format!(
             "`{name}` is of type {}, but `{}` is a {}; an object of type {} would be right",
@@ -182,17 +190,18 @@ impl<'a> Resolving<'a> {
         }
     }
 
-    /// Objects that would be several individuals.
+    /// Reports objects that several individuals would share.
     fn clashes(&mut self) {
-        let mut all: BTreeMap<Name, Vec<&Individual>> = BTreeMap::new();
+        let mut by_name: BTreeMap<Name, Vec<&Individual>> = BTreeMap::new();
         for individual in &self.individuals {
             let name = self.called.get(individual.iri.as_str()).map_or(&individual.name, |(name, _)| name);
-            all.entry(Name::new(name)).or_default().push(individual);
+            by_name.entry(Name::new(name)).or_default().push(individual);
         }
-        for (name, individuals) in all.iter().filter(|(_, individuals)| individuals.len() > 1) {
-            let mut entries = individuals.iter().filter_map(|own| self.called.get(own.iri.as_str()));
+        for (name, individuals) in by_name.iter().filter(|(_, individuals)| individuals.len() > 1) {
+            let mut entries =
+                individuals.iter().filter_map(|individual| self.called.get(individual.iri.as_str()));
             let Some((_, entry)) = entries.next_back() else { continue };
-            let names: Vec<&str> = individuals.iter().map(|own| own.name.as_str()).collect();
+            let names: Vec<&str> = individuals.iter().map(|individual| individual.name.as_str()).collect();
             let text = format!("`{name}` would be {}; an object is one individual", list(&names));
             self.errors.push(entry.wrong("M225", &text));
         }

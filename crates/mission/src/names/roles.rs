@@ -1,8 +1,9 @@
-//! Objects of a problem and individuals of a knowledge base by the roles in which both sides speak about them.
+//! Roles of objects and individuals, by which both sides are compared.
 //!
-//! A type of the domain that is bound to a class gives its objects the role of that class. Where types say nothing, the
-//! predicates that are bound to TOMASys do: of a fact that a design solves a function, the first argument is a design and the
-//! second one a function.
+//! A type of the domain that is bound to a class gives its objects the role of that class. If no
+//! type is bound, the roles follow from facts with predicates that are bound to TOMASys: if a fact
+//! states that a design solves a function, its first argument is a design and its second one a
+//! function.
 
 use std::collections::BTreeSet;
 
@@ -19,7 +20,7 @@ pub(super) const DESIGN: &str = "FunctionDesign";
 pub(super) const ACTION: &str = "Action";
 const COMPONENT: &str = "Component";
 
-/// An object, and where it is named: in the problem, or as a constant of the domain.
+/// An object with its source location, in the problem or among the constants of the domain.
 #[derive(Debug, Clone)]
 pub(super) struct Object {
     pub(super) name: Name,
@@ -27,27 +28,27 @@ pub(super) struct Object {
     pub(super) in_domain: bool,
 }
 
-/// A class, and what has its role on either side.
+/// A class with its individuals and objects.
 #[derive(Debug)]
 pub(super) struct Role {
     /// The local name of the class.
     pub(super) class: String,
-    /// The types of the domain that stand for it.
+    /// The types of the domain that are bound to the class.
     pub(super) types: TypeExpression,
-    /// Its members, by IRI.
+    /// Members of the class, by IRI.
     pub(super) individuals: Vec<Individual>,
-    /// The objects with this role, each once, in the order of the files.
+    /// Objects with this role, each once, in the order of the files.
     pub(super) objects: Vec<Object>,
 }
 
-/// All roles.
+/// The roles of a mission.
 #[derive(Debug)]
 pub(super) struct Roles {
     roles: Vec<Role>,
 }
 
 impl Roles {
-    /// The roles of a domain and a problem, as a knowledge base knows them.
+    /// Determines the roles of the objects and individuals of a mission.
     pub(super) fn new(
         domain: &Domain,
         problem: &Problem,
@@ -55,7 +56,7 @@ impl Roles {
         bindings: &Bindings,
     ) -> Self {
         let (view, catalogue) = (knowledge.view(), knowledge.catalogue());
-        let known = |class: &str| match class {
+        let individuals = |class: &str| match class {
             FUNCTION => view.functions(),
             DESIGN => catalogue.designs().iter().map(|design| design.individual.clone()).collect(),
             ACTION => catalogue.actions().iter().map(|action| action.individual.clone()).collect(),
@@ -66,14 +67,14 @@ impl Roles {
             .map(|class| Role {
                 class: class.to_owned(),
                 types: TypeExpression::default(),
-                individuals: known(class),
+                individuals: individuals(class),
                 objects: Vec::new(),
             })
             .into();
         for declared in &domain.types {
             let name = &declared.identifier.name;
             let Some(class) = bindings.class(name) else { continue };
-            let members = catalogue.members(&view, &class);
+            let class_members = catalogue.members(&view, &class);
             let class = local_name(&class);
             let index = roles.iter().position(|role| role.class == class).unwrap_or_else(|| {
                 let (class, types) = (class.to_owned(), TypeExpression::default());
@@ -81,9 +82,9 @@ impl Roles {
                 roles.len() - 1
             });
             let role = &mut roles[index];
-            let all: BTreeSet<Individual> =
-                role.individuals.drain(..).chain(members.iter().cloned()).collect();
-            role.individuals = all.into_iter().collect();
+            let members: BTreeSet<Individual> =
+                role.individuals.drain(..).chain(class_members.iter().cloned()).collect();
+            role.individuals = members.into_iter().collect();
             role.types.alternatives.push(identifier(name));
         }
         let mut roles = Self { roles };
@@ -92,17 +93,17 @@ impl Roles {
         roles
     }
 
-    /// All roles.
+    /// Returns all roles.
     pub(super) fn all(&self) -> &[Role] {
         &self.roles
     }
 
-    /// The role of a class, by local name.
+    /// Returns the role of a class, given by local name.
     pub(super) fn of(&self, class: &str) -> &Role {
         self.roles.iter().find(|role| role.class == class).expect("invariant: TOMASys' own roles are there")
     }
 
-    /// Gives objects the roles of their types.
+    /// Assigns roles to objects by their types.
     fn place(&mut self, domain: &Domain, problem: &Problem) {
         let types = TypeHierarchy::of(domain);
         let constants = domain.constants.iter().map(|constant| (constant, true));
@@ -115,7 +116,7 @@ impl Roles {
         }
     }
 
-    /// Gives objects whose types say nothing the roles that they have in facts.
+    /// Assigns roles by facts to the objects whose types have no role.
     fn place_by_facts(&mut self, domain: &Domain, problem: &Problem, bindings: &Bindings) {
         let constants = domain.constants.iter().map(|constant| (constant, true));
         let declared: Vec<_> =
@@ -140,18 +141,18 @@ impl Role {
         }
     }
 
-    /// Whether an object has it.
+    /// Returns `true` if an object has the role.
     pub(super) fn has(&self, name: &Name) -> bool {
         self.objects.iter().any(|object| object.name == *name)
     }
 
-    /// Whether the knowledge base has an individual of that name in it.
+    /// Returns `true` if the knowledge base has an individual of that name in the class.
     pub(super) fn knows(&self, name: &Name) -> bool {
         self.individuals.iter().any(|individual| Name::new(&individual.name) == *name)
     }
 }
 
-/// The facts that a problem states.
+/// Returns the facts that a problem states.
 pub(super) fn facts(problem: &Problem) -> impl Iterator<Item = &Atom> {
     problem.init.iter().filter_map(|element| match element {
         InitialElement::Fact(atom) => Some(atom),
@@ -159,7 +160,7 @@ pub(super) fn facts(problem: &Problem) -> impl Iterator<Item = &Atom> {
     })
 }
 
-/// The names of the arguments of a fact.
+/// Returns the names of the arguments of a fact.
 pub(super) fn arguments(atom: &Atom) -> Vec<&Name> {
     let name = |term| match term {
         &Term::Constant(ref identifier) | &Term::Variable(ref identifier) => &identifier.name,
@@ -167,7 +168,7 @@ pub(super) fn arguments(atom: &Atom) -> Vec<&Name> {
     atom.arguments.iter().map(name).collect()
 }
 
-/// Which classes a fact puts its arguments in.
+/// Returns the arguments of a fact with the classes to which the fact assigns them.
 fn said<'p>(atom: &'p Atom, bindings: &Bindings) -> Vec<(&'static str, &'p Name)> {
     let (predicate, arguments) = (&atom.predicate.name, arguments(atom));
     if bindings.solves().contains(predicate) && arguments.len() == 2 {

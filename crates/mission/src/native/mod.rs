@@ -1,12 +1,15 @@
-//! Native co-adaptation: a plain domain, and what the knowledge base says of its actions, to the explicit form.
+//! Native co-adaptation: compiles a plain domain to the explicit form, using the requirements that
+//! the knowledge base has for its actions.
 //!
-//! A domain is plain if it declares no type of function designs. An action of it that the knowledge base knows
-//! (`move` as `move` or `a_move`, or by a binding) gets a parameter for the design of each function that it requires, and conditions:
-//! the design solves the function, is available, and keeps the bounds of the action (`t:requiresQuality`), in its context if
-//! it has one. A numeric function without parameters that is named like an estimated attribute stands for the sum over the chosen
-//! designs; one bound to `reconfigured:ATTRIBUTE` for the sum over those that were not at work before. The parameters become
-//! slots of the encoding as in the explicit form, so no design is ever ground into an action, unless what a change of designs
-//! costs makes the designs part of the state.
+//! A domain is plain if it declares no type of function designs. An action that the knowledge base
+//! has as well (`move` as `move` or `a_move`, or by a binding) gets a parameter for the design of
+//! each function that it requires, and conditions: the design solves the function, is available,
+//! and meets the quality bounds of the action (`t:requiresQuality`), in their context if they have
+//! one. A numeric function without parameters that is named like an estimated attribute is replaced
+//! by the sum over the chosen designs. A function that is bound to `reconfigured:ATTRIBUTE` is
+//! replaced by the sum over the designs that were not in use before. The parameters become slots of
+//! the encoding as in the explicit form. Designs are therefore not ground into actions, unless
+//! reconfiguration costs make the designs part of the state.
 
 mod spoken;
 mod walk;
@@ -30,23 +33,23 @@ const FUNCTION: &str = "function";
 const DESIGN: &str = "functiondesign";
 const SOLVES: &str = "fd_solve_f";
 const AVAILABLE: &str = "fd_available";
-/// Of a design and its function: it was chosen last.
+/// Predicate `(p DESIGN FUNCTION)`: the design was chosen last for the function.
 const AT_WORK: &str = "fd_at_work";
-/// Of a function: some design of it has been chosen.
+/// Predicate `(p FUNCTION)`: a design has been chosen for the function.
 const CONFIGURED: &str = "f_configured";
 
-/// What a knowledge base adds to the actions of a plain domain.
+/// Additions of a knowledge base to the actions of a plain domain.
 #[derive(Debug, Clone)]
 pub struct CoAdaptation {
-    /// By the name of the action in the domain.
+    /// Requirements by name of the action.
     actions: BTreeMap<Name, Needs>,
-    /// Names of attributes by the numeric function that stands for the chosen designs.
+    /// Attributes by the numeric function that is their sum over the chosen designs.
     chosen: BTreeMap<Name, String>,
-    /// The same for those that a change has brought.
+    /// Attributes by the numeric function that is their sum over the changed designs.
     changed: BTreeMap<Name, String>,
 }
 
-/// What an action needs, and how many parameters it has without that.
+/// Requirements of an action, and the number of its parameters in the plain domain.
 #[derive(Debug, Clone)]
 struct Needs {
     functions: Vec<Needed>,
@@ -54,7 +57,7 @@ struct Needs {
     parameters: usize,
 }
 
-/// A function, and the attributes that are estimated of its designs.
+/// A required function, with the attributes that are estimated for its designs.
 #[derive(Debug, Clone)]
 struct Needed {
     name: String,
@@ -62,10 +65,12 @@ struct Needed {
 }
 
 impl CoAdaptation {
-    /// What the knowledge base adds to a domain; none if the domain is not plain, or has no action that it knows.
+    /// Determines the additions to a domain. Returns `None` if the domain is explicit, or if the
+    /// knowledge base requires nothing of its actions.
     ///
     /// # Errors
-    /// Names that PDDL does not admit, contexts that the domain does not have, names that the domain uses otherwise.
+    /// Function names that PDDL does not admit, contexts that are not predicates of the domain, and
+    /// reserved names that the domain declares.
     pub(super) fn new(
         domain: &Domain,
         problem: &Problem,
@@ -76,20 +81,22 @@ impl CoAdaptation {
             return Ok(None);
         }
         let designs = view.function_designs();
-        let known = view.actions();
+        let known_actions = view.actions();
         let mut actions = BTreeMap::new();
         for action in &domain.actions {
             let name = &action.identifier.name;
-            let Some(known) = known.iter().find(|known| bindings.is_action(name, &known.individual)) else {
+            let Some(known_action) =
+                known_actions.iter().find(|action| bindings.is_action(name, &action.individual))
+            else {
                 continue;
             };
-            let functions = known.requires.iter().map(|function| Needed {
+            let functions = known_action.requires.iter().map(|function| Needed {
                 name: function.name.clone(),
                 attributes: estimated(designs.iter().filter(|design| design.solves.contains(function))),
             });
             let functions: Vec<_> = functions.collect();
             if !functions.is_empty() {
-                let (quality, parameters) = (known.quality.clone(), action.parameters.len());
+                let (quality, parameters) = (known_action.quality.clone(), action.parameters.len());
                 actions.insert(name.clone(), Needs { functions, quality, parameters });
             }
         }
@@ -147,14 +154,15 @@ impl CoAdaptation {
         errors
     }
 
-    /// The functions for changed designs that an action mentions in durations, conditions and effects that do not count changes.
+    /// Returns the functions of changed designs that an action uses in durations, conditions or
+    /// effects where changes cannot be counted.
     fn not_counted(&self, action: &Action) -> BTreeSet<Name> {
-        let found = RefCell::new(BTreeSet::new());
+        let uncounted = RefCell::new(BTreeSet::new());
         let see = |part: &mut Expression| {
             if let Expression::Fluent(fluent) = part
                 && self.changed.contains_key(&fluent.predicate.name)
             {
-                found.borrow_mut().insert(fluent.predicate.name.clone());
+                uncounted.borrow_mut().insert(fluent.predicate.name.clone());
             }
         };
         match action.body.clone() {
@@ -174,20 +182,21 @@ impl CoAdaptation {
                 }
             }
         }
-        found.into_inner()
+        uncounted.into_inner()
     }
 
-    /// How many parameters an action has in the plain domain.
+    /// Returns the number of parameters of an action in the plain domain.
     pub(super) fn parameters(&self, action: &str) -> Option<usize> {
         self.actions.get(&Name::new(action)).map(|needs| needs.parameters)
     }
 
-    /// The domain in explicit form.
+    /// Returns the domain in explicit form.
     pub(super) fn explicit(&self, domain: &Domain) -> Domain {
         let mut explicit = domain.clone();
         for own in [FUNCTION, DESIGN] {
-            let known = explicit.types.iter().any(|declared| declared.identifier.name == Name::new(own));
-            if !known {
+            let is_declared =
+                explicit.types.iter().any(|declared| declared.identifier.name == Name::new(own));
+            if !is_declared {
                 explicit.types.push(typed(own, ""));
             }
         }
@@ -197,20 +206,20 @@ impl CoAdaptation {
         let new = functions.into_iter().filter(|name| !declared.contains(&Name::new(name)));
         explicit.constants.extend(new.map(|name| typed(name, FUNCTION)));
         explicit.predicates.extend(self.predicates());
-        // Outside of actions there are no chosen designs that these could stand for.
+        // These functions have no value outside of actions, where no designs are chosen.
         let stands = |name: &Name| self.chosen.contains_key(name) || self.changed.contains_key(name);
         explicit.functions.retain(|declared| !stands(&declared.identifier.name));
         explicit.functions.extend(self.functions());
-        let none = Needs { functions: Vec::new(), quality: Vec::new(), parameters: 0 };
+        let no_needs = Needs { functions: Vec::new(), quality: Vec::new(), parameters: 0 };
         for action in &mut explicit.actions {
             let needs = self.actions.get(&action.identifier.name);
-            self.adapt(action, needs.unwrap_or(&none), domain);
+            self.adapt(action, needs.unwrap_or(&no_needs), domain);
         }
         explicit
     }
 
-    /// Adds which designs keep which bounds. Where no design of a function has an estimation of the attribute, the bounds do not
-    /// concern the function.
+    /// Adds the facts which designs meet which quality bounds. Bounds do not apply to a function if
+    /// no design of it has an estimation of the attribute.
     pub(super) fn fill(&self, problem: &mut Problem, designs: &[FunctionDesign]) {
         for quality in self.quality() {
             for design in designs {
@@ -218,11 +227,11 @@ impl CoAdaptation {
                     design.solves.iter().any(|function| function.name == needed.name)
                         && needed.attributes.contains(&quality.bounds.attribute)
                 });
-                let kept = design.estimations.get(&quality.bounds.attribute).is_some_and(|value| {
+                let is_met = design.estimations.get(&quality.bounds.attribute).is_some_and(|value| {
                     quality.bounds.minimum.as_ref().is_none_or(|minimum| value >= minimum)
                         && quality.bounds.maximum.as_ref().is_none_or(|maximum| value <= maximum)
                 });
-                if (kept || !concerned) && is_pddl_name(&design.individual.name) {
+                if (is_met || !concerned) && is_pddl_name(&design.individual.name) {
                     let fact = atom(&meets(quality), &[&design.individual.name]);
                     problem.init.push(pddl::ast::InitialElement::Fact(fact));
                 }
@@ -234,26 +243,26 @@ impl CoAdaptation {
         self.actions.values().flat_map(|needs| &needs.functions)
     }
 
-    /// All bounds, each once.
+    /// Returns all quality bounds without duplicates.
     fn quality(&self) -> Vec<&Quality> {
-        let mut all: Vec<_> = self.actions.values().flat_map(|needs| &needs.quality).collect();
-        all.sort_by(|a, b| a.individual.cmp(&b.individual));
-        all.dedup();
-        all
+        let mut bounds: Vec<_> = self.actions.values().flat_map(|needs| &needs.quality).collect();
+        bounds.sort_by(|a, b| a.individual.cmp(&b.individual));
+        bounds.dedup();
+        bounds
     }
 
     fn predicates(&self) -> Vec<Declaration> {
-        let mut all = vec![
+        let mut predicates = vec![
             declaration(SOLVES, &[("fd", DESIGN), ("f", FUNCTION)]),
             declaration(AVAILABLE, &[("fd", DESIGN)]),
         ];
         if !self.changed.is_empty() {
-            all.push(declaration(AT_WORK, &[("fd", DESIGN), ("f", FUNCTION)]));
-            all.push(declaration(CONFIGURED, &[("f", FUNCTION)]));
+            predicates.push(declaration(AT_WORK, &[("fd", DESIGN), ("f", FUNCTION)]));
+            predicates.push(declaration(CONFIGURED, &[("f", FUNCTION)]));
         }
         let meets = self.quality().into_iter().map(|q| declaration(meets(q).as_str(), &[("fd", DESIGN)]));
-        all.extend(meets);
-        all
+        predicates.extend(meets);
+        predicates
     }
 
     fn functions(&self) -> Vec<Declaration> {
@@ -261,7 +270,7 @@ impl CoAdaptation {
         attributes.into_iter().map(|attribute| declaration(&value_of(attribute), &[("fd", DESIGN)])).collect()
     }
 
-    /// Gives an action its designs.
+    /// Adds to an action the parameters, conditions and effects of its designs.
     fn adapt(&self, action: &mut Action, needs: &Needs, domain: &Domain) {
         let designs: Vec<(Identifier, &Needed)> = needs
             .functions
@@ -282,13 +291,14 @@ impl CoAdaptation {
         match &mut action.body {
             ActionBody::Instantaneous { precondition, effect } => {
                 precondition.change_leaves(&mut |leaf| rewrite(leaf));
-                let own = std::mem::replace(precondition, Condition::And(Vec::new()));
-                *precondition = Condition::And(std::iter::once(own).chain(chosen).chain(lasting).collect());
+                let original = std::mem::replace(precondition, Condition::And(Vec::new()));
+                *precondition =
+                    Condition::And(std::iter::once(original).chain(chosen).chain(lasting).collect());
                 self.changes(effect, &designs, &mut work);
                 effect.change_leaves(&mut |leaf| rewrite(leaf));
-                let own = std::mem::replace(effect, Effect::And(Vec::new()));
+                let original = std::mem::replace(effect, Effect::And(Vec::new()));
                 *effect =
-                    Effect::And(std::iter::once(own).chain(work).chain(self.starts(&designs)).collect());
+                    Effect::And(std::iter::once(original).chain(work).chain(self.starts(&designs)).collect());
             }
             ActionBody::Durative { duration, conditions, effects } => {
                 for constraint in duration {
@@ -299,19 +309,19 @@ impl CoAdaptation {
                 }
                 conditions.extend(chosen.into_iter().map(|condition| (ConditionTime::AtStart, condition)));
                 conditions.extend(lasting.into_iter().map(|condition| (ConditionTime::OverAll, condition)));
-                let mut more = Vec::new();
+                let mut additions = Vec::new();
                 for (time, effect) in &mut *effects {
                     self.changes(effect, &designs, &mut work);
-                    more.extend(work.drain(..).map(|effect| (*time, effect)));
+                    additions.extend(work.drain(..).map(|effect| (*time, effect)));
                     effect.change_leaves(&mut |leaf| rewrite(leaf));
                 }
-                more.extend(self.starts(&designs).into_iter().map(|effect| (EffectTime::AtEnd, effect)));
-                effects.extend(more);
+                additions.extend(self.starts(&designs).into_iter().map(|effect| (EffectTime::AtEnd, effect)));
+                effects.extend(additions);
             }
         }
     }
 
-    /// Puts the sum over the chosen designs in the place of the functions that stand for it.
+    /// Replaces functions that are bound to chosen designs by the sum over these designs.
     fn sum(&self, expression: &mut Expression, designs: &[(Identifier, &Needed)]) {
         let Expression::Fluent(fluent) = expression else { return };
         if let Some(attribute) = self.chosen.get(&fluent.predicate.name) {
@@ -324,7 +334,8 @@ impl CoAdaptation {
         }
     }
 
-    /// For each numeric effect that counts changes: what each changed design adds to it.
+    /// For each numeric effect that counts changes, adds the conditional effects of the changed
+    /// designs to `out`.
     fn changes(&self, effect: &Effect, designs: &[(Identifier, &Needed)], out: &mut Vec<Effect>) {
         match effect {
             Effect::And(parts) => parts.iter().for_each(|part| self.changes(part, designs, out)),
@@ -348,9 +359,10 @@ impl CoAdaptation {
                         let mut without = expression.clone();
                         with.change_leaves(&mut |part| self.sum(part, designs));
                         without.change_leaves(&mut |part| self.sum(part, designs));
-                        let more = Expression::Operation(Arithmetic::Subtract, vec![with, without], *span);
-                        let more = Effect::Assign(*kind, target.clone(), more, *span);
-                        out.push(Effect::When(changed(design, &needed.name), Box::new(more)));
+                        let difference =
+                            Expression::Operation(Arithmetic::Subtract, vec![with, without], *span);
+                        let difference = Effect::Assign(*kind, target.clone(), difference, *span);
+                        out.push(Effect::When(changed(design, &needed.name), Box::new(difference)));
                     }
                 }
             }
@@ -358,20 +370,20 @@ impl CoAdaptation {
         }
     }
 
-    /// The designs are at work from now on, and no others for their functions.
+    /// Returns the effects by which the designs replace the former designs of their functions.
     fn starts(&self, designs: &[(Identifier, &Needed)]) -> Vec<Effect> {
         if self.changed.is_empty() {
             return Vec::new();
         }
         let mut effects = Vec::new();
         for (design, needed) in designs {
-            let other = identifier(&Name::new("other"));
+            let other_design = identifier(&Name::new("other"));
             let is_other = Condition::Not(Box::new(Condition::Equal(
-                Term::Variable(other.clone()),
+                Term::Variable(other_design.clone()),
                 Term::Variable(design.clone()),
                 Span::default(),
             )));
-            let stops = Effect::Delete(of_design(AT_WORK, &other, Some(&needed.name)));
+            let stops = Effect::Delete(of_design(AT_WORK, &other_design, Some(&needed.name)));
             let each = Effect::When(is_other, Box::new(stops));
             effects.push(Effect::ForAll(vec![typed("other", DESIGN)], Box::new(each)));
             effects.push(Effect::Add(of_design(AT_WORK, design, Some(&needed.name))));
@@ -381,7 +393,7 @@ impl CoAdaptation {
     }
 }
 
-/// What must hold when the designs are chosen, and as long as they are at work.
+/// Returns the conditions at the choice of the designs, and those during their use.
 fn conditions(
     designs: &[(Identifier, &Needed)],
     needs: &Needs,
@@ -392,18 +404,18 @@ fn conditions(
         chosen.push(Condition::Atom(of_design(SOLVES, design, Some(&needed.name))));
         lasting.push(Condition::Atom(of_design(AVAILABLE, design, None)));
         for quality in &needs.quality {
-            let kept = Condition::Atom(of_design(meets(quality).as_str(), design, None));
+            let bounds_met = Condition::Atom(of_design(meets(quality).as_str(), design, None));
             let context = quality.context.as_ref().and_then(|context| {
                 domain.predicates.iter().find(|p| p.identifier.name == Name::new(context))
             });
             lasting.push(match context {
-                None => kept,
+                None => bounds_met,
                 Some(predicate) => {
                     let mut here = atom(&predicate.identifier.name, &[]);
                     let parameters = predicate.parameters.iter();
                     here.arguments =
                         parameters.map(|p| Term::Variable(identifier(&p.identifier.name))).collect();
-                    Condition::Or(vec![Condition::Not(Box::new(Condition::Atom(here))), kept])
+                    Condition::Or(vec![Condition::Not(Box::new(Condition::Atom(here))), bounds_met])
                 }
             });
         }
@@ -411,14 +423,15 @@ fn conditions(
     (chosen, lasting)
 }
 
-/// Another design of the function was at work.
+/// Condition that another design of the function was in use.
 fn changed(design: &Identifier, function: &str) -> Condition {
     let at_work = Condition::Atom(of_design(AT_WORK, design, Some(function)));
     let configured = Condition::Atom(atom(&Name::new(CONFIGURED), &[function]));
     Condition::And(vec![configured, Condition::Not(Box::new(at_work))])
 }
 
-/// The functions of the domain that stand for the chosen designs, and for the changed ones, with their attributes.
+/// Returns the functions of the domain that are sums over the chosen designs and over the changed
+/// designs, with their attributes.
 fn attributes(
     domain: &Domain,
     problem: &Problem,
@@ -458,12 +471,13 @@ fn has_parameter(action: &Action, name: &Name) -> bool {
     action.parameters.iter().any(|parameter| parameter.identifier.name == *name)
 }
 
-/// The predicate that says which designs keep the bounds.
+/// Name of the predicate that states which designs meet a quality bound.
 fn meets(quality: &Quality) -> Name {
     Name::new(&format!("fd_meets_{}", quality.individual.name))
 }
 
-/// The numeric function of a design that is the value of an attribute; bindings know it by its prefix.
+/// Name of the numeric function that has the value of an attribute for a design. Bindings recognise
+/// it by its prefix.
 fn value_of(attribute: &str) -> String {
     format!("fd_{attribute}")
 }
@@ -479,7 +493,7 @@ fn declaration(name: &str, parameters: &[(&str, &str)]) -> Declaration {
     Declaration { identifier: identifier(&Name::new(name)), parameters }
 }
 
-/// An atom of a design variable, and of a function if one is given.
+/// Builds an atom of a design variable, and of a function if one is given.
 fn of_design(symbol: &str, design: &Identifier, function: Option<&str>) -> pddl::ast::Atom {
     let mut atom = atom(&Name::new(symbol), function.as_slice());
     atom.arguments.insert(0, Term::Variable(design.clone()));

@@ -1,16 +1,16 @@
-//! What the explicit form adds to a domain, as its author is told of it: not by names that stand in none of the files.
+//! Translates predicates of the explicit form for the user, whose files do not contain them.
 
 use pddl::ast::Name;
 
 use super::{CoAdaptation, meets};
 
 impl CoAdaptation {
-    /// Whether a function stands for the chosen designs, or for those that a change has brought.
+    /// Returns `true` if a function is a sum over the chosen designs or over the changed designs.
     pub(crate) fn stands_for_designs(&self, function: &Name) -> bool {
         self.chosen.contains_key(function) || self.changed.contains_key(function)
     }
 
-    /// A condition with other words for the predicates that are added.
+    /// Rewrites the added predicates of a condition for display.
     pub(crate) fn spoken(&self, condition: &str) -> String {
         let mut text = condition.to_owned();
         for quality in self.quality() {
@@ -24,7 +24,7 @@ impl CoAdaptation {
         text
     }
 
-    /// Whether the explicit form has a predicate or function that the domain of the author does not.
+    /// Returns `true` if a predicate or function was added to the domain of the user.
     pub(crate) fn is_added(&self, name: &Name) -> bool {
         self.predicates().into_iter().chain(self.functions()).any(|own| own.identifier.name == *name)
     }

@@ -2,14 +2,15 @@
 
 use pddl::ast::{Assignment, Effect, Expression, Name};
 
-/// Returns `true` if an expression reads a numeric function whose name is wanted.
+/// Returns `true` if the expression reads a numeric function that `wanted` accepts.
 pub(super) fn mentions(expression: &Expression, wanted: &dyn Fn(&Name) -> bool) -> bool {
     let mut is_mentioned = false;
     expression.walk_fluents(&mut |fluent| is_mentioned |= wanted(&fluent.predicate.name));
     is_mentioned
 }
 
-/// Visits the expressions of an effect, except the amounts that it adds to numbers unconditionally.
+/// Visits the expressions of an effect in which changes of designs cannot be counted: all except
+/// the amounts of unconditional `increase` and `decrease` effects.
 pub(super) fn walk_uncounted(effect: Effect, see: &dyn Fn(&mut Expression)) {
     match effect {
         Effect::And(parts) => parts.into_iter().for_each(|part| walk_uncounted(part, see)),

@@ -1,4 +1,5 @@
-//! Axioms as derived predicates, of the kinds that `OWLToPDDL` translates; of the others it is said that they are left out.
+//! Translates axioms to derived predicates, for the kinds of axioms that `OWLToPDDL` translates.
+//! The others are reported as left out.
 
 use std::collections::BTreeMap;
 
@@ -12,16 +13,16 @@ use super::terms::{Terms, is_annotation, is_top};
 use crate::message::Message;
 
 impl Terms {
-    /// What an ontology says.
+    /// Translates the terminology of an ontology: signature, axioms and rules.
     pub(crate) fn new(ontology: &Ontology) -> Self {
         let mut terms = Self::default();
         terms.signature(ontology);
         terms.types(ontology);
         terms.lift();
-        let mut left = Vec::new();
+        let mut skipped = Vec::new();
         for annotated in &ontology.axioms {
             if let Err(kind) = terms.axiom(&annotated.axiom) {
-                left.push(kind);
+                skipped.push(kind);
             }
         }
         for rule in &ontology.rules {
@@ -37,16 +38,16 @@ impl Terms {
                 }
             }
         }
-        if !left.is_empty() {
-            left.sort_unstable();
-            left.dedup();
+        if !skipped.is_empty() {
+            skipped.sort_unstable();
+            skipped.dedup();
             let text = format!(
                 "these axioms have no form as derived predicates, and conclude nothing in the domain: {}",
-                left.join(", ")
+                skipped.join(", ")
             );
             terms.warnings.push(Message::warning("M212", text));
         }
-        // Rules that several documents state are one, and the order is that of the text.
+        // The map removes rules that several documents repeat, and sorts them by their text.
         let mut derived: BTreeMap<String, Derived> = BTreeMap::new();
         for axiom in terms.derived.drain(..) {
             derived.insert(format!("{:?} {:?}", axiom.head, axiom.condition), axiom);
@@ -55,10 +56,10 @@ impl Terms {
         terms
     }
 
-    /// An axiom as a derived predicate.
+    /// Translates an axiom to a derived predicate.
     ///
     /// # Errors
-    /// It has no such form: what kind of axiom it is.
+    /// The kind of the axiom, if it has no translation.
     fn axiom(&mut self, stated: &Axiom) -> Result<(), &'static str> {
         let [x, y, z] = [variable("x"), variable("y"), variable("z")];
         match stated {
@@ -105,7 +106,7 @@ impl Terms {
             }
             Axiom::ObjectPropertyCharacteristic(Characteristic::Functional, own) => {
                 let own = property(own).ok_or("FunctionalObjectProperty of an inverse")?;
-                // As `OWLToPDDL` has it, see docs/decisions/planta-form.md.
+                // The translation is that of `OWLToPDDL`, see docs/decisions/planta-form.md.
                 self.functional(own, Condition::Equal(y, z, Span::default()))?;
             }
             Axiom::FunctionalDataProperty(own) => {
@@ -113,7 +114,8 @@ impl Terms {
                 let plain = self.functional(own, Condition::Not(Box::new(equal)))?;
                 self.functional.insert(plain);
             }
-            // Statements are not axioms in general, and what a literal's datatype is PDDL cannot say.
+            // Assertions are translated to initial facts elsewhere. PDDL cannot express the
+            // datatype of a literal.
             Axiom::ClassAssertion(ClassExpression::Class(_), _)
             | Axiom::ObjectPropertyAssertion(ObjectPropertyExpression::Property(_), ..)
             | Axiom::DataPropertyAssertion(..)
@@ -124,7 +126,8 @@ impl Terms {
         Ok(())
     }
 
-    /// `head(parameters) ← body(arguments)`, with bound variables.
+    /// Adds the derived predicate `head(parameters) ← body(arguments)` with existentially bound
+    /// variables.
     fn follows(
         &mut self,
         head: &Iri,
@@ -144,9 +147,9 @@ impl Terms {
         let mut alternatives = Vec::new();
         for (position, left) in classes.iter().enumerate() {
             for right in &classes[position + 1..] {
-                let both = [*left, *right].map(|class| self.inferred(class, vec![variable("x")]));
-                let both: Result<Vec<Condition>, String> = both.into_iter().collect();
-                alternatives.push(Condition::And(both.map_err(|_| "DisjointClasses of punned names")?));
+                let atoms = [*left, *right].map(|class| self.inferred(class, vec![variable("x")]));
+                let atoms: Result<Vec<Condition>, String> = atoms.into_iter().collect();
+                alternatives.push(Condition::And(atoms.map_err(|_| "DisjointClasses of punned names")?));
             }
         }
         self.contradiction(exists(&["x"], Condition::Or(alternatives)));
@@ -168,7 +171,7 @@ impl Terms {
     }
 }
 
-/// The kind of an axiom, as the specification names it.
+/// Kind of an axiom, by its name in the OWL specification.
 fn kind(axiom: &Axiom) -> &'static str {
     match axiom {
         Axiom::EquivalentClasses(_) => "EquivalentClasses",

@@ -1,4 +1,4 @@
-//! What a domain lacks that asks a knowledge base: types, constants and predicates.
+//! Completes a PLANTA domain with the types, constants and predicates of the knowledge base.
 
 use std::collections::BTreeSet;
 
@@ -11,7 +11,7 @@ use super::terms::Terms;
 use crate::message::Message;
 
 impl Terms {
-    /// Numbers keep the names that the files give them.
+    /// Gives numbers the names that the PDDL files use for them.
     pub(super) fn name_numbers(&mut self, domain: &Domain, problem: &Problem, mentioned: &BTreeSet<Name>) {
         let declared = domain.constants.iter().chain(&problem.objects);
         let declared = declared.map(|object| &object.identifier.name);
@@ -24,7 +24,7 @@ impl Terms {
         self.literals.prefer(literals);
     }
 
-    /// Types of individuals and numbers, and those that only objects mention.
+    /// Declares the types of individuals and numbers, and types that only objects refer to.
     pub(super) fn declare_types(
         &self,
         domain: &mut Domain,
@@ -32,13 +32,19 @@ impl Terms {
         number: &Name,
         warnings: &mut Vec<Message>,
     ) {
-        let mut known: BTreeSet<Name> = domain.types.iter().map(|own| own.identifier.name.clone()).collect();
-        known
-            .extend(domain.types.iter().flat_map(|own| &own.r#type.alternatives).map(|own| own.name.clone()));
-        known.insert(Name::new("object"));
+        let mut declared: BTreeSet<Name> =
+            domain.types.iter().map(|entry| entry.identifier.name.clone()).collect();
+        declared.extend(
+            domain
+                .types
+                .iter()
+                .flat_map(|entry| &entry.r#type.alternatives)
+                .map(|parent| parent.name.clone()),
+        );
+        declared.insert(Name::new("object"));
         let typed: BTreeSet<&Name> = self.constants.values().flatten().chain([number]).collect();
         for name in typed {
-            if known.insert(name.clone()) {
+            if declared.insert(name.clone()) {
                 domain.types.push(object(name.clone(), None));
             }
         }
@@ -46,7 +52,7 @@ impl Terms {
         let mentioned: Vec<Identifier> =
             objects.flat_map(|object| object.r#type.alternatives.clone()).collect();
         for r#type in mentioned {
-            if known.insert(r#type.name.clone()) {
+            if declared.insert(r#type.name.clone()) {
                 let text = format!(
                     "the type `{}` of objects is declared nowhere, and nothing else is of that type",
                     r#type.name
@@ -57,7 +63,8 @@ impl Terms {
         }
     }
 
-    /// Individuals, values, and the numbers that rules or the files name.
+    /// Declares constants for individuals, for values, and for the numbers in rules and in the PDDL
+    /// files.
     pub(super) fn declare_constants(
         &self,
         domain: &mut Domain,
@@ -65,36 +72,37 @@ impl Terms {
         number: &Name,
         mentioned: &BTreeSet<Name>,
     ) {
-        let mut known: BTreeSet<Name> =
-            domain.constants.iter().map(|own| own.identifier.name.clone()).collect();
+        let mut declared: BTreeSet<Name> =
+            domain.constants.iter().map(|constant| constant.identifier.name.clone()).collect();
         for (name, r#type) in &self.constants {
-            if known.insert(name.clone()) {
-                // An object of the problem that the ontology gives no type keeps its own.
-                let own = problem.objects.iter().find(|object| object.identifier.name == *name);
-                let r#type = match (r#type, own) {
-                    (None, Some(own)) => own.r#type.clone(),
+            if declared.insert(name.clone()) {
+                // An object of the problem keeps its own type if the ontology gives it none.
+                let object_of_problem = problem.objects.iter().find(|object| object.identifier.name == *name);
+                let r#type = match (r#type, object_of_problem) {
+                    (None, Some(object_of_problem)) => object_of_problem.r#type.clone(),
                     (r#type, _) => typed(r#type.clone()),
                 };
                 domain.constants.push(TypedName { identifier: name.clone().into(), r#type });
             }
         }
-        known.extend(problem.objects.iter().map(|object| object.identifier.name.clone()));
+        declared.extend(problem.objects.iter().map(|object| object.identifier.name.clone()));
         let mentioned = mentioned.iter().filter(|name| names::number(name).is_some());
         for name in self.numbers.iter().chain(mentioned) {
-            if known.insert(name.clone()) {
+            if declared.insert(name.clone()) {
                 domain.constants.push(object(name.clone(), Some(number.clone())));
             }
         }
     }
 
-    /// Classes and properties, stated and inferred, and how numbers compare.
+    /// Declares the predicates of classes and properties, asserted and inferred, and of numeric
+    /// comparisons.
     pub(super) fn declare_predicates(&self, domain: &mut Domain) {
-        let mut known: BTreeSet<Name> =
-            domain.predicates.iter().map(|own| own.identifier.name.clone()).collect();
+        let mut declared: BTreeSet<Name> =
+            domain.predicates.iter().map(|predicate| predicate.identifier.name.clone()).collect();
         let compared = [LESS, EQUAL].map(|name| (Name::new(name), 2));
-        let own = self.predicates.iter().map(|(name, arity)| (name.clone(), *arity));
-        for (name, arity) in own.chain(compared) {
-            if known.insert(name.clone()) {
+        let predicates = self.predicates.iter().map(|(name, arity)| (name.clone(), *arity));
+        for (name, arity) in predicates.chain(compared) {
+            if declared.insert(name.clone()) {
                 let parameters = untyped(&["x", "y"][..arity]);
                 domain.predicates.push(Declaration { identifier: name.into(), parameters });
             }
@@ -102,10 +110,11 @@ impl Terms {
     }
 }
 
-/// Objects of the problem that are constants of the domain, too, and of a type that is declared nowhere: what counts is the constant.
+/// Removes objects of the problem with an undeclared type that are also constants of the domain;
+/// the constant takes precedence.
 pub(super) fn drop_repeated(domain: &Domain, problem: &mut Problem) -> Vec<Message> {
     let hierarchy = TypeHierarchy::of(domain);
-    let unknown = |object: &TypedName| {
+    let undeclared_type = |object: &TypedName| {
         object
             .r#type
             .alternatives
@@ -117,7 +126,7 @@ pub(super) fn drop_repeated(domain: &Domain, problem: &mut Problem) -> Vec<Messa
     problem.objects.retain(|object| {
         let name = &object.identifier.name;
         let is_constant = domain.constants.iter().any(|constant| constant.identifier.name == *name);
-        let Some(r#type) = unknown(object).filter(|_| is_constant) else { return true };
+        let Some(r#type) = undeclared_type(object).filter(|_| is_constant) else { return true };
         let text = format!(
             "`{name}` is a constant of the domain; its type in the problem, `{type}`, is declared nowhere"
         );

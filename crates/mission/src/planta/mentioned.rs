@@ -1,11 +1,11 @@
-//! The predicates and types that a domain and a problem mention.
+//! Collects the predicates and types that a domain and a problem use.
 
 use std::collections::BTreeSet;
 
 use pddl::Mentioned;
 use pddl::ast::{Domain, Name, Problem, TypeExpression};
 
-/// The predicates that a domain uses in conditions and effects and that it declares nowhere.
+/// Returns the predicates that a domain uses in conditions and effects but does not declare.
 pub(super) fn undeclared(domain: &Domain) -> BTreeSet<Name> {
     let mut used = Mentioned::by_domain(domain).predicates;
     for declared in &domain.predicates {
@@ -14,11 +14,11 @@ pub(super) fn undeclared(domain: &Domain) -> BTreeSet<Name> {
     used
 }
 
-/// The types that a domain or a problem gives to parameters, constants and objects.
+/// Returns the types of parameters, constants and objects, and the declared types.
 pub(super) fn types(domain: &Domain, problem: &Problem) -> BTreeSet<Name> {
-    let mut found = BTreeSet::new();
+    let mut types = BTreeSet::new();
     let mut note = |r#type: &TypeExpression| {
-        found.extend(r#type.alternatives.iter().map(|alternative| alternative.name.clone()));
+        types.extend(r#type.alternatives.iter().map(|alternative| alternative.name.clone()));
     };
     let parameters = domain.actions.iter().flat_map(|action| &action.parameters);
     let heads = domain.derived.iter().flat_map(|axiom| &axiom.head.parameters);
@@ -27,6 +27,6 @@ pub(super) fn types(domain: &Domain, problem: &Problem) -> BTreeSet<Name> {
     for entry in named.clone().chain(parameters).chain(heads).chain(declared) {
         note(&entry.r#type);
     }
-    found.extend(domain.types.iter().map(|entry| entry.identifier.name.clone()));
-    found
+    types.extend(domain.types.iter().map(|entry| entry.identifier.name.clone()));
+    types
 }

@@ -1,9 +1,11 @@
-//! PLANTA's form: a domain that mentions what its knowledge base concludes and declares none of it.
+//! PLANTA's form: a domain that uses the conclusions of its knowledge base without declaring them.
 //!
-//! PLANTA \[1\] keeps what robots are in OWL and lets its domains ask for it by names: `(solvesF ?fd ?f)` for what the knowledge base
-//! states, `(inferred-Fd_realisability ?fd false_boolean)` for what is stated or follows. Its `OWLToPDDL` \[2\] writes the rest into
-//! the files before each planning: types, constants, predicates, axioms and rules as derived predicates, assertions as initial
-//! facts, and how numbers compare. This module does the same inside, with the same names.
+//! PLANTA \[1\] describes robots in OWL. Its domains refer to the ontology by names: `(solvesF ?fd
+//! ?f)` for assertions, `(inferred-Fd_realisability ?fd false_boolean)` for assertions and inferred
+//! facts. Before each planning, its `OWLToPDDL` \[2\] writes the ontology into the PDDL files:
+//! types, constants, predicates, axioms and rules as derived predicates, assertions as initial
+//! facts, and comparisons of numbers. This module performs the same translation in memory, with the
+//! same names.
 //!
 //! \[1\] G. Rezende Silva et al.: PLANTA, `kas-lab/suave_planta` and `kas-lab/navigation_planta`.
 //! \[2\] `remaro-network/dlToPlanning`.
@@ -30,8 +32,9 @@ use names::{EQUAL, LESS, NUMBER_TYPES, UNGROUND, UNREALISABLE};
 use syntax::{Fact as PddlFact, atom, object};
 pub use terms::Terms;
 
-/// What an ontology adds to a domain in general, if the domain asks for it: it mentions predicates that it does not declare, and
-/// one of them is `inferred-…` or named as a class or a property.
+/// Returns the translated terminology of an ontology if the domain is in PLANTA's form: it uses
+/// undeclared predicates, and at least one of them is `inferred-…` or has the name of a class or
+/// property.
 pub(crate) fn wanted(ontology: &Ontology, domain: &str) -> Option<Terms> {
     let source = Source::new("domain", domain);
     let missing = mentioned::undeclared(&pddl::parse_domain(&source).0?);
@@ -43,62 +46,64 @@ pub(crate) fn wanted(ontology: &Ontology, domain: &str) -> Option<Terms> {
     missing.iter().any(|name| inferred(name) || terms.has(name)).then_some(terms)
 }
 
-/// What a knowledge base adds to a domain and a problem in PLANTA's form.
+/// Completes a domain and a problem in PLANTA's form from a knowledge base.
 #[derive(Debug, Clone)]
 pub(crate) struct Planta {
     terms: Arc<Terms>,
-    /// The type of numbers.
+    /// Type of numbers.
     number: Name,
-    /// The predicates that the knowledge base or a comparison of numbers has something to say of.
+    /// Predicates of the knowledge base and of numeric comparisons.
     known: HashSet<Name>,
 }
 
 impl Planta {
-    /// Completes a domain; what is questionable about that is returned, too.
+    /// Completes a domain. Also returns warnings.
     pub(crate) fn new(
         terms: &Arc<Terms>,
         domain: &Domain,
         problem: &mut Problem,
     ) -> (Self, Domain, Vec<Message>) {
-        let mut own = Terms::clone(terms);
-        let mut warnings = std::mem::take(&mut own.warnings);
+        let mut terms_of_mission = Terms::clone(terms);
+        let mut warnings = std::mem::take(&mut terms_of_mission.warnings);
         warnings.extend(drop_repeated(domain, problem));
         let mentioned = Mentioned::by_domain(domain).and_problem(problem);
         let types = mentioned::types(domain, problem);
-        let known = |r#type: &&&str| types.contains(&Name::new(r#type));
-        let number = Name::new(NUMBER_TYPES.iter().find(known).unwrap_or(&NUMBER_TYPES[0]));
-        own.name_numbers(domain, problem, &mentioned.objects);
+        let is_used = |r#type: &&&str| types.contains(&Name::new(r#type));
+        let number = Name::new(NUMBER_TYPES.iter().find(is_used).unwrap_or(&NUMBER_TYPES[0]));
+        terms_of_mission.name_numbers(domain, problem, &mentioned.objects);
         let mut completed = domain.clone();
-        own.declare_types(&mut completed, problem, &number, &mut warnings);
-        own.declare_constants(&mut completed, problem, &number, &mentioned.objects);
-        own.declare_predicates(&mut completed);
-        // The domain's own axioms come last, as they do in what `OWLToPDDL` writes.
-        let rules = own.derived.iter().cloned().chain(std::mem::take(&mut completed.derived));
+        terms_of_mission.declare_types(&mut completed, problem, &number, &mut warnings);
+        terms_of_mission.declare_constants(&mut completed, problem, &number, &mentioned.objects);
+        terms_of_mission.declare_predicates(&mut completed);
+        // The order of axioms follows the output of `OWLToPDDL`, where those of the domain are
+        // last.
+        let rules = terms_of_mission.derived.iter().cloned().chain(std::mem::take(&mut completed.derived));
         completed.derived = rules.collect();
-        let known = own.predicates.keys().cloned().chain([LESS, EQUAL].map(Name::new)).collect();
-        (Self { terms: Arc::new(own), number, known }, completed, warnings)
+        let predicates =
+            terms_of_mission.predicates.keys().cloned().chain([LESS, EQUAL].map(Name::new)).collect();
+        (Self { terms: Arc::new(terms_of_mission), number, known: predicates }, completed, warnings)
     }
 
-    /// The predicates about which the knowledge base or a comparison of numbers says something.
+    /// Returns the predicates of the knowledge base and of numeric comparisons.
     pub(crate) fn known(&self) -> &HashSet<Name> {
         &self.known
     }
 
-    /// Predicates that a completed domain asks for and that neither it nor the knowledge base has.
+    /// Returns an error for each predicate that a completed domain uses but nothing declares.
     pub(crate) fn unknown(completed: &Domain) -> Vec<Message> {
         let declared: Vec<&str> =
             completed.predicates.iter().map(|declared| declared.identifier.name.as_str()).collect();
-        let unknown = mentioned::undeclared(completed).into_iter().map(|name| {
-            let meant = did_you_mean(name.as_str(), declared.iter().copied());
+        let errors = mentioned::undeclared(completed).into_iter().map(|name| {
+            let suggestion = did_you_mean(name.as_str(), declared.iter().copied());
             let text = format!(
-                "the domain asks for `{name}`, and the knowledge base has no class or property of that name{meant}"
+                "the domain asks for `{name}`, and the knowledge base has no class or property of that name{suggestion}"
             );
             Message::error("M215", text)
         });
-        unknown.collect()
+        errors.collect()
     }
 
-    /// Adds to a problem what is stated now and how numbers compare; returns warnings.
+    /// Adds the current assertions and the comparisons of numbers to a problem. Returns warnings.
     pub(crate) fn fill(
         &self,
         domain: &Domain,
@@ -108,25 +113,26 @@ impl Planta {
     ) -> Vec<Message> {
         let mut facts: BTreeSet<PddlFact> = self.stated(engine, stated).collect();
         let messages = self.replace_values(problem, &facts);
-        let said: BTreeSet<PddlFact> = self.said(problem).collect();
+        let problem_facts: BTreeSet<PddlFact> = self.said(problem).collect();
         let constants = domain.constants.iter().chain(&problem.objects);
-        let mut known: BTreeSet<Name> = constants.map(|object| object.identifier.name.clone()).collect();
+        let mut names: BTreeSet<Name> = constants.map(|object| object.identifier.name.clone()).collect();
         for name in facts.iter().flat_map(|(_, arguments)| arguments) {
-            if known.insert(name.clone()) {
+            if names.insert(name.clone()) {
                 let r#type = names::number(name).map(|_| self.number.clone());
                 problem.objects.push(object(name.clone(), r#type));
             }
         }
-        facts.extend(Self::comparisons(domain, &known));
-        problem.init.extend(facts.difference(&said).map(|(predicate, arguments)| {
+        facts.extend(Self::comparisons(domain, &names));
+        problem.init.extend(facts.difference(&problem_facts).map(|(predicate, arguments)| {
             let arguments = arguments.iter().map(|name| Term::Constant(name.clone().into()));
             InitialElement::Fact(atom(predicate.clone(), arguments.collect()))
         }));
         messages
     }
 
-    /// Says anew in a filled problem which designs are available: of the others it holds that they cannot be realised. The domain
-    /// that is returned concludes nothing about that. That a function is not grounded is not a design that somebody could do without.
+    /// Replaces the available designs of a filled problem, by asserting that the other designs are
+    /// not realisable. The returned domain no longer infers realisability. `fd_unground` marks a
+    /// function without a design and is no design itself, so it is skipped.
     pub(crate) fn allow<'d>(
         &self,
         domain: &Domain,
@@ -138,8 +144,8 @@ impl Planta {
         domain.derived.retain(|own| own.head.identifier.name != predicate);
         for (design, available) in designs.filter(|(design, _)| *design != UNGROUND) {
             let arguments = vec![names::plain(design), no.clone()];
-            let own = Some((predicate.clone(), arguments.clone()));
-            problem.init.retain(|element| element.fact() != own);
+            let withdrawn = Some((predicate.clone(), arguments.clone()));
+            problem.init.retain(|element| element.fact() != withdrawn);
             if !available {
                 let arguments: Vec<Term> =
                     arguments.into_iter().map(|name| Term::Constant(name.into())).collect();
@@ -149,12 +155,13 @@ impl Planta {
         domain
     }
 
-    /// Whether the knowledge base or a comparison of numbers has something to say of a predicate.
+    /// Returns `true` if a predicate is of the knowledge base or a numeric comparison.
     fn is_known(&self, predicate: &Name) -> bool {
         self.known.contains(predicate)
     }
 
-    /// What a problem states of such predicates: all else is of maps and tasks, and there may be very much of it.
+    /// Returns the facts of the problem with these predicates. The other facts describe maps and
+    /// tasks and may be very numerous.
     fn said(&self, problem: &Problem) -> impl Iterator<Item = PddlFact> {
         let is_known = |element: &&InitialElement| match element {
             InitialElement::Fact(atom) => self.is_known(&atom.predicate.name),
@@ -163,12 +170,13 @@ impl Planta {
         problem.init.iter().filter(is_known).filter_map(InitialElement::fact)
     }
 
-    /// What is stated, in PDDL.
+    /// Translates assertions to PDDL.
     fn stated(&self, engine: &Engine, stated: impl Iterator<Item = Fact>) -> impl Iterator<Item = PddlFact> {
         stated.filter_map(|fact| self.fact(&fact, engine))
     }
 
-    /// A statement in PDDL; none if it is of nothing that the ontology names.
+    /// Translates an assertion to PDDL. Returns `None` if its predicate is not part of the
+    /// ontology.
     fn fact(&self, fact: &Fact, engine: &Engine) -> Option<PddlFact> {
         let symbols = engine.symbols();
         let predicate = self.terms.symbols.get(symbols.value(fact.predicate).as_name()?)?.clone();
@@ -179,7 +187,8 @@ impl Planta {
         Some((predicate, fact.arguments.iter().map(name).collect()))
     }
 
-    /// Of properties that have one value only, that of the knowledge base counts.
+    /// Removes values of functional properties from the problem if the knowledge base has other
+    /// ones.
     fn replace_values(&self, problem: &mut Problem, facts: &BTreeSet<PddlFact>) -> Vec<Message> {
         let mut warnings = Vec::new();
         problem.init.retain(|element| {
@@ -191,8 +200,8 @@ impl Planta {
             }
             let Some((predicate, arguments)) = element.fact() else { return true };
             let [subject, value] = &arguments[..] else { return true };
-            let other = facts.iter().find(|(own, stated)| *own == predicate && stated[0] == *subject);
-            match other {
+            let base_fact = facts.iter().find(|(own, stated)| *own == predicate && stated[0] == *subject);
+            match base_fact {
                 Some((_, stated)) if stated[1] != *value => {
                     let text = format!(
                         "the problem's own `({predicate} {subject} {value})` is ignored: the knowledge base says {}",
@@ -207,7 +216,7 @@ impl Planta {
         warnings
     }
 
-    /// How the numbers that there are compare, if anything asks for it.
+    /// Returns the comparisons of all numbers, if the domain declares a comparison.
     fn comparisons(domain: &Domain, known: &BTreeSet<Name>) -> Vec<PddlFact> {
         let declared =
             |name: &str| domain.predicates.iter().any(|own| own.identifier.name == Name::new(name));

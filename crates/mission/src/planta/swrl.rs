@@ -1,8 +1,8 @@
-//! SWRL rules as derived predicates.
+//! Translates SWRL rules to derived predicates.
 //!
-//! Variables keep their names. What a head says of a constant is said of a parameter that equals it, as PDDL asks. Comparisons
-//! of numbers become relations between the objects that stand for numbers, `sameAs` and `differentFrom` become equality: every
-//! name is an object of its own.
+//! Variables keep their names. PDDL heads admit variables only, so a constant in a head becomes a
+//! parameter with an equality condition. Numeric comparisons become predicates over the objects of
+//! the numbers. `sameAs` and `differentFrom` become (in)equality, because PDDL has unique names.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ use super::names::{self, EQUAL, LESS};
 use super::syntax::{atom, axiom, exists, variable};
 use super::terms::{Terms, is_top};
 
-/// The variables of a rule, each by a name of its own.
+/// Distinct PDDL names for the variables of a rule.
 #[derive(Default)]
 struct Variables {
     names: BTreeMap<Iri, String>,
@@ -22,23 +22,23 @@ struct Variables {
 
 impl Variables {
     fn name(&mut self, iri: &Iri) -> String {
-        if let Some(known) = self.names.get(iri) {
-            return known.clone();
+        if let Some(name) = self.names.get(iri) {
+            return name.clone();
         }
         let plain = names::plain(iri).to_string();
-        let taken = |name: &str| self.names.values().any(|other| other.eq_ignore_ascii_case(name));
+        let is_used = |name: &str| self.names.values().any(|other| other.eq_ignore_ascii_case(name));
         let numbered = (2..).map(|number| format!("{plain}_{number}"));
-        let free = std::iter::once(plain.clone()).chain(numbered).find(|name| !taken(name));
+        let free = std::iter::once(plain.clone()).chain(numbered).find(|name| !is_used(name));
         let name = free.unwrap_or(plain);
         self.names.insert(iri.clone(), name.clone());
         name
     }
 }
 
-/// A rule as derived predicates, one for each atom of its head.
+/// Translates a rule to derived predicates, one for each atom of its head.
 ///
 /// # Errors
-/// Why it has no such form.
+/// The reason why the rule has no translation.
 pub(super) fn derived(rule: &Rule, terms: &mut Terms) -> Result<Vec<Derived>, String> {
     if rule.head.is_empty() {
         return Err("it concludes nothing".to_owned());
@@ -68,18 +68,20 @@ fn conclude(
     let plain = terms.plain(iri, arguments.len())?;
     let (mut parameters, mut equal) = (Vec::<String>::new(), Vec::new());
     for argument in arguments {
-        let known = term(argument, variables, terms);
-        let own = match &known {
-            Term::Variable(own) if !parameters.iter().any(|other| *other == own.name.as_str()) => {
-                own.name.to_string()
+        let value = term(argument, variables, terms);
+        let parameter = match &value {
+            Term::Variable(parameter)
+                if !parameters.iter().any(|other| *other == parameter.name.as_str()) =>
+            {
+                parameter.name.to_string()
             }
-            Term::Variable(own) | Term::Constant(own) => {
-                let own = format!("{}_{}", own.name, parameters.len() + 1);
-                equal.push(Condition::Equal(variable(&own), known, Span::default()));
-                own
+            Term::Variable(parameter) | Term::Constant(parameter) => {
+                let parameter = format!("{}_{}", parameter.name, parameters.len() + 1);
+                equal.push(Condition::Equal(variable(&parameter), value, Span::default()));
+                parameter
             }
         };
-        parameters.push(own);
+        parameters.push(parameter);
     }
     let bound: Vec<String> =
         variables.names.values().filter(|name| !parameters.contains(name)).cloned().collect();
@@ -99,7 +101,7 @@ fn term(argument: &Argument, variables: &mut Variables, terms: &mut Terms) -> Te
     }
 }
 
-/// An atom of a body; none if it holds of everything.
+/// Translates an atom of a body. Returns `None` if the atom is a tautology.
 fn condition(
     stated: &Atom,
     variables: &mut Variables,
@@ -108,7 +110,7 @@ fn condition(
     let mut pair = |left: &Argument, right: &Argument, terms: &mut Terms| {
         [term(left, variables, terms), term(right, variables, terms)]
     };
-    let found = match stated {
+    let condition = match stated {
         Atom::Class(ClassExpression::Class(class), own) => {
             let own = term(own, variables, terms);
             if is_top(class) {
@@ -140,10 +142,10 @@ fn condition(
         Atom::Class(..) => return Err("it asks for a class expression".to_owned()),
         Atom::DataRange(..) => return Err("it asks for a data range".to_owned()),
     };
-    Ok(Some(found))
+    Ok(Some(condition))
 }
 
-/// A comparison of numbers.
+/// Translates a comparison of numbers.
 fn comparison(iri: &str, left: &Term, right: &Term) -> Result<Condition, String> {
     let relation = |name: &str, left: &Term, right: &Term| {
         Condition::Atom(atom(Name::new(name), vec![left.clone(), right.clone()]))
@@ -153,8 +155,8 @@ fn comparison(iri: &str, left: &Term, right: &Term) -> Result<Condition, String>
         "lessThan" => relation(LESS, left, right),
         "greaterThan" => relation(LESS, right, left),
         "equal" => {
-            let same = Condition::Equal(left.clone(), right.clone(), Span::default());
-            Condition::Or(vec![same, relation(EQUAL, left, right)])
+            let identical = Condition::Equal(left.clone(), right.clone(), Span::default());
+            Condition::Or(vec![identical, relation(EQUAL, left, right)])
         }
         "notEqual" => {
             let same = Condition::Equal(left.clone(), right.clone(), Span::default());

@@ -1,4 +1,4 @@
-//! Parts of PDDL that stand in no file.
+//! Constructors for PDDL syntax trees without source locations.
 
 use pddl::ast::{Atom, Condition, Declaration, Derived, Name, Span, Term, TypeExpression, TypedName};
 
@@ -13,19 +13,19 @@ pub(super) fn atom(predicate: Name, arguments: Vec<Term>) -> Atom {
     Atom { predicate: predicate.into(), arguments, span: Span::default() }
 }
 
-/// Entries of a typed list that may be anything.
+/// Builds the entries of a typed list without types.
 pub(super) fn untyped(names: &[&str]) -> Vec<TypedName> {
     let entry =
         |name: &&str| TypedName { identifier: Name::new(name).into(), r#type: TypeExpression::default() };
     names.iter().map(entry).collect()
 }
 
-/// A condition in which some variables may stand for anything.
+/// Binds variables of a condition existentially.
 pub(super) fn exists(bound: &[&str], condition: Condition) -> Condition {
     if bound.is_empty() { condition } else { Condition::Exists(untyped(bound), Box::new(condition)) }
 }
 
-/// A derived predicate.
+/// Builds a derived predicate.
 pub(super) fn axiom(head: Name, parameters: &[&str], condition: Condition) -> Derived {
     let head = Declaration { identifier: head.into(), parameters: untyped(parameters) };
     Derived { head, condition, span: Span::default() }

@@ -1,7 +1,9 @@
-//! What an ontology says in general, as PDDL: predicates, derived predicates, constants and their types.
+//! Translation of the terminology of an ontology to PDDL: predicates, derived predicates, constants
+//! and their types.
 //!
-//! For each class and property there are two predicates: the plain name for what is stated (and for what actions change), the
-//! inferred name for what is stated or follows. Axioms and rules become derived predicates over inferred names.
+//! Each class and property has two predicates: the plain name for asserted facts, which actions may
+//! change, and the inferred name for asserted and inferred facts. Axioms and rules become derived
+//! predicates over inferred names.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -14,55 +16,57 @@ use super::names::{self, Literals};
 use super::syntax::{atom, axiom, variable};
 use crate::message::Message;
 
-/// What an ontology says in general.
+/// The translated terminology of an ontology.
 #[derive(Debug, Clone, Default)]
 pub struct Terms {
-    /// The predicates, plain and inferred, with the number of their arguments.
+    /// Plain and inferred predicates with their arity.
     pub(super) predicates: BTreeMap<Name, usize>,
-    /// The plain predicates of classes and properties.
+    /// Plain predicates of classes and properties.
     pub(super) symbols: BTreeMap<Iri, Name>,
-    /// Plain predicates of data properties that have one value only.
+    /// Plain predicates of functional data properties.
     pub(super) functional: BTreeSet<Name>,
-    /// Axioms and rules.
+    /// Translated axioms and rules.
     pub(super) derived: Vec<Derived>,
-    /// The individuals and the values other than numbers, with the type of each that has one.
+    /// Constants for individuals and for values other than numbers, with their types if they have
+    /// one.
     pub(super) constants: BTreeMap<Name, Option<Name>>,
-    /// The numbers that rules name.
+    /// Numbers that occur in rules.
     pub(super) numbers: BTreeSet<Name>,
-    /// The names of literals.
+    /// Names of literals.
     pub(super) literals: Literals,
-    /// What is left out.
+    /// Warnings about axioms and rules without a translation.
     pub(super) warnings: Vec<Message>,
 }
 
 impl Terms {
-    /// Whether something is named so: a class or property, stated or inferred.
+    /// Returns `true` if a class or property has this plain or inferred predicate.
     pub(crate) fn has(&self, predicate: &Name) -> bool {
         self.predicates.contains_key(predicate)
     }
 
-    /// The classes and properties.
+    /// Declares the predicates of classes and properties.
     pub(super) fn signature(&mut self, ontology: &Ontology) {
         for (kind, arity) in
             [(EntityKind::Class, 1), (EntityKind::ObjectProperty, 2), (EntityKind::DataProperty, 2)]
         {
             for iri in ontology.entities(kind) {
                 if !is_annotation(iri) && !is_top(iri) {
-                    // Punned names are told apart by what is said of them below.
+                    // A punned name (class and property) is reported below, if an axiom or rule
+                    // uses it.
                     let _ = self.plain(iri, arity);
                 }
             }
         }
     }
 
-    /// The plain predicate of a class or property.
+    /// Returns the plain predicate of a class or property.
     ///
     /// # Errors
-    /// Another one of the same name has another number of arguments.
+    /// Another entity with the same name has another arity.
     pub(super) fn plain(&mut self, iri: &Iri, arity: usize) -> Result<Name, String> {
         let name = names::plain(iri);
-        let known = *self.predicates.entry(name.clone()).or_insert(arity);
-        if known != arity {
+        let declared_arity = *self.predicates.entry(name.clone()).or_insert(arity);
+        if declared_arity != arity {
             return Err(format!("`{name}` is a class and a property, which are one predicate in PDDL"));
         }
         self.predicates.insert(names::inferred(&name), arity);
@@ -70,13 +74,13 @@ impl Terms {
         Ok(name)
     }
 
-    /// That a class or property holds of terms, stated or inferred.
+    /// Returns the condition that a class or property holds, asserted or inferred.
     pub(super) fn inferred(&mut self, iri: &Iri, arguments: Vec<Term>) -> Result<Condition, String> {
         let plain = self.plain(iri, arguments.len())?;
         Ok(Condition::Atom(atom(names::inferred(&plain), arguments)))
     }
 
-    /// Constants: named individuals with their types, and the values of statements.
+    /// Collects the constants: named individuals with their types, and the values of assertions.
     pub(super) fn types(&mut self, ontology: &Ontology) {
         let (mut kinds, mut spelled) = (BTreeMap::new(), BTreeMap::new());
         for annotated in &ontology.axioms {
@@ -110,7 +114,7 @@ impl Terms {
         }
     }
 
-    /// The constant of an individual.
+    /// Returns the constant of an individual.
     pub(super) fn individual(&mut self, iri: &Iri) -> Name {
         let name = names::plain(iri);
         if !iri.starts_with(ANONYMOUS) {
@@ -119,7 +123,7 @@ impl Terms {
         name
     }
 
-    /// The constant of a value; numbers are constants where rules name them.
+    /// Returns the constant of a value. Numbers become constants only if they occur in rules.
     pub(super) fn literal(&mut self, literal: &ontology::Literal, in_rule: bool) -> Name {
         let (datatype, language) = (literal.datatype.as_deref(), literal.language.as_deref());
         let value = Literal::parse(&literal.lexical, datatype, language);
@@ -133,7 +137,7 @@ impl Terms {
         name
     }
 
-    /// What is stated holds.
+    /// Adds the axioms by which asserted facts hold as inferred ones.
     pub(super) fn lift(&mut self) {
         let plain: BTreeMap<Name, usize> =
             self.symbols.values().map(|name| (name.clone(), self.predicates[name])).collect();
@@ -145,12 +149,12 @@ impl Terms {
     }
 }
 
-/// Whether an IRI is one of PLANTA's, with which ontologies say what PDDL calls things.
+/// Returns `true` for the IRIs of PLANTA's annotations, by which ontologies specify PDDL names.
 pub(super) fn is_annotation(iri: &str) -> bool {
     iri.starts_with(annotation::NS)
 }
 
-/// Whether an IRI is that of the class of everything, which is not a condition, or of nothing.
+/// Returns `true` for `owl:Thing` and `owl:Nothing`, which have no predicate.
 pub(super) fn is_top(iri: &str) -> bool {
     [owl::THING, owl::NOTHING].contains(&iri)
 }

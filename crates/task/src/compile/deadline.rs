@@ -6,11 +6,12 @@ use pddl::ast::{ActionBody, Condition, Domain, Effect, Problem};
 use super::simplify::{all, flag, holds, not};
 use super::syntax_edits::{declare, hidden};
 
-/// After each state with one condition there is, so much later at most, one with another condition.
+/// A deadline: after each state with the first condition, the second condition must hold within a
+/// time.
 #[derive(Debug, Clone)]
 pub struct Deadline {
     pub within: BigRational,
-    /// Whether plans have to keep it.
+    /// `true` if plans must satisfy the deadline.
     pub is_hard: bool,
     number: usize,
 }
@@ -20,16 +21,17 @@ impl Deadline {
         Self { within, is_hard, number }
     }
 
-    /// The actions that never happen, whose conditions are the two, and the second of which notes that the deadline was kept if plans need not keep it.
+    /// Returns the names of the auxiliary actions whose preconditions are the two conditions. They
+    /// are never executed. The effect of the second one records a satisfied soft deadline.
     pub fn actions(&self) -> [String; 2] {
         ["begins", "ends"].map(|what| format!("deadline {} {what}", self.number))
     }
 }
 
-/// Never holds.
+/// Auxiliary atom that is never true.
 pub(super) const LOOKED_AT: &str = "a deadline was looked at";
 
-/// Adds the actions of deadlines.
+/// Adds the auxiliary actions of deadlines.
 pub(super) fn install(
     domain: &mut Domain,
     problem: &Problem,
@@ -42,7 +44,7 @@ pub(super) fn install(
     for (deadline, conditions, noted) in deadlines {
         let effects = [vec![], vec![noted]];
         for ((name, condition), mut effects) in deadline.actions().iter().zip(conditions).zip(effects) {
-            // What changes nothing would be left out.
+            // Actions without effects would be pruned.
             effects.push(Effect::Add(flag(LOOKED_AT)));
             let precondition = all([condition, not(holds(LOOKED_AT))]);
             let body = ActionBody::Instantaneous { precondition, effect: Effect::And(effects) };

@@ -1,4 +1,4 @@
-//! Conditions without free variables in the initial state.
+//! Evaluation of closed conditions in the initial state.
 
 use num_rational::BigRational;
 use num_traits::Zero;
@@ -15,7 +15,7 @@ use super::syntax_edits::unsupported;
 
 type Key = (Name, Vec<Name>);
 
-/// What holds at first. Derived predicates are not asked for.
+/// The initial state, without derived predicates.
 pub(super) struct Initial<'t> {
     objects: &'t Objects<'t>,
     domain: &'t Domain,
@@ -48,12 +48,14 @@ impl<'t> Initial<'t> {
         Self { objects, domain, facts, values }
     }
 
-    /// Whether a condition holds; one that depends on an undefined value does not.
+    /// Returns `true` if a condition holds. Conditions that depend on an undefined value do not
+    /// hold.
     pub(super) fn holds(&self, condition: &Condition) -> bool {
         self.truth(condition, &mut Vec::new()) == Some(true)
     }
 
-    /// Whether a condition always is true or false: where it may be neither, what is not met is not the same as its negation.
+    /// Checks that a condition is always true or false. Otherwise an unsatisfied condition differs
+    /// from its negation.
     pub(super) fn is_defined(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {
         match self.undefined(condition, &mut Vec::new()) {
             None => Ok(()),
@@ -67,7 +69,8 @@ impl<'t> Initial<'t> {
         }
     }
 
-    /// A function that a condition reads, and that may be without a value. Variables that nothing binds stand for all objects.
+    /// Returns a possibly undefined function that a condition reads. Unbound variables range over
+    /// all objects.
     fn undefined<'c>(&self, condition: &'c Condition, binding: &mut Binding) -> Option<&'c Name> {
         match condition {
             Condition::Exists(variables, body) | Condition::ForAll(variables, body) => {
@@ -94,17 +97,17 @@ impl<'t> Initial<'t> {
             return self.values.contains_key(&key(atom, binding));
         }
         let name = &atom.predicate.name;
-        let mut declared = self.domain.functions.iter().filter(|own| own.identifier.name == *name);
-        let instances = declared.next().map(|own| {
+        let mut declared = self.domain.functions.iter().filter(|function| function.identifier.name == *name);
+        let instances = declared.next().map(|function| {
             let members =
-                own.parameters.iter().map(|parameter| self.objects.members(&parameter.r#type).count());
+                function.parameters.iter().map(|parameter| self.objects.members(&parameter.r#type).count());
             members.fold(1, usize::saturating_mul)
         });
-        let known = self.values.keys().filter(|(own, _)| own == name).count();
-        instances.is_some_and(|instances| known >= instances)
+        let with_value = self.values.keys().filter(|(function, _)| function == name).count();
+        instances.is_some_and(|instances| with_value >= instances)
     }
 
-    /// The truth value in Kleene's logic; none where it depends on an undefined value.
+    /// Returns the truth value in Kleene's logic, or `None` if it depends on an undefined value.
     fn truth(&self, condition: &Condition, binding: &mut Binding) -> Option<bool> {
         match condition {
             Condition::And(parts) | Condition::Or(parts) => {
@@ -149,11 +152,11 @@ impl<'t> Initial<'t> {
             Expression::Operation(operation, operands, _) => {
                 let mut operands = operands.iter().map(|operand| self.value(operand, binding));
                 let first = operands.next()??;
-                let mut rest = operands.peekable();
-                if *operation == Arithmetic::Subtract && rest.peek().is_none() {
+                let mut remaining = operands.peekable();
+                if *operation == Arithmetic::Subtract && remaining.peek().is_none() {
                     return Some(-first);
                 }
-                rest.try_fold(first, |left, right| {
+                remaining.try_fold(first, |left, right| {
                     let right = right?;
                     Some(match operation {
                         Arithmetic::Add => left + right,
@@ -168,7 +171,7 @@ impl<'t> Initial<'t> {
     }
 }
 
-/// A disjunction, or a conjunction, of truth values.
+/// Disjunction or conjunction of truth values in Kleene's logic.
 fn kleene(truths: &[Option<bool>], is_disjunction: bool) -> Option<bool> {
     if truths.contains(&Some(is_disjunction)) {
         return Some(is_disjunction);

@@ -1,4 +1,4 @@
-//! Objects by type, and conditions with variables replaced by objects.
+//! Objects by type, and substitution of objects for variables.
 
 use crate::limits::Limits;
 use pddl::TypeHierarchy;
@@ -6,14 +6,14 @@ use pddl::ast::{Atom, Condition, Domain, Expression, Name, Problem, Term, TypeEx
 
 use super::simplify::identifier;
 
-/// The objects of a task, each with the types of its declarations.
+/// The objects of a task with the types of their declarations.
 pub(super) struct Objects<'t> {
     types: TypeHierarchy,
     all: Vec<(&'t Name, Vec<&'t TypeExpression>)>,
     limits: &'t Limits,
 }
 
-/// What stands for a variable, innermost last.
+/// Terms of variables, innermost last.
 pub(super) type Binding = Vec<(Name, Term)>;
 
 impl<'t> Objects<'t> {
@@ -30,13 +30,14 @@ impl<'t> Objects<'t> {
         Self { types: TypeHierarchy::of(domain), all: objects, limits }
     }
 
-    /// The objects of a type.
+    /// Returns the objects of a type.
     pub(super) fn members(&self, wanted: &TypeExpression) -> impl Iterator<Item = &'t Name> {
         let fits = |types: &[&TypeExpression]| types.iter().any(|given| self.types.fits(given, wanted));
         self.all.iter().filter(move |(_, types)| fits(types)).map(|(name, _)| *name)
     }
 
-    /// All ways to bind some variables, each added to a binding. They end at a limit, so that the limits are to be checked afterwards.
+    /// Returns all bindings of some variables, each appended to a binding. The iterator ends at a
+    /// limit, so callers must check the limits afterwards.
     pub(super) fn bindings(
         &self,
         variables: &[TypedName],
@@ -50,14 +51,14 @@ impl<'t> Objects<'t> {
         let positions = std::iter::successors(first, move |last| following(last, &sizes));
         let outer = binding.clone();
         self.limits.watch(positions).map_while(Result::ok).map(move |positions| {
-            let objects = members.iter().zip(positions).map(|(own, position)| own[position]);
+            let objects = members.iter().zip(positions).map(|(objects, position)| objects[position]);
             let constants = objects.map(|object| Term::Constant(identifier(object.as_str())));
             outer.iter().cloned().chain(names.iter().cloned().zip(constants)).collect()
         })
     }
 }
 
-/// The positions after some positions in lists of these sizes, in lexicographic order.
+/// Returns the next positions in lists of these sizes, in lexicographic order.
 fn following(positions: &[usize], sizes: &[usize]) -> Option<Vec<usize>> {
     let mut next = positions.to_vec();
     for (position, size) in next.iter_mut().zip(sizes).rev() {
@@ -70,7 +71,8 @@ fn following(positions: &[usize], sizes: &[usize]) -> Option<Vec<usize>> {
     None
 }
 
-/// A condition with objects for its variables. The variables of its own quantifiers get names that no action uses; `fresh` counts them.
+/// Substitutes objects for the variables of a condition. Quantified variables are renamed to names
+/// that no action uses; `fresh` counts them.
 #[expect(clippy::arithmetic_side_effects, reason = "as many bindings were pushed as are taken off")]
 pub(super) fn instance(condition: &Condition, binding: &mut Binding, fresh: &mut u64) -> Condition {
     use Condition as C;

@@ -1,14 +1,18 @@
-//! PDDL 3 to PDDL 2: preferences and constraints on trajectories are compiled away, on the syntax tree, before names become ids.
+//! Compiles preferences and trajectory constraints of PDDL 3 to PDDL 2, on the syntax tree before
+//! names are resolved.
 //!
-//! Each instance of a constraint gets atoms that remember what its automaton has to, and each action effects on them: a condition on
-//! the state *after* the action is regressed to the state before it (`regress`), so that no state is added to plans. What has to hold
-//! becomes a condition of actions and of the goal. Preferences are judged after the plan, by actions that are not shown (`preferences`):
-//! each either is met, or costs what the metric says (A. Gerevini et al.: Deterministic planning in the fifth international planning
-//! competition, Artificial Intelligence 173, 2009; regression after L. Bonassi et al.: On planning with qualitative
-//! state-trajectory constraints in PDDL3 by compiling them away, ICAPS 2021; preferences after E. Keyder, H. Geffner: Soft goals can be
-//! compiled away, JAIR 36, 2009). Where actions overlap, these actions never happen: their conditions are looked up in the last state.
+//! Each instance of a constraint gets atoms that store the state of its automaton, and each action
+//! gets effects on them. A condition on the state *after* an action is regressed to the state
+//! before it (`regress`), so plans have no additional states. Requirements become conditions of
+//! actions and of the goal. Preferences are evaluated after the plan by hidden actions
+//! (`preferences`): each one is either satisfied or costs what the metric specifies (A. Gerevini et
+//! al.: Deterministic planning in the fifth international planning competition, Artificial
+//! Intelligence 173, 2009; regression after L. Bonassi et al.: On planning with qualitative
+//! state-trajectory constraints in PDDL3 by compiling them away, ICAPS 2021; preferences after E.
+//! Keyder, H. Geffner: Soft goals can be compiled away, JAIR 36, 2009). With overlapping actions,
+//! the hidden actions are never executed: their conditions are evaluated in the last state.
 //!
-//! Names that are made up have a space, so that no file can mean them.
+//! Auxiliary names contain a space, so no file can use them.
 
 mod deadline;
 mod initial;
@@ -37,32 +41,33 @@ pub struct CompiledTask<'t> {
     pub domain: Cow<'t, Domain>,
     pub problem: Cow<'t, Problem>,
     pub objectives: Cow<'t, [Metric]>,
-    /// What plans have to keep in time, or should, which is judged when their times are known.
+    /// Deadlines, which are checked when the times of a plan are known.
     pub deadlines: Vec<Deadline>,
-    /// Whether nothing keeps happenings apart that the files do not. Of no meaning where actions do not overlap.
+    /// `true` if the compilation adds no separation between happenings. Irrelevant for sequential
+    /// plans.
     pub is_exact: bool,
 }
 
-/// Whether there is anything to compile.
+/// Returns `true` if there is anything to compile.
 pub fn is_needed(domain: &Domain, problem: &Problem) -> bool {
     constraints(domain, problem).next().is_some()
         || domain.actions.iter().any(|action| !action.preferences.is_empty())
 }
 
-/// Whether an action of that name is none of the domain, but judges preferences.
+/// Returns `true` for the name of an auxiliary action that evaluates preferences.
 pub fn is_hidden(action: &str) -> bool {
     action.contains(' ')
 }
 
-/// Whether an action of that name judges an instance of a preference violated.
+/// Returns `true` for the name of an action that evaluates a preference as violated.
 pub fn is_violation(action: &str) -> bool {
     is_hidden(action) && action.ends_with(preferences::VIOLATION)
 }
 
-/// Compiles preferences and constraints away. Preferences that no objective asks for are dropped.
+/// Compiles preferences and constraints away. Preferences that no objective uses are dropped.
 ///
 /// # Errors
-/// Every constraint that cannot be compiled, with its place; or a limit was reached.
+/// All unsupported constraints with their source locations, or a reached limit.
 pub fn compile<'t>(
     domain: &'t Domain,
     problem: &'t Problem,
@@ -116,7 +121,7 @@ pub fn compile<'t>(
         name_violations(&mut metric.expression);
     }
     if !asked.is_empty() {
-        // What an action prefers, it reads.
+        // The preconditions of preferences of an action count as reads.
         let mut preferences = task.0.actions.iter().flat_map(|action| &action.preferences);
         is_exact &= !preferences.any(|own| asked.contains(&own.name.name));
         preferences::install(&mut task.0, &mut task.1, (wanted, &asked), course);
@@ -136,7 +141,7 @@ fn constraints<'t>(
     of_domain.chain(problem.constraints.iter().map(|constraint| (File::Problem, constraint)))
 }
 
-/// The preference that `(is-violated NAME)` asks for.
+/// Returns the preference of `(is-violated NAME)`.
 fn violation(expression: &Expression) -> Option<&Name> {
     match expression {
         Expression::Fluent(atom) if atom.predicate.name == Name::new("is-violated") => {
@@ -149,7 +154,7 @@ fn violation(expression: &Expression) -> Option<&Name> {
     }
 }
 
-/// The preferences that some objectives ask for, each once.
+/// Returns the preferences that some objectives use, without duplicates.
 fn asked(objectives: &[Metric]) -> Vec<Name> {
     fn walk(expression: &Expression, found: &mut Vec<Name>) {
         if let Some(name) = violation(expression).filter(|name| !found.contains(name)) {
@@ -161,14 +166,14 @@ fn asked(objectives: &[Metric]) -> Vec<Name> {
             }
         }
     }
-    let mut found = Vec::new();
+    let mut preferences = Vec::new();
     for metric in objectives {
-        walk(&metric.expression, &mut found);
+        walk(&metric.expression, &mut preferences);
     }
-    found
+    preferences
 }
 
-/// Gives the number of violations of each preference a function of its own.
+/// Replaces the number of violations of each preference by a numeric function.
 fn name_violations(expression: &mut Expression) {
     if let Some(name) = violation(expression).cloned() {
         *expression = Expression::Fluent(preferences::count(&name));

@@ -1,8 +1,11 @@
-//! Preferences as actions after the plan, which are not shown: each instance of a preference is met, or violated at a cost.
+//! Compiles preferences to hidden actions after the plan: each instance is satisfied, or violated
+//! at a cost.
 //!
-//! They come in one order, each is possible in one way only, and they change nothing else. So every plan can be judged in exactly one way.
-//! Where actions overlap, the plan would last longer by them: there is one for each instance that is violated, which never happens. Its
-//! condition is looked up in the last state.
+//! The actions have a fixed order, exactly one of both is applicable for each instance, and they
+//! change nothing else. Every plan thus has exactly one evaluation. With overlapping actions, the
+//! hidden actions would extend the makespan. There is then an action per instance with its
+//! violation as the precondition, which is never executed: its condition is evaluated in the last
+//! state.
 
 use num_rational::BigRational;
 use num_traits::{One, Zero};
@@ -16,26 +19,26 @@ use super::semantics::PlanSemantics;
 use super::simplify::{all, flag, holds, not};
 use super::syntax_edits::{PreferenceInstance, declare, happen, hidden, require};
 
-/// Holds as long as actions can be executed.
+/// Auxiliary atom that holds while actions can be executed.
 const GOING_ON: &str = "the plan goes on";
 
-/// How the names of actions end that judge an instance violated.
+/// Suffix of the names of actions that evaluate an instance as violated.
 pub(super) const VIOLATION: &str = " is violated";
 
-/// Never holds.
+/// Auxiliary atom that is never true.
 const VIOLATED: &str = "a preference is violated";
 
-/// The function that counts the violations of a preference.
+/// Returns the function that counts the violations of a preference.
 pub(super) fn count(preference: &Name) -> Atom {
     flag(&format!("violations of {preference}"))
 }
 
 fn violate(preference: &Name) -> Effect {
-    let one = Expression::Number(BigRational::one(), Span::default());
-    Effect::Assign(Assignment::Increase, count(preference), one, Span::default())
+    let unit = Expression::Number(BigRational::one(), Span::default());
+    Effect::Assign(Assignment::Increase, count(preference), unit, Span::default())
 }
 
-/// Adds the preferences that are asked for.
+/// Adds the preferences that objectives use.
 pub(super) fn install(
     domain: &mut Domain,
     problem: &mut Problem,
@@ -57,7 +60,7 @@ pub(super) fn install(
     }
 }
 
-/// Adds the actions that judge after the plan.
+/// Adds the actions that evaluate preferences after the plan.
 fn follow(domain: &mut Domain, problem: &mut Problem, wanted: Vec<PreferenceInstance>) {
     declare(domain, GOING_ON);
     problem.init.push(InitialElement::Fact(flag(GOING_ON)));
@@ -70,7 +73,7 @@ fn follow(domain: &mut Domain, problem: &mut Problem, wanted: Vec<PreferenceInst
     for ((name, condition), number) in wanted.into_iter().zip(1_u64..) {
         let after = format!("{number} preferences are judged");
         declare(domain, &after);
-        // The goal holds when the first preference is judged, and nothing changes any more.
+        // The goal must hold at the first evaluation, and the state is unchanged afterwards.
         let ready = all([holds(&before)].into_iter().chain(first.take()));
         let pass = [Effect::Delete(flag(&before)), Effect::Add(flag(&after))];
         let met = (format!("preference {number} is met"), condition.clone(), None);
@@ -87,13 +90,13 @@ fn follow(domain: &mut Domain, problem: &mut Problem, wanted: Vec<PreferenceInst
     problem.goal = holds(&before);
 }
 
-/// Adds the actions whose condition is that an instance is violated.
+/// Adds the actions whose precondition is the violation of an instance.
 fn look_up(domain: &mut Domain, span: Span, wanted: Vec<PreferenceInstance>) {
     if !wanted.is_empty() {
         declare(domain, VIOLATED);
     }
     for ((name, condition), number) in wanted.into_iter().zip(1_u64..) {
-        // What changes nothing would be left out.
+        // Actions without effects would be pruned.
         let precondition = all([not(condition), not(holds(VIOLATED))]);
         let effect = Effect::And(vec![violate(&name), Effect::Add(flag(VIOLATED))]);
         let body = ActionBody::Instantaneous { precondition, effect };
@@ -101,7 +104,7 @@ fn look_up(domain: &mut Domain, span: Span, wanted: Vec<PreferenceInstance>) {
     }
 }
 
-/// Lets an action count the violations of its own preferences.
+/// Makes an action count the violations of its own preferences.
 fn count_preferences(action: &mut Action, asked: &[Name]) {
     let preferences = std::mem::take(&mut action.preferences);
     for preference in preferences.into_iter().filter(|own| asked.contains(&own.name.name)) {

@@ -1,4 +1,5 @@
-//! Conditions on the state after a happening to conditions on the state before it (R. Reiter: Knowledge in Action, 2001, chapter 4).
+//! Regression of conditions on the state after a happening to conditions on the state before it (R.
+//! Reiter: Knowledge in Action, 2001, chapter 4).
 
 use pddl::ast::{
     Action, ActionBody, Arithmetic, Assignment, Atom, Condition, Effect, EffectTime, Expression, Name, Span,
@@ -7,29 +8,30 @@ use pddl::ast::{
 
 use super::simplify::{all, any, equal, exists, falsity, is_false, not};
 
-/// How many ways a comparison may turn out, by which of its functions change.
+/// Limit on the number of cases of a comparison, by which of its functions change.
 const MAX_CASES: usize = 64;
 
-/// What one happening of an action changes.
+/// Changes of a happening of an action.
 pub(super) struct Happening {
     changes: Vec<Change>,
 }
 
-/// An effect with the quantifiers and conditions that it stands below.
+/// An effect with its quantifiers and conditions.
 struct Change {
     bound: Vec<TypedName>,
     conditions: Vec<Condition>,
     effect: Effect,
 }
 
-/// A way in which functions can change: when it is so, and what stands for each function then.
+/// A case of how functions change: its condition and the new value of each function.
 type Way = (Condition, Vec<(Atom, Expression)>);
 
-/// A condition that cannot be regressed.
+/// Reason why a condition cannot be regressed.
 pub(super) struct NotRegressable(pub(super) &'static str);
 
 impl Happening {
-    /// What an action changes at a time; an instantaneous one does everything at its start.
+    /// Returns the changes of an action at a time. All changes of an instantaneous action are at
+    /// its start.
     pub(super) fn of(action: &Action, time: EffectTime) -> Self {
         let mut changes = Vec::new();
         match &action.body {
@@ -38,7 +40,7 @@ impl Happening {
             }
             ActionBody::Instantaneous { .. } => {}
             ActionBody::Durative { effects, .. } => {
-                for (_, effect) in effects.iter().filter(|(own, _)| *own == time) {
+                for (_, effect) in effects.iter().filter(|(at, _)| *at == time) {
                     flatten(effect, &[], &[], &mut changes);
                 }
             }
@@ -46,7 +48,7 @@ impl Happening {
         Self { changes }
     }
 
-    /// Whether a number of that function is changed.
+    /// Returns `true` if the happening changes a value of the function.
     pub(super) fn changes_function(&self, name: &Name) -> bool {
         self.changes
             .iter()
@@ -54,11 +56,11 @@ impl Happening {
             .any(|(own, numeric)| numeric && own.predicate.name == *name)
     }
 
-    /// Under which condition the happening may change whether a condition holds. The condition has no free variables.
+    /// Returns the condition under which the happening may change the truth of a closed condition.
     pub(super) fn touches(&self, condition: &Condition) -> Condition {
-        let mut found = Vec::new();
-        self.touching(condition, &mut Vec::new(), &mut found);
-        any(found)
+        let mut conditions_of_change = Vec::new();
+        self.touching(condition, &mut Vec::new(), &mut conditions_of_change);
+        any(conditions_of_change)
     }
 
     fn touching(&self, condition: &Condition, inner: &mut Vec<TypedName>, found: &mut Vec<Condition>) {
@@ -82,7 +84,8 @@ impl Happening {
         }
     }
 
-    /// Under which conditions an atom or a function is changed, whatever stands for the variables in `inner`.
+    /// Adds the conditions under which an atom or a function changes, for any values of the
+    /// variables in `inner`.
     fn touched(&self, atom: &Atom, is_function: bool, inner: &[TypedName], found: &mut Vec<Condition>) {
         for change in &self.changes {
             let (target, numeric) = target(&change.effect);
@@ -95,14 +98,14 @@ impl Happening {
             };
             let pairs = target.arguments.iter().zip(&atom.arguments).filter(|(_, own)| !is_inner(own));
             let matches = all(pairs.map(|(changed, own)| equal(changed, own)));
-            let same = exists(&change.bound, matches);
-            if !found.iter().any(|known| format!("{known:?}") == format!("{same:?}")) {
-                found.push(same);
+            let is_affected = exists(&change.bound, matches);
+            if !found.iter().any(|known| format!("{known:?}") == format!("{is_affected:?}")) {
+                found.push(is_affected);
             }
         }
     }
 
-    /// The condition in terms of the state before.
+    /// Regresses a condition to the state before the happening.
     pub(super) fn regress(&self, condition: &Condition) -> Result<Condition, NotRegressable> {
         let each =
             |parts: &[Condition]| parts.iter().map(|part| self.regress(part)).collect::<Result<Vec<_>, _>>();
@@ -122,7 +125,7 @@ impl Happening {
             Condition::Atom(atom) => {
                 let added = self.occurs(atom, |effect| matches!(effect, Effect::Add(_)));
                 let deleted = self.occurs(atom, |effect| matches!(effect, Effect::Delete(_)));
-                // Of an atom that is added and deleted, the addition counts.
+                // Addition takes precedence over deletion.
                 any([added, all([Condition::Atom(atom.clone()), not(deleted)])])
             }
             Condition::Equal(..) => condition.clone(),
@@ -139,7 +142,7 @@ impl Happening {
         })
     }
 
-    /// When a change of an atom takes place.
+    /// Returns the condition under which an atom changes.
     fn occurs(&self, atom: &Atom, is_kind: impl Fn(&Effect) -> bool) -> Condition {
         let changes = self.changes.iter().filter(|change| is_kind(&change.effect));
         any(changes.map(|change| {
@@ -152,7 +155,7 @@ impl Happening {
         }))
     }
 
-    /// Every way in which functions can change: when it is so, and what stands for each function then.
+    /// Returns all cases of how functions change.
     fn ways(&self, functions: &[Atom]) -> Result<Vec<Way>, NotRegressable> {
         let mut ways = vec![(super::simplify::truth(), Vec::new())];
         for function in functions {
@@ -167,19 +170,19 @@ impl Happening {
                 if !change.bound.is_empty() {
                     return Err(NotRegressable("a number that an effect changes for all objects"));
                 }
-                let mut more = Vec::new();
+                let mut cases = Vec::new();
                 for (condition, value) in values {
-                    more.push((all([condition.clone(), hits.clone()]), changed(*kind, &value, by)));
-                    more.push((all([condition, not(hits.clone())]), value));
+                    cases.push((all([condition.clone(), hits.clone()]), changed(*kind, &value, by)));
+                    cases.push((all([condition, not(hits.clone())]), value));
                 }
-                more.retain(|(condition, _)| !is_false(condition));
-                values = more;
+                cases.retain(|(condition, _)| !is_false(condition));
+                values = cases;
             }
-            let longer = ways.iter().flat_map(|(condition, known): &Way| {
+            let longer = ways.iter().flat_map(|(condition, assigned): &Way| {
                 values.iter().map(|(own, value)| {
-                    let mut known = known.clone();
-                    known.push((function.clone(), value.clone()));
-                    (all([condition.clone(), own.clone()]), known)
+                    let mut assigned = assigned.clone();
+                    assigned.push((function.clone(), value.clone()));
+                    (all([condition.clone(), own.clone()]), assigned)
                 })
             });
             ways = longer.collect();
@@ -192,7 +195,7 @@ impl Happening {
 }
 
 impl Change {
-    /// When the change takes place and is one of this atom.
+    /// Returns the condition under which the change affects this atom.
     fn hits(&self, target: &Atom, atom: &Atom) -> Condition {
         let matches = target.arguments.iter().zip(&atom.arguments).map(|(changed, own)| equal(changed, own));
         all(self.conditions.iter().cloned().chain(matches))
@@ -221,7 +224,7 @@ fn flatten(effect: &Effect, bound: &[TypedName], conditions: &[Condition], out: 
     }
 }
 
-/// What an effect changes, and whether that is a number.
+/// Returns the target of an effect, and `true` if the target is a number.
 fn target(effect: &Effect) -> (&Atom, bool) {
     match effect {
         Effect::Assign(_, target, ..) => (target, true),
@@ -235,16 +238,16 @@ fn is_same_symbol(left: &Atom, right: &Atom) -> bool {
 }
 
 fn is_same(left: &Atom, right: &Atom) -> bool {
-    let same = |(left, right): (&Term, &Term)| match (left, right) {
+    let is_equal = |(left, right): (&Term, &Term)| match (left, right) {
         (Term::Variable(left), Term::Variable(right)) | (Term::Constant(left), Term::Constant(right)) => {
             left.name == right.name
         }
         _ => false,
     };
-    is_same_symbol(left, right) && left.arguments.iter().zip(&right.arguments).all(same)
+    is_same_symbol(left, right) && left.arguments.iter().zip(&right.arguments).all(is_equal)
 }
 
-/// The functions in an expression, each once.
+/// Collects the functions of an expression without duplicates.
 fn functions_of(expression: &Expression, found: &mut Vec<Atom>) {
     expression.walk_fluents(&mut |atom| {
         if !found.iter().any(|known| is_same(known, atom)) {
@@ -267,7 +270,7 @@ fn substitute(expression: &Expression, values: &[(Atom, Expression)]) -> Express
     }
 }
 
-/// The value after an assignment.
+/// Returns the value after an assignment.
 fn changed(kind: Assignment, value: &Expression, by: &Expression) -> Expression {
     let with = |operation| Expression::Operation(operation, vec![value.clone(), by.clone()], Span::default());
     match kind {

@@ -2,11 +2,11 @@
 
 use num_rational::BigRational;
 
-/// How the states of a plan follow each other.
+/// Execution semantics of a plan.
 #[derive(Clone, Copy)]
 pub enum PlanSemantics<'c> {
-    /// Actions one after another.
+    /// Sequential execution.
     Sequence,
-    /// Actions may overlap. What interferes lies so far apart.
+    /// Actions may overlap. Interfering happenings are separated by this time.
     Overlapping(&'c BigRational),
 }

@@ -6,7 +6,7 @@ pub(super) fn identifier(name: &str) -> Identifier {
     Identifier { name: Name::new(name), span: Span::default() }
 }
 
-/// An atom without arguments.
+/// Returns an atom without arguments.
 pub(super) fn flag(name: &str) -> Atom {
     Atom { predicate: identifier(name), arguments: Vec::new(), span: Span::default() }
 }
@@ -32,27 +32,27 @@ pub(super) fn is_false(condition: &Condition) -> bool {
 }
 
 pub(super) fn all(parts: impl IntoIterator<Item = Condition>) -> Condition {
-    let mut kept = Vec::new();
+    let mut conjuncts = Vec::new();
     for part in parts {
         match part {
             part if is_false(&part) => return falsity(),
-            Condition::And(inner) => kept.extend(inner),
-            part => kept.push(part),
+            Condition::And(inner) => conjuncts.extend(inner),
+            part => conjuncts.push(part),
         }
     }
-    if kept.len() == 1 { kept.swap_remove(0) } else { Condition::And(kept) }
+    if conjuncts.len() == 1 { conjuncts.swap_remove(0) } else { Condition::And(conjuncts) }
 }
 
 pub(super) fn any(parts: impl IntoIterator<Item = Condition>) -> Condition {
-    let mut kept = Vec::new();
+    let mut disjuncts = Vec::new();
     for part in parts {
         match part {
             part if is_true(&part) => return truth(),
-            Condition::Or(inner) => kept.extend(inner),
-            part => kept.push(part),
+            Condition::Or(inner) => disjuncts.extend(inner),
+            part => disjuncts.push(part),
         }
     }
-    if kept.len() == 1 { kept.swap_remove(0) } else { Condition::Or(kept) }
+    if disjuncts.len() == 1 { disjuncts.swap_remove(0) } else { Condition::Or(disjuncts) }
 }
 
 pub(super) fn not(condition: Condition) -> Condition {
@@ -80,12 +80,12 @@ pub(super) fn exists(variables: &[TypedName], body: Condition) -> Condition {
     Condition::Exists(variables.to_vec(), Box::new(body))
 }
 
-/// The conditions of which one holds if a condition does.
+/// Returns the disjuncts of a condition.
 pub(super) fn ways(condition: Condition) -> Vec<Condition> {
     if let Condition::Or(parts) = condition { parts } else { vec![condition] }
 }
 
-/// A condition where another one holds, without what that decides.
+/// Simplifies a condition under the assumption that another one holds.
 pub(super) fn assume(condition: &Condition, known: &Condition) -> Condition {
     if format!("{condition:?}") == format!("{known:?}") {
         return truth();

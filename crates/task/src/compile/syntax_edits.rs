@@ -7,7 +7,7 @@ use pddl::ast::{
 
 use super::simplify::{all, identifier};
 
-/// An instance of a preference: its name, and what has to hold in the end.
+/// An instance of a preference: its name and the condition on the last state.
 pub(super) type PreferenceInstance = (Name, Condition);
 
 /// Declares a predicate without parameters.
@@ -15,17 +15,17 @@ pub(super) fn declare(domain: &mut Domain, name: &str) {
     domain.predicates.push(Declaration { identifier: identifier(name), parameters: Vec::new() });
 }
 
-/// An action without parameters that is none of the domain.
+/// Returns an auxiliary action without parameters, hidden from users.
 pub(super) fn hidden(name: &str, body: ActionBody, span: Span) -> Action {
     Action { identifier: identifier(name), parameters: Vec::new(), body, preferences: Vec::new(), span }
 }
 
-/// Adds a condition to an action, in the state before what it does at a time.
+/// Adds a condition to an action, on the state before its happening at a time.
 pub(super) fn require(action: &mut Action, time: EffectTime, condition: Condition) {
     match &mut action.body {
         ActionBody::Instantaneous { precondition, .. } => {
-            let own = std::mem::replace(precondition, Condition::And(Vec::new()));
-            *precondition = all([own, condition]);
+            let original = std::mem::replace(precondition, Condition::And(Vec::new()));
+            *precondition = all([original, condition]);
         }
         ActionBody::Durative { conditions, .. } => {
             let time = match time {
@@ -41,14 +41,14 @@ pub(super) fn require(action: &mut Action, time: EffectTime, condition: Conditio
 pub(super) fn happen(action: &mut Action, time: EffectTime, more: Effect) {
     match &mut action.body {
         ActionBody::Instantaneous { effect, .. } => {
-            let own = std::mem::replace(effect, Effect::And(Vec::new()));
-            *effect = Effect::And(vec![own, more]);
+            let original = std::mem::replace(effect, Effect::And(Vec::new()));
+            *effect = Effect::And(vec![original, more]);
         }
         ActionBody::Durative { effects, .. } => effects.push((time, more)),
     }
 }
 
-/// A construct that cannot be compiled.
+/// Error about an unsupported construct.
 pub(super) fn unsupported(
     construct: impl Into<String>,
     instead: impl Into<String>,

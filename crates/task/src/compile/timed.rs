@@ -1,7 +1,7 @@
-//! Constraints on the times of states, where actions overlap: timed initial literals tell what time has come.
+//! Constraints on times with overlapping actions: timed initial literals mark the times.
 //!
-//! What happens reads them, so it lies apart from them by the separation. They come so much later, or sooner, than the time that is
-//! meant, so that something may happen at that time, too.
+//! Happenings read these literals, so they are separated from them. The literals are therefore
+//! shifted by the separation, so that happenings at the specified time remain possible.
 
 use num_rational::BigRational;
 use num_traits::{Signed, Zero};
@@ -16,7 +16,7 @@ use super::syntax_edits::unsupported;
 use super::trajectory_monitors::{Addition, Monitors, decided};
 
 impl Monitors<'_> {
-    /// How far apart happenings are that interfere.
+    /// Returns the separation of interfering happenings.
     fn separation(&self, place: (File, Span)) -> Result<BigRational, Error> {
         match self.course {
             PlanSemantics::Overlapping(separation) => Ok(separation.clone()),
@@ -28,11 +28,11 @@ impl Monitors<'_> {
         }
     }
 
-    /// The atom that is added at a time, which is above 0.
+    /// Returns the atom that is added at a time above 0.
     fn moment(&mut self, time: BigRational) -> Condition {
         let name = format!("time {time} has come");
-        let known = self.moments.iter().any(|(known, _)| *known == name);
-        self.moments.extend((!known).then(|| (name.clone(), time)));
+        let is_declared = self.moments.iter().any(|(is_declared, _)| *is_declared == name);
+        self.moments.extend((!is_declared).then(|| (name.clone(), time)));
         holds(&name)
     }
 
@@ -55,8 +55,8 @@ impl Monitors<'_> {
         Ok(holds(&met))
     }
 
-    /// A condition that has to hold in the state that there is at a time, and in those that are reached from then on, until another time if
-    /// there is one.
+    /// Monitors a condition that must hold in the state at a time and in all later states,
+    /// optionally until another time.
     pub(super) fn hold(
         &mut self,
         (from, until): (&BigRational, Option<&BigRational>),
@@ -70,7 +70,7 @@ impl Monitors<'_> {
         if from.is_negative() && !is_asked(&zero) {
             return Ok(decided(true));
         }
-        // The initial state and one after it may both be of time 0.
+        // The initial state and a later one may both have time 0.
         let at_first = from.is_positive() || !is_asked(&zero) || self.initial.holds(what);
         let broken = if hard { None } else { Some(self.remember("is broken", !at_first)) };
         let looked_at = self.remember("was looked at", false);
@@ -86,17 +86,18 @@ impl Monitors<'_> {
         };
         self.after_each(&[what], place, |touched, after| {
             let touched = all([touched, begun.clone()]);
-            let left = all([touched.clone(), not(holds(&looked_at)), not(what.clone())]);
+            let violated = all([touched.clone(), not(holds(&looked_at)), not(what.clone())]);
             let reached = all([touched.clone(), not(over.clone()), not(after[0].clone())]);
             let mut addition = Addition::notes(touched, Effect::Add(flag(&looked_at)));
-            addition.forbid(any([left, reached]), broken.as_deref());
+            addition.forbid(any([violated, reached]), broken.as_deref());
             addition
         })?;
-        let kept = broken.map_or(decided(at_first), |broken| not(holds(&broken)));
-        Ok(all([kept, any([holds(&looked_at), what.clone()])]))
+        let satisfied = broken.map_or(decided(at_first), |broken| not(holds(&broken)));
+        Ok(all([satisfied, any([holds(&looked_at), what.clone()])]))
     }
 
-    /// While the search goes on, it is kept as long as nothing begins that has to end in time. What has been kept is known with the times.
+    /// During search, the constraint counts as satisfied while no deadline is pending. The
+    /// deadlines are checked when the times are known.
     pub(super) fn always_within(
         &mut self,
         within: &BigRational,
@@ -108,21 +109,23 @@ impl Monitors<'_> {
         for condition in [first, second] {
             self.can_be_watched(condition, place)?;
         }
-        let own = Deadline::new(within.clone(), hard, self.deadlines.len());
+        let deadline = Deadline::new(within.clone(), hard, self.deadlines.len());
         let begun = self.remember("has begun", self.initial.holds(first) && !self.initial.holds(second));
-        // What begins keeps apart from what ends it, so that it can be put off until it has ended.
+        // Starts of the deadline are separated from its ends, so that a start can be delayed after
+        // the end.
         self.after_each(&[first, second], place, |touched, after| {
             let begins = all([touched, after[0].clone(), not(after[1].clone())]);
             Addition::notes(begins, Effect::Add(flag(&begun)))
         })?;
         let (noted, last) = if hard {
-            // The search tells by this whether it has begun; it never happens.
+            // The search evaluates this effect to detect pending deadlines; the action is never
+            // executed.
             (Effect::When(holds(&begun), Box::new(Effect::Add(flag(LOOKED_AT)))), truth())
         } else {
-            let kept = self.remember("is kept", false);
-            (Effect::Add(flag(&kept)), any([not(holds(&begun)), holds(&kept)]))
+            let satisfied = self.remember("is kept", false);
+            (Effect::Add(flag(&satisfied)), any([not(holds(&begun)), holds(&satisfied)]))
         };
-        self.deadlines.push((own, [first.clone(), second.clone()], noted));
+        self.deadlines.push((deadline, [first.clone(), second.clone()], noted));
         Ok(last)
     }
 }

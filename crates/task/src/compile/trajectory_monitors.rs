@@ -1,4 +1,5 @@
-//! Monitors of trajectory constraints: the atoms that store the state of each automaton, and the effects that update them.
+//! Monitors of trajectory constraints: the atoms that store the state of each automaton, and the
+//! effects that update them.
 
 use num_rational::BigRational;
 use num_traits::{Signed, Zero};
@@ -19,34 +20,34 @@ use super::semantics::PlanSemantics;
 use super::simplify::{all, any, assume, flag, holds, is_false, is_true, not, ways};
 use super::syntax_edits::{PreferenceInstance, declare, happen, require, unsupported};
 
-/// Constraints have at most this many instances together.
+/// Limit on the total number of instances of constraints.
 const INSTANCES: usize = 20_000;
 
-/// The constraints of a task, as far as they were taken up.
+/// Monitors of the added constraints.
 pub(super) struct Monitors<'t> {
     domain: &'t Domain,
     problem: &'t Problem,
     objects: &'t Objects<'t>,
     pub(super) initial: Initial<'t>,
-    /// What the actions have in addition, by action and time.
+    /// Additional conditions and effects by action and time.
     additions: Vec<[Addition; 2]>,
-    /// Atoms that remember, and whether they hold at first.
+    /// Monitor atoms with their initial truth values.
     memory: Vec<(String, bool)>,
-    /// What has to hold in the end.
+    /// Conditions on the last state.
     goals: Vec<Condition>,
     wanted: Vec<PreferenceInstance>,
-    /// Atoms that timed initial literals add, and when.
+    /// Atoms that timed initial literals add, with their times.
     pub(super) moments: Vec<(String, BigRational)>,
     pub(super) course: PlanSemantics<'t>,
-    /// What has to be kept in time: the two conditions, and what notes that it was.
+    /// Deadlines: the two conditions, and the effect that records satisfaction.
     pub(super) deadlines: Vec<(Deadline, [Condition; 2], Effect)>,
-    /// Whether durations are asked for that the files do not ask for.
+    /// `true` if the compilation restricts durations further than the files.
     narrows: bool,
     instances: usize,
     fresh: u64,
 }
 
-/// What one happening of an action has in addition.
+/// Additional conditions and effects of a happening.
 #[derive(Default)]
 pub(super) struct Addition {
     conditions: Vec<Condition>,
@@ -85,7 +86,7 @@ impl<'t> Monitors<'t> {
         self.initial.is_defined(condition, place)
     }
 
-    /// Takes up a constraint.
+    /// Adds a constraint.
     pub(super) fn add_constraint(&mut self, file: File, constraint: &Constraint) -> Result<(), Error> {
         for binding in self.objects.bindings(&constraint.variables, &Vec::new()) {
             let place = (file, constraint.span);
@@ -99,7 +100,8 @@ impl<'t> Monitors<'t> {
         Ok(())
     }
 
-    /// What has to hold in the last state for a trajectory to be as wanted. One that is `hard` can rule actions out.
+    /// Adds the monitor of a trajectory and returns the condition on the last state. A `hard`
+    /// trajectory may also restrict actions.
     fn trajectory(
         &mut self,
         trajectory: &Trajectory,
@@ -167,15 +169,16 @@ impl<'t> Monitors<'t> {
         }
     }
 
-    /// An atom that remembers something about an instance.
+    /// Adds an atom for the state of the current instance.
     pub(super) fn remember(&mut self, what: &str, at_first: bool) -> String {
         let name = format!("instance {} {what}", self.instances);
         self.memory.push((name.clone(), at_first));
         name
     }
 
-    /// Adds to each happening of each action that may change one of some conditions what is made of the condition that it does,
-    /// and of the conditions after it.
+    /// Calls `make` for each happening of each action that may change one of the conditions, with
+    /// the condition of the change and the regressed conditions, and adds the result to the
+    /// happening.
     pub(super) fn after_each(
         &mut self,
         conditions: &[&Condition],
@@ -220,16 +223,18 @@ impl<'t> Monitors<'t> {
                 })?;
                 for way in ways(touched) {
                     let after: Vec<_> = after.iter().map(|condition| assume(condition, &way)).collect();
-                    let more = make(way, &after);
-                    addition.conditions.extend(more.conditions.into_iter().filter(|own| !is_true(own)));
-                    addition.effects.extend(more.effects);
+                    let addition_of_way = make(way, &after);
+                    addition
+                        .conditions
+                        .extend(addition_of_way.conditions.into_iter().filter(|own| !is_true(own)));
+                    addition.effects.extend(addition_of_way.effects);
                 }
             }
         }
         Ok(())
     }
 
-    /// Whether what happenings have in addition keeps none of them apart from another one, and rules none out.
+    /// Returns `true` if the additions neither separate happenings nor exclude any.
     pub(super) fn keeps_apart_nothing(&self) -> bool {
         let is_plain = |addition: &Addition| {
             addition.conditions.is_empty()
@@ -243,7 +248,7 @@ impl<'t> Monitors<'t> {
         !self.narrows && self.deadlines.is_empty() && self.additions.iter().flatten().all(is_plain)
     }
 
-    /// Whether nothing but actions changes a condition.
+    /// Checks that only actions change a condition.
     pub(super) fn can_be_watched(&self, condition: &Condition, place: (File, Span)) -> Result<(), Error> {
         let mut predicates = FxHashSet::default();
         predicates_of(condition, &mut predicates);
@@ -279,11 +284,11 @@ impl<'t> Monitors<'t> {
     }
 
     fn sometime(&mut self, what: &Condition, place: (File, Span)) -> Result<Condition, Error> {
-        let seen = self.remember("was met", self.initial.holds(what));
+        let was_met = self.remember("was met", self.initial.holds(what));
         self.after_each(&[what], place, |touched, after| {
-            Addition::notes(all([touched, after[0].clone()]), Effect::Add(flag(&seen)))
+            Addition::notes(all([touched, after[0].clone()]), Effect::Add(flag(&was_met)))
         })?;
-        Ok(holds(&seen))
+        Ok(holds(&was_met))
     }
 
     fn at_most_once(
@@ -330,21 +335,22 @@ impl<'t> Monitors<'t> {
         hard: bool,
         place: (File, Span),
     ) -> Result<Condition, Error> {
-        let seen = self.remember("was met", self.initial.holds(second));
+        let was_met = self.remember("was met", self.initial.holds(second));
         let at_first = self.initial.holds(first);
         let broken = if hard { None } else { Some(self.remember("is broken", at_first)) };
         self.after_each(&[first], place, |touched, after| {
             let mut addition = Addition::default();
-            addition.forbid(all([touched, after[0].clone(), not(holds(&seen))]), broken.as_deref());
+            addition.forbid(all([touched, after[0].clone(), not(holds(&was_met))]), broken.as_deref());
             addition
         })?;
         self.after_each(&[second], place, |touched, after| {
-            Addition::notes(all([touched, after[0].clone()]), Effect::Add(flag(&seen)))
+            Addition::notes(all([touched, after[0].clone()]), Effect::Add(flag(&was_met)))
         })?;
         Ok(broken.map_or(decided(!at_first), |broken| not(holds(&broken))))
     }
 
-    /// Changes the task. What is left are the preferences, what has to hold in the last state for each, and what has to be kept in time.
+    /// Applies the monitors to the task. Returns the preferences with their conditions on the last
+    /// state, and the deadlines.
     pub(super) fn install(
         self,
         domain: &mut Domain,
@@ -391,7 +397,7 @@ impl Addition {
         Self { conditions: Vec::new(), effects: vec![effect] }
     }
 
-    /// Rules out what must not be, or notes that it was.
+    /// Excludes a violation, or records it in an atom.
     pub(super) fn forbid(&mut self, what: Condition, broken: Option<&str>) {
         match broken {
             None => self.conditions.push(not(what)),
@@ -400,7 +406,7 @@ impl Addition {
     }
 }
 
-/// Whether a condition is about the objects of an action only.
+/// Returns `true` if a condition depends only on the objects of an action.
 fn reads_nothing(condition: &Condition) -> bool {
     let mut reads = false;
     condition.walk(&mut |node| {
@@ -417,7 +423,7 @@ fn predicates_of<'c>(condition: &'c Condition, found: &mut FxHashSet<&'c pddl::a
     condition.walk(&mut |node| found.extend(node.atom().map(|atom| &atom.predicate.name)));
 }
 
-/// That an action takes time, if its duration is fixed.
+/// Returns the condition that an action with a fixed duration takes time.
 fn positive(action: &Action) -> Option<Condition> {
     let ActionBody::Durative { duration, .. } = &action.body else { return None };
     let [DurationConstraint { operator: Comparison::Equal, expression, span, .. }] = &duration[..] else {
@@ -427,7 +433,7 @@ fn positive(action: &Action) -> Option<Condition> {
     Some(Condition::Compare(Comparison::Greater, expression.clone(), zero, *span))
 }
 
-/// Whether an action is known to have a start and an end apart.
+/// Returns `true` if the start and end of an action are always distinct.
 fn takes_time(domain: &Domain, problem: &Problem, action: &Action) -> bool {
     let ActionBody::Durative { duration, .. } = &action.body else { return true };
     let [DurationConstraint { operator, expression, .. }] = &duration[..] else { return false };

@@ -4,19 +4,20 @@ use crate::limits::Limits;
 use crate::number::Int;
 use pddl::ast::{Metric, Name};
 
-/// How the domain's symbols are to be read. Each `with_` changes one thing.
+/// Interpretation of the domain's symbols. Each `with_` method changes a single setting.
 #[derive(Debug, Clone)]
 pub struct GroundConfig {
-    /// Predicates `(p DESIGN FUNCTION)` that say which design solves which function.
+    /// Predicates `(p DESIGN FUNCTION)` that state which design solves which function.
     pub solves: Vec<Name>,
-    /// What plans are measured by, the most important first, in place of the metric of the problem; none for that metric.
+    /// Objectives in lexicographic order that replace the metric of the problem; empty for that
+    /// metric.
     pub objectives: Vec<Metric>,
-    /// When to give up.
+    /// Limits of grounding.
     pub limits: Limits,
 }
 
 impl Default for GroundConfig {
-    /// The names of the Metaplan paper and of the files of kas-lab.
+    /// Returns the names of the Metaplan paper and of the files of kas-lab.
     fn default() -> Self {
         Self {
             solves: ["fd_solve_f", "fd_solves_f", "inferred-SolvesF", "solvesF"].map(Name::new).to_vec(),
@@ -27,35 +28,37 @@ impl Default for GroundConfig {
 }
 
 impl GroundConfig {
-    /// Predicates `(p DESIGN FUNCTION)` that say which design solves which function.
+    /// Sets the predicates `(p DESIGN FUNCTION)` that state which design solves which function.
     #[must_use]
     pub fn with_solves(self, solves: Vec<Name>) -> Self {
         Self { solves, ..self }
     }
 
-    /// What plans are measured by in place of the metric of the problem, the most important first.
+    /// Sets objectives in lexicographic order that replace the metric of the problem.
     #[must_use]
     pub fn with_objectives(self, objectives: Vec<Metric>) -> Self {
         Self { objectives, ..self }
     }
 
-    /// When to give up.
+    /// Sets the limits of grounding.
     #[must_use]
     pub fn with_limits(self, limits: Limits) -> Self {
         Self { limits, ..self }
     }
 }
 
-/// What a ground task is to be good for beside the problem that it is made of.
+/// Requirements on a ground task beyond the given problem.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Generality {
-    /// If given, numbers of the initial state may be others, too, that are integers when multiplied by this: nothing is
-    /// concluded from those of the problem.
+    /// If set, the initial numbers may be replaced by other multiples of the reciprocal of this
+    /// factor. Nothing is then inferred from the initial numbers of the problem.
     pub numbers: Option<Int>,
-    /// If given, all numbers are integers when multiplied by this.
+    /// If set, multiplying by this factor makes all numbers integers.
     pub precision: Option<Int>,
-    /// Whether a metric may count fluents whose changes depend on the state: plans have that metric, and none is the best.
+    /// If set, a metric may contain fluents whose changes depend on the state. Optimality is then
+    /// not provable.
     pub measures_ends: bool,
-    /// Whether fluents by which actions improve the metric are counted in the same way.
+    /// If set, fluents by which actions improve the metric are treated like state-dependent
+    /// fluents.
     pub measures_rewards: bool,
 }

@@ -1,10 +1,11 @@
-//! Derived atoms: those of derived predicates, and names for parts of conditions.
+//! Simplifies derived atoms: those of derived predicates, and auxiliary atoms of conditions.
 //!
-//! They stay rules over the state [1]: which of them hold follows from the other variables, as the least fixpoint of
-//! their rules, those that are negated first. What is always or never true is folded, and an atom with one rule
-//! is replaced by the body of that rule where it occurs.
+//! Derived atoms stay rules over the state [1]: their truth values are the least fixpoint of the
+//! stratified rules over the other variables. Constant atoms are folded, and an atom with a single
+//! rule is replaced by the rule's body.
 //!
-//! \[1\] S. Thiébaux, J. Hoffmann, B. Nebel: In defense of PDDL axioms, Artificial Intelligence 168, 2005.
+//! \[1\] S. Thiébaux, J. Hoffmann, B. Nebel: In defense of PDDL axioms, Artificial Intelligence
+//! 168, 2005.
 
 use rustc_hash::{FxHashMap, FxHashSet};
 
@@ -15,19 +16,19 @@ use crate::ground::vocabulary::task::GroundTask;
 use crate::limits::{Interrupted, Limits};
 use crate::number::dense;
 
-/// Folds what is always or never true, and replaces atoms with one rule.
+/// Folds constant atoms, and inlines atoms with a single rule.
 pub fn simplify(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
     let limits = task.world.limits;
     let mut axioms = std::mem::take(&mut task.axioms);
-    let mut seen = FxHashSet::default();
-    axioms.retain(|axiom| seen.insert(axiom.clone()));
+    let mut distinct = FxHashSet::default();
+    axioms.retain(|axiom| distinct.insert(axiom.clone()));
     fold(task, &mut axioms)?;
     let bodies = single_bodies(&axioms, limits)?;
-    let mut kept = Vec::with_capacity(axioms.len());
+    let mut simplified = Vec::with_capacity(axioms.len());
     for axiom in limits.watch(axioms) {
         let mut axiom = axiom?;
         if inline(&mut axiom.body, &bodies) {
-            kept.push(axiom);
+            simplified.push(axiom);
         }
     }
     retain(&mut task.operators, limits, |operator| {
@@ -38,11 +39,11 @@ pub fn simplify(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
     if task.goal.as_mut().is_some_and(|goal| !inline(goal, &bodies)) {
         task.goal = None;
     }
-    task.axioms = kept;
+    task.axioms = simplified;
     Ok(())
 }
 
-/// Keeps the items that a function says are to be kept, as long as no limit is reached.
+/// Keeps the items for which the predicate returns `true`, while no limit is reached.
 fn retain<T>(
     items: &mut Vec<T>,
     limits: &Limits,
@@ -56,41 +57,43 @@ fn retain<T>(
     outcome
 }
 
-/// Whether each derived atom is known to be true or false, as long as that leads to more.
+/// Folds derived atoms with a constant truth value, until no more are found.
 fn fold(task: &mut GroundTask<'_>, axioms: &mut Vec<GroundAxiom>) -> Result<(), Interrupted> {
     let (world, limits) = (&task.world, task.world.limits);
     let derived: Vec<AtomId> =
         (0..dense(world.atoms.len())).map(AtomId).filter(|atom| world.is_derived(*atom)).collect();
-    let mut known: FxHashMap<AtomId, bool> = FxHashMap::default();
+    let mut truth_values: FxHashMap<AtomId, bool> = FxHashMap::default();
     loop {
-        let before = known.len();
+        let before = truth_values.len();
         let mut has_rule = FxHashSet::default();
         for axiom in limits.watch(axioms.iter()) {
             let axiom = axiom?;
             has_rule.insert(axiom.head);
             if axiom.body == GroundCondition::default() {
-                known.insert(axiom.head, true);
+                truth_values.insert(axiom.head, true);
             }
         }
         for atom in derived.iter().filter(|atom| !has_rule.contains(*atom)) {
-            known.entry(*atom).or_insert(false);
+            truth_values.entry(*atom).or_insert(false);
         }
-        if known.len() == before {
+        if truth_values.len() == before {
             break;
         }
-        axioms.retain_mut(|axiom| !known.contains_key(&axiom.head) && substitute(&mut axiom.body, &known));
+        axioms.retain_mut(|axiom| {
+            !truth_values.contains_key(&axiom.head) && substitute(&mut axiom.body, &truth_values)
+        });
     }
     retain(&mut task.operators, limits, |operator| {
-        operator.conditional.retain_mut(|effect| conjunction(&mut effect.condition, &known));
-        substitute(&mut operator.condition, &known)
+        operator.conditional.retain_mut(|effect| conjunction(&mut effect.condition, &truth_values));
+        substitute(&mut operator.condition, &truth_values)
     })?;
-    if task.goal.as_mut().is_some_and(|goal| !substitute(goal, &known)) {
+    if task.goal.as_mut().is_some_and(|goal| !substitute(goal, &truth_values)) {
         task.goal = None;
     }
     Ok(())
 }
 
-/// Removes decided literals from a conjunction; false if one of them fails.
+/// Removes decided literals from a conjunction. Returns `false` if one of them fails.
 fn conjunction(literals: &mut Vec<GroundLiteral>, known: &FxHashMap<AtomId, bool>) -> bool {
     let fails =
         literals.iter().any(|(atom, positive)| known.get(atom).is_some_and(|value| value != positive));
@@ -98,7 +101,7 @@ fn conjunction(literals: &mut Vec<GroundLiteral>, known: &FxHashMap<AtomId, bool
     !fails
 }
 
-/// Removes decided literals from a condition; false if it fails.
+/// Removes decided literals from a condition. Returns `false` if it fails.
 fn substitute(condition: &mut GroundCondition, known: &FxHashMap<AtomId, bool>) -> bool {
     if !conjunction(&mut condition.literals, known) {
         return false;
@@ -118,7 +121,8 @@ fn substitute(condition: &mut GroundCondition, known: &FxHashMap<AtomId, bool>) 
     condition.tidy()
 }
 
-/// The body of each atom that has exactly one rule and does not depend on itself, free of such atoms.
+/// Returns the body of each non-recursive atom with exactly one rule, with other such atoms
+/// inlined.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 fn single_bodies(
     axioms: &[GroundAxiom],
@@ -144,7 +148,7 @@ fn single_bodies(
     Ok(bodies)
 }
 
-/// Replaces literals over atoms with one rule by its body; false if the condition contradicts itself then.
+/// Inlines atoms with a single rule. Returns `false` if the condition then contradicts itself.
 fn inline(condition: &mut GroundCondition, bodies: &FxHashMap<AtomId, GroundCondition>) -> bool {
     let mut literals = Vec::with_capacity(condition.literals.len());
     for mut literal in std::mem::take(&mut condition.literals) {
@@ -164,7 +168,7 @@ fn inline(condition: &mut GroundCondition, bodies: &FxHashMap<AtomId, GroundCond
     condition.tidy()
 }
 
-/// Replaces a literal by the only literal of its atom's only rule.
+/// Replaces a literal if the only rule of its atom has a single literal as its body.
 fn rename(literal: &mut GroundLiteral, bodies: &FxHashMap<AtomId, GroundCondition>) {
     if let Some(body) = bodies.get(&literal.0)
         && let [(atom, positive)] = body.literals[..]

@@ -1,9 +1,9 @@
-//! Metrics as costs of each operator.
+//! Compiles metrics to operator costs.
 //!
-//! A metric is linear in fluents and total time. Fluents in it that are changed by sums that do not depend on the state make
-//! an offset plus the sum of its operators' costs. Others are only measured: their values in the end are added, and of such a
-//! metric no plan is called the best. A metric to maximize is
-//! negated. Without a metric, plans of durative actions are measured by total time, others by their length.
+//! A metric is linear in fluents and total time. A fluent whose changes are state-independent
+//! becomes an offset plus a sum of operator costs. The final values of other fluents are added at
+//! the end, and optimality for such a metric is not claimed. Maximisation is negated. Without a
+//! metric, the cost is total time for plans with durative actions, and plan length otherwise.
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 
@@ -21,16 +21,16 @@ use crate::task::quantity::{Linear, NumericId, Quantity};
 use crate::task::table_map::TableMap;
 use pddl::ast::Direction;
 
-/// Gives every operator its costs, and the task the rest of the metrics.
+/// Attaches costs to the operators, and the remaining parts of the metrics to the task.
 ///
 /// # Errors
-/// A metric that is not linear, or over a fluent whose change depends on the state.
+/// A metric is not linear, or contains a fluent with state-dependent changes.
 pub fn attach_costs(task: &mut GroundTask<'_>, generality: &Generality) -> Result<(), Errors> {
     let lifted = task.world.lifted;
     if lifted.metrics.is_empty() {
         let temporal = task.operators.iter().any(|operator| !operator.duration.is_zero());
         for operator in &mut task.operators {
-            // A wait is not an action of the plan.
+            // A wait is not an action of the plan and has no cost.
             let unit = Quantity::constant(Rational::from_integer(i128::from(operator.wait.is_none())));
             operator.costs = vec![if temporal { operator.duration.clone() } else { unit }];
         }
@@ -44,7 +44,7 @@ pub fn attach_costs(task: &mut GroundTask<'_>, generality: &Generality) -> Resul
     if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
 }
 
-/// Gives every operator its cost by one metric.
+/// Attaches the costs by a single metric.
 fn attach(task: &mut GroundTask<'_>, metric: &Metric, generality: &Generality) -> Result<(), Error> {
     let limits = task.world.limits;
     let (mut linear, mut time) = split(&mut task.world, &metric.expression, metric.place)?;
@@ -69,10 +69,10 @@ fn attach(task: &mut GroundTask<'_>, metric: &Metric, generality: &Generality) -
     Ok(())
 }
 
-/// Takes the fluents out of a metric whose changes depend on the state.
+/// Removes the fluents with state-dependent changes from a metric.
 ///
 /// # Errors
-/// There is one, and the task is to be good for more than for plans.
+/// There is such a fluent although the task needs costs that are exact.
 fn rest(
     task: &GroundTask<'_>,
     linear: &mut Linear<Rational>,
@@ -104,14 +104,14 @@ fn rest(
     Ok(rest)
 }
 
-/// Whether a change of a fluent that counts by a factor may lower the metric.
+/// Returns `true` if a change of a fluent, weighted by a factor, may decrease the metric.
 fn lowers(value: &Linear<Rational>, factor: &Rational) -> bool {
     let mut change = value.quantity.clone();
     change.scale(factor);
     change.minimum().is_negative()
 }
 
-/// The part of the metric over fluents, and the factor of total time.
+/// Splits a metric into its linear part over fluents and the factor of total time.
 fn split(
     world: &mut World<'_>,
     expression: &Expression,
@@ -122,9 +122,9 @@ fn split(
         Expression::Sum(parts) => {
             let (mut sum, mut time) = (Linear::constant(Rational::zero()), Rational::zero());
             for part in parts {
-                let (linear, more) = split(world, part, place)?;
+                let (linear, part_time) = split(world, part, place)?;
                 sum.add(&linear);
-                time += more;
+                time += part_time;
             }
             Ok((sum, time))
         }
@@ -178,7 +178,7 @@ fn multiply(
     Some((linear, time * &factor.quantity.constant))
 }
 
-/// Quantities times the factors of a metric; what operators share, they share afterwards.
+/// Cache of scaled quantities. Quantities that operators share remain shared.
 #[derive(Default)]
 struct ScaledQuantities {
     by_factor: BTreeMap<Rational, TableMap<Rational>>,
@@ -198,7 +198,7 @@ impl ScaledQuantities {
     }
 }
 
-/// What one application adds to the metric.
+/// Cost of an application of the operator.
 fn cost(
     operator: &GroundOperator,
     metric: &Linear<Rational>,

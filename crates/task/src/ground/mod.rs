@@ -1,10 +1,11 @@
-//! Lifted task to ground task.
+//! Grounding: lifted task to ground task.
 //!
-//! Relaxed reachability (a Datalog program on the rule engine, after Helmert \[1\]) yields the instances of each
-//! schema, without its separable design parameters; each instance becomes one operator with slots; mutex groups become
-//! finite-domain variables; all numbers become exact integers.
+//! Relaxed reachability (a Datalog program on the rule engine, after Helmert \[1\]) computes the
+//! instances of each schema, without its separable design parameters. Each instance becomes an
+//! operator with slots, mutex groups become finite-domain variables, and all numbers become exact
+//! integers.
 //!
-//! Each pass turns one thing into the next, and what they hand to each other is in `vocabulary`:
+//! The passes exchange the types in `vocabulary`:
 //!
 //! | pass | from | to |
 //! |---|---|---|
@@ -68,16 +69,16 @@ use vocabulary::world::World;
 /// ```
 ///
 /// # Errors
-/// Every construct that the planner does not handle, with its place.
+/// All unsupported constructs with their source locations.
 pub fn ground(domain: &Domain, problem: &Problem, config: &GroundConfig) -> Result<Task, Errors> {
     let measures_ends = config.objectives.len() <= 1;
     ground_for(domain, problem, config, &Generality { measures_ends, ..Generality::default() })
 }
 
-/// Grounds a problem so that other initial states can take the place of its own.
+/// Grounds a problem for use with other initial states as well.
 ///
 /// # Errors
-/// All constructs that the planner does not support, or the limit that was reached.
+/// All unsupported constructs, or a reached limit.
 pub fn ground_for<N: TaskNumber>(
     domain: &Domain,
     problem: &Problem,
@@ -89,18 +90,18 @@ pub fn ground_for<N: TaskNumber>(
         .in_scope(|| compile(domain, problem, objectives, PlanSemantics::Sequence, limits))?;
     let lifted =
         || info_span!("normalize").in_scope(|| normalize(&plain.domain, &plain.problem, &plain.objectives));
-    let found = ground_normal(lifted()?, config, generality);
-    match found {
+    let grounded = ground_normal(lifted()?, config, generality);
+    match grounded {
         Err(errors) if generality.numbers.is_none() && errors.iter().any(Error::is_value_missing) => {
             let mut lifted = lifted()?;
             undefined_fluents::guard(&mut lifted);
             ground_normal(lifted, config, generality)
         }
-        found => found,
+        grounded => grounded,
     }
 }
 
-/// Grounds a task in which start and end of actions of duration 0 are still apart.
+/// Grounds a task in which actions of duration 0 still have separate start and end.
 fn ground_normal<N: TaskNumber>(
     mut lifted: Lifted,
     config: &GroundConfig,
@@ -119,10 +120,10 @@ fn ground_normal<N: TaskNumber>(
     ground_lifted(&lifted, &designs, &slots, generality, &config.limits).map(|(task, _)| task)
 }
 
-/// Grounds a lifted task. For each schema: its design parameters, and those of them that become slots.
+/// Grounds a lifted task. `designs` has the design parameters of each schema that become slots.
 ///
 /// # Errors
-/// As [`ground`].
+/// See [`ground`].
 pub fn ground_lifted<N: TaskNumber>(
     lifted: &Lifted,
     designs: &[Vec<SlotParameter>],

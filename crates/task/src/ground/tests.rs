@@ -1,4 +1,4 @@
-//! Each pass of grounding by itself: what it gets, and what it hands on.
+//! Unit tests of the grounding passes.
 
 use crate::ground::vocabulary::reached::RelaxedReachability;
 use crate::ground::vocabulary::task::GroundTask;
@@ -12,7 +12,8 @@ use crate::task::Task;
 use crate::task::quantity::Quantity;
 use pddl::{Source, read};
 
-/// Two ways, a lamp without which nobody walks, and a jump for which there is never enough fuel.
+/// A domain with two roads, a lamp that walking requires, and a jump whose fuel requirement is
+/// never met.
 const DOMAIN: &str = "(define (domain d)
   (:predicates (at ?p) (way ?a ?b) (lit) (ready))
   (:functions (fuel))
@@ -33,7 +34,7 @@ fn lifted() -> Lifted {
     normalize(&domain, &problem, &[]).expect("a lifted task")
 }
 
-/// No parameter is a design.
+/// Declares no parameter as a design.
 fn none(lifted: &Lifted) -> Vec<Vec<SlotParameter>> {
     vec![Vec::new(); lifted.schemas.len()]
 }
@@ -42,20 +43,20 @@ fn reached(lifted: &Lifted) -> RelaxedReachability {
     relaxed_reachability::reach(lifted, &none(lifted), &Limits::none()).expect("no limit")
 }
 
-/// How many operators each schema has.
+/// Number of operators of each schema.
 fn counts(lifted: &Lifted, task: &GroundTask<'_>) -> Vec<(String, usize)> {
     let schemas = lifted.schemas.iter().zip(0_u32..);
     let count = |schema| task.operators.iter().filter(|operator| operator.schema == schema).count();
     schemas.map(|(schema, number)| (schema.name.to_string(), count(number))).collect()
 }
 
-/// Calls `check` with what all passes before the costs have made of the task.
+/// Calls `check` with the task after all passes before the costs.
 fn instantiated(check: impl FnOnce(&Lifted, GroundTask<'_>)) {
     let (lifted, limits) = (lifted(), Limits::none());
     let reached = reached(&lifted);
     let world = World::new(&lifted, &reached, &limits);
-    let none = none(&lifted);
-    check(&lifted, instantiate::instantiate(world, &none, &none).expect("operators"));
+    let no_slots = none(&lifted);
+    check(&lifted, instantiate::instantiate(world, &no_slots, &no_slots).expect("operators"));
 }
 
 #[test]
@@ -63,7 +64,7 @@ fn reach_finds_instances_and_atoms_as_if_nothing_were_deleted() {
     let lifted = lifted();
     let reached = reached(&lifted);
     let instances: Vec<usize> = reached.instances.iter().map(Vec::len).collect();
-    // Nobody asks for numbers, and nothing leads from a place to itself.
+    // Relaxed reachability ignores numbers, and no road leads from a place to itself.
     assert_eq!(instances, [2, 1, 0, 4]);
     let name = |predicate: usize| lifted.predicates[predicate].name.to_string();
     let mut atoms: Vec<String> = reached.atoms.iter().map(|(predicate, _)| name(predicate.index())).collect();
@@ -100,8 +101,8 @@ fn derived_atoms_with_one_rule_are_replaced_by_its_body() {
 fn without_a_metric_each_step_costs_one() {
     instantiated(|_, mut task| {
         metric::attach_costs(&mut task, &Generality::default()).expect("costs");
-        let one = [Quantity::constant(Rational::from_integer(1))];
-        assert!(task.operators.iter().all(|operator| operator.costs == one));
+        let unit = [Quantity::constant(Rational::from_integer(1))];
+        assert!(task.operators.iter().all(|operator| operator.costs == unit));
         assert_eq!(task.objectives.len(), 1);
     });
 }
@@ -113,13 +114,16 @@ fn prune_drops_what_numbers_rule_out_and_finish_makes_variables() {
         metric::attach_costs(&mut task, &Generality::default()).expect("costs");
         let generality = Generality::default();
         assert_eq!(prune::prune(&mut task, &generality).expect("no limit"), None);
-        // Nothing asks for the head of the rule any more.
+        // The head of the rule is no longer used.
         assert!(task.axioms.is_empty());
         let expected = [("go", 2), ("light", 1), ("jump", 0), ("fly", 0)];
         assert_eq!(counts(lifted, &task), expected.map(|(name, count)| (name.to_owned(), count)));
         let task: Task = finalize::finish(task, None, &generality).expect("integers");
-        let mut values: Vec<Vec<&str>> =
-            task.variables.iter().map(|own| own.values.iter().map(String::as_str).collect()).collect();
+        let mut values: Vec<Vec<&str>> = task
+            .variables
+            .iter()
+            .map(|variable| variable.values.iter().map(String::as_str).collect())
+            .collect();
         values.sort();
         assert_eq!(values, [vec!["(at a)", "(at b)", "none of these"], vec!["(lit)", "none of these"]]);
         assert!(task.initial.numbers.is_empty());
@@ -127,7 +131,7 @@ fn prune_drops_what_numbers_rule_out_and_finish_makes_variables() {
 }
 
 #[test]
-fn where_other_numbers_are_to_come_prune_concludes_nothing_from_those_of_the_problem() {
+fn prune_ignores_initial_numbers_that_may_change() {
     instantiated(|lifted, mut task| {
         derived::simplify(&mut task).expect("no limit");
         metric::attach_costs(&mut task, &Generality::default()).expect("costs");

@@ -1,8 +1,8 @@
-//! Which parameters of an action schema are function designs that need not be grounded.
+//! Separable design parameters, which need not be grounded.
 //!
-//! In the explicit way of modelling (Metaplan paper, Listings 1 and 2) a schema has parameters `?fd` with
-//! `(fd_solve_f ?fd ?f)`. Such a parameter is *separable*, and becomes a slot that is filled step by step, if no fluent
-//! mentions it: then the designs of one action instance do not multiply the ground operators.
+//! In the explicit form (Metaplan paper, Listings 1 and 2) a schema has parameters `?fd` with
+//! `(fd_solve_f ?fd ?f)`. Such a parameter is *separable*, and becomes a slot, if no fluent
+//! mentions it. The designs of an action instance then do not multiply the ground operators.
 
 use rustc_hash::FxHashSet;
 use smallvec::SmallVec;
@@ -12,15 +12,16 @@ use crate::number::dense;
 use crate::task::quantity::SlotSet;
 use pddl::ast::Name;
 
-/// A parameter that stands for a function design, and the function that the design solves.
+/// A design parameter with the function that the design solves.
 #[derive(Debug, Clone, Copy)]
 pub struct SlotParameter {
     pub(crate) parameter: u32,
     pub(crate) function: Term,
 }
 
-/// The design parameters of a schema with the function that each solves, ascending. `solves` names the
-/// predicates whose first argument is a design and whose second is the function that it solves.
+/// Returns the design parameters of a schema with their functions, in ascending order. `solves` has
+/// the predicates whose first argument is a design and whose second argument is a function that it
+/// solves.
 pub fn design_parameters(lifted: &Lifted, schema: &Schema, solves: &[Name]) -> Vec<SlotParameter> {
     let conjuncts = conjuncts(&schema.start_condition).into_iter().chain(conjuncts(&schema.middle_condition));
     let mut designs: Vec<SlotParameter> = Vec::new();
@@ -30,7 +31,8 @@ pub fn design_parameters(lifted: &Lifted, schema: &Schema, solves: &[Name]) -> V
             && let [Term::Parameter(parameter), function] = terms[..]
             && function != Term::Parameter(parameter)
             && designs.iter().all(|slot| {
-                // No function is a design itself: it has to be known before the designs are chosen.
+                // Functions must be known before designs are chosen, so no function may itself be a
+                // design parameter.
                 slot.parameter != parameter
                     && Term::Parameter(slot.parameter) != function
                     && slot.function != Term::Parameter(parameter)
@@ -43,12 +45,12 @@ pub fn design_parameters(lifted: &Lifted, schema: &Schema, solves: &[Name]) -> V
     designs
 }
 
-/// Those design parameters that are separable.
+/// Returns the separable design parameters.
 pub fn slot_parameters(lifted: &Lifted, schema: &Schema, designs: &[SlotParameter]) -> Vec<SlotParameter> {
     designs.iter().filter(|design| is_separable(lifted, schema, design.parameter)).copied().collect()
 }
 
-/// The parts of a conjunction, flattened.
+/// Returns the flattened conjuncts of a condition.
 pub fn conjuncts(formula: &Formula) -> Vec<&Formula> {
     match formula {
         Formula::And(parts) => parts.iter().flat_map(conjuncts).collect(),
@@ -77,7 +79,8 @@ fn is_separable(lifted: &Lifted, schema: &Schema, parameter: u32) -> bool {
     }) && schema.duration.as_ref().is_none_or(|duration| expression_separable(lifted, duration, parameter))
 }
 
-/// Whether the parameter occurs only below static functions, and not as a factor of a fluent.
+/// Returns `true` if the parameter occurs only below static functions, and not in a factor of a
+/// fluent.
 fn expression_separable(lifted: &Lifted, expression: &Expression, parameter: u32) -> bool {
     match expression {
         Expression::Sum(parts) => parts.iter().all(|part| expression_separable(lifted, part, parameter)),
@@ -86,7 +89,7 @@ fn expression_separable(lifted: &Lifted, expression: &Expression, parameter: u32
     }
 }
 
-/// Whether no fluent occurs in a condition.
+/// Returns `true` if a condition contains no fluent.
 pub fn is_static(lifted: &Lifted, formula: &Formula) -> bool {
     match formula {
         Formula::And(parts) | Formula::Or(parts) => parts.iter().all(|part| is_static(lifted, part)),
@@ -114,25 +117,25 @@ fn is_static_expression(lifted: &Lifted, expression: &Expression) -> bool {
 }
 
 fn mentions(formula: &Formula, parameter: u32) -> bool {
-    let mut found = false;
-    formula_terms(formula, &mut |term| found |= term == Term::Parameter(parameter));
-    found
+    let mut is_mentioned = false;
+    formula_terms(formula, &mut |term| is_mentioned |= term == Term::Parameter(parameter));
+    is_mentioned
 }
 
 fn expression_mentions(expression: &Expression, parameter: u32) -> bool {
-    let mut found = false;
-    expression_terms(expression, &mut |term| found |= term == Term::Parameter(parameter));
-    found
+    let mut is_mentioned = false;
+    expression_terms(expression, &mut |term| is_mentioned |= term == Term::Parameter(parameter));
+    is_mentioned
 }
 
-/// The positions (in `slots`) of the slot parameters that a condition mentions.
+/// Returns the positions (in `slots`) of the slot parameters in a condition.
 pub fn slots_of_formula(formula: &Formula, slots: &[SlotParameter]) -> SlotSet {
     let mut set = SmallVec::new();
     formula_terms(formula, &mut |term| insert(&mut set, term, slots));
     set
 }
 
-/// The positions (in `slots`) of the slot parameters that an expression mentions.
+/// Returns the positions (in `slots`) of the slot parameters in an expression.
 pub fn slots_of_expression(expression: &Expression, slots: &[SlotParameter]) -> SlotSet {
     let mut set = SmallVec::new();
     expression_terms(expression, &mut |term| insert(&mut set, term, slots));
@@ -148,8 +151,8 @@ fn insert(set: &mut SlotSet, term: Term, slots: &[SlotParameter]) {
     }
 }
 
-/// Whether a condition after the start effects of a durative action asks for a derived predicate that they, or what
-/// happens by itself, may change.
+/// Returns `true` if a condition after the start of a durative action contains a derived predicate
+/// that its start effects or timed events may change.
 pub fn depends_on_own_start(lifted: &Lifted, schema: &Schema) -> bool {
     let (mut open, mut seen, mut numbers) = (Vec::new(), FxHashSet::default(), false);
     let conditions =
@@ -168,15 +171,16 @@ pub fn depends_on_own_start(lifted: &Lifted, schema: &Schema) -> bool {
             });
         }
     }
-    let own = schema.start_effects.iter().any(|effect| match &effect.change {
+    let is_changed_by_start = schema.start_effects.iter().any(|effect| match &effect.change {
         Change::Add(predicate, _) | Change::Delete(predicate, _) => seen.contains(predicate),
         Change::Assign { .. } => numbers,
     });
     let changes = lifted.events.iter().flat_map(|event| &event.changes);
-    own || changes.into_iter().any(|(predicate, ..)| schema.duration.is_some() && seen.contains(predicate))
+    is_changed_by_start
+        || changes.into_iter().any(|(predicate, ..)| schema.duration.is_some() && seen.contains(predicate))
 }
 
-/// Derived predicates that depend on themselves through a universal quantifier.
+/// Returns the derived predicates that recur through a universal quantifier.
 pub fn recursive_through_forall(lifted: &Lifted) -> Vec<PredicateId> {
     let depends = |from: PredicateId, on: PredicateId| {
         let (mut open, mut seen) = (vec![from], FxHashSet::default());
@@ -194,18 +198,18 @@ pub fn recursive_through_forall(lifted: &Lifted) -> Vec<PredicateId> {
         }
         false
     };
-    let mut found = Vec::new();
+    let mut recursive = Vec::new();
     for axiom in &lifted.axioms {
         let mut inside = Vec::new();
         universal_atoms(&axiom.condition, &mut |predicate| inside.push(predicate));
         if inside.into_iter().any(|predicate| depends(predicate, axiom.predicate)) {
-            found.push(axiom.predicate);
+            recursive.push(axiom.predicate);
         }
     }
-    found
+    recursive
 }
 
-/// Calls `visit` with the predicate of every atom below a universal quantifier.
+/// Calls `visit` for the predicate of every atom below a universal quantifier.
 fn universal_atoms(formula: &Formula, visit: &mut dyn FnMut(PredicateId)) {
     match formula {
         Formula::And(parts) | Formula::Or(parts) => {
@@ -219,7 +223,7 @@ fn universal_atoms(formula: &Formula, visit: &mut dyn FnMut(PredicateId)) {
     }
 }
 
-/// Calls `visit` with the predicate of every atom of a condition.
+/// Calls `visit` for the predicate of every atom in a condition.
 pub fn atoms(formula: &Formula, visit: &mut dyn FnMut(PredicateId)) {
     match formula {
         Formula::And(parts) | Formula::Or(parts) => {
@@ -233,7 +237,7 @@ pub fn atoms(formula: &Formula, visit: &mut dyn FnMut(PredicateId)) {
     }
 }
 
-/// Whether a condition compares numbers.
+/// Returns `true` if a condition compares numbers.
 pub fn has_numbers(formula: &Formula) -> bool {
     match formula {
         Formula::And(parts) | Formula::Or(parts) => parts.iter().any(has_numbers),
@@ -243,7 +247,7 @@ pub fn has_numbers(formula: &Formula) -> bool {
     }
 }
 
-/// Calls `visit` with every term of a condition.
+/// Calls `visit` for every term in a condition.
 pub fn formula_terms(formula: &Formula, visit: &mut dyn FnMut(Term)) {
     match formula {
         Formula::Exists(_, body) | Formula::ForAll(_, body) => formula_terms(body, visit),

@@ -1,8 +1,8 @@
-//! The lifted task: PDDL with its names resolved to ids, and negation pushed inwards.
+//! The lifted task: PDDL with names resolved to ids, in negation normal form.
 //!
-//! Objects, predicates, functions and parameters are dense ids in the order of their declaration, so that
-//! nothing further on depends on how anything is named. A durative action keeps its two halves; `ground`
-//! composes them into one operator, because actions execute one after another.
+//! Objects, predicates, functions and parameters are dense ids in declaration order, so later
+//! stages are independent of names. A durative action keeps its start and end. `ground` composes
+//! both into a single operator, because execution is sequential.
 
 use std::sync::Arc;
 
@@ -51,123 +51,125 @@ pub struct Lifted {
     pub functions: Vec<Function>,
     pub schemas: Vec<Schema>,
     pub axioms: Vec<Axiom>,
-    /// Initial facts in the order of the file, without repetitions.
+    /// Initial facts in the order of the file, without duplicates.
     pub(crate) facts: Vec<(PredicateId, Arguments)>,
     pub(crate) values: Vec<(FunctionId, Arguments, Rational)>,
-    /// What happens by itself, in the order of time.
+    /// Timed initial literals in chronological order.
     pub events: Vec<Event>,
     pub time: Time,
     pub goal: Formula,
-    /// How many variables the quantifiers of the goal bind.
+    /// Number of variables that the quantifiers of the goal bind.
     pub(crate) goal_variables: usize,
-    /// What plans are measured by, the most important first; empty if the files do not say.
+    /// Metrics in lexicographic order; empty if the files have none.
     pub metrics: Vec<Metric>,
 }
 
-/// A predicate; it is a fluent if an action adds or deletes it, or if it is derived from fluents; else static.
+/// A predicate. It is a fluent if an action changes it or if it is derived from fluents, otherwise
+/// static.
 #[derive(Debug, Clone)]
 pub struct Predicate {
     pub name: Name,
     pub arity: usize,
     pub fluent: bool,
     pub derived: bool,
-    /// Says that an instance of a schema is under way; it has the parameters of the schema, and no name in the files.
+    /// `true` if the predicate marks running instances of a schema. It has the parameters of the
+    /// schema, and no name in the files.
     pub running: bool,
 }
 
-/// A numeric function; it is a fluent if an action changes it, else static.
+/// A numeric function. It is a fluent if an action changes it, otherwise static.
 #[derive(Debug, Clone)]
 pub struct Function {
     pub name: Name,
     pub fluent: bool,
-    /// Whether it may have no value; conditions see to it that it is not read then.
+    /// `true` if it may be undefined. Conditions then guard its uses.
     pub partial: bool,
 }
 
-/// An action schema with its parameters as `Term::Parameter` indices.
+/// An action schema, whose parameters are `Term::Parameter` indices.
 #[derive(Debug, Clone)]
 pub struct Schema {
     pub name: Name,
     pub parameters: Vec<Parameter>,
-    /// Parameters and the variables that quantifiers bind.
+    /// Number of parameters and bound variables.
     pub variables: usize,
-    /// Must hold before the action.
+    /// Condition before the action.
     pub start_condition: Formula,
     pub start_effects: Vec<Effect>,
-    /// Must hold after the start effects: `over all` and `at end` of a durative action.
+    /// Condition after the start effects: `over all` and `at end` of a durative action.
     pub middle_condition: Formula,
-    /// The part of it that must hold from the start to the end; the planner asks only if something happens by itself.
+    /// Part of the condition for the whole interval, used only with timed events.
     pub over_all: Formula,
-    /// The part of it that must hold at the end.
+    /// Part of the condition at the end.
     pub at_end: Formula,
     pub end_effects: Vec<Effect>,
-    /// Duration in the domain's time unit; none for an instantaneous action.
+    /// Duration in the domain's time unit; `None` for an instantaneous action.
     pub duration: Option<Expression>,
-    /// Set if the planner has chosen the duration, as short as it may be.
+    /// `true` if the planner has chosen the shortest admissible duration.
     pub is_chosen: bool,
-    /// Set if start and end of a durative action are one happening, because its duration is 0.
+    /// Set if start and end of a durative action are simultaneous, because its duration is 0.
     pub joint: Option<Box<Joint>>,
-    /// The position of the action in the domain; several schemas may stand for one.
+    /// Position of the action in the domain. Several schemas may represent an action.
     pub action: u32,
     pub place: Place,
 }
 
-/// What belongs to the start and what to the end of a happening that is both.
+/// Parts of a simultaneous start and end.
 #[derive(Debug, Clone)]
 pub struct Joint {
-    /// The condition of the start.
+    /// Condition of the start.
     pub(crate) start: Formula,
-    /// The condition of the end.
+    /// Condition of the end.
     pub(crate) end: Formula,
-    /// How many of the effects, the first ones, are those of the start.
+    /// Number of leading effects that belong to the start.
     pub(crate) start_effects: usize,
 }
 
-/// What stands for time in a task in which something happens by itself.
+/// Auxiliary symbols for time in a task with timed events.
 #[derive(Debug, Clone, Copy)]
 pub struct Time {
     pub(crate) clock: FunctionId,
-    /// A time so short that nothing that begins or ends later than something else does so less than twice this later.
+    /// Duration of a moment: distinct times differ by at least two moments.
     pub(crate) moment: FunctionId,
-    /// `(phase NUMBER)`: how many events have taken place.
+    /// `(phase NUMBER)`: number of past events.
     pub phase: PredicateId,
-    /// The object for phase 0; those of the others follow.
+    /// Object of phase 0; the objects of later phases follow.
     pub first_phase: ObjectId,
     pub waited: PredicateId,
 }
 
-/// Timed initial literals of one time: each becomes true or false then.
+/// Timed initial literals of the same time.
 #[derive(Debug, Clone)]
 pub struct Event {
-    /// In the domain's time unit, from the start of the plan.
+    /// Time from the start of the plan, in the domain's time unit.
     pub time: Rational,
     pub changes: Vec<(PredicateId, Arguments, bool)>,
 }
 
-/// A rule of a derived predicate: the atom over the parameters holds where the condition does.
+/// A rule of a derived predicate: the atom over the parameters holds if the condition does.
 #[derive(Debug, Clone)]
 pub struct Axiom {
     pub(crate) predicate: PredicateId,
     pub(crate) parameters: Vec<Parameter>,
-    /// Parameters and the variables that quantifiers bind.
+    /// Number of parameters and bound variables.
     pub(crate) variables: usize,
     pub condition: Formula,
 }
 
-/// A parameter and the objects that its type admits, ascending.
+/// A parameter with the objects of its type, ascending.
 #[derive(Debug, Clone)]
 pub struct Parameter {
     pub(crate) candidates: Arc<[ObjectId]>,
 }
 
-/// A variable that a quantifier binds, numbered after the parameters, and the objects that it ranges over, ascending.
+/// A bound variable, numbered after the parameters, with the objects of its type, ascending.
 #[derive(Debug, Clone)]
 pub struct Bound {
     pub(crate) variable: u32,
     pub(crate) candidates: Arc<[ObjectId]>,
 }
 
-/// A schema parameter or bound variable, or an object.
+/// A schema parameter, bound variable or object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Term {
     Parameter(u32),
@@ -187,12 +189,12 @@ pub enum Formula {
 }
 
 impl Formula {
-    /// The condition that always holds.
+    /// Returns the condition that is always true.
     pub const fn truth() -> Self {
         Self::And(Vec::new())
     }
 
-    /// The negation, in negation normal form again.
+    /// Returns the negation in negation normal form.
     pub(crate) fn negated(&self) -> Self {
         use Comparison as Op;
         let each = |parts: &[Self]| parts.iter().map(Self::negated).collect();
@@ -221,7 +223,7 @@ impl Formula {
     }
 }
 
-/// An effect: for all objects that the bound variables range over, the change if the condition holds.
+/// An effect: the change for all objects of the bound variables for which the condition holds.
 #[derive(Debug, Clone)]
 pub struct Effect {
     pub bound: Vec<Bound>,
@@ -229,7 +231,7 @@ pub struct Effect {
     pub change: Change,
 }
 
-/// What an effect changes.
+/// Change of an effect.
 #[derive(Debug, Clone)]
 pub enum Change {
     Add(PredicateId, Vec<Term>),
@@ -255,7 +257,7 @@ pub enum Expression {
     Quotient(Box<Expression>, Box<Expression>, Place),
 }
 
-/// What a plan is measured by.
+/// Metric of plans.
 #[derive(Debug, Clone)]
 pub struct Metric {
     pub direction: Direction,

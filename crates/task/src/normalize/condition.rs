@@ -1,4 +1,4 @@
-//! Conditions, effects and expressions of the syntax tree in ids.
+//! Resolves conditions, effects and expressions of the syntax tree.
 
 use crate::lifted::configuration::formula_terms;
 use crate::lifted::{Bound, Change, Effect, Expression, Formula, Rational, Term};
@@ -6,7 +6,7 @@ use crate::normalize::names::{Duration, Names, Scope};
 use pddl::ast;
 use rustc_hash::FxHashSet;
 
-/// A condition, or its negation, in negation normal form.
+/// Resolves a condition, or its negation, to negation normal form.
 pub(super) fn condition(
     names: &mut Names,
     written: &ast::Condition,
@@ -14,10 +14,10 @@ pub(super) fn condition(
     scope: &mut Scope,
 ) -> Formula {
     use ast::Condition as C;
-    let all = |parts| if positive { Formula::And(parts) } else { Formula::Or(parts) };
+    let junction = |parts| if positive { Formula::And(parts) } else { Formula::Or(parts) };
     let any = |parts| if positive { Formula::Or(parts) } else { Formula::And(parts) };
     match written {
-        C::And(parts) => all(parts.iter().map(|part| condition(names, part, positive, scope)).collect()),
+        C::And(parts) => junction(parts.iter().map(|part| condition(names, part, positive, scope)).collect()),
         C::Or(parts) => any(parts.iter().map(|part| condition(names, part, positive, scope)).collect()),
         C::Not(inner) => condition(names, inner, !positive, scope),
         C::Imply(premise, conclusion) => any(vec![
@@ -46,7 +46,7 @@ pub(super) fn condition(
     }
 }
 
-/// A quantified condition without the variables that do not occur in it, unless their types are empty.
+/// Builds a quantified condition without unused variables, unless their types are empty.
 fn quantified(universal: bool, mut bound: Vec<Bound>, body: Formula) -> Formula {
     let mut used = FxHashSet::default();
     formula_terms(&body, &mut |term| {
@@ -54,7 +54,7 @@ fn quantified(universal: bool, mut bound: Vec<Bound>, body: Formula) -> Formula 
             used.insert(variable);
         }
     });
-    bound.retain(|own| own.candidates.is_empty() || used.contains(&own.variable));
+    bound.retain(|variable| variable.candidates.is_empty() || used.contains(&variable.variable));
     match (bound.is_empty(), universal) {
         (true, _) => body,
         (false, true) => Formula::ForAll(bound, Box::new(body)),
@@ -62,7 +62,7 @@ fn quantified(universal: bool, mut bound: Vec<Bound>, body: Formula) -> Formula 
     }
 }
 
-/// Flattens an effect into changes, each with the variables and the condition that it stands under.
+/// Flattens an effect into changes, each with its bound variables and its condition.
 pub(super) fn effect(names: &mut Names, written: &ast::Effect, scope: &mut Scope, out: &mut Vec<Effect>) {
     let change = match written {
         ast::Effect::And(parts) => return parts.iter().for_each(|part| effect(names, part, scope, out)),
@@ -81,8 +81,8 @@ pub(super) fn effect(names: &mut Names, written: &ast::Effect, scope: &mut Scope
             let first = out.len();
             effect(names, inner, scope, out);
             for effect in &mut out[first..] {
-                let own = std::mem::replace(&mut effect.condition, Formula::truth());
-                effect.condition = Formula::And(vec![condition.clone(), own]);
+                let outer_condition = std::mem::replace(&mut effect.condition, Formula::truth());
+                effect.condition = Formula::And(vec![condition.clone(), outer_condition]);
             }
             return;
         }
@@ -103,7 +103,7 @@ pub(super) fn effect(names: &mut Names, written: &ast::Effect, scope: &mut Scope
     out.push(Effect { bound: Vec::new(), condition: Formula::truth(), change });
 }
 
-/// An expression in ids.
+/// Resolves an expression.
 pub(super) fn expression(names: &mut Names, written: &ast::Expression, scope: &mut Scope) -> Expression {
     use ast::Arithmetic as Op;
     match written {

@@ -1,8 +1,8 @@
-//! Durations that are constrained rather than fixed.
+//! Durations with constraints other than equations.
 //!
-//! Actions execute one after another, and nothing happens by itself. So an action may as well take as little time
-//! as it must, or as much as it may where the metric rewards time, provided that no effect depends on how long it takes. Where
-//! actions overlap, a duration that is not fixed is a number that the planner chooses when the action starts.
+//! In sequential execution without timed events, an action takes the shortest admissible duration,
+//! or the longest one if the metric rewards time, provided that no effect depends on the duration.
+//! If actions overlap, the planner chooses a duration when the action starts.
 
 use crate::error::{File, Place};
 use crate::lifted::{Expression, Formula, Function, FunctionId, Metric, Rational, Term};
@@ -11,10 +11,11 @@ use crate::normalize::names::{Duration, Names, Scope};
 use crate::number::dense;
 use pddl::ast::{self, Comparison, Direction, Name, Span};
 
-/// What the names of chosen durations begin with: no name in a file has a blank.
+/// Prefix of the names of chosen durations. Names in files contain no blanks, so there are no
+/// conflicts.
 pub const CHOSEN: &str = "chosen duration of ";
 
-/// Whether the metrics reward time; nothing if that cannot be told from the metrics alone, or if they disagree.
+/// Returns `true` if the metrics reward time, or `None` if they do not determine it or disagree.
 pub(super) fn rewards_time(metrics: &[Metric]) -> Option<bool> {
     let zero = Rational::from_integer(0);
     let mut rewards = Vec::new();
@@ -29,7 +30,7 @@ pub(super) fn rewards_time(metrics: &[Metric]) -> Option<bool> {
     rewards.iter().all(|other| *other == rewarded).then_some(rewarded)
 }
 
-/// The factor of total time in an expression.
+/// Returns the factor of total time in an expression.
 pub fn time_factor(expression: &Expression) -> Option<Rational> {
     let number = |expression: &Expression| match expression {
         Expression::Number(number) => Some(number.clone()),
@@ -61,8 +62,8 @@ pub fn time_factor(expression: &Expression) -> Option<Rational> {
     }
 }
 
-/// The duration of the action at a place, chosen if it is not fixed, and what the choice rests on. `longest` says whether the metric
-/// rewards time, so that actions should take as long as they may.
+/// Returns the duration of an action, chosen if it is not fixed, and the conditions of the choice.
+/// `longest` is `true` if the metric rewards time.
 pub(super) fn duration(
     names: &mut Names,
     (constraints, span): (&[ast::DurationConstraint], Span),
@@ -92,15 +93,16 @@ pub(super) fn duration(
         let number = chosen(names, action, scope.place(span));
         let fixed = fixed.into_iter().map(|(bound, span)| (Comparison::Equal, bound, span));
         let open = lower.into_iter().chain(upper);
-        let all = open.map(|(bound, constraint)| (constraint.operator, bound, constraint.span)).chain(fixed);
+        let constraints_on_duration =
+            open.map(|(bound, constraint)| (constraint.operator, bound, constraint.span)).chain(fixed);
         let compare =
             |(operator, bound, span)| Formula::Compare(operator, number.clone(), bound, scope.place(span));
-        let conditions = all.map(compare).collect();
+        let conditions = constraints_on_duration.map(compare).collect();
         scope.duration = Duration::Fixed(number.clone());
         return (number, conditions);
     }
     scope.duration = Duration::Open;
-    let taken = match longest {
+    let selected = match longest {
         Some(longest) if fixed.is_empty() => match if longest { &upper[..] } else { &lower[..] } {
             [(expression, constraint)]
                 if matches!(constraint.operator, Comparison::GreaterOrEqual | Comparison::LessOrEqual) =>
@@ -111,7 +113,7 @@ pub(super) fn duration(
         },
         _ => None,
     };
-    let Some(chosen) = taken else {
+    let Some(chosen) = selected else {
         names.unsupported(
             "a duration without one bound that the metric makes it take",
             "one `(= ?duration …)`, one `(>= ?duration …)` and a metric that does not reward time, or `--concurrent`",
@@ -128,7 +130,7 @@ pub(super) fn duration(
     (chosen, conditions)
 }
 
-/// The number that is the duration of an action with so many parameters.
+/// Creates the numeric function for the chosen duration of an action.
 fn chosen(names: &mut Names, (action, parameters): (&Name, usize), place: Place) -> Expression {
     let id = FunctionId(dense(names.functions.len()));
     let name = Name::new(&format!("{CHOSEN}{action}"));

@@ -2,7 +2,7 @@
 
 use crate::lifted::{Arguments, Lifted, ObjectId};
 
-/// Lets the events of time 0 take place in the initial state.
+/// Applies the events of time 0 to the initial state.
 #[expect(clippy::arithmetic_side_effects, reason = "phases are objects, which are held in memory")]
 pub fn begin(lifted: &mut Lifted) {
     let phases = (lifted.time.first_phase.0..).map(ObjectId);

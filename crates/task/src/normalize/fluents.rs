@@ -1,9 +1,10 @@
-//! Which predicates and functions change.
+//! Determines the fluents: predicates and functions that actions change.
 
 use crate::lifted::configuration::{is_static, recursive_through_forall};
 use crate::lifted::{Axiom, Change, Formula, Lifted};
 
-/// A predicate or function is a fluent if some action changes it, and a derived predicate if it depends on a fluent.
+/// Marks predicates and functions that actions change, and derived predicates that depend on
+/// fluents.
 pub(super) fn mark_fluents(lifted: &mut Lifted) {
     for effect in
         lifted.schemas.iter().flat_map(|schema| schema.start_effects.iter().chain(&schema.end_effects))
@@ -18,8 +19,9 @@ pub(super) fn mark_fluents(lifted: &mut Lifted) {
     for (predicate, ..) in lifted.events.iter().flat_map(|event| &event.changes) {
         lifted.predicates[predicate.index()].fluent = true;
     }
-    // The rule engine negates only what is complete; what recurs through a quantifier is evaluated by itself.
-    // So is a comparison below one: where a value is missing it does not hold, and neither does its negation.
+    // The rule engine requires stratified negation, so predicates that recur through a quantifier
+    // are evaluated separately. Comparisons below quantifiers are as well: with an undefined value,
+    // neither the comparison nor its negation holds.
     let compares = lifted.axioms.iter().filter(|axiom| compares_for_all(&axiom.condition, false));
     let compares: Vec<_> = compares.map(|axiom| axiom.predicate).collect();
     for predicate in recursive_through_forall(lifted).into_iter().chain(compares) {
@@ -29,17 +31,17 @@ pub(super) fn mark_fluents(lifted: &mut Lifted) {
         let depends = |axiom: &&Axiom| {
             !lifted.predicates[axiom.predicate.index()].fluent && !is_static(lifted, &axiom.condition)
         };
-        let more: Vec<_> = lifted.axioms.iter().filter(depends).map(|axiom| axiom.predicate).collect();
-        if more.is_empty() {
+        let dependents: Vec<_> = lifted.axioms.iter().filter(depends).map(|axiom| axiom.predicate).collect();
+        if dependents.is_empty() {
             return;
         }
-        for predicate in more {
+        for predicate in dependents {
             lifted.predicates[predicate.index()].fluent = true;
         }
     }
 }
 
-/// Whether numbers are compared below a universal quantifier.
+/// Returns `true` if numbers are compared below a universal quantifier.
 fn compares_for_all(formula: &Formula, below: bool) -> bool {
     match formula {
         Formula::And(parts) | Formula::Or(parts) => parts.iter().any(|part| compares_for_all(part, below)),

@@ -1,4 +1,4 @@
-//! The initial state, and what happens by itself.
+//! Initial state and timed events.
 
 use rustc_hash::FxHashSet;
 
@@ -10,19 +10,19 @@ use crate::normalize::names::{Names, Scope};
 use crate::number::dense;
 use pddl::ast::{self, Name};
 
-/// What holds at the start, without repetitions, and the values of functions.
+/// Returns the initial facts without duplicates, and the values of functions.
 #[allow(clippy::type_complexity)]
 pub(super) fn initial_state(
     names: &mut Names,
     problem: &ast::Problem,
 ) -> (Vec<(PredicateId, Arguments)>, Vec<(FunctionId, Arguments, Rational)>) {
     let (mut facts, mut values) = (Vec::new(), Vec::new());
-    let mut seen = FxHashSet::default();
+    let mut stated = FxHashSet::default();
     for element in &problem.init {
         match element {
             ast::InitialElement::Fact(atom) => {
                 let fact = (names.predicate(&atom.predicate, File::Problem), objects(names, atom));
-                if seen.insert(fact.clone()) {
+                if stated.insert(fact.clone()) {
                     facts.push(fact);
                 }
             }
@@ -36,7 +36,7 @@ pub(super) fn initial_state(
     (facts, values)
 }
 
-/// Symbols for time. Their names have a space, so that no file can mean them.
+/// Creates the auxiliary symbols for time. Their names contain a space, so no file can use them.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 pub(super) fn time(names: &mut Names, events: &[Event]) -> Time {
     let time = Time {
@@ -62,7 +62,8 @@ pub(super) fn time(names: &mut Names, events: &[Event]) -> Time {
     time
 }
 
-/// The timed initial literals by time; of two of one time about one atom, the later one prevails.
+/// Returns the timed initial literals in chronological order. Of two literals about an atom at the
+/// same time, the later one in the file prevails.
 pub(super) fn events(names: &mut Names, problem: &ast::Problem) -> Vec<Event> {
     let mut events: Vec<Event> = Vec::new();
     for element in &problem.init {

@@ -1,8 +1,8 @@
-//! Syntax tree to lifted task: names become ids, negation moves inwards to the atoms, and the two times of
-//! durative conditions and effects are sorted apart.
+//! Normalisation: syntax tree to lifted task. Names become ids, negation is moved inwards, and the
+//! conditions and effects of durative actions are separated by time.
 //!
-//! The files have passed `pddl::check`; what the planner does not handle (such as durations that effects depend on and
-//! that are not fixed) is refused here, with its place.
+//! The files have passed `pddl::check`. Unsupported features (such as variable durations that
+//! effects depend on) are rejected here with their source locations.
 
 mod condition;
 pub mod duration;
@@ -18,11 +18,11 @@ use crate::lifted::{Axiom, Formula, Lifted, Metric, Schema};
 use names::{Duration, Names, Scope};
 use pddl::ast::{self, ConditionTime, EffectTime};
 
-/// Resolves and simplifies a domain and a problem, to be measured by `objectives` (the most important first) or, if
-/// there are none, by the metric of the problem.
+/// Normalises a domain and a problem. `objectives` in lexicographic order replace the metric of the
+/// problem; if empty, the metric is used.
 ///
 /// # Errors
-/// All constructs that the planner does not handle, and all names that are declared nowhere.
+/// All unsupported constructs and undeclared names.
 pub fn normalize(
     domain: &ast::Domain,
     problem: &ast::Problem,
@@ -31,11 +31,11 @@ pub fn normalize(
     named(Names::new(domain, problem), (domain, problem), objectives)
 }
 
-/// As [`normalize`], where a duration that is not fixed stays open: it is a number of its own ([`duration::CHOSEN`]), which its bounds
-/// and all that mention `?duration` read.
+/// Normalises a domain and a problem as [`normalize`] does, but keeps variable durations: each
+/// becomes a numeric function ([`duration::CHOSEN`]) with its bounds.
 ///
 /// # Errors
-/// As [`normalize`].
+/// See [`normalize`].
 pub fn normalize_freely(
     domain: &ast::Domain,
     problem: &ast::Problem,
@@ -61,7 +61,8 @@ fn named(
         })
         .collect();
     let has_events = problem.init.iter().any(|element| matches!(element, ast::InitialElement::Timed(..)));
-    // What happens by itself may be worth waiting for, in the midst of an action, too.
+    // With timed events, a longer duration may serve as a wait, so the shortest one is not always
+    // best.
     let longest = if has_events { None } else { duration::rewards_time(&metrics) };
     let schemas = domain.actions.iter().zip(0..);
     let schemas = schemas.map(|(action, index)| schema(&mut names, longest, action, index)).collect();
@@ -95,7 +96,7 @@ fn named(
     Ok(lifted)
 }
 
-/// An action with its conditions and effects sorted by time.
+/// Converts an action, with its conditions and effects separated by time.
 fn schema(names: &mut Names, longest: Option<bool>, action: &ast::Action, index: u32) -> Schema {
     let mut scope = Scope::new(File::Domain);
     let mut schema = Schema {
@@ -151,7 +152,7 @@ fn schema(names: &mut Names, longest: Option<bool>, action: &ast::Action, index:
     schema
 }
 
-/// A derived predicate with the condition under which it holds.
+/// Converts a derived predicate.
 fn axiom(names: &mut Names, axiom: &ast::Derived) -> Axiom {
     let mut scope = Scope::new(File::Domain);
     let parameters = names.parameters(&axiom.head.parameters, &mut scope);

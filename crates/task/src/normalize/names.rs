@@ -1,4 +1,4 @@
-//! Names to ids: objects and their types, predicates, functions, and variables in sight.
+//! Resolves names to ids: objects and types, predicates, functions, and variables in scope.
 
 use std::sync::Arc;
 
@@ -11,24 +11,24 @@ use crate::lifted::{
 use crate::number::dense;
 use pddl::ast::{self, Identifier, Name, Span, TypeExpression, TypedName};
 
-/// What `?duration` stands for.
+/// Meaning of `?duration`.
 pub(super) enum Duration {
-    /// The action has none.
+    /// The action has no duration.
     Instantaneous,
     Fixed(Expression),
-    /// The planner chooses it.
+    /// The planner chooses the duration.
     Open,
 }
 
-/// The variables in sight, each with what it stands for, and the file that is read.
+/// Variables in scope with their terms, and the current file.
 pub(super) struct Scope {
     pub(super) file: File,
     variables: Vec<Name>,
-    /// What each variable in sight stands for, innermost last.
+    /// Terms of each variable in scope, innermost last.
     terms: FxHashMap<Name, Vec<Term>>,
-    /// How many variables have been bound so far, in sight or not.
+    /// Number of bound variables, including those out of scope.
     pub(super) bound: u32,
-    /// What `?duration` stands for.
+    /// Meaning of `?duration`.
     pub(super) duration: Duration,
 }
 
@@ -47,7 +47,7 @@ impl Scope {
         self.terms.entry(name.clone()).or_default().push(term);
     }
 
-    /// Takes the last `count` variables out of sight.
+    /// Removes the last `count` variables from the scope.
     pub(super) fn pop(&mut self, count: usize) {
         for name in self.variables.drain(self.variables.len().saturating_sub(count)..) {
             self.terms.get_mut(&name).map(Vec::pop);
@@ -59,23 +59,23 @@ impl Scope {
     }
 }
 
-/// What the names of the files stand for, and what is wrong with them.
+/// Symbol tables of the files, and the errors.
 pub(super) struct Names {
     pub(super) objects: Vec<Name>,
     object_ids: FxHashMap<Name, ObjectId>,
-    /// Objects of each type, ascending, subtypes included.
+    /// Objects of each type including subtypes, ascending.
     members: FxHashMap<Name, Vec<ObjectId>>,
     pub(super) predicates: Vec<Predicate>,
     predicate_ids: FxHashMap<Name, PredicateId>,
     pub(super) functions: Vec<Function>,
     function_ids: FxHashMap<Name, FunctionId>,
-    /// Whether the planner can choose durations within any bounds.
+    /// `true` if the planner can choose durations within arbitrary bounds.
     pub(super) is_free: bool,
     pub(super) errors: Vec<Error>,
 }
 
 impl Names {
-    /// The declarations of the files.
+    /// Reads the declarations of the files.
     pub(super) fn new(domain: &ast::Domain, problem: &ast::Problem) -> Self {
         let predicates: Vec<_> = domain
             .predicates
@@ -138,9 +138,9 @@ impl Names {
             });
             let mut open: Vec<Name> = entry.r#type.alternatives.iter().map(|t| t.name.clone()).collect();
             open.push(Name::new("object"));
-            let mut seen = FxHashSet::default();
+            let mut declared = FxHashSet::default();
             while let Some(name) = open.pop() {
-                if seen.insert(name.clone()) {
+                if declared.insert(name.clone()) {
                     open.extend(parents.get(&name).into_iter().flatten().cloned());
                     self.members.entry(name).or_default().push(id);
                 }
@@ -152,7 +152,7 @@ impl Names {
         }
     }
 
-    /// The objects of a type, ascending.
+    /// Returns the objects of a type, ascending.
     fn candidates(&self, expression: &TypeExpression) -> Arc<[ObjectId]> {
         let object = Identifier { name: Name::new("object"), span: Span::default() };
         let alternatives = if expression.alternatives.is_empty() {
@@ -160,11 +160,11 @@ impl Names {
         } else {
             &expression.alternatives
         };
-        let mut all: Vec<_> =
+        let mut objects: Vec<_> =
             alternatives.iter().filter_map(|t| self.members.get(&t.name)).flatten().copied().collect();
-        all.sort_unstable();
-        all.dedup();
-        all.into()
+        objects.sort_unstable();
+        objects.dedup();
+        objects.into()
     }
 
     pub(super) fn unsupported(&mut self, construct: &str, instead: &str, file: File, span: Span) {
@@ -180,10 +180,11 @@ impl Names {
         self.errors.push(Error::Unknown { kind, name: identifier.name.to_string(), place });
     }
 
-    /// Takes the variables of a quantifier into sight. One with a single object stands for that object, and is not bound.
+    /// Adds quantified variables to the scope. A variable whose type has a single object is
+    /// replaced by that object.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(super) fn quantify(&mut self, variables: &[TypedName], scope: &mut Scope) -> Vec<Bound> {
-        let mut all = Vec::new();
+        let mut bound_variables = Vec::new();
         for variable in variables {
             let candidates = self.candidates(&variable.r#type);
             if let [object] = candidates[..] {
@@ -191,23 +192,23 @@ impl Names {
                 continue;
             }
             scope.push(&variable.identifier.name, Term::Parameter(scope.bound));
-            all.push(Bound { variable: scope.bound, candidates });
+            bound_variables.push(Bound { variable: scope.bound, candidates });
             scope.bound += 1;
         }
-        all
+        bound_variables
     }
 
-    /// Takes parameters into sight.
+    /// Adds parameters to the scope.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(super) fn bind(&mut self, variables: &[TypedName], scope: &mut Scope) -> Vec<Bound> {
-        let mut all = Vec::with_capacity(variables.len());
+        let mut parameters = Vec::with_capacity(variables.len());
         for variable in variables {
             let candidates = self.candidates(&variable.r#type);
             scope.push(&variable.identifier.name, Term::Parameter(scope.bound));
-            all.push(Bound { variable: scope.bound, candidates });
+            parameters.push(Bound { variable: scope.bound, candidates });
             scope.bound += 1;
         }
-        all
+        parameters
     }
 
     pub(super) fn parameters(&mut self, written: &[TypedName], scope: &mut Scope) -> Vec<Parameter> {
@@ -234,14 +235,14 @@ impl Names {
     }
 
     pub(super) fn term(&mut self, term: &ast::Term, scope: &mut Scope) -> Term {
-        let (kind, identifier, found) = match term {
+        let (kind, identifier, resolved) = match term {
             ast::Term::Variable(identifier) => ("variable", identifier, scope.get(&identifier.name)),
             ast::Term::Constant(identifier) => {
-                let found = self.object_ids.get(&identifier.name);
-                ("object", identifier, found.map(|object| Term::Object(*object)))
+                let resolved = self.object_ids.get(&identifier.name);
+                ("object", identifier, resolved.map(|object| Term::Object(*object)))
             }
         };
-        found.unwrap_or_else(|| {
+        resolved.unwrap_or_else(|| {
             self.unknown(kind, identifier, scope.file);
             Term::Object(ObjectId(0))
         })

@@ -1,8 +1,11 @@
-//! Numeric functions without an initial value: undefined until they are assigned, and what reads them before is inapplicable.
+//! Numeric functions without an initial value: undefined until assigned. Happenings that read
+//! undefined functions are inapplicable.
 //!
-//! Each gets a predicate that says where it has a value. A comparison holds if it does and its functions have values; in Kleene's logic
-//! that makes a formula in negation normal form hold exactly where it is true. What an effect needs becomes a condition of its action:
-//! that its own condition is true or false, and if it is true, that what it reads has a value (`validate`, "One happening").
+//! Each such function gets a guard predicate that holds where it has a value. A comparison holds if
+//! it is true and its functions have values. By Kleene's logic, a formula in negation normal form
+//! then holds exactly if it is true. The requirements of an effect become a condition of its
+//! action: the effect's condition is true or false, and if it is true, the functions that it reads
+//! have values (`validate`, "One happening").
 
 use rustc_hash::FxHashMap;
 
@@ -12,10 +15,10 @@ use crate::lifted::{
 use crate::number::dense;
 use pddl::ast::{Assignment, Name};
 
-/// The predicate that says where a function has a value.
+/// Guard predicates by function.
 type Guards = FxHashMap<FunctionId, PredicateId>;
 
-/// Guards all numeric fluents but those that a metric reads.
+/// Guards all numeric fluents except those that a metric reads.
 pub fn guard(lifted: &mut Lifted) {
     let guards = declare(lifted);
     for schema in &mut lifted.schemas {
@@ -28,7 +31,7 @@ pub fn guard(lifted: &mut Lifted) {
     super::fluents::mark_fluents(lifted);
 }
 
-/// Declares the predicates, which hold at first where there is a value.
+/// Declares the guard predicates with their initial facts.
 fn declare(lifted: &mut Lifted) -> Guards {
     let mut measured = Vec::new();
     for metric in &lifted.metrics {
@@ -80,22 +83,23 @@ fn guard_schema(schema: &mut Schema, guards: &Guards) {
     }
     add(&mut schema.start_condition, at_start);
     for effects in [&mut schema.start_effects, &mut schema.end_effects] {
-        let known: Vec<Effect> = effects.iter().filter_map(|effect| gives_value(effect, guards)).collect();
+        let guard_effects: Vec<Effect> =
+            effects.iter().filter_map(|effect| gives_value(effect, guards)).collect();
         for effect in effects.iter_mut() {
             effect.condition = guarded(&effect.condition, guards);
         }
-        effects.extend(known);
+        effects.extend(guard_effects);
     }
 }
 
 fn add(condition: &mut Formula, more: Vec<Formula>) {
     if !more.is_empty() {
-        let own = std::mem::replace(condition, Formula::truth());
-        *condition = Formula::And(std::iter::once(own).chain(more).collect());
+        let original = std::mem::replace(condition, Formula::truth());
+        *condition = Formula::And(std::iter::once(original).chain(more).collect());
     }
 }
 
-/// That an assigned function has a value.
+/// Returns the effect that sets the guard of an assigned function.
 fn gives_value(effect: &Effect, guards: &Guards) -> Option<Effect> {
     let Change::Assign { assignment: Assignment::Assign, function, terms, .. } = &effect.change else {
         return None;
@@ -108,7 +112,7 @@ fn needs_of_all(effects: &[Effect], guards: &Guards) -> Vec<Formula> {
     effects.iter().filter_map(|effect| needs(effect, guards)).collect()
 }
 
-/// What must hold so that an effect reads nothing that has no value.
+/// Returns the condition that all values read by an effect are defined.
 fn needs(effect: &Effect, guards: &Guards) -> Option<Formula> {
     let mut values = Vec::new();
     if let Change::Assign { assignment, function, terms, expression, .. } = &effect.change {
@@ -147,7 +151,7 @@ fn compares(formula: &Formula) -> bool {
     }
 }
 
-/// The formula with each comparison under the condition that its functions have values.
+/// Adds to each comparison the condition that its functions have values.
 fn guarded(formula: &Formula, guards: &Guards) -> Formula {
     let each = |parts: &[Formula]| parts.iter().map(|part| guarded(part, guards)).collect();
     match formula {
@@ -163,7 +167,7 @@ fn guarded(formula: &Formula, guards: &Guards) -> Formula {
     }
 }
 
-/// That all functions in an expression have values.
+/// Returns the conditions that all functions in an expression have values.
 fn values_of(expression: &Expression, guards: &Guards) -> Vec<Formula> {
     let mut all = Vec::new();
     functions(expression, &mut |function, terms| all.extend(has_value(function, terms, guards)));

@@ -1,8 +1,9 @@
-//! Durative actions whose duration can be 0: start and end are one happening then.
+//! Durative actions whose duration may be 0: start and end are then simultaneous.
 //!
-//! Its conditions, of start and end, hold in the one state before it, its effects take place together, and nothing holds over all of
-//! an interval without a point in it (`validate`, clauses 1 and 4 of the definition). So such a schema becomes a second one for
-//! duration 0; the first keeps the durations above 0.
+//! The conditions of start and end must hold in the state before the happening, the effects are
+//! simultaneous, and conditions over the interval are void, because the interval is empty
+//! (`validate`, clauses 1 and 4 of the definition). Such a schema gets a copy for duration 0; the
+//! original keeps the positive durations.
 use num_traits::Zero;
 use rustc_hash::FxHashMap;
 
@@ -10,13 +11,14 @@ use crate::error::{Error, Errors};
 use crate::lifted::{Expression, Formula, FunctionId, Joint, Lifted, Rational, Schema};
 use pddl::ast::Comparison;
 
-/// The least and the greatest value that an expression can have; none where that is not known.
+/// Minimum and maximum of an expression, if known.
 type Range = Option<(Rational, Rational)>;
 
-/// Splits every schema whose duration can be 0. The schemas that are added come last.
+/// Splits every schema whose duration may be 0. The copies are appended.
 ///
 /// # Errors
-/// A duration that is chosen as short as it may be, and may be 0 or less: what holds with 0 does not tell what holds with a little more.
+/// A duration that is chosen as short as possible may be 0 or less. The conditions for duration 0
+/// do not determine those for slightly longer durations.
 pub fn split(lifted: &mut Lifted) -> Result<(), Errors> {
     let mut ranges: FxHashMap<FunctionId, (Rational, Rational)> = FxHashMap::default();
     for (function, _, value) in &lifted.values {
@@ -25,13 +27,13 @@ pub fn split(lifted: &mut Lifted) -> Result<(), Errors> {
         range.1 = range.1.clone().max(value.clone());
     }
     let functions = &lifted.functions;
-    let known = |function: FunctionId| {
+    let range_of_function = |function: FunctionId| {
         (!functions[function.index()].fluent).then(|| ranges.get(&function).cloned()).flatten()
     };
     let (mut instants, mut errors) = (Vec::new(), Vec::new());
     for schema in &mut lifted.schemas {
         let Some(duration) = schema.duration.clone() else { continue };
-        match range(&duration, &known) {
+        match range(&duration, &range_of_function) {
             Some((low, _)) if low.is_positive() => {}
             _ if schema.is_chosen => errors.push(Error::Unsupported {
                 construct: format!("a duration of `{}` that is chosen, and may be 0", schema.name),
@@ -45,16 +47,16 @@ pub fn split(lifted: &mut Lifted) -> Result<(), Errors> {
                     let zero = Expression::Number(Rational::zero());
                     Formula::Compare(comparison, duration.clone(), zero, schema.place)
                 };
-                let (none, some) = (compare(Comparison::Equal), compare(Comparison::Greater));
-                let mut other = instant(schema);
+                let (is_zero, is_positive) = (compare(Comparison::Equal), compare(Comparison::Greater));
+                let mut copy = instant(schema);
                 // A happening reads its duration.
-                if let Some(joint) = &mut other.joint {
-                    joint.start = Formula::And(vec![none.clone(), schema.start_condition.clone()]);
+                if let Some(joint) = &mut copy.joint {
+                    joint.start = Formula::And(vec![is_zero.clone(), schema.start_condition.clone()]);
                 }
-                other.start_condition = Formula::And(vec![none, other.start_condition]);
-                instants.push(other);
-                let own = std::mem::replace(&mut schema.start_condition, Formula::truth());
-                schema.start_condition = Formula::And(vec![some, own]);
+                copy.start_condition = Formula::And(vec![is_zero, copy.start_condition]);
+                instants.push(copy);
+                let original = std::mem::replace(&mut schema.start_condition, Formula::truth());
+                schema.start_condition = Formula::And(vec![is_positive, original]);
             }
         }
     }
@@ -62,7 +64,7 @@ pub fn split(lifted: &mut Lifted) -> Result<(), Errors> {
     if errors.is_empty() { Ok(()) } else { Err(errors.into()) }
 }
 
-/// The schema with duration 0.
+/// Returns the copy of a schema for duration 0.
 fn instant(schema: &Schema) -> Schema {
     let condition = Formula::And(vec![schema.start_condition.clone(), schema.at_end.clone()]);
     Schema {
@@ -110,7 +112,7 @@ fn range(expression: &Expression, known: &dyn Fn(FunctionId) -> Range) -> Range 
 
 #[allow(clippy::unnecessary_wraps)]
 fn product((a, b): (Rational, Rational), (c, d): (Rational, Rational)) -> Range {
-    let all = [a.clone() * &c, a * &d, b.clone() * &c, b * &d];
-    let low = all.iter().min().cloned()?;
-    Some((low, all.into_iter().max()?))
+    let products = [a.clone() * &c, a * &d, b.clone() * &c, b * &d];
+    let low = products.iter().min().cloned()?;
+    Some((low, products.into_iter().max()?))
 }

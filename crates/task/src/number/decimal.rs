@@ -1,6 +1,7 @@
-//! Decimals of up to 76 places in 256 bits: what sums and products of measured numbers are, without looking for common divisors.
+//! Decimals of up to 76 places in 256 bits. Sums and products of measured numbers are decimals,
+//! which need no greatest common divisors.
 //!
-//! A mantissa that is not a multiple of 10 (unless there are no places) makes equal decimals equal representations.
+//! The representation is unique: the mantissa is not a multiple of 10, unless there are no places.
 
 use std::cmp::Ordering;
 
@@ -8,10 +9,10 @@ use ethnum::{I256, U256};
 use num_bigint::BigInt;
 use num_rational::{BigRational, Ratio};
 
-/// 10 to the power of so many has fewer than 254 bits.
+/// Maximum number of places; this power of 10 has fewer than 254 bits.
 const PLACES: u32 = 76;
 
-/// Mantissas have at most so many bits.
+/// Maximum number of bits of a mantissa.
 const BITS: u32 = 254;
 
 /// Powers of 5 below 2^128.
@@ -47,13 +48,13 @@ fn fits(mantissa: I256) -> bool {
     mantissa.unsigned_abs().leading_zeros() >= U256::BITS - BITS
 }
 
-/// The exponent of a power of 5.
+/// Returns the exponent of a power of 5.
 fn exponent_of_five(power: u128) -> Option<u32> {
-    // Each power has more bits than the one before, at least 2.32 a step.
+    // Powers of 5 are sorted, so the exponent is found by binary search.
     FIVES.binary_search(&power).ok().and_then(|exponent| u32::try_from(exponent).ok())
 }
 
-/// Since 2^64 is one more than a multiple of 5, a number leaves the same rest as the sum of its words.
+/// Tests divisibility by 5. As 2^64 ≡ 1 (mod 5), a number is congruent to the sum of its words.
 fn is_multiple_of_five(number: I256) -> bool {
     let bytes = number.unsigned_abs().to_le_bytes();
     let (words, _) = bytes.as_chunks::<8>();
@@ -61,7 +62,7 @@ fn is_multiple_of_five(number: I256) -> bool {
 }
 
 impl Decimal {
-    /// In the form in which equal decimals are equal; none if there are too many digits.
+    /// Normalises a decimal. Returns `None` if it has too many digits.
     fn new(mut mantissa: I256, mut places: u32) -> Option<Self> {
         while places > 0 && mantissa.trailing_zeros() > 0 && is_multiple_of_five(mantissa) {
             mantissa = mantissa.checked_div(I256::new(10))?;
@@ -70,7 +71,7 @@ impl Decimal {
         (places <= PLACES && fits(mantissa)).then_some(Self { mantissa, places })
     }
 
-    /// None if it is not a decimal, or has too many digits.
+    /// Converts a fraction. Returns `None` if it is not a decimal or has too many digits.
     pub(super) fn from_small(small: &Ratio<i128>) -> Option<Self> {
         if *small.denom() == 1 {
             return Some(Self { mantissa: I256::from(*small.numer()), places: 0 });
@@ -79,14 +80,14 @@ impl Decimal {
         let twos = denominator.trailing_zeros();
         let fives = exponent_of_five(denominator >> twos)?;
         let places = twos.max(fives);
-        // One of these is 1.
+        // At least one of the factors is 1.
         let missing_twos = I256::ONE.checked_shl(places.checked_sub(twos)?)?;
         let missing_fives = I256::new(5).checked_pow(places.checked_sub(fives)?)?;
         let mantissa = I256::from(*small.numer()).checked_mul(missing_twos)?.checked_mul(missing_fives)?;
         Self::new(mantissa, places)
     }
 
-    /// None if it is not a decimal, or has too many digits.
+    /// Converts a fraction. Returns `None` if it is not a decimal or has too many digits.
     pub(super) fn from_big(big: &BigRational) -> Option<Self> {
         let bits = |integer: &BigInt| integer.bits();
         if bits(big.numer()) > BITS.into() || bits(big.denom()) > U256::BITS.into() {
@@ -106,16 +107,16 @@ impl Decimal {
             return None;
         }
         let sign = if mantissa.sign() == num_bigint::Sign::Minus { 0xff } else { 0 };
-        let mut all = [sign; 32];
-        all[..bytes.len()].copy_from_slice(&bytes);
-        Self::new(I256::from_le_bytes(all), places)
+        let mut padded = [sign; 32];
+        padded[..bytes.len()].copy_from_slice(&bytes);
+        Self::new(I256::from_le_bytes(padded), places)
     }
 
-    /// The fraction that it is, with numerator and denominator that have no common divisor; none if one of them is too large.
+    /// Converts to a reduced fraction. Returns `None` on overflow.
     pub(super) fn to_small(self) -> Option<Ratio<i128>> {
         let (mut mantissa, mut denominator) = (self.mantissa, power_of_ten(self.places)?);
         if self.places > 0 {
-            // Not a multiple of 10: of 2 or of 5, or of neither.
+            // The mantissa is not a multiple of 10, so it is divisible by at most one of 2 and 5.
             let twos = mantissa.trailing_zeros().min(self.places);
             mantissa = mantissa.checked_shr(twos)?;
             denominator = denominator.checked_shr(twos)?;
@@ -144,7 +145,7 @@ impl Decimal {
         self.mantissa.is_positive()
     }
 
-    /// Both mantissas with as many places as the one with more has; none if they do not fit.
+    /// Returns both mantissas with the same number of places, or `None` on overflow.
     fn aligned(self, other: Self) -> Option<(I256, I256, u32)> {
         let widen =
             |own: Self, places: u32| own.mantissa.checked_mul(power_of_ten(places.checked_sub(own.places)?)?);
@@ -156,13 +157,13 @@ impl Decimal {
     }
 
     pub(super) fn plus(self, other: Self) -> Option<Self> {
-        let (own, other, places) = self.aligned(other)?;
-        Self::new(own.checked_add(other)?, places)
+        let (left, other, places) = self.aligned(other)?;
+        Self::new(left.checked_add(other)?, places)
     }
 
     pub(super) fn minus(self, other: Self) -> Option<Self> {
-        let (own, other, places) = self.aligned(other)?;
-        Self::new(own.checked_sub(other)?, places)
+        let (left, other, places) = self.aligned(other)?;
+        Self::new(left.checked_sub(other)?, places)
     }
 
     pub(super) fn times(self, other: Self) -> Option<Self> {
@@ -170,7 +171,7 @@ impl Decimal {
     }
 
     pub(super) fn compare(self, other: Self) -> Option<Ordering> {
-        let (own, other, _) = self.aligned(other)?;
-        Some(own.cmp(&other))
+        let (left, other, _) = self.aligned(other)?;
+        Some(left.cmp(&other))
     }
 }

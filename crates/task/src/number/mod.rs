@@ -1,7 +1,9 @@
-//! Exact numbers: rationals of any size while files are read and ground, and integers of a ground task.
+//! Exact numbers: rationals of arbitrary size while files are read and ground, and integers of a
+//! ground task.
 //!
-//! Nothing here rounds, wraps or saturates. A rational that no longer fits two machine integers goes on with big ones; an integer
-//! of a task that may outgrow its type is computed by the checked operations, whose users say what happens then.
+//! No operation rounds, wraps or saturates. A rational that no longer fits two machine integers is
+//! stored with big integers. Integers of a task that may overflow are computed by checked
+//! operations, whose callers handle the overflow.
 
 mod decimal;
 
@@ -17,21 +19,24 @@ use decimal::Decimal;
 
 /// A number of a ground task, scaled to an integer.
 ///
-/// Constants stay below [`LIMIT`] in magnitude. What can outgrow the type (products with fluents, fluents that grow with every
-/// step, sums of many costs) is computed by checked operations. `overflow-checks` are on in every profile.
+/// Constants stay below [`LIMIT`] in magnitude. Values that may exceed the type (products with
+/// fluents, growing fluents, sums of costs) are computed by checked operations. `overflow-checks`
+/// are enabled in every profile.
 pub type Int = i128;
 
-/// Constants of a task stay below this once they are scaled.
+/// Limit on the magnitude of scaled constants.
 pub const LIMIT: Int = 1 << 118;
 
-/// What fluents may grow to, and sums of costs: a state beyond is left out, and the search knows that it is not complete then.
+/// Limit on the magnitude of fluents and sums of costs. States beyond are pruned, and the search is
+/// then incomplete.
 pub const GROWTH_LIMIT: Int = 1 << 124;
 
 /// An exact rational of any size.
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub struct Rational(Repr);
 
-/// A number is `Small` whenever it fits, then `Decimal`, so that equal numbers are equal representations.
+/// Unique representation: `Small` if it fits, else `Decimal` if it fits, so equal numbers have
+/// equal representations.
 #[derive(Clone, PartialEq, Eq, Hash)]
 enum Repr {
     Small(Ratio<i128>),
@@ -66,7 +71,7 @@ impl Rational {
         Self(decimal.to_small().map_or(Repr::Decimal(decimal), Repr::Small))
     }
 
-    /// None if it is not a decimal, or has too many digits.
+    /// Converts to a decimal. Returns `None` if it is not a decimal or has too many digits.
     fn to_decimal(&self) -> Option<Decimal> {
         match &self.0 {
             Repr::Small(small) => Decimal::from_small(small),
@@ -93,7 +98,7 @@ impl Rational {
         }
     }
 
-    /// The denominator, positive; none if it does not fit.
+    /// Returns the positive denominator, or `None` on overflow.
     pub fn denominator(&self) -> Option<Int> {
         match &self.0 {
             Repr::Small(small) => Some(*small.denom()),
@@ -102,7 +107,7 @@ impl Rational {
         }
     }
 
-    /// This number as an integer; none if it is none, or does not fit.
+    /// Converts to an integer. Returns `None` if it is no integer or overflows.
     pub fn to_int(&self) -> Option<Int> {
         match &self.0 {
             Repr::Small(small) => small.is_integer().then(|| *small.numer()),
@@ -110,7 +115,7 @@ impl Rational {
         }
     }
 
-    /// `1 / self`; it must not be 0.
+    /// Returns `1 / self`, which must not be 0.
     #[must_use]
     pub fn recip(&self) -> Self {
         Self::one() / self.clone()
@@ -128,7 +133,7 @@ impl Rational {
         !self.is_positive() && !self.is_zero()
     }
 
-    /// How many bits its numerator or its denominator has; 256 where it has no more.
+    /// Returns an upper bound on the bits of numerator and denominator, at least 256.
     pub(crate) fn bits(&self) -> u64 {
         match &self.0 {
             Repr::Small(_) | Repr::Decimal(_) => 256,
@@ -136,7 +141,7 @@ impl Rational {
         }
     }
 
-    /// The result if both are small integers, which most are: no common divisor has to be found.
+    /// Fast path for two small integers, which needs no greatest common divisor.
     fn integers(&self, other: &Self, operation: impl Fn(i128, i128) -> Option<i128>) -> Option<Self> {
         let (a, b) = (self.to_int()?, other.to_int()?);
         operation(a, b).filter(|result| *result > i128::MIN).map(Self::from_integer)
@@ -165,22 +170,22 @@ impl Rational {
     }
 }
 
-/// An index as a number of 32 bits: of operators, atoms, values, designs or steps, of which there are fewer than fit into memory.
+/// Converts an index to 32 bits: of operators, atoms, values, designs or steps.
 ///
 /// # Panics
-/// From 2^32.
+/// The index is at least 2^32, which exceeds the memory.
 pub fn dense(index: usize) -> u32 {
     u32::try_from(index).expect("invariant: fewer than 2^32 of anything are held in memory")
 }
 
-/// A number in words, for keys.
+/// Splits a number into 32-bit words, for keys.
 pub fn words(number: Int) -> [u32; 4] {
     let bytes = number.to_le_bytes();
     let (words, _) = bytes.as_chunks::<4>();
     std::array::from_fn(|word| u32::from_le_bytes(words[word]))
 }
 
-/// The least common multiple of two positive integers; none if it does not fit.
+/// Returns the least common multiple of two positive integers, or `None` on overflow.
 pub fn checked_lcm(a: Int, b: Int) -> Option<Int> {
     a.checked_div(num_integer::gcd(a, b))?.checked_mul(b)
 }
@@ -313,7 +318,7 @@ impl Ord for Rational {
     }
 }
 
-/// As a fraction.
+/// Formats a fraction.
 impl std::fmt::Debug for Rational {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}", self.to_big())
@@ -326,7 +331,7 @@ mod tests {
 
     use super::*;
 
-    /// Numbers of every size, those at the borders of the small ones among them.
+    /// Numbers of all sizes, including those at the limits of small ones.
     fn number() -> impl Strategy<Value = BigRational> {
         let integer = prop_oneof![
             (-20_i128..20).prop_map(BigInt::from),
@@ -359,7 +364,7 @@ mod tests {
             prop_assert_eq!((x.clone() * &y).to_big(), &a * &b);
             prop_assert_eq!((-x.clone()).to_big(), -a.clone());
             prop_assert_eq!(x.to_big(), a.clone());
-            // Equal numbers are equal however they came about.
+            // Equal numbers have equal representations, independent of their computation.
             prop_assert_eq!(x.clone() + &y, Rational::from_big(&a + &b));
             prop_assert_eq!(x.clone() - &y, Rational::from_big(&a - &b));
             prop_assert_eq!(x.clone() * &y, Rational::from_big(&a * &b));
@@ -369,7 +374,7 @@ mod tests {
             prop_assert_eq!(x.is_integer(), a.is_integer());
             if !b.is_zero() {
                 prop_assert_eq!((x.clone() / y.clone()).to_big(), &a / &b);
-                // Equal numbers are equal however they came about.
+                // Equal numbers have equal representations, independent of their computation.
                 prop_assert_eq!((x.clone() / y.clone()) * &y, x);
             }
         }

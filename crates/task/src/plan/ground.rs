@@ -4,7 +4,7 @@ use crate::number::Int;
 use crate::task::number::TaskNumber;
 use crate::task::{OperatorId, State, Task};
 
-/// One step of a plan over operators.
+/// A step of a plan over operators.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct GroundStep {
     pub operator: OperatorId,
@@ -12,7 +12,7 @@ pub struct GroundStep {
     pub choice: Vec<u32>,
 }
 
-/// A plan and the sum of its operators' costs, in the task's integer unit.
+/// A plan and the sum of its operator costs, in the task's integer unit.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct GroundPlan<N = Int> {
     pub steps: Vec<GroundStep>,
@@ -20,19 +20,19 @@ pub struct GroundPlan<N = Int> {
 }
 
 impl GroundPlan {
-    /// The limit on the cost of cheaper plans.
+    /// Greatest cost of strictly cheaper plans.
     pub fn below(&self) -> Int {
         self.cost.saturating_sub(1)
     }
 }
 
-/// The states that a plan passes through, the initial one first, and its cost; none if a step is not applicable, the last
-/// state is not a goal state, or the cost does not fit.
+/// Returns the states of a plan, beginning with the initial one, and its cost. `None` if a step is
+/// not applicable, the last state is no goal state, or the cost overflows.
 pub fn replay<N: TaskNumber>(task: &Task<N>, plan: &[GroundStep]) -> Option<(Vec<State<N>>, N)> {
     replay_from(task, &task.initial, plan)
 }
 
-/// The same from a state of its own.
+/// Replays a plan from a given state, see [`replay`].
 pub fn replay_from<N: TaskNumber>(
     task: &Task<N>,
     initial: &State<N>,
@@ -42,7 +42,7 @@ pub fn replay_from<N: TaskNumber>(
     Some((states, cost(task, plan)?))
 }
 
-/// The sum of the costs of steps; none if it does not fit.
+/// Returns the sum of the costs of steps, or `None` on overflow.
 pub fn cost<N: TaskNumber>(task: &Task<N>, plan: &[GroundStep]) -> Option<N> {
     plan.iter().try_fold(N::zero(), |sum, step| {
         let operator = &task.operators[step.operator.index()];
@@ -50,8 +50,8 @@ pub fn cost<N: TaskNumber>(task: &Task<N>, plan: &[GroundStep]) -> Option<N> {
     })
 }
 
-/// The states that a plan passes through from a state on; none if a step is not applicable, or the last state is not a goal
-/// state.
+/// Returns the states of a plan from a state on. `None` if a step is not applicable, or the last
+/// state is no goal state.
 pub fn pass<N: TaskNumber>(task: &Task<N>, initial: &State<N>, plan: &[GroundStep]) -> Option<Vec<State<N>>> {
     let mut states = vec![initial.clone()];
     for step in plan {

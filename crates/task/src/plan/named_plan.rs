@@ -1,4 +1,4 @@
-//! Plans in names: actions with their designs, as text and JSON.
+//! Plans with names: actions with their designs, as text and JSON.
 
 use std::borrow::Cow;
 use std::str::FromStr;
@@ -18,12 +18,12 @@ use crate::task::number::TaskNumber;
 use crate::task::{Argument, Objective, Operator, OperatorId, State, Task};
 use pddl::to_decimal;
 
-/// An exact number of any size, in the units of the PDDL files.
+/// An exact number of arbitrary size, in the units of the PDDL files.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Exact(Rational);
 
 impl Exact {
-    /// A number of a ground task that is so many times what the files write.
+    /// Converts a number of a ground task that is scaled by `scale`.
     pub fn scaled<N: TaskNumber>(value: &N, scale: Int) -> Self {
         Self(value.to_rational() / Rational::from_integer(scale))
     }
@@ -33,27 +33,27 @@ impl Exact {
         Self(self.0.clone() + &other.0)
     }
 
-    /// The numerator of the reduced fraction.
+    /// Numerator of the reduced fraction.
     pub fn numerator(&self) -> BigInt {
         self.0.to_big().numer().clone()
     }
 
-    /// The denominator of the reduced fraction, positive.
+    /// Denominator of the reduced fraction, positive.
     pub fn denominator(&self) -> BigInt {
         self.0.to_big().denom().clone()
     }
 
-    /// Whether it is 0.
+    /// Returns `true` if the number is 0.
     pub fn is_zero(&self) -> bool {
         self.0.is_zero()
     }
 
-    /// As a rational.
+    /// Converts the number to a rational.
     pub fn to_rational(&self) -> BigRational {
         self.0.to_big()
     }
 
-    /// The nearest double.
+    /// Returns the nearest double.
     pub fn to_f64(&self) -> f64 {
         self.to_rational().to_f64().unwrap_or(f64::NAN)
     }
@@ -65,7 +65,7 @@ impl From<BigRational> for Exact {
     }
 }
 
-/// Reads a decimal or a fraction: `2.5`, `-7/3`.
+/// Parses a decimal or a fraction: `2.5`, `-7/3`.
 impl FromStr for Exact {
     type Err = NotANumber;
 
@@ -99,7 +99,7 @@ impl FromStr for Exact {
 #[error("`{0}` is not a number: a decimal such as `2.5` or a fraction such as `7/3` would be one")]
 pub struct NotANumber(String);
 
-/// As text, because the numbers of most formats are binary: `"2.5"`, `"7/3"`.
+/// Serialises as text, because the numbers of most formats are binary: `"2.5"`, `"7/3"`.
 impl Serialize for Exact {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
@@ -113,7 +113,7 @@ impl<'de> Deserialize<'de> for Exact {
     }
 }
 
-/// Writes an exact decimal where there is one, else a fraction.
+/// Writes an exact decimal if there is one, otherwise a fraction.
 impl std::fmt::Display for Exact {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let exact = self.to_rational();
@@ -121,36 +121,36 @@ impl std::fmt::Display for Exact {
     }
 }
 
-/// One action of a plan as users see it.
+/// An action of a plan as displayed to users.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Step {
-    /// The name of the action schema.
+    /// Name of the action schema.
     pub action: String,
-    /// All arguments in the order of the schema's parameters, designs among them.
+    /// Arguments in the order of the schema's parameters, including designs.
     pub arguments: Vec<String>,
-    /// The function and the design chosen for it, in the order of the parameters.
+    /// Functions with their chosen designs, in the order of the parameters.
     pub configuration: Vec<(String, String)>,
-    /// Functions whose design differs from the one that the last step with this function used.
+    /// Functions whose design differs from that of their previous step.
     pub reconfigured: Vec<String>,
-    /// When the action starts, in the domain's time unit, actions executing one after another. There is nothing between
-    /// them but time to wait for timed initial literals.
+    /// Start in the domain's time unit, for sequential execution. Gaps between actions are waits
+    /// for timed initial literals only.
     pub start: Exact,
-    /// How long it takes; none for an instantaneous action.
+    /// Duration; 0 for an instantaneous action.
     pub duration: Exact,
-    /// What it adds to the metric.
+    /// Contribution to the metric.
     pub cost: Exact,
 }
 
-/// A plan as users see it.
+/// A plan as displayed to users.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Plan {
-    /// The actions, in order of execution.
+    /// Actions in order of execution.
     pub steps: Vec<Step>,
-    /// The metric of the problem file.
+    /// Metric of the problem file.
     pub cost: Exact,
 }
 
-/// The plan in the names of the task, each action as early as can be found within the limits.
+/// Converts a plan to names, with each action as early as can be found within the limits.
 pub fn decode<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> Plan {
     let (task, plan) = (context.task, earliest(context, plan));
     let mut steps = Vec::new();
@@ -174,7 +174,7 @@ pub fn decode<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> P
     plan
 }
 
-/// What the fluents that are only measured come to in a state, in the unit of costs.
+/// Returns the value of the state-dependent part of the metric in a state, in cost units.
 pub fn rest<N: TaskNumber>(task: &Task<N>, state: &State<N>) -> Rational {
     let unit = Rational::from_integer(task.objective.scale) / Rational::from_integer(task.number_scale);
     let terms = task.objective.rest.iter();
@@ -182,7 +182,8 @@ pub fn rest<N: TaskNumber>(task: &Task<N>, state: &State<N>) -> Rational {
     terms.fold(Rational::zero(), |sum, term| sum + term) * &unit
 }
 
-/// What each step adds to the fluents that are only measured, and what they come to in the end, in the unit of costs.
+/// Returns the contribution of each step to the state-dependent part of the metric, and its final
+/// value, in cost units.
 pub fn measured<'s, N: TaskNumber>(
     task: &Task<N>,
     steps: impl Iterator<Item = (OperatorId, &'s [u32])>,
@@ -193,7 +194,7 @@ pub fn measured<'s, N: TaskNumber>(
     let (mut state, mut added) = (task.initial.clone(), Vec::new());
     let mut before = rest(task, &state);
     for (operator, choice) in steps {
-        // What stands for one step alone may be out of reach here.
+        // A step outside of its plan may be inapplicable.
         if let Some(next) = task.successor(&task.operators[operator.index()], &state, choice) {
             state = next;
         }
@@ -205,13 +206,13 @@ pub fn measured<'s, N: TaskNumber>(
 }
 
 impl Plan {
-    /// When the last action ends, in the domain's time unit.
+    /// End of the last action, in the domain's time unit.
     pub fn makespan(&self) -> Exact {
         let ends = self.steps.iter().map(|step| step.start.0.clone() + &step.duration.0);
         Exact(ends.max().unwrap_or_default())
     }
 
-    /// Says of each step anew which functions have another design than in the last step with them.
+    /// Recomputes the reconfigured functions of each step.
     pub fn note_reconfigured(&mut self) {
         let mut current = Vec::new();
         for step in &mut self.steps {
@@ -222,7 +223,8 @@ impl Plan {
 }
 
 impl Step {
-    /// An operator in names, with its start and duration in the task's time unit and its cost in the task's cost unit.
+    /// Converts an operator to names. Start and duration are in the task's time unit, the cost in
+    /// the task's cost unit.
     pub fn new<N: TaskNumber>(
         task: &Task<N>,
         operator: &Operator<N>,
@@ -240,10 +242,11 @@ impl Step {
         }
     }
 
-    /// Notes the functions whose design is not the one in `current`, which has the last design of each; and updates it.
+    /// Records the functions whose design differs from the last one in `current`, and updates
+    /// `current`.
     fn note_reconfigured(&mut self, current: &mut Vec<(String, String)>) {
         for (function, design) in &self.configuration {
-            match current.iter_mut().find(|(known, _)| known == function) {
+            match current.iter_mut().find(|(name, _)| name == function) {
                 Some((_, known)) if known == design => {}
                 Some((_, known)) => {
                     known.clone_from(design);
@@ -255,25 +258,25 @@ impl Step {
     }
 }
 
-/// The metric of the problem file for a sum of operator costs.
+/// Returns the metric of the problem file for a sum of operator costs.
 pub fn metric<N: TaskNumber>(task: &Task<N>, cost: &impl TaskNumber) -> Exact {
     task.objective.metric(cost)
 }
 
 impl<N: TaskNumber> Objective<N> {
-    /// The metric as the file writes it for a sum of operator costs.
+    /// Returns the metric in the file's terms for a sum of operator costs.
     pub fn metric(&self, cost: &impl TaskNumber) -> Exact {
         Exact::scaled(&self.signed(&(cost.to_rational() + self.offset.to_rational())), self.scale)
     }
 
-    /// A cost as the file counts it.
+    /// Converts a cost to the sign of the file.
     fn signed(&self, cost: &impl TaskNumber) -> Rational {
         let cost = cost.to_rational();
         if self.maximize { -cost } else { cost }
     }
 }
 
-/// The object that an argument stands for, with a combination of designs.
+/// Returns the object of an argument for a combination of designs.
 pub fn resolve<N>(task: &Task<N>, operator: &Operator<N>, choice: &[u32], argument: Argument) -> ObjectId {
     match argument {
         Argument::Object(object) => object,

@@ -1,8 +1,9 @@
-//! A plan to the same plan with earlier starts.
+//! Rescheduling: a plan to the same plan with earlier starts.
 //!
-//! Waiting is free, so that a cheapest plan may put an action off until an event that only a later one needs. Nobody wants a robot to
-//! do that. So each action in turn is tried at its earlier passages, with waits before the next one where that needs events;
-//! what still is a plan, and costs no more, is kept.
+//! Waiting is free, so an optimal plan may delay an action unnecessarily until an event that only a
+//! later action needs. Each action is therefore tried in its earlier windows, with waits before the
+//! next one if events are required. A change is kept if the result is still a plan with at most the
+//! same cost.
 
 use num_traits::Zero;
 
@@ -12,7 +13,8 @@ use crate::plan::ground::{GroundPlan, GroundStep, replay};
 use crate::task::number::TaskNumber;
 use crate::task::{Operator, OperatorId, Task};
 
-/// The same actions, each as early as the ones before it and the rest of the plan admit; as far as the limits let it.
+/// Returns the same actions, each as early as its predecessors and the remaining plan admit, within
+/// the limits.
 pub fn earliest<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) -> GroundPlan<N> {
     let Context { task, limits } = context;
     let mut plan = plan.clone();
@@ -23,12 +25,12 @@ pub fn earliest<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) ->
     while position < plan.steps.len() && !limits.reached() {
         let id = plan.steps[position].operator;
         if task.operators[id.index()].wait.is_none() {
-            let own = starts(task, &plan.steps);
-            let tried = same_action(task, id).filter_map(|other| with(task, &plan, position, other));
+            let current_starts = starts(task, &plan.steps);
+            let tried = same_action(task, id).filter_map(|operator| with(task, &plan, position, operator));
             let best = tried.map(|tried| (starts(task, &tried.steps), tried)).min_by(|a, b| a.0.cmp(&b.0));
-            if let Some((_, tried)) = best.filter(|(times, _)| *times < own) {
+            if let Some((_, tried)) = best.filter(|(times, _)| *times < current_starts) {
                 plan = tried;
-                // Waits may have gone or come before it.
+                // The number of earlier waits may have changed.
                 position = 0;
                 continue;
             }
@@ -38,17 +40,20 @@ pub fn earliest<N: TaskNumber>(context: Context<'_, N>, plan: &GroundPlan<N>) ->
     plan
 }
 
-/// The other operators of the action of an operator.
+/// Returns the other operators of an operator's action.
 fn same_action<N: TaskNumber>(task: &Task<N>, id: OperatorId) -> impl Iterator<Item = OperatorId> + '_ {
-    let own = &task.operators[id.index()];
-    let same = move |other: &Operator<N>| {
-        other.schema == own.schema && other.arguments == own.arguments && other.slots == own.slots
+    let operator = &task.operators[id.index()];
+    let is_same_action = move |other: &Operator<N>| {
+        other.schema == operator.schema
+            && other.arguments == operator.arguments
+            && other.slots == operator.slots
     };
-    let all = task.operators.iter().zip((0..).map(OperatorId));
-    all.filter(move |(other, other_id)| *other_id != id && same(other)).map(|(_, id)| id)
+    let operators = task.operators.iter().zip((0..).map(OperatorId));
+    operators.filter(move |(other, other_id)| *other_id != id && is_same_action(other)).map(|(_, id)| id)
 }
 
-/// The plan with another operator at a position, and waits where they are needed; none if that is not a plan, or a dearer one.
+/// Replaces an operator of the plan and inserts the necessary waits. Returns `None` if the result
+/// is no plan or costs more.
 fn with<N: TaskNumber>(
     task: &Task<N>,
     plan: &GroundPlan<N>,
@@ -68,7 +73,7 @@ fn with<N: TaskNumber>(
     for (at, step) in plan.steps.iter().enumerate().filter(|(_, step)| !is_wait(step)) {
         let step = if at == position { GroundStep { operator: other, ..step.clone() } } else { step.clone() };
         let operator = &task.operators[step.operator.index()];
-        // At most one wait is possible at a time, and each leads to a later event.
+        // At most one wait is applicable at a time, and each leads to a later event.
         while !operator.applicable(&state, &step.choice) {
             let wait = waits.iter().find(|wait| task.operators[wait.index()].applicable(&state, &[]))?;
             state = task.successor(&task.operators[wait.index()], &state, &[])?;
@@ -84,10 +89,10 @@ fn with<N: TaskNumber>(
     (cost <= plan.cost).then_some(GroundPlan { steps, cost })
 }
 
-/// When the actions start, in the task's time unit.
+/// Start times of the actions, in the task's time unit.
 pub fn starts<N: TaskNumber>(task: &Task<N>, steps: &[GroundStep]) -> Vec<Rational> {
     let mut clock = Rational::zero();
-    let mut all = Vec::new();
+    let mut times = Vec::new();
     for step in steps {
         let operator = &task.operators[step.operator.index()];
         if let Some(time) = &operator.wait {
@@ -98,8 +103,8 @@ pub fn starts<N: TaskNumber>(task: &Task<N>, steps: &[GroundStep]) -> Vec<Ration
         let by_end = operator.timing.end.as_ref().map(|end| end.to_rational() - &duration);
         let by_start = operator.timing.start.as_ref().map(TaskNumber::to_rational);
         let start = by_start.into_iter().chain(by_end).fold(clock, Rational::max);
-        all.push(start.clone());
+        times.push(start.clone());
         clock = start + &duration;
     }
-    all
+    times
 }

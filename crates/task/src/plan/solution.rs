@@ -1,4 +1,4 @@
-//! Solutions of the optimizer: plan, status, proof and statistics.
+//! Results of the planner: plan, status, proof and statistics.
 
 use std::time::Duration;
 
@@ -6,18 +6,18 @@ use crate::plan::ground::GroundPlan;
 use crate::plan::named_plan::{Exact, Plan};
 use crate::words;
 
-/// How good the answer is.
+/// Quality of the result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
-    /// No plan of any length has a better metric: proved.
+    /// The plan is proved optimal.
     Optimal,
-    /// There is a plan; that it is optimal is not proved.
+    /// The plan is not proved optimal.
     Feasible,
-    /// There is no plan of any length: proved.
+    /// It is proved that no plan exists.
     Unsolvable,
-    /// There is no plan with at most as many steps as asked for: proved.
+    /// It is proved that no plan exists within the requested number of steps.
     UnsolvableWithinHorizon,
-    /// A limit was reached before anything was known.
+    /// A limit was reached without a result.
     Unknown,
 }
 
@@ -30,134 +30,138 @@ words! {
     Unknown = "unknown",
 }
 
-/// Why the status is what it is.
+/// Justification of the status.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Proof {
-    /// The formula for cheaper plans is unsatisfiable up to the step bound, and no longer plan is cheaper.
+    /// The formula for cheaper plans is unsatisfiable up to the step bound, and longer plans are
+    /// not cheaper.
     Sat {
-        /// No plan with more steps can be cheaper.
+        /// Number of steps above which no plan is cheaper.
         step_bound: usize,
     },
-    /// The cost of the plan equals a lower bound on the cost of all plans, by the cost to go in a projection, or by what each action takes and costs by itself.
+    /// The cost of the plan equals a lower bound on the cost of all plans: the goal distance in a
+    /// projection, or the sum of individual minimum costs.
     Bound,
-    /// A* with an admissible estimate ended; all that it left out is dominated.
+    /// A* with an admissible heuristic has terminated; all pruned nodes are dominated.
     Search,
-    /// Relaxed or projected, the goal is out of reach: the reason in words.
+    /// The goal is unreachable in a relaxation or projection; contains the reason.
     Relaxation(String),
 }
 
-/// A better plan was found, or a better lower bound.
+/// A better plan or a better lower bound.
 #[derive(Debug, Clone)]
 pub struct Improvement {
-    /// The metric of the best plan so far.
+    /// Metric of the best known plan.
     pub cost: Exact,
-    /// No plan has a better metric than this.
+    /// Lower bound on the metric of every plan.
     pub lower_bound: Exact,
-    /// Steps of the formula at hand.
+    /// Number of steps of the current formula.
     pub horizon: usize,
 }
 
 impl Improvement {
-    /// How far the bound is from the plan, as a part of the plan's metric: 0 if the plan is proved optimal. Infinite or not a number
-    /// where that metric is 0.
+    /// Relative gap between the plan and the bound: 0 for an optimal plan. Infinite or not a number
+    /// if the metric is 0.
     pub fn gap(&self) -> f64 {
         let (cost, bound) = (self.cost.to_f64(), self.lower_bound.to_f64());
         if self.cost == self.lower_bound { 0.0 } else { (cost - bound).abs() / cost.abs() }
     }
 }
 
-/// A metric that has no best value, or none that is known.
+/// Reason why a metric has no best value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MetricUnbounded {
-    /// An action that improves the metric can be repeated for ever in a state that the plan passes.
+    /// An action that improves the metric can be repeated forever in a state of the plan.
     Proved,
-    /// Actions improve the metric; that they can be repeated for ever is not shown.
+    /// Actions improve the metric, but it is not shown that they can be repeated forever.
     Suspected,
 }
 
 words! { MetricUnbounded, "reason": Proved = "proved", Suspected = "suspected" }
 
-/// A part of the planner.
+/// Component of the planner.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PlannerPart {
     /// A\* with lower bounds.
     Search,
-    /// Search by relaxed plans and landmarks, for a plan soon.
+    /// Satisficing search with relaxed plans and landmarks.
     Satisficing,
-    /// The SAT solver.
+    /// SAT solver.
     Sat,
 }
 
 words! { PlannerPart, "part of the planner": Search = "search", Satisficing = "satisficing", Sat = "sat" }
 
-/// What was known at some time of a run.
+/// Progress of a run at a point in time.
 #[derive(Debug, Clone)]
 pub struct Moment {
-    /// Since the optimizer has begun.
+    /// Time since the start of the optimiser.
     pub time: Duration,
-    /// The metric of the best plan so far.
+    /// Metric of the best known plan.
     pub cost: Option<Exact>,
-    /// No plan has a better metric than this.
+    /// Lower bound on the metric of every plan.
     pub lower_bound: Exact,
 }
 
-/// Figures of a run.
+/// Statistics of a run.
 #[derive(Debug, Clone, Default)]
 pub struct Statistics {
-    /// Operators of the ground task.
+    /// Number of operators of the ground task.
     pub operators: usize,
-    /// Variables of the largest formula.
+    /// Number of variables of the largest formula.
     pub variables: usize,
-    /// Clauses of that formula.
+    /// Number of clauses of the largest formula.
     pub clauses: usize,
-    /// Clauses of that formula by family.
+    /// Number of clauses of the largest formula by family.
     pub families: Vec<(&'static str, usize)>,
-    /// Clauses learnt by the SAT solver, over all formulas.
+    /// Number of clauses that the SAT solver has learnt, over all formulas.
     pub conflicts: u64,
-    /// Calls of the SAT solver.
+    /// Number of calls of the SAT solver.
     pub calls: usize,
-    /// Why a SAT solver gave up, if not at a limit.
+    /// Reason why a SAT solver stopped, other than a limit.
     pub failure: Option<String>,
-    /// Two parts of the planner contradict each other: a fault of ours, and nothing is claimed to be proved.
+    /// Contradiction between two components: a fault of the planner, for which no proof is claimed.
     pub contradiction: Option<String>,
-    /// The program by whose word alone a formula has no model, if the answer rests on that: its refutation was not checked.
+    /// Name of the program on whose unchecked result the unsatisfiability of a formula rests.
     pub unchecked: Option<String>,
-    /// What found the plan.
+    /// Component that found the plan.
     pub found_by: Option<PlannerPart>,
-    /// States whose successors were looked at, by all searches.
+    /// Number of expanded states, over all searches.
     pub expanded: u64,
-    /// Successors that these have.
+    /// Number of generated successors.
     pub generated: u64,
-    /// States that were estimated: successors that were new, and not dominated.
+    /// Number of evaluated states: new successors that are not dominated.
     pub evaluated: u64,
-    /// How often the search for a plan soon has begun anew, to find a better one.
+    /// Number of restarts of the satisficing search.
     pub restarts: usize,
-    /// Better plans in the order of their times, and bounds that had risen by a hundredth.
+    /// Better plans in chronological order, and bounds that increased by at least one percent.
     pub history: Vec<Moment>,
-    /// Time for bounds and searches.
+    /// Time of bounds and searches.
     pub search: Duration,
-    /// Time for building formulas.
+    /// Time of encoding.
     pub encode: Duration,
-    /// Time in the SAT solver.
+    /// Time of the SAT solver.
     pub solve: Duration,
 }
 
-/// The answer. Shown by `Display` it is its verdict, and the plan if there is one.
+/// Result of planning. `Display` writes the verdict and the plan, if there is one.
 #[derive(Debug, Clone)]
 pub struct Solution {
-    /// How good the plan is.
+    /// Quality of the plan.
     pub status: Status,
     /// The best plan.
     pub plan: Option<Plan>,
     pub ground: Option<GroundPlan>,
-    /// No plan has a better metric; none if the metric is unbounded or nothing is known.
+    /// Lower bound on the metric of every plan. `None` if the metric is unbounded or no bound is
+    /// known.
     pub lower_bound: Option<Exact>,
-    /// Steps up to which all plans were considered.
+    /// Number of steps up to which all plans were considered.
     pub horizon: usize,
-    /// The reason for the status.
+    /// Justification of the status.
     pub proof: Option<Proof>,
-    /// Set if the metric has no best value: the plan has fewest steps, and of those the best metric.
+    /// Set if the metric has no best value: the plan has the fewest steps, and among those the best
+    /// metric.
     pub unbounded: Option<MetricUnbounded>,
-    /// Figures.
+    /// Statistics of the run.
     pub statistics: Statistics,
 }

@@ -1,7 +1,8 @@
-//! A plan as text, and its times as decimals that keep what lies between them.
+//! Plan as text, with times as decimals that preserve their order.
 //!
-//! A third has no decimal. Starts and ends are rounded to the same grid, and a duration is what is left between the two, so that what is a
-//! thousandth apart stays so, and what follows something never comes before it.
+//! A fraction such as 1/3 has no finite decimal. Starts and ends are rounded to the same grid, and
+//! a duration is their difference. Gaps of a thousandth are thus preserved, and no action starts
+//! before its predecessor ends.
 
 use std::fmt;
 
@@ -9,11 +10,11 @@ use num_rational::BigRational;
 
 use crate::plan::named_plan::{Exact, Plan, Step};
 
-/// Decimals of times that have no finite number of them.
+/// Number of decimals of times without a finite decimal.
 const DECIMALS: u32 = 12;
 
 impl Step {
-    /// The start and the duration as decimals; as they are, where they are decimals.
+    /// Returns start and duration as decimals, exact if possible.
     pub fn times(&self) -> (Exact, Exact) {
         let start = self.start.to_rational();
         let end = rounded(&start + self.duration.to_rational());
@@ -22,7 +23,7 @@ impl Step {
         (start.into(), duration.into())
     }
 
-    /// The action with its arguments, as PDDL writes it: `(move a b)`.
+    /// Formats the action in PDDL: `(move a b)`.
     pub fn call(&self) -> String {
         let words: Vec<&str> =
             std::iter::once(&self.action).chain(&self.arguments).map(String::as_str).collect();
@@ -31,8 +32,8 @@ impl Step {
 }
 
 impl Exact {
-    /// As a time of a plan: with three decimals, or as many more as it has, because an action must not start before what it waits for;
-    /// rounded to nine where it has no end of them.
+    /// Formats the number as a time: with at least three decimals and all further ones, because an
+    /// action must not start before its preconditions hold. Infinite decimals are rounded to nine.
     pub fn as_time(&self) -> String {
         let text = self.to_string();
         match text.split_once('.') {
@@ -43,8 +44,9 @@ impl Exact {
     }
 }
 
-/// The plan as the planning competitions write it and as `pddl::validate::PlanText` reads it: a line `(action arguments)` for each step, or
-/// `start: (action arguments)  [duration]` if there are times.
+/// Writes the format of the planning competitions, which `pddl::validate::PlanText` parses: a line
+/// `(action arguments)` for each step, or `start: (action arguments)  [duration]` for plans with
+/// times.
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let timed = |step: &Step| !step.duration.is_zero() || !step.start.is_zero();
@@ -79,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_a_thousandth_apart_stays_so() {
+    fn gaps_of_a_thousandth_are_preserved() {
         let apart = fraction(1, 1000);
         for (numerator, denominator) in [(1, 3), (2, 3), (22, 7), (5, 4), (1, 999), (586_754, 999)] {
             let time = fraction(numerator, denominator);

@@ -1,6 +1,6 @@
-//! The ground task as a transition system in the names of the files: for simulation, inspection and tests.
+//! The ground task as a transition system with PDDL names, for simulation, inspection and tests.
 //!
-//! Every function design is chosen here, so an action appears once for each combination of its designs.
+//! Function designs are chosen here, so an action occurs once for each combination of its designs.
 
 use crate::context::Context;
 use crate::limits::Limits;
@@ -10,16 +10,16 @@ use crate::plan::named_plan::{Exact, Step, decode, metric, rest};
 use crate::task::number::TaskNumber as _;
 use crate::task::{OperatorId, State, Task};
 
-/// A state of a task, with what was paid on the way to it.
+/// A state with the cost of the path to it.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct TaskState {
     state: State,
-    /// In the task's integer unit.
+    /// Cost in the task's integer unit.
     cost: Int,
 }
 
 impl TaskState {
-    /// The same state with nothing paid so far, for those to whom only states matter.
+    /// Resets the cost, for callers that compare states only.
     #[must_use]
     pub fn unpaid(mut self) -> Self {
         self.cost = 0;
@@ -27,26 +27,27 @@ impl TaskState {
     }
 }
 
-/// An action that can be executed in some state.
+/// An applicable action.
 #[derive(Debug, Clone)]
 pub struct Transition {
-    /// The name of the action schema.
+    /// Name of the action schema.
     pub action: String,
-    /// All arguments in the order of the schema's parameters, designs among them.
+    /// Arguments in the order of the schema's parameters, including designs.
     pub arguments: Vec<String>,
-    /// The state after it.
+    /// Successor state.
     pub after: TaskState,
 }
 
 impl Task {
-    /// The state before any action.
+    /// Returns the initial state.
     pub fn start(&self) -> TaskState {
         TaskState { state: self.initial.clone(), cost: 0 }
     }
 
-    /// The atoms that the task keeps track of, as `(predicate objects)`: those that can change and that matter.
+    /// Returns the relevant fluent atoms of the task, as `(predicate objects)`.
     pub fn atoms(&self) -> impl Iterator<Item = &str> {
-        // The last value of each variable stands for none of its atoms; parts of conditions have no parentheses.
+        // The last value of each variable means "none of its atoms". Auxiliary atoms have no
+        // parentheses.
         self.variables
             .iter()
             .filter_map(|variable| variable.values.split_last())
@@ -55,7 +56,7 @@ impl Task {
             .filter(|atom| atom.starts_with('('))
     }
 
-    /// All actions with their arguments, whether or not they can be executed.
+    /// Returns all actions with their arguments, including inapplicable ones.
     pub fn actions(&self) -> impl Iterator<Item = (String, Vec<String>)> {
         let steps = self.ids().flat_map(move |id| {
             self.operators[id.index()].admitted_combinations().filter_map(move |choice| self.step(id, choice))
@@ -72,12 +73,12 @@ impl Task {
         decode(Context::new(self, &Limits::none()), &plan).steps.pop()
     }
 
-    /// How many operators there are, each standing for all combinations of its designs.
+    /// Number of operators, each of which represents all combinations of its designs.
     pub fn operator_count(&self) -> usize {
         self.operators.len()
     }
 
-    /// The atoms of [`Task::atoms`] that hold.
+    /// Returns the atoms of [`Task::atoms`] that hold in a state.
     #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
     pub fn holding(&self, situation: &TaskState) -> Vec<&str> {
         let values = self.variables.iter().zip(&situation.state.values);
@@ -88,25 +89,26 @@ impl Task {
             .collect()
     }
 
-    /// Why the goal is out of reach, if grounding has found that out; what can be done may then be incomplete.
+    /// Returns the reason why the goal is unreachable, if grounding has found one. The transitions
+    /// may then be incomplete.
     pub fn unreachable(&self) -> Option<&str> {
         self.unreachable.as_deref()
     }
 
-    /// Whether the goal holds.
+    /// Returns `true` if the goal holds.
     pub fn reaches_goal(&self, situation: &TaskState) -> bool {
         self.unreachable.is_none() && self.is_goal(&situation.state)
     }
 
-    /// The metric of a plan that leads here.
+    /// Returns the metric of a plan that leads to this state.
     pub fn metric(&self, situation: &TaskState) -> Exact {
         metric(self, &(situation.cost.to_rational() + rest(self, &situation.state)))
     }
 
-    /// Everything that can be done; none if numbers grow too large for it.
+    /// Returns all transitions from a state, or `None` on numeric overflow.
     pub fn transitions(&self, situation: &TaskState) -> Option<Vec<Transition>> {
         let TaskState { state, cost } = situation;
-        let mut found = Vec::new();
+        let mut transitions = Vec::new();
         for id in self.ids() {
             let operator = &self.operators[id.index()];
             for choice in operator.admitted_combinations().filter(|choice| operator.applicable(state, choice))
@@ -114,9 +116,9 @@ impl Task {
                 let cost = cost.checked_add(operator.cost.at(&choice, &operator.sizes()))?;
                 let after = TaskState { state: self.successor(operator, state, &choice)?, cost };
                 let Some(Step { action, arguments, .. }) = self.step(id, choice) else { continue };
-                found.push(Transition { action, arguments, after });
+                transitions.push(Transition { action, arguments, after });
             }
         }
-        Some(found)
+        Some(transitions)
     }
 }

@@ -5,7 +5,8 @@ use std::fmt;
 use crate::plan::solution::{MetricUnbounded, Proof, Solution, Status};
 
 impl Solution {
-    /// What is claimed, and whether it is proved: a sentence without a full stop; two lines where the metric has no best value.
+    /// Returns the claim and its proof status: a sentence without a full stop, or two lines if the
+    /// metric has no best value.
     pub fn verdict(&self) -> String {
         verdict(self)
     }

@@ -1,4 +1,4 @@
-//! The common denominator of rationals, of any size.
+//! Least common denominator of rationals of arbitrary size.
 
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
@@ -11,12 +11,12 @@ use rustc_hash::FxHashMap;
 use crate::number::Rational;
 use crate::task::quantity::Quantity;
 
-/// The least common denominator of the numbers so far.
+/// Least common denominator of the added numbers.
 pub struct CommonDenominator {
-    /// None if it has more bits than admitted.
+    /// `None` if it exceeds the limit of bits.
     common: Option<BigInt>,
     most_bits: u64,
-    /// Tables that have been looked at, by where they lie, as operators share them.
+    /// Visited tables by address, because operators share them.
     seen: FxHashMap<*const Rational, Arc<[Rational]>>,
 }
 
@@ -43,7 +43,7 @@ impl CommonDenominator {
         }
     }
 
-    /// None if it has too many bits.
+    /// Returns the denominator, or `None` if it exceeds the limit of bits.
     pub fn get(self) -> Option<BigInt> {
         self.common
     }

@@ -1,6 +1,6 @@
 //! Newtypes for dense ids.
 
-/// From ids to indices and back.
+/// Implements conversions between ids and indices.
 macro_rules! dense_ids {
     ($($id:ident),+) => {$(
         impl $id {
@@ -8,12 +8,12 @@ macro_rules! dense_ids {
                 self.0 as usize
             }
 
-            /// The id of what stands at an index.
+            /// Returns the id of an index.
             pub fn of(index: usize) -> Self {
                 Self($crate::number::dense(index))
             }
 
-            /// The first ids, so many.
+            /// Returns the ids below `count`.
             pub fn all(count: usize) -> impl Iterator<Item = Self> + Clone {
                 (0..$crate::number::dense(count)).map(Self)
             }

@@ -1,10 +1,12 @@
-//! The ground task: finite-domain and numeric variables, and operators whose function designs are still open.
+//! The ground task: finite-domain and numeric variables, and operators with open design slots.
 //!
-//! After Bäckström and Nebel's SAS+ \[1\], with two additions: numeric variables hold exact integers, and an
-//! operator has *slots*, each to be filled with one function design. Conditions, costs and consumptions that
-//! depend on the designs are tables over slots, so k functions of m designs cost k·m choices, not m^k operators.
+//! The formalism is SAS+ of Bäckström and Nebel \[1\] with two extensions. Numeric variables have
+//! exact integer values. Operators have *slots*, each of which takes a function design. Conditions,
+//! costs and consumption that depend on designs are tables over slots, so k functions with m
+//! designs each need k·m choices instead of m^k operators.
 //!
-//! \[1\] C. Bäckström, B. Nebel: Complexity results for SAS+ planning, Computational Intelligence 11(4), 1995.
+//! \[1\] C. Bäckström, B. Nebel: Complexity results for SAS+ planning, Computational Intelligence
+//! 11(4), 1995.
 
 use std::hash::{Hash, Hasher};
 use std::sync::Arc;
@@ -20,22 +22,22 @@ use crate::task::timing::Timing;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct VariableId(pub u32);
 
-/// An operator: an action schema with its arguments, apart from the function designs.
+/// An operator: an action schema with its arguments except the function designs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct OperatorId(pub u32);
 
-/// A function whose design is chosen anew at every step.
+/// A function whose design is chosen at every step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct SlotId(pub u32);
 
 dense_ids!(VariableId, OperatorId, SlotId);
 
-/// A variable has a value.
+/// Assignment of a value to a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Fact {
     /// The variable.
     pub variable: VariableId,
-    /// The index of the value in the variable's domain.
+    /// Index of the value in the domain of the variable.
     pub value: u32,
 }
 
@@ -46,107 +48,112 @@ pub struct Literal {
     pub positive: bool,
 }
 
-/// What must hold: all facts, one literal of every clause, and every linear expression at least zero.
+/// A condition: all facts, a literal of every clause, and all comparisons must hold.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Condition<N = Int> {
     pub facts: Vec<Fact>,
     pub clauses: Vec<Vec<Literal>>,
-    /// Each is ≥ 0.
+    /// Expressions that must be ≥ 0.
     pub comparisons: Vec<Linear<N>>,
-    /// Each is > 0. Integers have none: one that is > 0 is ≥ 1.
+    /// Expressions that must be > 0. Empty for integers, where > 0 is expressed as ≥ 1.
     pub above: Vec<Linear<N>>,
 }
 
-/// A finite-domain variable: at every moment exactly one of its values holds.
+/// A finite-domain variable, which has exactly one of its values in every state.
 #[derive(Debug, Clone)]
 pub struct Variable {
-    /// Ground atoms as written, or `none of these`.
+    /// Names of ground atoms, or `none of these`.
     pub values: Vec<String>,
 }
 
-/// A function and the designs that may solve it.
+/// A function and its possible designs.
 #[derive(Debug, Clone)]
 pub struct Slot {
     pub designs: Vec<ObjectId>,
 }
 
-/// How an operator uses a slot.
+/// Use of a slot by an operator.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct SlotUse {
     pub slot: SlotId,
-    /// Indices into the slot's designs, ascending: those that suit this operator.
+    /// Ascending indices of the slot's designs that suit the operator.
     pub designs: Vec<u32>,
 }
 
-/// Combinations of designs that an operator must not run with.
+/// Combinations of designs with which an operator is not applicable.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct ForbiddenCombinations {
     /// Positions in the operator's slot list.
     pub slots: SlotSet,
-    /// Each an index into `SlotUse::designs` for every slot of `slots`.
+    /// Combinations: for every slot of `slots` an index into `SlotUse::designs`.
     pub combinations: Vec<SlotSet>,
 }
 
-/// What an operator does to a numeric variable: the variable becomes this.
+/// Assignment of a new value to a numeric variable.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct NumericEffect<N = Int> {
     pub variable: NumericId,
     pub value: Linear<N>,
 }
 
-/// What an operator sets if all literals hold before it.
+/// Facts that an operator sets if all literals hold before it.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct ConditionalEffect {
     pub condition: Vec<Literal>,
     pub effects: Vec<Fact>,
 }
 
-/// A rule of a derived variable: it has the value of the head if the body holds, and its last value if no body does.
+/// A rule of a derived variable: the variable has the value of the head if the body holds. If no
+/// body holds, it has its last value.
 #[derive(Debug, Clone)]
 pub struct Axiom<N = Int> {
     pub head: Fact,
     pub body: Condition<N>,
 }
 
-/// Rules that depend on each other, or a single one; negated variables and those of other rules are in earlier layers.
+/// A set of mutually dependent rules or a single rule. Negated variables and dependencies are in
+/// earlier layers.
 #[derive(Debug, Clone)]
 pub struct Layer<N = Int> {
     pub rules: Vec<Axiom<N>>,
     pub recursive: bool,
 }
 
-/// An argument of an action: fixed, or the design of a slot (by position in the operator's slot list).
+/// An argument of an action: an object, or the design of a slot (by position in the operator's slot
+/// list).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Argument {
     Object(ObjectId),
     Slot(u32),
 }
 
-/// An operator. What depends on its designs is shared with other operators of the same schema.
+/// An operator. Design-dependent data is shared with other operators of the same schema.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Operator<N = Int> {
     /// Index of the action schema in the domain.
     pub schema: u32,
     pub arguments: Vec<Argument>,
-    /// Each function that the action requires, with the argument that is its design.
+    /// Required functions with the arguments that are their designs.
     pub configuration: Vec<(ObjectId, Argument)>,
     pub slots: Arc<[SlotUse]>,
     pub forbidden: Arc<[ForbiddenCombinations]>,
     pub condition: Condition<N>,
-    /// At most one value for each variable, ascending by variable.
+    /// At most one value per variable, in ascending order of the variables.
     pub effects: Vec<Fact>,
-    /// In order: later ones prevail over earlier ones and over `effects`.
+    /// Conditional effects in order: later ones take precedence over earlier ones and over
+    /// `effects`.
     pub conditional: Vec<ConditionalEffect>,
     pub numeric_effects: Vec<NumericEffect<N>>,
-    /// In the task's cost unit; may be negative where the metric rewards.
+    /// Cost in the task's cost unit; negative if the metric rewards the operator.
     pub cost: Quantity<N>,
-    /// By the task's other objectives, in their units.
+    /// Costs by the task's other objectives, in their units.
     pub others: Vec<Quantity<N>>,
-    /// In the task's time unit.
+    /// Duration in the task's time unit.
     pub duration: Quantity<N>,
-    /// Set if this is not an action but a wait until that time, in the task's time unit from the start of the plan.
+    /// Set for a wait instead of an action: its end in the task's time unit from the start of the
+    /// plan.
     pub wait: Option<N>,
-    /// In the task's time unit from the start of the plan.
+    /// Earliest times in the task's time unit from the start of the plan.
     pub timing: Timing<N>,
 }
 
@@ -157,21 +164,22 @@ pub struct State<N = Int> {
     pub numbers: Vec<N>,
 }
 
-/// How integer costs relate to the metric of the problem file.
+/// Relation between integer costs and the metric of the problem file.
 #[derive(Debug, Clone)]
 pub struct Objective<N = Int> {
-    /// Costs are this many times the metric.
+    /// Factor between costs and the metric.
     pub scale: Int,
-    /// Added to the sum of operator costs (in scaled units).
+    /// Offset of the sum of operator costs, in scaled units.
     pub offset: N,
-    /// Whether the file asks to maximize; operator costs are negated then.
+    /// `true` for maximisation; operator costs are then negated.
     pub maximize: bool,
-    /// Numeric variables whose final values count as well, with their factors (negated if to be maximized).
+    /// Numeric variables whose final values are added, with their factors (negated for
+    /// maximisation).
     pub rest: Vec<(NumericId, Rational)>,
 }
 
 impl Objective {
-    /// The plain sum of costs.
+    /// Returns the plain sum of costs.
     pub fn sum() -> Self {
         Self { scale: 1, offset: 0, maximize: false, rest: Vec::new() }
     }
@@ -182,35 +190,35 @@ impl Objective {
 pub struct Task<N = Int> {
     pub object_names: Vec<String>,
     pub schema_names: Vec<String>,
-    /// The basic variables, then the derived ones, which have two values: true (0) and false (1).
+    /// Basic variables, followed by derived variables, whose values are true (0) and false (1).
     pub variables: Vec<Variable>,
-    /// How many variables are basic.
+    /// Number of basic variables.
     pub basic: usize,
-    /// Groups of facts over several variables, of which at most one holds in the initial state and in every state that follows. The
-    /// operators do what the files say only in states of which that is true.
+    /// Mutex groups over several variables: at most one fact of a group holds in every reachable
+    /// state. The operators are correct only in states with this property.
     pub exclusive: Vec<Vec<Fact>>,
-    /// The numeric variables as PDDL writes them.
+    /// Names of the numeric variables in PDDL.
     pub number_names: Vec<String>,
-    /// Numbers are this many times the values of the files.
+    /// Factor between numbers of the task and values in the files.
     pub number_scale: Int,
-    /// So many times that the values of numeric variables are, besides; empty where all are as they are.
+    /// Additional factors of the numeric variables; empty if all are 1.
     pub number_multiples: Vec<Int>,
-    /// The rules of the derived variables, in the order of their evaluation.
+    /// Rules of the derived variables, in evaluation order.
     pub axioms: Vec<Layer<N>>,
     pub slots: Vec<Slot>,
     pub operators: Vec<Operator<N>>,
     pub initial: State<N>,
     pub goal: Condition<N>,
     pub objective: Objective<N>,
-    /// Less important ones, in order.
+    /// Further objectives in lexicographic order.
     pub others: Vec<Objective<N>>,
-    /// Durations are this many times the values of the files.
+    /// Factor between durations of the task and values in the files.
     pub time_scale: Int,
-    /// Set if relaxed reachability shows that the goal cannot be reached: the reason.
+    /// Reason for unsolvability, if relaxed reachability shows that the goal is unreachable.
     pub unreachable: Option<String>,
 }
 
-/// By what usually tells operators apart; the rest may be long.
+/// Hashes only the most distinctive fields, because the others may be long.
 impl<N> Hash for Operator<N> {
     fn hash<H: Hasher>(&self, state: &mut H) {
         (self.schema, &self.arguments, &self.condition.facts, &self.effects).hash(state);
@@ -224,12 +232,13 @@ impl<N> Default for Condition<N> {
 }
 
 impl<N> Operator<N> {
-    /// How many designs each slot admits.
+    /// Number of admitted designs of each slot.
     pub fn sizes(&self) -> Vec<usize> {
         self.slots.iter().map(|slot| slot.designs.len()).collect()
     }
 
-    /// Whether the combination (an index into `SlotUse::designs` for each slot) is not forbidden.
+    /// Returns `true` if the combination (an index into `SlotUse::designs` for each slot) is not
+    /// forbidden.
     pub fn admits(&self, choice: &[u32]) -> bool {
         self.forbidden.iter().all(|rule| {
             rule.combinations
@@ -238,7 +247,7 @@ impl<N> Operator<N> {
         })
     }
 
-    /// All admitted combinations of designs, in lexicographic order.
+    /// Returns all admitted combinations of designs in lexicographic order.
     pub fn admitted_combinations(&self) -> Choices<'_, N> {
         let empty = self.slots.iter().any(|slot| slot.designs.is_empty());
         Choices { operator: self, sizes: self.sizes(), next: (!empty).then(|| vec![0; self.slots.len()]) }
@@ -276,37 +285,37 @@ impl<N> Iterator for Choices<'_, N> {
 }
 
 impl<N: TaskNumber> Linear<N> {
-    /// Factors with the numbers that they stand at.
+    /// Returns the factors with the values of their variables.
     fn terms<'n>(&'n self, numbers: &'n [N]) -> impl Iterator<Item = (&'n N, &'n N)> + Clone {
         self.coefficients.iter().map(|(variable, factor)| (factor, &numbers[variable.index()]))
     }
 
-    /// The value in a state, for a combination of designs; none if it does not fit.
+    /// Returns the value in a state for a combination of designs, or `None` on overflow.
     pub fn value(&self, numbers: &[N], choice: &[u32], sizes: &[usize]) -> Option<N> {
         sum_of_products(self.quantity.at(choice, sizes), self.terms(numbers))
     }
 
-    /// Whether the value is at least 0, or above 0 if `strict`.
+    /// Returns `true` if the value is at least 0, or above 0 if `strict`.
     fn compares(&self, numbers: &[N], choice: &[u32], sizes: &[usize], strict: bool) -> bool {
         N::compare(self.quantity.at(choice, sizes), self.terms(numbers), strict)
     }
 }
 
 impl<N> Condition<N> {
-    /// Whether the propositional part holds.
+    /// Returns `true` if the propositional part holds.
     pub fn holds_propositionally(&self, values: &[u32]) -> bool {
         self.facts.iter().all(|fact| fact.holds(values))
             && self.clauses.iter().all(|clause| clause.iter().any(|literal| literal.holds(values)))
     }
 
-    /// What the numeric part compares, whether or not strictly.
+    /// Returns the expressions of all comparisons, strict or not.
     pub fn linears(&self) -> impl Iterator<Item = &Linear<N>> {
         self.comparisons.iter().chain(&self.above)
     }
 }
 
 impl<N: TaskNumber> Condition<N> {
-    /// Whether the numeric part holds.
+    /// Returns `true` if the numeric part holds.
     pub fn holds_numerically(&self, numbers: &[N], choice: &[u32], sizes: &[usize]) -> bool {
         self.comparisons.iter().all(|linear| linear.compares(numbers, choice, sizes, false))
             && self.above.iter().all(|linear| linear.compares(numbers, choice, sizes, true))
@@ -314,34 +323,35 @@ impl<N: TaskNumber> Condition<N> {
 }
 
 impl Fact {
-    /// Whether it holds.
+    /// Returns `true` if the fact holds.
     pub fn holds(self, values: &[u32]) -> bool {
         values[self.variable.index()] == self.value
     }
 }
 
 impl Literal {
-    /// Whether it holds.
+    /// Returns `true` if the literal holds.
     pub fn holds(&self, values: &[u32]) -> bool {
         self.fact.holds(values) == self.positive
     }
 }
 
 impl Operator {
-    /// The cost with a combination of designs.
+    /// Returns the cost for a combination of designs.
     pub fn cost_of(&self, choice: &[u32]) -> Int {
         self.cost.at(choice, &self.sizes())
     }
 }
 
 impl<N: TaskNumber> Operator<N> {
-    /// Whether the operator may be applied with this combination of designs.
+    /// Returns `true` if the operator is applicable with this combination of designs.
     pub fn applicable(&self, state: &State<N>, choice: &[u32]) -> bool {
         self.condition.holds_propositionally(&state.values)
             && self.condition.holds_numerically(&state.numbers, choice, &self.sizes())
     }
 
-    /// Changes what is equal to a state to the state after this operator, but for its derived variables.
+    /// Applies the operator to `next`, which must equal `state`. Derived variables are not updated.
+    /// Returns `None` on overflow.
     pub fn apply(&self, state: &State<N>, choice: &[u32], next: &mut State<N>) -> Option<()> {
         for effect in &self.effects {
             next.values[effect.variable.index()] = effect.value;
@@ -368,27 +378,27 @@ impl<N: TaskNumber> Operator<N> {
 }
 
 impl Task {
-    /// Where the problem has no metric: whether plans are measured by their time, and not by the number of their steps.
+    /// Returns `true` if plans without a metric are measured by total time instead of plan length.
     pub fn is_timed(&self) -> bool {
         self.is_measured_by_time(&self.objective.scale)
     }
 }
 
 impl<N: TaskNumber> Task<N> {
-    /// [`Task::is_timed`], where `step` is what a step costs.
+    /// Generalises [`Task::is_timed`] to steps of cost `step`.
     pub fn is_measured_by_time(&self, step: &N) -> bool {
         let step = |operator: &Operator<N>| if operator.wait.is_some() { N::zero() } else { step.clone() };
         self.operators.iter().any(|operator| operator.cost != Quantity::constant(step(operator)))
     }
 
-    /// Whether a state satisfies the goal.
+    /// Returns `true` if a state satisfies the goal.
     pub fn is_goal(&self, state: &State<N>) -> bool {
         self.goal.holds_propositionally(&state.values)
             && self.goal.holds_numerically(&state.numbers, &[], &[])
     }
 
-    /// The state after an operator, which must be applicable with this combination of designs; none if its numbers grow
-    /// too large.
+    /// Returns the state after an operator, which must be applicable with this combination of
+    /// designs. `None` on overflow.
     pub fn successor(&self, operator: &Operator<N>, state: &State<N>, choice: &[u32]) -> Option<State<N>> {
         let mut next = state.clone();
         operator.apply(state, choice, &mut next)?;
@@ -396,7 +406,7 @@ impl<N: TaskNumber> Task<N> {
         Some(next)
     }
 
-    /// Gives the derived variables their values: the least fixpoint of the rules, layer by layer.
+    /// Evaluates the derived variables: the least fixpoint of the rules, layer by layer.
     #[expect(clippy::arithmetic_side_effects, reason = "every variable has a value")]
     pub fn evaluate_axioms(&self, state: &mut State<N>) {
         if self.axioms.is_empty() {

@@ -1,4 +1,4 @@
-//! Number types of a ground task: scaled integers, or rationals.
+//! Number types of a ground task: scaled integers or rationals.
 
 use num_bigint::BigInt;
 use num_traits::{Signed, ToPrimitive as _};
@@ -6,46 +6,49 @@ use num_traits::{Signed, ToPrimitive as _};
 use crate::number::{GROWTH_LIMIT, Int, LIMIT, Rational};
 use crate::task::quantity::{Number, Quantity, Table};
 
-/// What the numbers of a quantity come to together, whatever their signs.
+/// Limit on the sum of the magnitudes of a quantity's numbers.
 pub const QUANTITY_LIMIT: Int = 1 << 123;
 
-/// Quantities with so many numbers are below [`QUANTITY_LIMIT`] by [`LIMIT`] alone.
+/// Number of values up to which [`LIMIT`] alone keeps a quantity below [`QUANTITY_LIMIT`].
 const SMALL_QUANTITY: usize = 32;
 
-/// Rationals of a task may take this many bits; a state with longer ones is left out, and the search knows that it is not complete
-/// then.
+/// Limit on the bits of rationals in a state. States beyond are pruned, and the search is then
+/// incomplete.
 const BIT_LIMIT: u64 = 4_096;
 
-/// What numbers of a ground task are: integers that are scaled, or, where these do not fit, rationals as they are.
+/// Number type of a ground task: scaled integers, or rationals if integers would overflow.
 pub trait TaskNumber: Number + std::fmt::Debug + std::hash::Hash + Default {
-    /// Whether fractions become integers by a common factor; otherwise that factor is 1.
+    /// `true` if fractions are scaled to integers. Otherwise the factor is 1.
     const SCALED: bool;
 
-    /// A rational times a factor; none if that is not a number of this kind.
+    /// Converts a rational times a factor. Returns `None` if the result is not of this type.
     fn from_rational(number: &Rational, scale: Int) -> Option<Self>;
 
-    /// About the number, for estimates.
+    /// Returns an approximation for estimates.
     fn approximate(&self) -> f64;
 
-    /// The number as a rational.
+    /// Converts the number to a rational.
     fn to_rational(&self) -> Rational;
 
-    /// The sum; none if it does not fit.
+    /// Returns the sum, or `None` on overflow.
     fn plus(&self, other: &Self) -> Option<Self>;
 
-    /// The product; none if it does not fit.
+    /// Returns the product, or `None` on overflow.
     fn times(&self, other: &Self) -> Option<Self>;
 
-    /// Whether a fluent or a sum of costs may become as large as this.
+    /// Returns `true` if fluents and sums of costs may reach this magnitude.
     fn is_moderate(&self) -> bool;
 
-    /// How often a number above 0 has to be added up at least to come to this one; 0 if that is not known.
+    /// Lower bound on the number of summands `part` > 0 whose sum reaches this number; 0 if
+    /// unknown.
     fn times_at_least(&self, part: &Self) -> u32;
 
-    /// Whether all sums over the numbers of a quantity fit: those of its tables' greatest magnitudes and its constant do.
+    /// Returns `true` if all sums over the numbers of a quantity fit: the sum of the tables'
+    /// greatest magnitudes and the constant does.
     fn fits(quantity: &Quantity<Self>) -> bool;
 
-    /// Whether `start`, with products added, is at least 0 (more than 0 if `strict`), however large the numbers in between.
+    /// Returns `true` if the sum of `start` and the products is at least 0 (above 0 if `strict`),
+    /// without overflow of intermediate results.
     fn compare<'n>(
         start: Self,
         terms: impl Iterator<Item = (&'n Self, &'n Self)> + Clone,
@@ -55,7 +58,7 @@ pub trait TaskNumber: Number + std::fmt::Debug + std::hash::Hash + Default {
         Self: 'n;
 }
 
-/// The sum of a number and of products; none if something does not fit.
+/// Returns the sum of a number and of products, or `None` on overflow.
 pub fn sum_of_products<'n, N: TaskNumber + 'n>(
     start: N,
     mut terms: impl Iterator<Item = (&'n N, &'n N)>,
@@ -98,8 +101,8 @@ impl TaskNumber for Int {
 
     fn fits(quantity: &Quantity<Self>) -> bool {
         let greatest = |table: &Table<Int>| table.values.iter().map(|value| value.unsigned_abs()).max();
-        let mut all = quantity.tables.iter().filter_map(greatest);
-        let mut sum = || all.try_fold(quantity.constant.unsigned_abs(), u128::checked_add);
+        let mut magnitudes = quantity.tables.iter().filter_map(greatest);
+        let mut sum = || magnitudes.try_fold(quantity.constant.unsigned_abs(), u128::checked_add);
         quantity.tables.len() < SMALL_QUANTITY
             || sum().is_some_and(|sum| sum <= QUANTITY_LIMIT.unsigned_abs())
     }

@@ -1,7 +1,8 @@
-//! Objects that change places: where that takes facts and operators, and whether the task is the same then.
+//! Object symmetries: exchanges of two objects that map the task to itself.
 //!
-//! Two objects are interchangeable if their exchange maps operators to operators and the goal to the goal \[1\]. Objects whose numeric
-//! variables differ, and tasks with derived variables, are left alone.
+//! Two objects are interchangeable if their exchange maps operators to operators and the goal to
+//! the goal \[1\]. Objects with different numeric variables, and tasks with derived variables, are
+//! not considered.
 //!
 //! \[1\] J. Rintanen: Symmetry reduction for SAT representations of transition systems, ICAPS 2003.
 
@@ -16,14 +17,14 @@ use crate::task::{
     Argument, Condition, ConditionalEffect, Fact, Literal, Operator, OperatorId, Task, VariableId,
 };
 
-/// So many operators are compared at most, over all pairs of objects.
+/// Limit on the number of compared operators over all pairs of objects.
 const WORK_LIMIT: usize = 2_000_000;
 
-/// The exchanges of neighbours in classes of objects any two of which can be exchanged without changing what operators do and what the goal
-/// is; nor, if that is asked for, the initial state.
+/// Returns the exchanges of neighbours within classes of pairwise interchangeable objects.
+/// Exchanges preserve operators and goal, and with `initially` also the initial state.
 ///
 /// # Errors
-/// Fails when a limit is reached.
+/// A limit is reached.
 #[expect(clippy::arithmetic_side_effects, reason = "work is looked at each time")]
 pub fn symmetry_generators(context: Context<'_>, initially: bool) -> Result<Vec<Exchange>, Interrupted> {
     let Context { task, limits } = context;
@@ -50,39 +51,40 @@ pub fn symmetry_generators(context: Context<'_>, initially: bool) -> Result<Vec<
     }
     let parts = Parts::new(context)?;
     let mut work = 0;
-    let mut found = Vec::new();
-    for mut rest in alike.into_values() {
-        while let Some(first) = rest.first().copied() {
+    let mut exchanges = Vec::new();
+    for mut remaining in alike.into_values() {
+        while let Some(first) = remaining.first().copied() {
             let (mut last, mut others) = (first, Vec::new());
-            for object in rest.drain(1..) {
+            for object in remaining.drain(1..) {
                 work += task.operators.len();
                 let exchange =
                     if work <= WORK_LIMIT { Exchange::new(&parts, last, object, limits)? } else { None };
                 match exchange {
                     Some(exchange) if exchange.keeps(&parts, initially, limits)? => {
-                        found.push(exchange);
+                        exchanges.push(exchange);
                         last = object;
                     }
                     _ => others.push(object),
                 }
             }
-            rest = others;
+            remaining = others;
         }
     }
-    Ok(found)
+    Ok(exchanges)
 }
 
-/// A task taken apart, so that images of its parts are found at once.
+/// Indices of a task by which images of its parts are looked up.
 struct Parts<'t> {
     task: &'t Task,
-    /// By variable and value: the words of the atom, as positions among all words; none for values that are not atoms.
+    /// By variable and value: the words of the atom, as positions among all words. `None` for
+    /// values without an atom.
     words: Vec<Vec<Option<Vec<usize>>>>,
-    /// What atoms are in the task.
+    /// Facts by the words of their atoms.
     facts: FxHashMap<Vec<usize>, Fact>,
     all_words: FxHashMap<&'t str, usize>,
-    /// Operators by schema and arguments; none where there are several.
+    /// Operators by schema and arguments. `None` if several operators have them.
     calls: FxHashMap<(u32, Vec<Argument>), Option<OperatorId>>,
-    /// By operator, in the normal form of [`Exchange::operator`].
+    /// Operators in the normal form of [`Exchange::operator`].
     normal: Vec<Operator>,
     goal: Condition,
 }
@@ -94,10 +96,10 @@ impl<'t> Parts<'t> {
         let mut facts = FxHashMap::default();
         let mut words = Vec::with_capacity(task.variables.len());
         for (variable, id) in task.variables.iter().zip(VariableId::all(task.variables.len())) {
-            let mut own = Vec::with_capacity(variable.values.len());
+            let mut atoms_of_variable = Vec::with_capacity(variable.values.len());
             for (name, value) in limits.watch(&variable.values).zip(0..) {
                 let name = name?.as_str();
-                own.push(name.starts_with('(').then(|| {
+                atoms_of_variable.push(name.starts_with('(').then(|| {
                     let atom: Vec<usize> = name
                         .trim_matches(['(', ')'])
                         .split(' ')
@@ -110,14 +112,14 @@ impl<'t> Parts<'t> {
                     atom
                 }));
             }
-            words.push(own);
+            words.push(atoms_of_variable);
         }
         let identity = Exchange::identity(task);
         let (mut calls, mut normal) = (FxHashMap::default(), Vec::with_capacity(task.operators.len()));
         for (operator, id) in limits.watch(&task.operators).zip(OperatorId::all(task.operators.len())) {
             let operator = operator?;
             let call = (operator.schema, operator.arguments.clone());
-            calls.entry(call).and_modify(|known| *known = None).or_insert(Some(id));
+            calls.entry(call).and_modify(|entry| *entry = None).or_insert(Some(id));
             normal.push(identity.operator(operator));
         }
         let goal = identity.condition(&task.goal);
@@ -129,15 +131,15 @@ impl<'t> Parts<'t> {
     }
 }
 
-/// Two objects that change places, and where that takes each fact.
+/// Exchange of two objects with the image of each fact.
 pub struct Exchange {
     pub objects: (ObjectId, ObjectId),
-    /// By variable and value.
+    /// Image by variable and value.
     pub facts: Vec<Vec<Fact>>,
 }
 
 impl Exchange {
-    /// None if the variables do not match.
+    /// Returns `None` if the variables do not match.
     fn new(
         parts: &Parts<'_>,
         a: ObjectId,
@@ -150,12 +152,12 @@ impl Exchange {
             let mut image = atom.clone();
             // The first word is the predicate.
             for word in image.iter_mut().skip(1) {
-                let other = match Some(*word) {
+                let exchanged_word = match Some(*word) {
                     word if word == a_word => b_word,
                     word if word == b_word => a_word,
                     word => word,
                 };
-                *word = other?;
+                *word = exchanged_word?;
             }
             parts.facts.get(&image).copied()
         };
@@ -221,7 +223,7 @@ impl Exchange {
         Condition { facts: self.facts(&condition.facts), clauses, comparisons, above: Vec::new() }
     }
 
-    /// Whether the task with the objects exchanged is the same task.
+    /// Returns `true` if exchanging the objects maps the task to itself.
     fn keeps(&self, parts: &Parts<'_>, initially: bool, limits: &Limits) -> Result<bool, Interrupted> {
         let task = parts.task;
         let initial = |(variable, value): (usize, &u32)| {
@@ -244,14 +246,14 @@ impl Exchange {
     }
 
     fn identity(task: &Task) -> Self {
-        let all = task.variables.iter().zip(VariableId::all(task.variables.len()));
-        let facts = all.map(|(own, variable)| {
+        let variables = task.variables.iter().zip(VariableId::all(task.variables.len()));
+        let facts = variables.map(|(own, variable)| {
             own.values.iter().zip(0..).map(|(_, value)| Fact { variable, value }).collect()
         });
         Self { objects: (ObjectId(u32::MAX), ObjectId(u32::MAX)), facts: facts.collect() }
     }
 
-    /// The operator with the objects exchanged, in a normal form.
+    /// Returns the image of an operator in normal form.
     fn operator(&self, operator: &Operator) -> Operator {
         let mut image = operator.clone();
         for argument in &mut image.arguments {

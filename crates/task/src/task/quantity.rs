@@ -1,7 +1,7 @@
-//! Quantities that depend on which function designs an operator runs with.
+//! Quantities that depend on the function designs of an operator.
 //!
-//! A quantity is a constant plus tables over slots. The tables are what keeps the encoding factored: a sum over
-//! k functions of m designs each is k tables of m entries, not one of m^k.
+//! A quantity is a constant plus tables over slots. Tables keep the encoding factored: a sum over k
+//! functions of m designs each is k tables of m entries instead of a table of m^k entries.
 
 use crate::number::Int;
 use crate::task::dense_ids::dense_ids;
@@ -13,22 +13,22 @@ use smallvec::SmallVec;
 /// Positions in an operator's slot list, ascending.
 pub type SlotSet = SmallVec<[u32; 2]>;
 
-/// One value for each combination of the admitted designs of some slots.
+/// A value for each combination of the admitted designs of some slots.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Table<N> {
     pub slots: SlotSet,
-    /// Row-major: the last slot varies fastest. Shared by the operators of one schema for which it is the same.
+    /// Row-major: the last slot varies fastest. Shared by operators of a schema.
     pub values: Arc<[N]>,
 }
 
-/// By the slots and the first value: tables are long, and operators with equal ones are few.
+/// Hashes the slots and the first value only: tables are long, and equal ones are rare.
 impl<N: Hash> Hash for Table<N> {
     fn hash<H: Hasher>(&self, state: &mut H) {
         (&self.slots, self.values.first()).hash(state);
     }
 }
 
-/// A constant plus tables; the sum of what the chosen designs contribute.
+/// A constant plus tables: the sum of the contributions of the chosen designs.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
 pub struct Quantity<N> {
     pub constant: N,
@@ -38,7 +38,7 @@ pub struct Quantity<N> {
 /// A linear combination of numeric variables plus a quantity.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Default)]
 pub struct Linear<N> {
-    /// Numeric variable and factor, ascending by variable, factors not zero.
+    /// Numeric variables with non-zero factors, in ascending order.
     pub coefficients: Vec<(NumericId, N)>,
     pub quantity: Quantity<N>,
 }
@@ -49,7 +49,7 @@ pub struct NumericId(pub u32);
 
 dense_ids!(NumericId);
 
-/// The arithmetic that quantities need.
+/// Arithmetic that quantities require.
 pub trait Number:
     Clone
     + PartialEq
@@ -92,7 +92,8 @@ impl<N: Number> Quantity<N> {
         }
     }
 
-    /// Adds a table; one that is constant joins the constant, one over the same slots is merged.
+    /// Adds a table. A constant table is added to the constant, a table over the same slots is
+    /// merged.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
@@ -140,18 +141,20 @@ impl<N: Number> Quantity<N> {
         self.fold_constant_tables();
     }
 
-    /// What tables over no other slots than these contribute.
+    /// Returns the contribution of the tables whose slots are all in `slots`.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
     )]
     pub fn part(&self, slots: &[u32], choice: &[u32], sizes: &[usize]) -> N {
-        let own = self.tables.iter().filter(|table| table.slots.iter().all(|slot| slots.contains(slot)));
-        own.map(|table| table.values[table.index(choice, sizes)].clone())
+        let tables = self.tables.iter().filter(|table| table.slots.iter().all(|slot| slots.contains(slot)));
+        tables
+            .map(|table| table.values[table.index(choice, sizes)].clone())
             .fold(N::zero(), |sum, value| sum + value)
     }
 
-    /// The value when the slot at position `i` has its `choice[i]`-th admitted design; `sizes` counts those designs.
+    /// Returns the value if the slot at position `i` has its `choice[i]`-th admitted design.
+    /// `sizes` has the numbers of admitted designs.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
@@ -163,7 +166,7 @@ impl<N: Number> Quantity<N> {
 }
 
 impl<N: Number> Quantity<N> {
-    /// A lower bound that ignores that tables share slots; exact if no two do.
+    /// Returns a lower bound that treats tables independently; exact if no two tables share a slot.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"
@@ -175,7 +178,7 @@ impl<N: Number> Quantity<N> {
 }
 
 impl Quantity<Int> {
-    /// An upper bound, as `minimum` is a lower one.
+    /// Returns an upper bound, analogous to `minimum`.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "where they are machine integers, the numbers of a quantity fit together (TaskNumber::fits), whatever their signs"

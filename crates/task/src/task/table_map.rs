@@ -1,4 +1,4 @@
-//! Maps the numbers of quantities; tables that operators share stay shared.
+//! Maps the numbers of quantities. Tables that operators share remain shared.
 
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
@@ -8,13 +8,13 @@ use rustc_hash::FxHashMap;
 use crate::number::Rational;
 use crate::task::quantity::{Quantity, Table};
 
-/// The values of a table, and what they are mapped to.
+/// Values of a table and their images.
 type MappedTable<M> = (Arc<[Rational]>, Arc<[M]>);
 
-/// Maps numbers of quantities; tables that operators share stay shared.
+/// Maps the numbers of quantities. Tables that operators share remain shared.
 #[derive(Debug)]
 pub struct TableMap<M> {
-    /// By where a table lies; it is kept, so that nothing else can come to lie there.
+    /// Images by address of the table. The table is kept, so that its address is not reused.
     done: FxHashMap<*const Rational, MappedTable<M>>,
 }
 
@@ -25,10 +25,10 @@ impl<M> Default for TableMap<M> {
 }
 
 impl<M> TableMap<M> {
-    /// Maps the numbers of a quantity; tables that quantities share are mapped once.
+    /// Maps the numbers of a quantity. Shared tables are mapped once.
     ///
     /// # Errors
-    /// The first failure of `f`.
+    /// The first error of `f`.
     pub fn map<E>(
         &mut self,
         quantity: &Quantity<Rational>,

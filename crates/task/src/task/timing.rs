@@ -1,16 +1,16 @@
 //! Earliest starts of operators relative to timed initial literals.
 
-/// When an operator starts at the earliest, besides not before what is before it has ended.
+/// Earliest start of an operator, in addition to the end of its predecessor.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct Timing<N> {
-    /// Not before this.
+    /// Lower bound on the start.
     pub(crate) start: Option<N>,
-    /// So that it does not end before this.
+    /// Lower bound on the end.
     pub(crate) end: Option<N>,
 }
 
 impl<N> Timing<N> {
-    /// As soon as what is before it has ended.
+    /// Returns a timing without bounds.
     pub fn free() -> Self {
         Self { start: None, end: None }
     }

@@ -1,11 +1,11 @@
-//! Asking a log until there is an answer.
+//! Retries of operations on a log.
 
 use std::future::Future;
 use std::time::Duration;
 
 use crate::store::{Bucket, Fault, Store};
 
-/// Writes a value behind a revision, until it is there or somebody else has written another one.
+/// Writes a value after a revision, retrying until it is stored or another value is found.
 pub(super) async fn write<S: Store>(
     store: &S,
     bucket: Bucket,
@@ -28,7 +28,7 @@ pub(super) async fn write<S: Store>(
     Err(Fault::Conflict)
 }
 
-/// Asks until there is an answer.
+/// Repeats an operation until it has a definite result.
 pub(super) async fn persist<T, F: Future<Output = Result<T, Fault>>>(
     ask: impl Fn() -> F,
 ) -> Result<T, Fault> {
@@ -41,14 +41,14 @@ pub(super) async fn persist<T, F: Future<Output = Result<T, Fault>>>(
     Err(Fault::Conflict)
 }
 
-/// Waits before another attempt: up to 10 ms, and up to twice as long each time, 5 s at most; a random part of that, so that not all come
-/// back at once.
+/// Waits before another attempt: a random time up to 10 ms, doubled with each attempt up to 5 s.
+/// Random pauses prevent synchronised retries.
 pub(crate) async fn pause(attempt: u32) {
-    let most = 5_000.min(10_u64 << attempt.min(10));
-    tokio::time::sleep(Duration::from_millis(fastrand::u64(1..=most))).await;
+    let limit = 5_000.min(10_u64 << attempt.min(10));
+    tokio::time::sleep(Duration::from_millis(fastrand::u64(1..=limit))).await;
 }
 
-/// A value as it is written.
+/// Serialises a value.
 pub(super) fn bytes(value: &impl serde::Serialize) -> Vec<u8> {
     serde_json::to_vec(value).unwrap_or_default()
 }

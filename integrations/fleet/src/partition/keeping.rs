@@ -1,4 +1,4 @@
-//! Robots are saved, and how far the partition has come.
+//! Checkpoints: saves robots and the progress of the partition.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::store::{Bucket, Store};
 use crate::wire::{Address, Progress};
 
 impl<S: Store> Partition<S> {
-    /// Begins to save robots whose turn it is, or all; whether there are such.
+    /// Starts to save the robots that are due, or all. Returns `true` if there are any.
     pub(super) fn save(&mut self, all: bool) -> bool {
         let within = self.shared.settings.save_within;
         let is_due = |slot: &Slot| all || slot.since.is_some_and(|since| since.elapsed() >= within);
@@ -19,7 +19,7 @@ impl<S: Store> Partition<S> {
         begun > 0
     }
 
-    /// Begins to save a robot, if that can be done and is worth it.
+    /// Starts to save a robot, if it is idle and has unsaved decisions.
     pub(super) fn save_robot(&mut self, name: &str) -> bool {
         let Some(slot) = self.slots.get_mut(name) else { return false };
         let (Some(robot), Some(last)) = (&slot.robot, slot.unsaved.back()) else { return false };
@@ -37,7 +37,7 @@ impl<S: Store> Partition<S> {
         true
     }
 
-    /// Begins to write how far the partition has come, if it has come further; whether it has.
+    /// Starts to write the progress, if it has advanced. Returns `true` if so.
     pub(super) fn advance(&mut self, must: bool) -> bool {
         if self.is_progressing {
             return true;
@@ -62,7 +62,7 @@ impl<S: Store> Partition<S> {
                 next.decisions = next.decisions.min(decision);
             }
         }
-        // What former owners have decided is needed until its events were read again.
+        // Decisions of former owners are needed until their events have been replayed.
         next.events = next.events.max(self.progress.events);
         next.decisions = next.decisions.max(self.progress.decisions);
         let worth = if must { 1 } else { self.shared.settings.save_every as u64 };

@@ -1,9 +1,11 @@
-//! The robots of one partition, by the worker that has its lease.
+//! Robots of a partition, run by the worker that has its lease.
 //!
-//! Events are read in their order. Each robot takes one at a time; robots go on side by side. A decision is appended behind the robot's last
-//! one, so that of two workers only one can decide an event. From time to time a robot is saved, and the partition's progress says from
-//! where on events and decisions must be read again. After a crash between any two of these operations a new owner reads what was saved,
-//! lets each robot go through the events since with the plans as they were decided, and goes on with the first event that nobody has decided.
+//! Events are read in order. Each robot handles a single event at a time, and robots run
+//! concurrently. A decision is appended after the robot's last one, so only one of two workers can
+//! decide an event. Robots are saved periodically, and the progress of the partition tells from
+//! where events and decisions must be read again. After a crash between any two of these
+//! operations, a new owner reads the saved states, replays later events with the recorded plans,
+//! and continues with the first undecided event.
 
 mod asking;
 mod keeping;
@@ -25,20 +27,20 @@ use crate::store::Store;
 pub(crate) use asking::pause;
 use own::Partition;
 
-/// How partitions are run.
+/// Parameters of partitions.
 #[derive(Debug, Clone, Copy)]
 pub struct Settings {
-    /// Loops that work at the same time.
+    /// Number of loops that work at the same time.
     pub threads: usize,
-    /// Robots that are kept ready; others are snapshots in memory, and made ready when they are needed.
+    /// Number of robots loaded in memory. Others are kept as snapshots and loaded on demand.
     pub warm: usize,
-    /// A robot is saved, and its partition's progress written, after so many decisions.
+    /// Number of decisions after which a robot is saved and the progress is written.
     pub save_every: usize,
-    /// What is not saved holds up what may be forgotten for so long at most.
+    /// Maximum time that a robot stays unsaved, which limits the retained events.
     pub save_within: Duration,
-    /// So often it is looked whether something is to be saved.
+    /// Interval between checks for robots to save.
     pub look: Duration,
-    /// So many events of a partition are read ahead.
+    /// Number of events of a partition that are read in advance.
     pub ahead: usize,
 }
 
@@ -55,72 +57,72 @@ impl Default for Settings {
     }
 }
 
-/// What a worker's partitions share.
+/// Shared state of a worker's partitions.
 #[derive(Debug)]
 pub struct Shared<S> {
     /// The log.
     pub store: S,
-    /// The missions that are known.
+    /// The missions of the worker.
     pub missions: Missions,
-    /// The worker's name.
+    /// Name of the worker.
     pub worker: String,
-    /// How partitions are run.
+    /// Parameters of partitions.
     pub settings: Settings,
-    /// Counts, over all partitions.
+    /// Counters over all partitions.
     pub counts: Counts,
     threads: Semaphore,
 }
 
-/// What is counted; of what is there now, and of what has happened.
+/// Counters of current objects and of past events.
 #[derive(Debug, Default)]
 pub struct Counts {
-    /// Robots, and those that are kept ready.
+    /// Number of robots.
     pub robots: AtomicU64,
-    /// Robots that are kept ready.
+    /// Number of robots loaded in memory.
     pub warm: AtomicU64,
-    /// Events that are read and not decided.
+    /// Number of events that are read but not decided.
     pub waiting: AtomicU64,
-    /// Partitions that are held.
+    /// Number of leased partitions.
     pub partitions: AtomicU64,
-    /// Events decided.
+    /// Number of decided events.
     pub decided: AtomicU64,
-    /// Events refused.
+    /// Number of refused events.
     pub refused: AtomicU64,
-    /// Microseconds that loops have worked.
+    /// Working time of loops in microseconds.
     pub busy: AtomicU64,
-    /// Partition to the event up to which all are decided or refused.
+    /// Sequence by partition up to which all events are decided or refused.
     pub reached: Mutex<BTreeMap<u32, u64>>,
 }
 
 impl<S> Shared<S> {
-    /// Nothing has happened yet.
+    /// Creates the state with all counters at zero.
     pub fn new(store: S, missions: Missions, worker: String, settings: Settings) -> Self {
         let threads = Semaphore::new(settings.threads.max(1));
         Self { store, missions, worker, settings, counts: Counts::default(), threads }
     }
 }
 
-/// What a partition is to do.
+/// Order to a partition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Order {
-    /// Go on.
+    /// Continue.
     Go,
-    /// Decide what was begun, save everything and end.
+    /// Finish running decisions, save everything and end.
     Drain,
-    /// End at once: somebody else has the lease.
+    /// End immediately, because another worker has the lease.
     Abandon,
 }
 
-/// How a partition has ended.
+/// Reason why a partition has ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum End {
-    /// As ordered.
+    /// An order.
     Ordered,
-    /// Somebody else has written what only an owner writes.
+    /// Another worker has written what only the owner writes.
     Fenced,
 }
 
-/// Runs a partition until it is ordered to end, or somebody else owns it.
+/// Runs a partition until it is ordered to end or is fenced.
 pub async fn serve<S: Store>(shared: Arc<Shared<S>>, partition: u32, orders: watch::Receiver<Order>) -> End {
     let mut abandoned = orders.clone();
     let work = async {

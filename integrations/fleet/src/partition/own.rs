@@ -1,4 +1,4 @@
-//! A partition at work.
+//! Execution of a partition: reads events, runs robots, and triggers checkpoints.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::atomic::Ordering;
@@ -23,12 +23,12 @@ pub(super) struct Partition<S> {
     pub(super) progress: Progress,
     pub(super) revision: u64,
     pub(super) slots: BTreeMap<String, Slot>,
-    /// The last event that was read, and the last decision that is known.
+    /// Sequences of the last event that was read and the last known decision.
     pub(super) seen: (u64, u64),
-    /// The revision of the last snapshot.
+    /// Revision of the last snapshot.
     pub(super) snapshots: u64,
     pub(super) jobs: FuturesUnordered<BoxFuture<'static, Done>>,
-    /// Events that are read and not decided.
+    /// Number of events that are read but not decided.
     pub(super) waiting: usize,
     pub(super) is_progressing: bool,
     pub(super) clock: u64,
@@ -53,8 +53,8 @@ impl<S: Store> Partition<S> {
         loop {
             if self.waiting == 0 && reached != self.seen.0 {
                 reached = self.seen.0;
-                let mut all = self.shared.counts.reached.lock().unwrap_or_else(PoisonError::into_inner);
-                all.insert(self.number, reached);
+                let mut positions = self.shared.counts.reached.lock().unwrap_or_else(PoisonError::into_inner);
+                positions.insert(self.number, reached);
             }
             let order = *orders.borrow_and_update();
             let is_draining = order == Order::Drain;
@@ -96,7 +96,7 @@ impl<S: Store> Partition<S> {
         }
     }
 
-    /// Takes the next event of the stream.
+    /// Handles the next event of the stream.
     fn read(&mut self, event: Stored) {
         if event.sequence <= self.seen.0 {
             return;
@@ -123,7 +123,7 @@ impl<S: Store> Partition<S> {
         }
         let has_slot = self.slots.contains_key(&address.robot);
         if !has_slot {
-            // Names that nobody can enrol take no memory.
+            // Events of unknown missions are refused here, so that they create no robot.
             let refused = match enrolment(&event.payload) {
                 Some(mission) if self.shared.missions.get(&mission).is_some() => None,
                 Some(_) => Some(Refused::Mission),
@@ -135,7 +135,7 @@ impl<S: Store> Partition<S> {
             }
         }
         let slot = self.slot(&address.robot);
-        if slot.robot.as_ref().is_some_and(|own| event.sequence <= own.event) {
+        if slot.robot.as_ref().is_some_and(|robot| event.sequence <= robot.event) {
             return;
         }
         if slot.faulted {
@@ -147,9 +147,9 @@ impl<S: Store> Partition<S> {
         self.begin(&address.robot);
     }
 
-    /// Lets a robot take the next event that waits for it, if it is not at work.
+    /// Starts the next pending event of a robot, if the robot is idle.
     fn begin(&mut self, name: &str) {
-        let known = self.seen.1;
+        let last_decision = self.seen.1;
         let Some(slot) = self.slots.get_mut(name) else { return };
         if slot.robot.is_none() || slot.faulted {
             return;
@@ -161,9 +161,10 @@ impl<S: Store> Partition<S> {
         }
         let is_next = slot.before.front().is_some_and(|(_, decided)| decided.event == event.sequence);
         let before = if is_next { slot.before.pop_front() } else { None };
-        // A former owner's decision is needed until it is counted among what is not saved.
-        let known = before.as_ref().map_or(known, |(decision, _)| known.min(decision - 1));
-        slot.at = Some((event.sequence, known));
+        // A former owner's decision is needed until it is listed as unsaved.
+        let last_decision =
+            before.as_ref().map_or(last_decision, |(decision, _)| last_decision.min(decision - 1));
+        slot.at = Some((event.sequence, last_decision));
         let task = Task {
             shared: Arc::clone(&self.shared),
             name: name.to_owned(),
@@ -211,7 +212,7 @@ impl<S: Store> Partition<S> {
                     self.recent.push_back((clock, name.clone()));
                     self.cool();
                 }
-                // Under load a robot is always at work: its turn to be saved is between two events.
+                // A busy robot is never idle between events, so it is saved here.
                 if self
                     .slots
                     .get(&name)
@@ -245,7 +246,7 @@ impl<S: Store> Partition<S> {
         Ok(())
     }
 
-    /// Keeps no more robots ready than there is room for.
+    /// Unloads robots until their number is within the limit.
     fn cool(&mut self) {
         let counts = &self.shared.counts;
         while counts.warm.load(Ordering::Relaxed) > self.shared.settings.warm as u64 {
@@ -258,7 +259,7 @@ impl<S: Store> Partition<S> {
         }
     }
 
-    /// Tells of an event that changes nothing.
+    /// Reports a refused event.
     fn say(&self, event: &Stored, refused: Refused) {
         self.refuse(Some((event.subject.clone(), refused.sentence().to_owned())), refused.name());
     }
@@ -272,7 +273,7 @@ impl<S: Store> Partition<S> {
         }
     }
 
-    /// A robot cannot go on. Its events stay where they are, for a worker that can.
+    /// Marks a robot as faulted. Its events are kept for a worker that can handle them.
     pub(super) fn fault(&mut self, robot: &str, event: u64, decision: u64, why: &str) {
         metrics::counter!("metaplan_fleet_faulted_total").increment(1);
         tracing::error!(partition = self.number, robot, "does not go on: {why}");
@@ -302,7 +303,7 @@ impl<S> Drop for Partition<S> {
     }
 }
 
-/// The mission that a message asks for, if it asks for an enrolment.
+/// Returns the mission of a message that requests an enrolment.
 fn enrolment(payload: &[u8]) -> Option<String> {
     #[derive(serde::Deserialize)]
     struct Head {

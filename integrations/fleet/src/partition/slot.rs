@@ -7,42 +7,42 @@ use crate::robot::{Refused, Robot};
 use crate::store::{Fault, Stored};
 use crate::wire::{Decided, Progress};
 
-/// A robot, what waits for it, and what of it is not saved.
+/// A robot with its pending events and unsaved decisions.
 #[derive(Default)]
 pub(super) struct Slot {
-    /// None while it is at work.
+    /// `None` while the robot is at work.
     pub(super) robot: Option<Box<Robot>>,
-    /// The event that it is at, and the last decision that was known when it began.
+    /// Sequences of the current event and of the last known decision at its start.
     pub(super) at: Option<(u64, u64)>,
     pub(super) waiting: VecDeque<Stored>,
-    /// Its last decision.
+    /// Sequence of the robot's last decision.
     pub(super) chain: u64,
-    /// Decisions of former owners that it has not gone through.
+    /// Decisions of former owners that are not replayed yet.
     pub(super) before: VecDeque<(u64, Decided)>,
-    /// Events and decisions since it was saved.
+    /// Sequences of events and decisions since the last save.
     pub(super) unsaved: VecDeque<(u64, u64)>,
     pub(super) since: Option<Instant>,
-    /// The revision of what was saved.
+    /// Revision of the saved state.
     pub(super) revision: u64,
     pub(super) is_saving: bool,
-    /// Why it cannot go on, if it cannot.
+    /// `true` if the robot cannot continue.
     pub(super) faulted: bool,
-    /// When it was used last, if it is kept ready; 0 if it is not.
+    /// Time of the last use in ticks of the partition's clock; 0 if the robot is not loaded.
     pub(super) used: u64,
 }
 
-/// What was done beside.
+/// Result of a background job.
 pub(super) enum Done {
-    /// An event was taken.
+    /// An event was handled.
     Taken { robot: String, own: Box<Robot>, event: Stored, outcome: Outcome },
-    /// A robot was saved, up to an event, as a revision.
+    /// A robot was saved up to an event, with this revision.
     Kept { robot: String, event: u64, revision: Result<u64, Fault> },
     /// The progress was written.
     Progressed { progress: Progress, revision: Result<u64, Fault> },
 }
 
 pub(super) enum Outcome {
-    /// As the decision of that sequence says.
+    /// Decided, with the sequence of the decision.
     Decided(u64),
     Refused(Refused),
     Faulted(String),

@@ -1,4 +1,4 @@
-//! What former owners have left.
+//! Recovery of a partition from the data of former owners.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -14,13 +14,14 @@ use crate::store::{Bucket, Store, Stream};
 use crate::wire::{Address, Decided, Progress, Saved};
 
 impl<S: Store> Partition<S> {
-    /// Takes over what former owners have left.
+    /// Recovers a partition.
     pub(super) async fn recover(shared: &Arc<Shared<S>>, number: u32) -> Result<Self, End> {
         let key = number.to_string();
         let store = &shared.store;
         let (progress, revision) = loop {
-            let known = persist(|| store.get(Bucket::Progress, &key)).await.map_err(|_| End::Fenced)?;
-            let (mut progress, revision) = match known {
+            let stored_progress =
+                persist(|| store.get(Bucket::Progress, &key)).await.map_err(|_| End::Fenced)?;
+            let (mut progress, revision) = match stored_progress {
                 Some(entry) => (serde_json::from_slice(&entry.value).unwrap_or_default(), entry.revision),
                 None => (Progress::default(), 0),
             };
@@ -28,7 +29,7 @@ impl<S: Store> Partition<S> {
             let value = bytes(&progress);
             match persist(|| store.put(Bucket::Progress, &key, &value, revision)).await {
                 Ok(revision) => break (progress, revision),
-                // It was written by somebody else, or by ourselves without our knowing.
+                // Another worker has written it, or an unacknowledged write succeeded.
                 Err(_) => pause(1).await,
             }
         };
@@ -37,7 +38,7 @@ impl<S: Store> Partition<S> {
         let history = persist(|| store.history(Stream::Decisions, number, progress.decisions));
         let history = history.await.map_err(|_| End::Fenced)?;
         shared.counts.partitions.fetch_add(1, Ordering::Relaxed);
-        let mut own = Self {
+        let mut partition = Self {
             shared: Arc::clone(shared),
             number,
             seen: (progress.events, progress.decisions),
@@ -52,24 +53,24 @@ impl<S: Store> Partition<S> {
             recent: VecDeque::new(),
         };
         for entry in saved {
-            own.snapshots = own.snapshots.max(entry.revision);
-            own.take_saved(&entry.key, &entry.value, entry.revision);
+            partition.snapshots = partition.snapshots.max(entry.revision);
+            partition.take_saved(&entry.key, &entry.value, entry.revision);
         }
         for message in history {
-            own.seen.1 = own.seen.1.max(message.sequence);
+            partition.seen.1 = partition.seen.1.max(message.sequence);
             let Some(address) = Address::parse(&message.subject) else { continue };
-            let slot = own.slot(&address.robot);
+            let slot = partition.slot(&address.robot);
             if slot.chain >= message.sequence {
                 continue;
             }
-            // Whatever stands there, the next decision stands behind it.
+            // The next decision follows this message, whatever its contents.
             slot.chain = message.sequence;
             match Decided::parse(&message.payload) {
                 Some(decided) => slot.before.push_back((message.sequence, decided)),
-                None => own.refuse(None, "not_a_decision"),
+                None => partition.refuse(None, "not_a_decision"),
             }
         }
-        Ok(own)
+        Ok(partition)
     }
 
     fn take_saved(&mut self, key: &str, value: &[u8], revision: u64) {

@@ -1,4 +1,5 @@
-//! One event of one robot: its loop in a thread of its own, and the decision behind the last one.
+//! Handling of a single event: the loop runs in a separate thread, and the decision is appended
+//! after the last one.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -11,14 +12,14 @@ use crate::robot::{Faulted, Robot};
 use crate::store::{Fault, Message, Store, Stored, Stream};
 use crate::wire::Decided;
 
-/// What one event of one robot takes.
+/// Input of handling an event.
 pub(super) struct Task<S> {
     pub(super) shared: Arc<Shared<S>>,
     pub(super) name: String,
     pub(super) epoch: u64,
     pub(super) chain: u64,
     pub(super) before: Option<(u64, Decided)>,
-    /// A former owner has decided later events and not this one.
+    /// `true` if a former owner has decided later events and not this one.
     pub(super) was_refused: bool,
 }
 
@@ -38,7 +39,7 @@ impl<S: Store> Task<S> {
             (robot, event, decided)
         });
         let Ok((own, event, decided)) = work.await else {
-            // A loop that panics takes its robot with it; whoever recovers the partition begins with what was saved.
+            // A panic loses the state of the robot. The next recovery starts from the saved state.
             let event =
                 Stored { sequence: 0, subject: String::new(), id: None, time: 0, payload: Vec::new() };
             return Done::Taken { robot: self.name, own: Box::default(), event, outcome: Outcome::Fenced };
@@ -63,7 +64,7 @@ impl<S: Store> Task<S> {
         Done::Taken { robot: self.name, own, event, outcome }
     }
 
-    /// Appends a decision behind the last one.
+    /// Appends a decision after the last one.
     async fn publish(&self, event: &Stored, decided: &Decided) -> Outcome {
         let (store, payload) = (&self.shared.store, bytes(decided));
         let id = format!("{}:{}:{}:{}", self.name, event.sequence, self.epoch, self.shared.worker);
@@ -84,7 +85,7 @@ impl<S: Store> Task<S> {
                     Ok(last) if last.as_ref().map_or(0, |last| last.sequence) != self.chain => {
                         return Outcome::Fenced;
                     }
-                    // What was sent before may still be on its way.
+                    // An earlier attempt may still be in transit.
                     _ => {}
                 },
                 Err(Fault::TooLong(length)) => {

@@ -1,6 +1,7 @@
-//! A directory instead of a server: the same streams and buckets in one file, for one process.
+//! Local directory with the same streams and buckets in a single file, for a single process.
 //!
-//! Whatever is to be written by anybody at one time is one transaction of `redb`, which is on the disk when it is acknowledged.
+//! All concurrent writes are combined into a transaction of `redb`, which is on disk before they
+//! are acknowledged.
 
 use std::collections::{HashMap, VecDeque};
 use std::path::Path;
@@ -15,33 +16,33 @@ use tokio::sync::{broadcast, mpsc, oneshot, watch};
 use super::{Bucket, Entry, Fault, Message, Receipt, Store, Stored, Stream};
 use crate::wire::Address;
 
-/// The name of the file in the directory.
+/// Name of the file in the directory.
 const FILE: &str = "fleet.redb";
 
-/// So many requests are one transaction at most.
+/// Maximum number of writes in a transaction.
 const BATCH: usize = 4096;
 
-/// So many messages are read at once.
+/// Maximum number of messages per read.
 const PAGE: usize = 512;
 
-/// Bytes of the file that are kept in memory.
+/// Cache size of the database in bytes.
 const CACHE: usize = 64 << 20;
 
-/// (stream, sequence) to (subject, id, time, payload).
+/// Value type of messages: (subject, id, time, payload); the key is (stream, sequence).
 type Parts = (&'static str, &'static str, u64, &'static [u8]);
 const MESSAGES: TableDefinition<'static, (u8, u64), Parts> = TableDefinition::new("messages");
-/// (stream, partition, sequence): what a partition has.
+/// Index of the messages of a partition: (stream, partition, sequence).
 const OF_PARTITION: TableDefinition<'static, (u8, u32, u64), ()> = TableDefinition::new("of_partition");
-/// (stream, subject) to the sequence of its last message.
+/// Sequence of the last message by (stream, subject).
 const LAST: TableDefinition<'static, (u8, &str), u64> = TableDefinition::new("last");
-/// (stream, message id) to the sequence of its message.
+/// Sequence of messages by (stream, message id).
 const IDS: TableDefinition<'static, (u8, &str), u64> = TableDefinition::new("ids");
-/// (bucket, key) to (revision, value).
+/// Revisions and values by (bucket, key).
 const VALUES: TableDefinition<'static, (u8, &str), (u64, &[u8])> = TableDefinition::new("values");
-/// Names to numbers: how many partitions, and the last sequence of everything.
+/// Counters by name: the number of partitions and the last sequence.
 const NUMBERS: TableDefinition<'static, &str, u64> = TableDefinition::new("numbers");
 
-/// A directory as a log.
+/// A log in a local directory.
 #[derive(Debug, Clone)]
 pub struct Local(Arc<Inner>);
 
@@ -51,18 +52,18 @@ struct Inner {
     partitions: u32,
     lease: Duration,
     requests: mpsc::UnboundedSender<Request>,
-    /// Grows whenever something is appended.
+    /// Incremented on every append.
     appended: watch::Receiver<u64>,
     notices: broadcast::Sender<(String, String)>,
 }
 
-/// What is to be written, and who waits for it.
+/// A write with the receiver of its result.
 struct Request {
     write: Write,
     done: oneshot::Sender<Answer>,
 }
 
-/// The sequence or the revision that something has got.
+/// Sequence or revision of a write.
 type Answer = Result<Receipt, Fault>;
 
 enum Write {
@@ -80,8 +81,8 @@ fn failed(error: impl std::fmt::Display) -> Fault {
 }
 
 impl Local {
-    /// Opens a directory, or makes it; how many partitions there are is decided when it is made. Leases that are not renewed for `lease`
-    /// are gone.
+    /// Opens or creates a directory. The number of partitions is fixed on creation. Leases expire
+    /// unless they are renewed within `lease`.
     ///
     /// # Errors
     /// The directory cannot be used, or another process uses it.
@@ -93,7 +94,7 @@ impl Local {
         let mut builder = Database::builder();
         builder.set_cache_size(CACHE);
         let database = builder.create(directory.join(FILE)).map_err(|error| wrong(&error))?;
-        let known = prepare(&database, partitions).map_err(|error| wrong(&error))?;
+        let partitions = prepare(&database, partitions).map_err(|error| wrong(&error))?;
         let database = Arc::new(database);
         let (requests, waiting) = mpsc::unbounded_channel();
         let (appending, appended) = watch::channel(0);
@@ -103,10 +104,10 @@ impl Local {
             .name("fleet-writer".to_owned())
             .spawn(move || writer.run(waiting, &appending))
             .map_err(|error| wrong(&error))?;
-        Ok(Self(Arc::new(Inner { database, partitions: known, lease, requests, appended, notices })))
+        Ok(Self(Arc::new(Inner { database, partitions, lease, requests, appended, notices })))
     }
 
-    /// What is refused, as it comes: subjects and sentences.
+    /// Subscribes to refusals: subjects and sentences.
     pub fn notices(&self) -> broadcast::Receiver<(String, String)> {
         self.0.notices.subscribe()
     }
@@ -117,7 +118,7 @@ impl Local {
         answer.await.map_err(failed)?
     }
 
-    /// So many messages of a partition after a sequence.
+    /// Reads up to `most` messages of a partition after a sequence.
     fn page(&self, stream: Stream, partition: u32, after: u64, most: usize) -> Result<Vec<Stored>, Fault> {
         let (number, transaction) = (stream as u8, self.0.database.begin_read().map_err(failed)?);
         let of_partition = transaction.open_table(OF_PARTITION).map_err(failed)?;
@@ -137,15 +138,15 @@ fn message(
     stream: u8,
     sequence: u64,
 ) -> Result<Option<Stored>, Fault> {
-    let found = messages.get((stream, sequence)).map_err(failed)?;
-    Ok(found.map(|value| {
+    let entry = messages.get((stream, sequence)).map_err(failed)?;
+    Ok(entry.map(|value| {
         let (subject, id, time, payload) = value.value();
         let id = (!id.is_empty()).then(|| id.to_owned());
         Stored { sequence, subject: subject.to_owned(), id, time, payload: payload.to_owned() }
     }))
 }
 
-/// Makes the tables, and gives the number of partitions.
+/// Creates the tables. Returns the number of partitions.
 fn prepare(database: &Database, partitions: u32) -> Result<u32, redb::Error> {
     let transaction = database.begin_write()?;
     transaction.open_table(MESSAGES)?;
@@ -154,7 +155,7 @@ fn prepare(database: &Database, partitions: u32) -> Result<u32, redb::Error> {
     transaction.open_table(IDS)?;
     let known = {
         let mut values = transaction.open_table(VALUES)?;
-        // Whoever had leases is gone: one process at a time has the file.
+        // Only one process uses the file at a time, so all old leases are invalid.
         for bucket in Bucket::ALL.into_iter().filter(|bucket| bucket.expires()) {
             values.retain_in((bucket as u8, "")..(bucket as u8 + 1, ""), |_, _| false)?;
         }
@@ -168,10 +169,10 @@ fn prepare(database: &Database, partitions: u32) -> Result<u32, redb::Error> {
     Ok(known)
 }
 
-/// The thread that writes.
+/// The writer thread.
 struct Writer {
     database: Arc<Database>,
-    /// When values that expire were written.
+    /// Time at which expiring values were written.
     seen: HashMap<(Bucket, String), Instant>,
     lease: Duration,
 }
@@ -190,7 +191,7 @@ impl Writer {
                 if let (Write::Append { .. }, Ok(receipt)) = (&request.write, &answer) {
                     last = last.max(receipt.sequence);
                 }
-                // Who does not wait any more need not know.
+                // The requester may have stopped waiting.
                 let _ = request.done.send(answer);
             }
             if last > 0 {
@@ -221,13 +222,13 @@ impl Writer {
     }
 
     fn expire(&mut self, tables: &mut Tables<'_>) -> Result<(), redb::Error> {
-        let gone: Vec<(Bucket, String)> = self
+        let expired: Vec<(Bucket, String)> = self
             .seen
             .iter()
             .filter(|(_, at)| at.elapsed() > self.lease)
             .map(|(key, _)| key.clone())
             .collect();
-        for key in gone {
+        for key in expired {
             tables.values.remove((key.0 as u8, key.1.as_str()))?;
             self.seen.remove(&key);
         }
@@ -314,7 +315,7 @@ impl Tables<'_> {
     }
 }
 
-/// Where a reader of a partition is.
+/// Position of a reader in a partition.
 struct Reader {
     store: Local,
     stream: Stream,
@@ -395,9 +396,9 @@ impl Store for Local {
     async fn get(&self, bucket: Bucket, key: &str) -> Result<Option<Entry>, Fault> {
         let transaction = self.0.database.begin_read().map_err(failed)?;
         let values = transaction.open_table(VALUES).map_err(failed)?;
-        let found = values.get((bucket as u8, key)).map_err(failed)?;
-        Ok(found.map(|found| {
-            let (revision, value) = found.value();
+        let stored = values.get((bucket as u8, key)).map_err(failed)?;
+        Ok(stored.map(|stored| {
+            let (revision, value) = stored.value();
             Entry { key: key.to_owned(), value: value.to_owned(), revision }
         }))
     }
@@ -416,7 +417,7 @@ impl Store for Local {
         let prefix = partition.map(|partition| format!("{partition}.")).unwrap_or_default();
         let transaction = self.0.database.begin_read().map_err(failed)?;
         let values = transaction.open_table(VALUES).map_err(failed)?;
-        let mut found = Vec::new();
+        let mut entries = Vec::new();
         for entry in values.range((bucket as u8, prefix.as_str())..).map_err(failed)? {
             let (key, value) = entry.map_err(failed)?;
             let (own, name) = key.value();
@@ -424,13 +425,13 @@ impl Store for Local {
                 break;
             }
             let (revision, value) = value.value();
-            found.push(Entry { key: name.to_owned(), value: value.to_owned(), revision });
+            entries.push(Entry { key: name.to_owned(), value: value.to_owned(), revision });
         }
-        Ok(found)
+        Ok(entries)
     }
 
     async fn notice(&self, subject: &str, text: &str) {
-        // Nobody need listen.
+        // There may be no listener.
         let _ = self.0.notices.send((subject.to_owned(), text.to_owned()));
     }
 }

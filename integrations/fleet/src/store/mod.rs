@@ -1,7 +1,9 @@
-//! What a fleet needs of a log: streams of messages whose appends can be conditional, and buckets of values with revisions.
+//! Interface of a log: streams of messages with conditional appends, and buckets of values with
+//! revisions.
 //!
-//! Two things are one: NATS JetStream, and a directory of this machine without a server. Both keep what they have acknowledged, number
-//! messages from 1 in the order of appending, and refuse an append or a value behind another one than was expected.
+//! It is implemented by NATS JetStream and by a local directory without a server. Both persist what
+//! they have acknowledged, number messages from 1 in the order of appends, and reject an append or
+//! a value if the expected predecessor is not the last one.
 
 pub mod local;
 pub mod nats;
@@ -11,20 +13,20 @@ use std::time::Duration;
 
 use futures::stream::BoxStream;
 
-/// The streams.
+/// The streams of a fleet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Stream {
-    /// `ev.PARTITION.ROBOT`: what robots say.
+    /// `ev.PARTITION.ROBOT`: events of robots.
     Events,
-    /// `dec.PARTITION.ROBOT`: what they are to do.
+    /// `dec.PARTITION.ROBOT`: decisions.
     Decisions,
 }
 
 impl Stream {
-    /// Both of them.
+    /// Both streams.
     pub const ALL: [Self; 2] = [Self::Events, Self::Decisions];
 
-    /// The first token of its subjects.
+    /// First token of the subjects.
     pub fn prefix(self) -> &'static str {
         match self {
             Self::Events => "ev",
@@ -33,24 +35,24 @@ impl Stream {
     }
 }
 
-/// The buckets.
+/// The buckets of a fleet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Bucket {
-    /// Key `PARTITION`: who has the partition; gone when it is not renewed.
+    /// Key `PARTITION`: the owner of the partition. Expires unless it is renewed.
     Leases,
-    /// Key: a worker's name; gone when it is not renewed.
+    /// Key: name of a worker. Expires unless it is renewed.
     Workers,
     /// Key `PARTITION`: its [progress](crate::wire::Progress).
     Progress,
-    /// Key `PARTITION.ROBOT`: the robot as it was [saved](crate::wire::Saved).
+    /// Key `PARTITION.ROBOT`: the [saved](crate::wire::Saved) state of the robot.
     Robots,
 }
 
 impl Bucket {
-    /// All of them.
+    /// All buckets.
     pub const ALL: [Self; 4] = [Self::Leases, Self::Workers, Self::Progress, Self::Robots];
 
-    /// The name of the bucket, behind that of the fleet.
+    /// Name of the bucket, which follows the name of the fleet.
     pub fn name(self) -> &'static str {
         match self {
             Self::Leases => "leases",
@@ -60,7 +62,7 @@ impl Bucket {
         }
     }
 
-    /// Whether values are gone when they are not renewed.
+    /// Returns `true` if values expire unless they are renewed.
     pub fn expires(self) -> bool {
         matches!(self, Self::Leases | Self::Workers)
     }
@@ -69,37 +71,38 @@ impl Bucket {
 /// A message of a stream.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Stored {
-    /// From 1, over all subjects of the stream.
+    /// Sequence from 1, over all subjects of the stream.
     pub sequence: u64,
-    /// What stands behind the prefix of the stream.
+    /// Subject without the prefix of the stream.
     pub subject: String,
     /// The message id, if it has one.
     pub id: Option<String>,
-    /// When it was stored, in microseconds since 1970.
+    /// Time of storage in microseconds since 1970.
     pub time: u64,
-    /// What it says.
+    /// Contents of the message.
     pub payload: Vec<u8>,
 }
 
-/// A message to be appended.
+/// A message to append.
 #[derive(Debug, Clone, Copy)]
 pub struct Message<'a> {
-    /// What stands behind the prefix of the stream.
+    /// Subject without the prefix of the stream.
     pub subject: &'a str,
-    /// A second message with the same id is not stored.
+    /// Message id. A second message with the same id is not stored.
     pub id: &'a str,
-    /// The sequence of the last message of the subject, if that is a condition; 0 where there must be none.
+    /// Required sequence of the last message of the subject, if the append is conditional; 0
+    /// requires that there is none.
     pub after: Option<u64>,
-    /// What it says.
+    /// Contents of the message.
     pub payload: &'a [u8],
 }
 
-/// That a message is there.
+/// Acknowledgement of an append.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Receipt {
-    /// Its sequence.
+    /// Sequence of the message.
     pub sequence: u64,
-    /// Whether it is not this message that is there, but one with the same id that came before it.
+    /// `true` if an earlier message with the same id was found instead.
     pub is_known: bool,
 }
 
@@ -110,34 +113,35 @@ pub struct Entry {
     pub key: String,
     /// The value.
     pub value: Vec<u8>,
-    /// Grows with every value of the bucket.
+    /// Revision, which grows with every value of the bucket.
     pub revision: u64,
 }
 
-/// Why something was not done.
+/// Reason for a failed operation.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Fault {
-    /// Another message or value is there than was expected.
+    /// The expected predecessor is not the last message or value.
     #[error("another message or value is there than was expected")]
     Conflict,
-    /// The message is longer than the server takes.
+    /// The message exceeds the server's limit.
     #[error("the message has {0} bytes; that is more than the server takes")]
     TooLong(usize),
-    /// It may have been done, or may be done later; ask again.
+    /// The result is unknown; the operation may succeed later and must be retried.
     #[error("{0}")]
     Unreachable(String),
 }
 
-/// What a fleet needs of a log.
+/// The log of a fleet.
 pub trait Store: Clone + Send + Sync + 'static {
-    /// How many partitions there are. It never changes.
+    /// Number of partitions, which never changes.
     fn partitions(&self) -> u32;
 
-    /// After this time leases and signs of life are gone unless they are renewed. It never changes.
+    /// Time after which leases and presences expire unless they are renewed. It never changes.
     fn lease(&self) -> Duration;
 
-    /// The messages of a partition after a sequence, as they come, without an end. Sequences grow.
+    /// Returns the messages of a partition after a sequence as an endless stream, in ascending
+    /// order.
     fn follow(
         &self,
         stream: Stream,
@@ -145,7 +149,7 @@ pub trait Store: Clone + Send + Sync + 'static {
         after: u64,
     ) -> impl Future<Output = Result<BoxStream<'static, Result<Stored, Fault>>, Fault>> + Send;
 
-    /// The messages of a partition after a sequence: all that are there at the time of the call.
+    /// Returns all messages of a partition after a sequence that exist at the time of the call.
     fn history(
         &self,
         stream: Stream,
@@ -153,31 +157,32 @@ pub trait Store: Clone + Send + Sync + 'static {
         after: u64,
     ) -> impl Future<Output = Result<Vec<Stored>, Fault>> + Send;
 
-    /// The sequence of the last message of a partition; 0 where there is none.
+    /// Returns the sequence of the last message of a partition; 0 for an empty partition.
     fn end(&self, stream: Stream, partition: u32) -> impl Future<Output = Result<u64, Fault>> + Send;
 
-    /// Appends a message; it is durable then.
+    /// Appends a message durably.
     fn append(
         &self,
         stream: Stream,
         message: Message<'_>,
     ) -> impl Future<Output = Result<Receipt, Fault>> + Send;
 
-    /// The last message of a subject.
+    /// Returns the last message of a subject.
     fn last(
         &self,
         stream: Stream,
         subject: &str,
     ) -> impl Future<Output = Result<Option<Stored>, Fault>> + Send;
 
-    /// The message of a sequence, of whatever subject.
+    /// Returns the message with a sequence, of any subject.
     fn at(&self, stream: Stream, sequence: u64)
     -> impl Future<Output = Result<Option<Stored>, Fault>> + Send;
 
-    /// A value.
+    /// Returns a value.
     fn get(&self, bucket: Bucket, key: &str) -> impl Future<Output = Result<Option<Entry>, Fault>> + Send;
 
-    /// Writes a value behind that of a revision, 0 where there must be none; gives its own revision.
+    /// Writes a value if the current revision is the given one (0: no value). Returns the new
+    /// revision.
     fn put(
         &self,
         bucket: Bucket,
@@ -186,7 +191,7 @@ pub trait Store: Clone + Send + Sync + 'static {
         after: u64,
     ) -> impl Future<Output = Result<u64, Fault>> + Send;
 
-    /// Takes a value away, if it has that revision.
+    /// Removes a value if it has that revision.
     fn remove(
         &self,
         bucket: Bucket,
@@ -194,7 +199,8 @@ pub trait Store: Clone + Send + Sync + 'static {
         revision: u64,
     ) -> impl Future<Output = Result<(), Fault>> + Send;
 
-    /// All values of a bucket, or those of a partition's robots; at least as new as that revision.
+    /// Returns all values of a bucket, or those of a partition's robots, at least as new as a
+    /// revision.
     fn list(
         &self,
         bucket: Bucket,
@@ -202,6 +208,6 @@ pub trait Store: Clone + Send + Sync + 'static {
         at_least: u64,
     ) -> impl Future<Output = Result<Vec<Entry>, Fault>> + Send;
 
-    /// Tells whoever listens on `err.PARTITION.ROBOT` why an event was refused; it is not kept.
+    /// Publishes on `err.PARTITION.ROBOT` why an event was refused. The message is not persistent.
     fn notice(&self, subject: &str, text: &str) -> impl Future<Output = ()> + Send;
 }

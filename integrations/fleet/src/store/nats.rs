@@ -1,7 +1,8 @@
 //! NATS JetStream as a log.
 //!
-//! Streams `FLEET-events` and `FLEET-decisions`, and a bucket for each [`Bucket`], all with the replicas that they were made with. What is
-//! asked for consistency goes to a stream's leader; what is read by a consumer may be late, so readers know how far they must come.
+//! Streams `FLEET-events` and `FLEET-decisions`, and a bucket for each [`Bucket`], all with the
+//! replicas that they were created with. Consistent reads are answered by the stream leader.
+//! Consumers may lag behind, so readers are given the sequence up to which they have to read.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -19,41 +20,41 @@ use metaplan::message::Message as Diagnostic;
 
 use super::{Bucket, Entry, Fault, Message, Receipt, Store, Stored, Stream};
 
-/// How to reach the servers.
+/// Connection settings of the servers.
 #[derive(Debug, Clone, Default)]
 pub struct Access {
-    /// One or several, by comma: `nats://HOST:PORT`, `tls://HOST:PORT`.
+    /// Comma-separated URLs: `nats://HOST:PORT`, `tls://HOST:PORT`.
     pub url: String,
-    /// A file of NATS with the user's JWT and seed.
+    /// NATS credentials file with the user's JWT and seed.
     pub credentials: Option<PathBuf>,
     /// User and password.
     pub user: Option<(String, String)>,
-    /// A file with the certificates of authorities that are trusted besides those of the system.
+    /// File with certificates of additional trusted authorities.
     pub authorities: Option<PathBuf>,
-    /// Files with an own certificate and its key.
+    /// Files with the client certificate and its key.
     pub certificate: Option<(PathBuf, PathBuf)>,
 }
 
-/// What streams and buckets are made like, where they are not there yet.
+/// Parameters of new streams and buckets.
 #[derive(Debug, Clone)]
 pub struct Layout {
-    /// The first part of their names; letters, digits, `-` and `_`.
+    /// Prefix of their names: letters, digits, `-` and `_`.
     pub fleet: String,
-    /// How many partitions; it never changes.
+    /// Number of partitions, which never changes.
     pub partitions: u32,
-    /// On how many servers everything is kept: 1, 3 or 5.
+    /// Number of replicas: 1, 3 or 5.
     pub replicas: usize,
-    /// Leases that are not renewed for so long are gone.
+    /// Time after which leases expire unless they are renewed.
     pub lease: Duration,
 }
 
-/// So many messages are fetched at once.
+/// Number of messages per fetch.
 const BATCH: usize = 500;
 
-/// So long a request may take.
+/// Timeout of a request.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// A second message of the same id is not stored within this time.
+/// Period during which a message with a repeated id is discarded.
 const WINDOW: Duration = Duration::from_secs(600);
 
 /// JetStream as a log.
@@ -73,10 +74,10 @@ fn failed(error: impl std::fmt::Display) -> Fault {
 }
 
 impl Nats {
-    /// Connects, and makes streams and buckets where they are not there.
+    /// Connects, and creates missing streams and buckets.
     ///
     /// # Errors
-    /// No server can be reached, it has no JetStream, or it refuses.
+    /// No server can be reached, the server has no JetStream, or it refuses access.
     pub async fn open(access: &Access, layout: &Layout) -> Result<Self, Diagnostic> {
         let wrong =
             |error: &dyn std::fmt::Display| Diagnostic::error("N311", format!("{}: {error}", access.url));
@@ -104,20 +105,21 @@ impl Nats {
     }
 
     async fn with(client: Client, context: Context, layout: &Layout) -> Result<Self, Fault> {
-        let own = |kind: Stream| stream::Config {
+        let config = |kind: Stream| stream::Config {
             name: stream_name(&layout.fleet, kind),
             subjects: vec![format!("{}.*.*", kind.prefix())],
             num_replicas: layout.replicas,
             duplicate_window: WINDOW,
-            // Readable by everybody who uses this fleet, so that all agree on it.
+            // The number of partitions is stored in the description, so that all clients agree on
+            // it.
             description: Some(format!("partitions={}", layout.partitions)),
             allow_direct: true,
             ..stream::Config::default()
         };
         let mut partitions = layout.partitions;
         for kind in Stream::ALL {
-            let made = context.get_or_create_stream(own(kind)).await.map_err(failed)?;
-            let known = made.cached_info().config.description.as_deref();
+            let created = context.get_or_create_stream(config(kind)).await.map_err(failed)?;
+            let known = created.cached_info().config.description.as_deref();
             let known = known.and_then(|text| text.strip_prefix("partitions=")?.parse().ok());
             partitions = known.ok_or_else(|| {
                 failed(format!("the stream {} is not one of a fleet", stream_name(&layout.fleet, kind)))
@@ -132,12 +134,12 @@ impl Nats {
                 max_age: if kind.expires() { layout.lease } else { Duration::ZERO },
                 ..kv::Config::default()
             };
-            let known = context.get_key_value(&bucket).await;
-            buckets.push(match known {
+            let existing = context.get_key_value(&bucket).await;
+            buckets.push(match existing {
                 Ok(store) => store,
                 Err(_) => match context.create_key_value(config).await {
                     Ok(store) => store,
-                    // Somebody else has made it in between.
+                    // Another client has created it in the meantime.
                     Err(_) => context.get_key_value(&bucket).await.map_err(failed)?,
                 },
             });
@@ -147,14 +149,14 @@ impl Nats {
             context.get_stream_no_info(events).await.map_err(failed)?,
             context.get_stream_no_info(decisions).await.map_err(failed)?,
         ];
-        // As it was made, whatever is asked for now.
+        // The lease time is that of the creation, not the current option.
         let leases: &kv::Store = &buckets[Bucket::Leases as usize];
         let lease = leases.status().await.map_err(failed)?.max_age();
         let buckets = buckets.try_into().map_err(|_| failed("a bucket is missing"))?;
         Ok(Self { client, context, partitions, lease, fleet: layout.fleet.clone(), streams, buckets })
     }
 
-    /// How many messages a stream has.
+    /// Returns the number of messages of a stream.
     ///
     /// # Errors
     /// The server cannot be reached.
@@ -162,17 +164,17 @@ impl Nats {
         Ok(self.stream(stream).get_info().await.map_err(failed)?.state.messages)
     }
 
-    /// Refusals as they come: subjects behind `err.`, and sentences.
+    /// Subscribes to refusals: subjects after `err.`, and sentences.
     ///
     /// # Errors
     /// The server cannot be reached.
     pub async fn notices(&self) -> Result<BoxStream<'static, (String, String)>, Fault> {
         let subscriber = self.client.subscribe("err.*.*").await.map_err(failed)?;
-        let known = subscriber.map(|message| {
+        let refusals = subscriber.map(|message| {
             let subject = message.subject.strip_prefix("err.").unwrap_or_default().to_owned();
             (subject, String::from_utf8_lossy(&message.payload).into_owned())
         });
-        Ok(known.boxed())
+        Ok(refusals.boxed())
     }
 
     fn stream(&self, stream: Stream) -> &stream::Stream<()> {
@@ -183,7 +185,8 @@ impl Nats {
         &self.buckets[bucket as usize]
     }
 
-    /// All messages of a filter from somewhere to the end, or further: to a sequence that must be reached.
+    /// Reads all messages of a filter after a sequence, up to the end and at least to the required
+    /// sequence.
     async fn read(
         &self,
         name: &str,
@@ -227,7 +230,7 @@ impl Nats {
                 return Err(failed("the server has no more messages, and should have"));
             }
         }
-        // Whoever is not asked any more is forgotten by the server after a while, too.
+        // The server would remove an unused consumer later anyway.
         let _ = self.context.delete_consumer_from_stream(consumer.cached_info().name.as_str(), name).await;
         Ok(())
     }
@@ -253,7 +256,7 @@ fn stored(stream: Stream, message: &jetstream::Message) -> Result<Stored, Fault>
     })
 }
 
-/// A message that a stream's leader has read.
+/// Converts a message read from the stream leader.
 fn raw(stream: Stream, message: &StreamMessage) -> Stored {
     Stored {
         sequence: message.sequence,
@@ -315,11 +318,11 @@ impl Store for Nats {
         if reach <= after {
             return Ok(Vec::new());
         }
-        let mut found = Vec::new();
+        let mut messages = Vec::new();
         let from = DeliverPolicy::ByStartSequence { start_sequence: after + 1 };
         let name = stream_name(&self.fleet, kind);
-        self.read(&name, filter, from, reach, |message, _| found.push(stored(kind, &message))).await?;
-        found.into_iter().collect()
+        self.read(&name, filter, from, reach, |message, _| messages.push(stored(kind, &message))).await?;
+        messages.into_iter().collect()
     }
 
     async fn end(&self, kind: Stream, partition: u32) -> Result<u64, Fault> {
@@ -396,21 +399,21 @@ impl Store for Nats {
         let prefix = format!("$KV.{}-{}.", self.fleet, bucket.name());
         let filter =
             partition.map_or_else(|| format!("{prefix}>"), |partition| format!("{prefix}{partition}.*"));
-        let mut found = Vec::new();
+        let mut entries = Vec::new();
         self.read(&name, filter, DeliverPolicy::LastPerSubject, at_least, |message, revision| {
             let is_gone = message.headers.as_ref().is_some_and(|headers| {
                 headers.get("KV-Operation").is_some() || headers.get("Nats-Marker-Reason").is_some()
             });
             if let Some(key) = message.subject.strip_prefix(&prefix).filter(|_| !is_gone) {
-                found.push(Entry { key: key.to_owned(), value: message.payload.to_vec(), revision });
+                entries.push(Entry { key: key.to_owned(), value: message.payload.to_vec(), revision });
             }
         })
         .await?;
-        Ok(found)
+        Ok(entries)
     }
 
     async fn notice(&self, subject: &str, text: &str) {
-        // It is not kept, and nobody need listen.
+        // The message is not persistent and may have no listener.
         let _ = self.client.publish(format!("err.{subject}"), text.to_owned().into()).await;
     }
 }

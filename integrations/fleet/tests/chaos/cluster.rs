@@ -1,4 +1,4 @@
-//! Three servers and some workers as processes, and what can happen to them.
+//! Three servers and several workers as processes, and the faults that are injected.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -11,23 +11,23 @@ use std::time::Duration;
 
 use super::wires::{Wire, routes};
 
-/// The servers that two servers are, by the number of the third one.
+/// The pairs of servers, by the number of the third one.
 const PAIRS: [[usize; 2]; 3] = [[1, 2], [0, 2], [0, 1]];
 
-/// The disk of the third server has so much room, where it can have a disk of its own.
+/// Size of the third server's disk, if it can have a separate one.
 const DISK: &str = "64m";
 
 fn program() -> String {
     std::env::var("NATS_SERVER").unwrap_or_else(|_| "nats-server".to_owned())
 }
 
-/// Whether servers can be had.
+/// Returns `true` if the server program is available.
 pub(super) fn is_there() -> Option<()> {
     let out = Command::new(program()).arg("--version").stdout(Stdio::null()).status();
     out.ok().filter(std::process::ExitStatus::success).map(|_| ())
 }
 
-/// The processes.
+/// The processes of the cluster.
 #[derive(Clone)]
 pub(super) struct Cluster(Arc<Inner>);
 
@@ -35,7 +35,7 @@ struct Inner {
     directory: tempfile::TempDir,
     clients: [u16; 3],
     monitors: [u16; 3],
-    /// Between two servers, by the number of the third one.
+    /// Connections between two servers, by the number of the third one.
     wires: [Wire; 3],
     own_disk: bool,
     processes: Mutex<BTreeMap<String, Child>>,
@@ -44,7 +44,7 @@ struct Inner {
 impl Drop for Inner {
     fn drop(&mut self) {
         for child in self.processes.lock().unwrap_or_else(std::sync::PoisonError::into_inner).values_mut() {
-            // It may have ended by itself.
+            // The process may already have ended.
             let _ = child.kill();
             let _ = child.wait();
         }
@@ -56,7 +56,7 @@ fn free_port() -> u16 {
     listener.local_addr().expect("it has an address").port()
 }
 
-/// Whether a process can have a disk of its own here.
+/// Returns `true` if processes can have a separate disk on this system.
 fn can_mount() -> bool {
     let script = "mount -t tmpfs -o size=1m tmpfs /mnt";
     let status = Command::new("unshare").args(["-rm", "sh", "-c", script]).stderr(Stdio::null()).status();
@@ -64,7 +64,7 @@ fn can_mount() -> bool {
 }
 
 impl Cluster {
-    /// Begins three servers on free ports of this machine.
+    /// Starts three servers on free ports.
     pub(super) fn begin(seed: u64) -> Self {
         let directory =
             tempfile::Builder::new().prefix(&format!("chaos-{seed}-")).tempdir().expect("a directory");
@@ -72,7 +72,8 @@ impl Cluster {
         let routes: [u16; 3] = std::array::from_fn(|_| free_port());
         let monitors: [u16; 3] = std::array::from_fn(|_| free_port());
         let wires: [Wire; 3] = std::array::from_fn(|_| Wire::default());
-        // Servers tell each other of further ones, which lets them go round a wire that is cut: nobody listens there.
+        // Servers announce further addresses to each other, which would bypass a cut connection.
+        // The announced addresses are unused.
         let nobody = free_port();
         for own in 0..3 {
             let others = (0..3).filter(|other| *other != own);
@@ -113,7 +114,7 @@ impl Cluster {
         self.0.directory.path().join(name)
     }
 
-    /// Where clients find the servers.
+    /// Returns the URLs of the servers.
     pub(super) fn url(&self) -> String {
         self.0.clients.map(|port| format!("nats://127.0.0.1:{port}")).join(",")
     }
@@ -128,7 +129,7 @@ impl Cluster {
         self.processes().insert(name.to_owned(), child.expect("it can be begun"));
     }
 
-    /// A small disk that is there for as long as a process holds it.
+    /// Mounts a small disk for the lifetime of a process.
     fn begin_disk(&self) {
         let (folder, ready) = (self.path("s2"), self.path("s2").join("ready"));
         let mount = format!(
@@ -162,7 +163,7 @@ impl Cluster {
         self.begin_process(&format!("s{own}"), command);
     }
 
-    /// Begins a worker.
+    /// Starts a worker.
     pub(super) fn begin_worker(&self, own: usize, partitions: u32, lease: u64) {
         let missions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../missions");
         let mut command = Command::new(env!("CARGO_BIN_EXE_metaplan-fleet"));
@@ -175,7 +176,7 @@ impl Cluster {
     fn signal(&self, name: &str, signal: &str) {
         let pid = self.processes().get(name).map(|child| child.id().to_string());
         if let Some(pid) = pid {
-            // It may have ended.
+            // The process may already have ended.
             let _ = Command::new("kill").args([signal, &pid]).stderr(Stdio::null()).status();
         }
     }
@@ -187,7 +188,7 @@ impl Cluster {
         }
     }
 
-    /// Fills the disk of the third server, or makes room again.
+    /// Fills the disk of the third server, or frees it again.
     fn fill(&self, full: bool) {
         let pid = self.processes().get("disk").map(Child::id);
         let Some(pid) = pid else { return };
@@ -195,7 +196,7 @@ impl Cluster {
         let inside = PathBuf::from(format!("/proc/{pid}/root{}", folder.display())).join("filler");
         if full {
             if let Ok(mut file) = File::create(&inside) {
-                // Until there is no room any more.
+                // Writes until the disk is full.
                 let _ = std::io::copy(&mut std::io::repeat(0), &mut file);
             }
         } else {
@@ -203,13 +204,13 @@ impl Cluster {
         }
     }
 
-    /// Cuts two servers off from each other for a time; both still hear the third one.
+    /// Cuts the connection between two servers for a time. Both remain connected to the third one.
     fn part(&self, third: usize, millis: u64) {
         let [one, other] = PAIRS[third];
         self.0.wires[third].cut();
         std::thread::sleep(Duration::from_millis(millis));
         for (own, lost) in [(one, other), (other, one)] {
-            // A server that is busy answers nothing.
+            // A busy server does not reply.
             if let Some(routes) = routes(self.0.monitors[own]) {
                 assert!(
                     !routes.contains(&format!("\"remote_name\": \"s{lost}\"")),
@@ -220,7 +221,7 @@ impl Cluster {
         self.0.wires[third].mend();
     }
 
-    /// Everything that goes wrong, until it is over; then all run again. One server at a time is away.
+    /// Injects random faults, one server at a time, then restores all processes.
     pub(super) fn trouble(&self, seed: u64, over: &AtomicBool, partitions: u32, lease: u64) -> String {
         let mut random = fastrand::Rng::with_seed(seed);
         let mut counts: BTreeMap<&str, u32> = BTreeMap::new();
@@ -276,7 +277,7 @@ impl Cluster {
         counts.iter().map(|(what, count)| format!("{count} {what}")).collect::<Vec<_>>().join(", ")
     }
 
-    /// The memory of a process, in megabytes.
+    /// Returns the memory of a process in megabytes.
     pub(super) fn memory(&self, name: &str) -> u64 {
         let pid = self.processes().get(name).map(Child::id).unwrap_or_default();
         let status = fs::read_to_string(format!("/proc/{pid}/status")).unwrap_or_default();
@@ -284,7 +285,7 @@ impl Cluster {
         line.split_whitespace().next().and_then(|text| text.parse::<u64>().ok()).unwrap_or_default() / 1024
     }
 
-    /// The ends of all logs.
+    /// Returns the ends of all logs.
     pub(super) fn logs(&self) -> String {
         let mut text = String::new();
         for entry in fs::read_dir(self.0.directory.path()).into_iter().flatten().flatten() {

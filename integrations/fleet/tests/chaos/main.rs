@@ -1,7 +1,10 @@
-//! Three servers, four workers, a thousand robots, and everything that goes wrong at random times: every robot is answered as by one loop.
+//! Three servers, four workers and a thousand robots with faults at random times: every robot
+//! receives the answers of a single loop.
 //!
-//! Ignored, since it needs `nats-server` (2.11 or newer), whose path is `NATS_SERVER` or which is in the path. Further: `SCHEDULES` (20), `SEED` (1),
-//! `ROBOTS` (1000), `EVENTS` for each robot (100), which it says within `SECONDS` (20). What happens follows from the seed, when from the machine, too.
+//! Ignored by default, because it needs `nats-server` (2.11 or newer), given by `NATS_SERVER` or
+//! found in the search path. Further variables: `SCHEDULES` (20), `SEED` (1), `ROBOTS` (1000),
+//! `EVENTS` per robot (100), sent within `SECONDS` (20). The seed determines the faults, but their
+//! timing depends on the machine.
 
 #![expect(clippy::print_stdout, reason = "what was done to whom is said while it is done")]
 
@@ -31,10 +34,11 @@ fn number(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
-/// What one robot says, and what it is answered.
+/// Events of a robot with the expected answers.
 type Script = (Vec<String>, Vec<Vec<Value>>);
 
-/// A script with so many lines: the simulated robot's, and then components that fail and recover.
+/// Returns a script of the given length: observations of the simulated robot, followed by failures
+/// and recoveries of components.
 fn script(number: usize, lines: usize) -> Script {
     let (mission, scenario) = scripts::SCENARIOS[number % scripts::SCENARIOS.len()];
     let (mut events, _) = scripts::play(mission, scenario, number as u64, lines);
@@ -63,7 +67,7 @@ async fn open(cluster: &Cluster, lease: u64) -> Nats {
     panic!("the servers do not answer: {}", cluster.logs());
 }
 
-/// A stream's messages, read until that works.
+/// Reads the messages of a stream, with retries.
 async fn read(store: &Nats, stream: Stream, partition: u32) -> Vec<Stored> {
     for _ in 0..60 {
         match store.history(stream, partition, 0).await {
@@ -74,7 +78,7 @@ async fn read(store: &Nats, stream: Stream, partition: u32) -> Vec<Stored> {
     panic!("partition {partition} cannot be read");
 }
 
-/// Sends what nobody should send, now and then.
+/// Sends invalid messages from time to time.
 async fn attack(store: Nats, over: Arc<AtomicBool>, seed: u64) -> u64 {
     let mut random = fastrand::Rng::with_seed(seed);
     let mut count = 0;
@@ -100,7 +104,7 @@ async fn attack(store: Nats, over: Arc<AtomicBool>, seed: u64) -> u64 {
     count
 }
 
-/// One schedule: the robots' events while everything goes wrong, and what has become of them.
+/// Runs a schedule: the robots' events during faults, and the check of the decisions.
 async fn schedule(seed: u64, robots: usize, scripts: &[Script]) {
     let cluster = Cluster::begin(seed);
     let store = Box::pin(open(&cluster, LEASE)).await;
@@ -134,7 +138,7 @@ async fn schedule(seed: u64, robots: usize, scripts: &[Script]) {
     }
     let said = begun.elapsed();
     let expected = sent.load(Ordering::Relaxed);
-    // Trouble ends, and what is left is done.
+    // All faults are over, and the remaining events are decided.
     over.store(true, Ordering::Relaxed);
     let what = trouble.join().expect("trouble ends");
     let attacks = attacker.await.expect("attacks end");
@@ -164,7 +168,8 @@ async fn schedule(seed: u64, robots: usize, scripts: &[Script]) {
     verify(&store, robots, scripts, seed).await;
 }
 
-/// Every robot has said what it had to say, in order and once, and was answered as by one loop.
+/// Asserts that every robot has sent all events, in order and once, and received the answers of a
+/// single loop.
 async fn verify(store: &Nats, robots: usize, scripts: &[Script], seed: u64) {
     let mut said: BTreeMap<String, Vec<Stored>> = BTreeMap::new();
     let mut made: BTreeMap<String, Vec<Decided>> = BTreeMap::new();
@@ -181,7 +186,7 @@ async fn verify(store: &Nats, robots: usize, scripts: &[Script], seed: u64) {
     assert_eq!(made.len(), robots, "seed {seed}");
     for robot in 0..robots {
         let (name, (events, answers)) = (format!("robot-{robot}"), &scripts[robot % scripts.len()]);
-        // What others have said in its name has another id, or none.
+        // Messages that other clients have sent in the robot's name have another id, or none.
         let prefix = format!("{name}:");
         let own = |message: &&Stored| {
             let id = message.id.as_deref().and_then(|id| id.strip_prefix(&prefix));
@@ -219,7 +224,8 @@ async fn nothing_is_lost_repeated_or_out_of_order() {
     }
 }
 
-/// Events a second and latencies for 1, 2 and 4 workers (`WORKERS`), beside loops in this process; and the memory of a worker.
+/// Measures events per second and latencies for 1, 2 and 4 workers (`WORKERS`) in comparison with
+/// local loops, and the memory of a worker.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 #[ignore = "needs nats-server and an idle machine; figures mean something in a release build only"]
 async fn figures() {
@@ -269,7 +275,7 @@ fn rate(count: usize, time: Duration) -> f64 {
     count as f64 / time.as_secs_f64()
 }
 
-/// Has all robots say all they have to say; the time until it was said, and until it was decided.
+/// Sends all events of all robots. Returns the times until all are sent and until all are decided.
 async fn say_all(store: &Nats, robots: usize, scripts: &[Script]) -> (Duration, Duration) {
     let begun = Instant::now();
     let mut senders = tokio::task::JoinSet::new();
@@ -297,8 +303,8 @@ async fn say_all(store: &Nats, robots: usize, scripts: &[Script]) -> (Duration, 
     }
 }
 
-/// Milliseconds from an event to its decision, as its robot sees it, when nothing else goes on; sorted. The event fails a component, and the
-/// next one brings it back.
+/// Returns the latencies from events to decisions in milliseconds as observed by an otherwise idle
+/// robot, sorted. Events alternately fail and restore a component.
 async fn calm(store: &Nats, robots: usize) -> Vec<f64> {
     let mut late = Vec::new();
     for number in 0..200 {
@@ -327,7 +333,7 @@ async fn calm(store: &Nats, robots: usize) -> Vec<f64> {
     late
 }
 
-/// Milliseconds from an event to its decision, both as they were stored; sorted.
+/// Returns the latencies from events to decisions in milliseconds by their storage times, sorted.
 async fn latencies(store: &Nats) -> Vec<f64> {
     let mut late = Vec::new();
     for partition in 0..PARTITIONS {

@@ -1,4 +1,4 @@
-//! The connections between servers, each of which can be cut.
+//! Connections between servers, each of which can be cut.
 
 use std::io::{Read as _, Write as _};
 use std::net::{Shutdown, TcpListener, TcpStream};
@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// What two servers say to each other goes through here, whoever of them has begun.
+/// A proxy for the connection of two servers, regardless of which one has opened it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Wire {
     is_cut: Arc<AtomicBool>,
@@ -14,14 +14,14 @@ pub(super) struct Wire {
 }
 
 impl Wire {
-    /// Leads from a port, which it returns, to another one.
+    /// Forwards a port, which it returns, to another one.
     pub(super) fn lead(&self, to: u16) -> u16 {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port is free");
         let port = listener.local_addr().expect("it has an address").port();
         let own = self.clone();
         std::thread::spawn(move || {
             for incoming in listener.incoming().flatten() {
-                // A server that is not there refuses, and so does a wire that is cut.
+                // Connections to an absent server are refused, like those over a cut connection.
                 let Ok(outgoing) = TcpStream::connect(("127.0.0.1", to)) else { continue };
                 let mut open = own.open.lock().unwrap_or_else(PoisonError::into_inner);
                 if own.is_cut.load(Ordering::SeqCst) {
@@ -37,30 +37,30 @@ impl Wire {
         port
     }
 
-    /// Ends all connections, and lets nobody make new ones.
+    /// Closes all connections and refuses new ones.
     pub(super) fn cut(&self) {
         let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
         self.is_cut.store(true, Ordering::SeqCst);
         for stream in open.drain(..) {
-            // It may have ended.
+            // The connection may already be closed.
             let _ = stream.shutdown(Shutdown::Both);
         }
     }
 
-    /// Lets servers connect again.
+    /// Accepts connections again.
     pub(super) fn mend(&self) {
         self.is_cut.store(false, Ordering::SeqCst);
     }
 }
 
-/// Carries all bytes one way.
+/// Copies all bytes in a single direction.
 fn carry(mut from: TcpStream, mut to: TcpStream) {
-    // Either end may be gone.
+    // Either end may be closed.
     let _ = std::io::copy(&mut from, &mut to);
     let _ = to.shutdown(Shutdown::Both);
 }
 
-/// What a server says of its connections to other servers; nothing where it does not answer.
+/// Returns a server's status of its connections to other servers. `None` without a reply.
 pub(super) fn routes(monitor: u16) -> Option<String> {
     let mut stream = TcpStream::connect(("127.0.0.1", monitor)).ok()?;
     stream.set_read_timeout(Some(Duration::from_secs(2))).ok()?;

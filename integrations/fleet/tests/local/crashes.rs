@@ -1,4 +1,4 @@
-//! A worker that ends between any two operations: nothing is lost, and nothing is there twice.
+//! Crashes of a worker between any two operations: nothing is lost or duplicated.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -12,25 +12,27 @@ use tokio::sync::{Notify, watch};
 
 use super::{assert_same, decided, decisions, open, scripts, shared, tell, work};
 
-/// A log that is not there any more after so many operations; the last one may have been carried out without anybody knowing.
+/// A log that fails after a number of operations. The last operation may be carried out without an
+/// acknowledgement.
 #[derive(Debug, Clone)]
 struct Crashing {
     inner: Local,
     left: Arc<AtomicU64>,
     carries_out: bool,
-    /// Whether decisions are compared with what they should come after.
+    /// `false` to disable the comparison of decisions with their required predecessors.
     fences: bool,
     over: Arc<Notify>,
 }
 
 impl Crashing {
-    /// A log that stays.
+    /// Returns a log that never fails.
     fn never(inner: Local, fences: bool) -> Self {
         let left = Arc::new(AtomicU64::new(u64::MAX));
         Self { inner, left, carries_out: false, fences, over: Arc::default() }
     }
 
-    /// Whether there is an operation left; the last one counts as `carries_out` says.
+    /// Counts an operation and returns `true` if it succeeds. The last one depends on
+    /// `carries_out`.
     async fn through<T>(&self, operation: impl Future<Output = Result<T, Fault>>) -> Result<T, Fault> {
         let left = self.left.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |left| left.checked_sub(1));
         match left {
@@ -153,7 +155,7 @@ async fn a_crash_between_any_two_operations_neither_loses_nor_repeats() {
     assert!(crashes > 30, "there were {crashes} crashes");
 }
 
-/// Two workers that both believe that they have a partition: each event is decided once.
+/// Two workers that both rely on the lease of a partition: each event is decided once.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn two_owners_of_one_partition_decide_each_event_once() {
     for seed in 0..4 {
@@ -169,7 +171,7 @@ async fn two_owners_of_one_partition_decide_each_event_once() {
         let owner = tokio::spawn({
             let own = own("owner");
             async move {
-                // A partition that is fenced by a former owner is read again.
+                // A partition that a former owner has fenced is recovered again.
                 loop {
                     serve(Arc::clone(&own), 0, heard.clone()).await;
                 }
@@ -186,11 +188,12 @@ async fn two_owners_of_one_partition_decide_each_event_once() {
     }
 }
 
-/// What keeps two owners from deciding an event twice is the comparison with the decision before, and nothing else: without it they do.
+/// The comparison with the previous decision alone prevents two owners from deciding an event
+/// twice: without it, both decide.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn without_the_comparison_events_are_decided_twice() {
     let (events, answers) = scripts::play("ugv", "kinect_comes_and_goes", 1, 30);
-    // Progress, which is compared, too, is not written.
+    // Progress, whose revision is compared as well, is not written.
     let settings = Settings { save_every: 1_000, look: Duration::from_secs(3_600), ..Settings::default() };
     for fences in [true, false] {
         let folder = tempfile::tempdir().expect("a directory");
@@ -222,7 +225,8 @@ async fn without_the_comparison_events_are_decided_twice() {
     }
 }
 
-/// What a former owner has decided is needed until it is gone through, however often progress is written in between.
+/// Decisions of former owners are kept until they are replayed, however often progress is written
+/// in between.
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn owners_that_are_gone_at_any_time_leave_what_is_needed() {
     let folder = tempfile::tempdir().expect("a directory");

@@ -1,4 +1,5 @@
-//! Fleets in a directory, without a server: what a partition decides is what `metaplan run` decides, whatever happens in between.
+//! Fleets in a directory, without a server: decisions of partitions equal those of `metaplan run`,
+//! with any interruptions.
 
 mod crashes;
 mod hostile;
@@ -19,7 +20,7 @@ use metaplan_fleet::worker;
 use serde_json::Value;
 use tokio::sync::watch;
 
-/// The project's own missions.
+/// Missions of the project.
 fn missions() -> Missions {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../missions");
     Missions::read(&folder).unwrap_or_else(|errors| panic!("{errors}"))
@@ -34,7 +35,7 @@ fn shared<S: Store>(store: S, name: &str, settings: Settings) -> Arc<Shared<S>> 
     Arc::new(Shared::new(store, missions(), name.to_owned(), settings))
 }
 
-/// Appends events of a robot, and gives their sequences.
+/// Appends events of a robot and returns their sequences.
 async fn tell<S: Store>(store: &S, robot: &str, events: &[String]) -> Vec<u64> {
     let subject = Address::of(robot, store.partitions()).to_string();
     let mut sequences = Vec::new();
@@ -46,7 +47,7 @@ async fn tell<S: Store>(store: &S, robot: &str, events: &[String]) -> Vec<u64> {
     sequences
 }
 
-/// All decisions by robot, in their order.
+/// Returns all decisions by robot, in order.
 async fn decisions<S: Store>(store: &S) -> BTreeMap<String, Vec<Decided>> {
     let mut all: BTreeMap<String, Vec<Decided>> = BTreeMap::new();
     for partition in 0..store.partitions() {
@@ -60,7 +61,7 @@ async fn decisions<S: Store>(store: &S) -> BTreeMap<String, Vec<Decided>> {
     all
 }
 
-/// Waits until so many decisions are there.
+/// Waits until the given number of decisions is stored.
 async fn decided<S: Store>(store: &S, count: usize) {
     for _ in 0..6000 {
         if decisions(store).await.values().map(Vec::len).sum::<usize>() >= count {
@@ -71,7 +72,7 @@ async fn decided<S: Store>(store: &S, count: usize) {
     panic!("{count} decisions were expected; there are {:?}", decisions(store).await.len());
 }
 
-/// Runs a worker until so many decisions are there, and then to its orderly end.
+/// Runs a worker until the given number of decisions is stored, then stops it in an orderly way.
 async fn work<S: Store>(store: &S, name: &str, settings: Settings, count: usize) {
     let (stop, heard) = watch::channel(false);
     let shared = shared(store.clone(), name, settings);
@@ -81,7 +82,7 @@ async fn work<S: Store>(store: &S, name: &str, settings: Settings, count: usize)
     task.await.expect("a worker ends in order");
 }
 
-/// That a robot was answered as by one loop, each event once.
+/// Asserts that a robot received the answers of a single loop, once per event.
 fn assert_same(robot: &str, decided: &[Decided], sequences: &[u64], expected: &[Vec<Value>]) {
     let events: Vec<u64> = decided.iter().map(|own| own.event).collect();
     assert_eq!(events, sequences, "{robot}: each event once, in order");
@@ -108,7 +109,7 @@ async fn robots_are_answered_as_by_a_loop_of_their_own() {
         count += events.len();
         expected.insert(robot, (sequences, answers));
     }
-    // Fewer robots are kept ready than there are, so that all go through snapshots.
+    // The limit of loaded robots is below their number, so that all pass through snapshots.
     let settings = Settings { warm: 2, save_every: 5, ..Settings::default() };
     work(&store, "one", settings, count / 3).await;
     work(&store, "two", settings, count).await;

@@ -1,4 +1,5 @@
-//! What robots say: the observations of a simulated robot, and what one loop answers to each.
+//! Scripts of robots: the observations of a simulated robot, with the answers of a single loop to
+//! each.
 
 use std::path::Path;
 use std::time::Duration;
@@ -22,14 +23,14 @@ fn setup(mission: &str) -> Setup {
     Setup::read(&path).unwrap_or_else(|errors| panic!("{errors}"))
 }
 
-/// So many lines at most: the enrolment, and what a simulated robot observes; with what a loop of its own answers to each. The time is that
-/// of the robot.
+/// Returns at most the given number of lines, with the answers of a separate loop: the enrolment
+/// and the observations of a simulated robot, with their times.
 pub(super) fn play(mission: &str, scenario: &str, seed: u64, most: usize) -> (Vec<String>, Vec<Vec<Value>>) {
     let own = setup(mission).experiment(scenario).unwrap_or_else(|errors| panic!("{errors}"));
     let mut events = vec![json!({"event": "enrol", "mission": mission}).to_string()];
     let mut is_first = true;
     let mut log = |observation: &Observation, _: &[_]| {
-        // The first entry stands for the beginning.
+        // The first entry represents the start.
         if !std::mem::take(&mut is_first) {
             events.push(observation.to_json().to_string());
         }
@@ -40,7 +41,7 @@ pub(super) fn play(mission: &str, scenario: &str, seed: u64, most: usize) -> (Ve
     (events, answers)
 }
 
-/// What one loop answers to lines of which the first one enrols.
+/// Returns the answers of a single loop to lines, of which the first one enrols.
 pub(super) fn alone(mission: &str, events: &[String]) -> Vec<Vec<Value>> {
     let Setup { mission, settings, .. } = setup(mission);
     let mut control = Loop::new(mission, settings).unwrap_or_else(|errors| panic!("{errors}"));
@@ -53,7 +54,7 @@ pub(super) fn alone(mission: &str, events: &[String]) -> Vec<Vec<Value>> {
     answers
 }
 
-/// Answers without explanations, of which several may be right.
+/// Removes explanations from answers, because several explanations may be valid.
 pub(super) fn essence(answers: &[Value]) -> Vec<Value> {
     let mut answers = answers.to_vec();
     for answer in &mut answers {

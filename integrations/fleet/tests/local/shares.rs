@@ -1,4 +1,4 @@
-//! Several workers: partitions are shared, given back, and taken over when a worker is gone.
+//! Several workers: partitions are shared, returned, and taken over after the loss of a worker.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -13,7 +13,7 @@ use super::{assert_same, decided, decisions, scripts, shared, tell};
 
 const LEASE: Duration = Duration::from_millis(400);
 
-/// Waits until partitions are distributed like that.
+/// Waits for a distribution of the partitions.
 async fn distributed(store: &Local, wanted: &[usize]) {
     let mut counts = Vec::new();
     for _ in 0..1000 {
@@ -31,7 +31,8 @@ async fn distributed(store: &Local, wanted: &[usize]) {
     panic!("partitions are distributed as {counts:?}, not as {wanted:?}");
 }
 
-/// Waits until each partition was taken over that often: a lease is there before what is in the partition was read.
+/// Waits until each partition was recovered the given number of times. A lease exists before the
+/// recovery is complete.
 async fn taken_over(store: &Local, epoch: u64) {
     let mut partitions = Vec::new();
     for _ in 0..1000 {
@@ -60,7 +61,7 @@ async fn partitions_are_shared_and_taken_over() {
     let (_second_stop, second) = begin("second");
     distributed(&store, &[4, 4]).await;
     sequences.extend(tell(&store, "r", &events[10..20]).await);
-    // One is gone without a word, and its leases with it.
+    // A worker is killed, so its leases expire.
     second.abort();
     sequences.extend(tell(&store, "r", &events[20..]).await);
     distributed(&store, &[8]).await;

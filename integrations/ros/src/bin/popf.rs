@@ -1,10 +1,10 @@
-//! The program `popf`, which PlanSys2's plugin for POPF calls.
+//! The program `popf`, which PlanSys2's plugin for POPF runs.
 
 use std::io::Write as _;
 
 fn main() {
-    let said = metaplan_ros::popf::run(std::env::args().skip(1), |name| std::env::var(name).ok());
-    // Who has closed the other end does not read on.
-    let _ = std::io::stdout().write_all(said.out.as_bytes());
-    let _ = std::io::stderr().write_all(said.error.as_bytes());
+    let output = metaplan_ros::popf::run(std::env::args().skip(1), |name| std::env::var(name).ok());
+    // A closed pipe is not an error.
+    let _ = std::io::stdout().write_all(output.out.as_bytes());
+    let _ = std::io::stderr().write_all(output.error.as_bytes());
 }

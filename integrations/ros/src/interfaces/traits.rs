@@ -1,4 +1,4 @@
-//! What is known of an interface at compile time: its name, its parts and its type hash.
+//! Compile-time description of an interface: its name, its parts and its type hash.
 //!
 //! A type hash (RIHS01, [1]) is what ROS 2 since Iron puts into an endpoint's user data; Humble has none.
 //!
@@ -6,31 +6,31 @@
 
 use ros2_client::Message;
 
-/// What is sent as one piece: a message, or a part of a service or an action.
+/// A serialised unit: a message, or a part of a service or an action.
 pub trait Structure: Message + Clone + Default + Send + Sync + 'static {
-    /// As in `std_srvs/srv/Trigger_Response`.
+    /// Name of the type, as in `std_srvs/srv/Trigger_Response`.
     const TYPE: &'static str;
-    /// The type hash, as in `RIHS01_f49f…`.
+    /// Type hash, as in `RIHS01_f49f…`.
     const RIHS01: &'static str;
 }
 
-/// A message, as on a topic.
+/// A message of a topic.
 pub trait Msg: Structure {
-    /// As in `std_msgs`.
+    /// Package, as in `std_msgs`.
     const PACKAGE: &'static str;
-    /// As in `String`.
+    /// Name, as in `String`.
     const NAME: &'static str;
 }
 
 /// A service.
 pub trait Service {
-    /// What the client sends.
+    /// Request of the client.
     type Request: Structure;
-    /// What the server answers.
+    /// Reply of the server.
     type Response: Structure;
-    /// As in `std_srvs`.
+    /// Package, as in `std_srvs`.
     const PACKAGE: &'static str;
-    /// As in `Trigger`.
+    /// Name, as in `Trigger`.
     const NAME: &'static str;
 }
 
@@ -53,15 +53,15 @@ impl ServiceHashes {
 
 /// An action.
 pub trait Action {
-    /// What the client wants.
+    /// Goal of the client.
     type Goal: Structure;
-    /// What has come of it.
+    /// Result of the action.
     type Result: Structure;
-    /// What is told on the way.
+    /// Intermediate feedback.
     type Feedback: Structure;
-    /// As in `nav2_msgs`.
+    /// Package, as in `nav2_msgs`.
     const PACKAGE: &'static str;
-    /// As in `NavigateToPose`.
+    /// Name, as in `NavigateToPose`.
     const NAME: &'static str;
     /// Type hashes of the service `send_goal`.
     const SEND_GOAL_RIHS01: ServiceHashes;

@@ -1,4 +1,5 @@
-//! The thread that has the machine: inputs one by one, and their outputs to the robot.
+//! Driver of the manager: a thread that passes inputs to the state machine, one at a time, and its
+//! outputs to the robot.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -21,36 +22,37 @@ use crate::node::{Lifecycle, Node, Severity};
 use crate::perform::Perform;
 use crate::performer::performers;
 
-/// Time is told the machine so often, and how it is on `/diagnostics`.
+/// Period of the clock input and of the manager's own status on `/diagnostics`.
 const PERIOD: Duration = Duration::from_secs(1);
 
-/// So much of what is heard waits while the manager is not active.
+/// Limit on the number of inputs that are kept while the manager is inactive.
 const KEPT: usize = 100_000;
 
-/// The functions are looked for so long at a time.
+/// Time of a single search for the functions.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// A task that is requested while functions are missing is refused after this; SUAVE's mission node waits for five seconds.
+/// Time after which a task that is requested while functions are missing is refused. SUAVE's
+/// mission node waits for five seconds.
 const ASKED: Duration = Duration::from_secs(4);
 
-/// What is missing of the graph is said so often.
+/// Period of log messages about missing parts of the graph.
 const GRAPH: Duration = Duration::from_secs(5);
 
-/// What the manager is started with.
+/// Options of the manager.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// A mission's manifest.
+    /// Manifest of the mission.
     pub mission: PathBuf,
-    /// How it meets the robot; a file `ros.toml` beside the mission unless said otherwise.
+    /// Settings of the robot; by default a file `ros.toml` beside the mission.
     pub settings: Option<PathBuf>,
-    /// Where the journal is.
+    /// Directory of the journal.
     pub journal: Option<PathBuf>,
 }
 
-/// Manages the tasks of a robot until told to stop.
+/// Manages the tasks of a robot until `stop` is set.
 ///
 /// # Errors
-/// The mission, its settings or the journal are wrong, or the journal cannot be written any more.
+/// The mission, its settings or the journal are wrong, or the journal can no longer be written.
 pub fn run(node: &Arc<Node>, options: &Options, stop: &AtomicBool) -> Result<(), Errors> {
     let Setup { mission, settings: adaptation, .. } = Setup::read(&options.mission)?;
     let settings = Settings::read(options.settings.as_deref(), &options.mission)?;
@@ -103,24 +105,24 @@ struct Driver {
     machine: Machine,
     robot: Robot,
     settings: Settings,
-    /// Whether it does its work, as its lifecycle says; what it hears meanwhile waits.
+    /// `true` while the lifecycle state is active. Other inputs wait.
     active: Arc<AtomicBool>,
-    /// Of calls, in milliseconds.
+    /// Timeout of calls, in milliseconds.
     timeout: Arc<AtomicU64>,
     clock: Instant,
-    /// The time of the last line in the journal.
+    /// Time of the last line in the journal.
     begun: Duration,
 }
 
 impl Driver {
-    /// Waits for the functions, and says from time to time what is missing. Requests wait a while.
+    /// Waits for the functions and logs the missing ones periodically. Task requests wait as well.
     fn meet(
         &mut self,
         sender: &Sender<Input>,
         inputs: &Receiver<Input>,
         stop: &AtomicBool,
     ) -> Result<(), Message> {
-        let (mut kept, mut asked, mut said) = (Vec::new(), Vec::new(), Instant::now());
+        let (mut delayed, mut asked, mut said) = (Vec::new(), Vec::new(), Instant::now());
         let mut next_diagnostic = Instant::now();
         loop {
             if Instant::now() >= next_diagnostic {
@@ -128,12 +130,13 @@ impl Driver {
                 self.diagnose();
             }
             let missing = smol::block_on(self.robot.wait(LOOK));
-            // A writer of diagnostics may come later: nothing is changed before it speaks.
+            // The writer of diagnostics may start later, because no mode is changed before its
+            // first message.
             let is_there = missing.iter().all(|text| text.contains("/diagnostics"));
             while let Ok(input) = inputs.try_recv() {
                 match input {
                     Input::Request(..) | Input::Cancel(..) => asked.push((Instant::now(), input)),
-                    other => kept.push(other),
+                    other => delayed.push(other),
                 }
             }
             if is_there {
@@ -142,7 +145,8 @@ impl Driver {
             if stop.load(Ordering::Relaxed) {
                 return Ok(());
             }
-            // Who asks for a task waits a while, and then believes that it is refused.
+            // A client that waits too long for its task treats it as refused, so the task must then
+            // be refused.
             let (late, waiting) = asked.into_iter().partition(|(since, _)| since.elapsed() >= ASKED);
             asked = waiting;
             let late: Vec<(Instant, Input)> = late;
@@ -154,7 +158,7 @@ impl Driver {
                 self.node.log(Severity::Warn, &text);
             }
         }
-        kept.extend(asked.into_iter().map(|(_, input)| input));
+        delayed.extend(asked.into_iter().map(|(_, input)| input));
         self.fits()?;
         let modes = smol::block_on(self.robot.modes());
         for (function, mode) in &modes {
@@ -167,22 +171,22 @@ impl Driver {
         };
         self.node.log(Severity::Info, &text);
         self.handle(Input::Ready(modes))?;
-        for input in kept {
-            // What was heard before is still so.
+        for input in delayed {
+            // Earlier inputs are still valid.
             let _ = sender.send(input);
         }
         Ok(())
     }
 
-    /// Every design is a mode of its function.
+    /// Checks that every design is a mode of its function.
     fn fits(&self) -> Result<(), Message> {
         let mut missing = Vec::new();
         for (function, available) in smol::block_on(self.robot.available(&self.settings)) {
             let absent =
                 self.machine.modes_of(&function).into_iter().filter(|mode| !available.contains(mode));
             missing.extend(absent.map(|mode| {
-                let meant = did_you_mean(&mode, available.iter().map(String::as_str));
-                format!("{function} has no mode `{mode}`{meant}")
+                let suggestion = did_you_mean(&mode, available.iter().map(String::as_str));
+                format!("{function} has no mode `{mode}`{suggestion}")
             }));
         }
         if missing.is_empty() {
@@ -218,18 +222,18 @@ impl Driver {
         Ok(())
     }
 
-    /// While it is not active, tasks are refused, and what else is heard waits.
+    /// While the node is inactive, refuses tasks and keeps other inputs.
     fn rest(&mut self, inputs: &Receiver<Input>) -> Result<(), Message> {
-        let mut kept = Vec::new();
-        while !self.active.load(Ordering::Relaxed) && kept.len() < KEPT {
+        let mut delayed = Vec::new();
+        while !self.active.load(Ordering::Relaxed) && delayed.len() < KEPT {
             match inputs.recv_timeout(Duration::from_millis(50)) {
                 Ok(Input::Request(number, _) | Input::Cancel(number, _)) => self.robot.reply(number, false),
-                Ok(input) => kept.push(input),
+                Ok(input) => delayed.push(input),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => break,
             }
         }
-        kept.into_iter().try_for_each(|input| self.handle(input))
+        delayed.into_iter().try_for_each(|input| self.handle(input))
     }
 
     fn handle(&mut self, input: Input) -> Result<(), Message> {

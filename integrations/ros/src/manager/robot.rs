@@ -1,4 +1,5 @@
-//! The robot as the manager sees it: topics and services to inputs of the machine, and its outputs to calls.
+//! Connection of the manager to the robot: topics and services become inputs of the state machine,
+//! and its outputs become calls.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
@@ -29,26 +30,27 @@ use crate::manager::settings::Settings;
 use crate::node::{CallError, Caller, Node, Publisher, Responder, depth, is_lyrical, keep_all, latched};
 use crate::perform::{Call, End, Perform, Progress, Running};
 
-/// So long a function may take to say which mode it has.
+/// Timeout of a function's reply with its mode.
 const LOOK: Duration = Duration::from_secs(2);
 
-/// A server that is new is asked so often, once in a period: it may not have discovered us at first.
+/// Number of mode requests to a new server, one per period: the first ones may be lost before it
+/// has discovered this node.
 const GREETINGS: u32 = 3;
 
-/// The services of one function.
+/// Services of a function.
 struct Function {
     change: Arc<Caller<ChangeMode>>,
     look: Arc<Caller<GetMode>>,
-    /// The call that is under way; another one takes its place.
+    /// Running call. A new call replaces it.
     calling: Option<Task<()>>,
     looking: Option<Task<()>>,
-    /// Who says its mode.
+    /// Servers of the mode.
     servers: BTreeSet<[u8; 16]>,
-    /// So often it is still to be asked for its mode.
+    /// Number of remaining mode requests.
     greetings: u32,
 }
 
-/// Everything that the manager hears from and asks of others.
+/// All topics, services and actions of the manager.
 pub(super) struct Robot {
     node: Arc<Node>,
     inputs: Sender<Input>,
@@ -63,7 +65,7 @@ pub(super) struct Robot {
 }
 
 impl Robot {
-    /// Connects with the topics and services that are there from the beginning.
+    /// Creates the topics and services.
     pub(super) fn connect(
         node: &Arc<Node>,
         settings: &Settings,
@@ -114,7 +116,8 @@ impl Robot {
         })
     }
 
-    /// Waits until every function is served and diagnostics have a writer, or time is up; what is missing then.
+    /// Waits until every function has a server and diagnostics have a writer, or the time is up.
+    /// Returns the missing ones.
     pub(super) async fn wait(&self, within: Duration) -> Vec<String> {
         let calls = self.functions.values().map(|function| function.change.ready(within));
         let answers = futures::future::join_all(calls).await;
@@ -126,14 +129,15 @@ impl Robot {
         missing
     }
 
-    /// The mode of each function, as far as it says; why one does not is an event, and logged.
+    /// Returns the mode of each function, if it replies. Missing replies are logged and published
+    /// as events.
     pub(super) async fn modes(&self) -> Vec<(String, Option<String>)> {
         let look = |(name, function): (&String, &Function)| {
             let (name, look) = (name.clone(), Arc::clone(&function.look));
             async move { (name, look.call(GetModeRequest::default(), LOOK).await) }
         };
         let answers = futures::future::join_all(self.functions.iter().map(look)).await;
-        let said = |(name, answer): (String, Result<GetModeResponse, CallError>)| match answer {
+        let logged = |(name, answer): (String, Result<GetModeResponse, CallError>)| match answer {
             Ok(answer) => (name, Some(answer.current_mode)),
             Err(error) => {
                 let because = error.to_string();
@@ -142,10 +146,10 @@ impl Robot {
                 (name, None)
             }
         };
-        answers.into_iter().map(said).collect()
+        answers.into_iter().map(logged).collect()
     }
 
-    /// The modes that each function can have, as far as it says.
+    /// Returns the possible modes of each function, if it replies.
     pub(super) async fn available(&self, settings: &Settings) -> Vec<(String, Vec<String>)> {
         let ask = |name: &String| {
             let service = format!("/{}/get_available_modes", settings.functions.system(name));
@@ -158,11 +162,11 @@ impl Robot {
         futures::future::join_all(self.functions.keys().map(ask)).await.into_iter().flatten().collect()
     }
 
-    /// Calls `change_mode`; a call of that function that is under way is given up.
+    /// Calls `change_mode`. A running call of the function is cancelled.
     pub(super) fn change(&mut self, change: Change, within: Duration) {
         let Some(function) = self.functions.get_mut(&change.function) else { return };
         let (caller, inputs) = (Arc::clone(&function.change), self.inputs.clone());
-        // First the old call ends, which holds the caller.
+        // The running call must end first, because it holds the client.
         function.calling = None;
         function.calling = Some(smol::spawn(async move {
             let answer = caller.call(ChangeModeRequest { mode_name: change.mode.clone() }, within).await;
@@ -175,7 +179,8 @@ impl Robot {
         }));
     }
 
-    /// Asks those functions for their modes whose server is new since the last time: one that was started again has forgotten its mode.
+    /// Requests the modes of functions with new servers, because a restarted server has lost its
+    /// mode.
     pub(super) fn greet(&mut self) {
         let mut names = Vec::new();
         for (name, function) in &mut self.functions {
@@ -196,7 +201,7 @@ impl Robot {
         }
     }
 
-    /// Asks a function for its mode.
+    /// Requests the mode of a function.
     pub(super) fn look(&mut self, name: &str) {
         let Some(function) = self.functions.get_mut(name) else { return };
         let (look, inputs, name) = (Arc::clone(&function.look), self.inputs.clone(), name.to_owned());
@@ -207,7 +212,8 @@ impl Robot {
         }));
     }
 
-    /// Asks a function later whether it answers; who does not say its mode answers as long as it is there.
+    /// Checks later whether a function replies. A function without a mode service counts as
+    /// replying while it has a server.
     pub(super) fn probe(&mut self, name: &str, after: Duration) {
         let Some(function) = self.functions.get(name) else { return };
         let (change, look) = (Arc::clone(&function.change), Arc::clone(&function.look));
@@ -224,12 +230,12 @@ impl Robot {
         .detach();
     }
 
-    /// What was diagnosed since it was asked last, as a line of events.
+    /// Returns the diagnostics since the last call, as a line of events.
     pub(super) fn diagnosed(&self) -> String {
         self.diagnosed.line()
     }
 
-    /// Answers the request of a task.
+    /// Replies to a task request.
     pub(super) fn reply(&self, number: u64, success: bool) {
         let mut replies = self.replies.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(responder) = replies.remove(&number) {
@@ -237,9 +243,9 @@ impl Robot {
         }
     }
 
-    /// Has an action performed; one that nobody performs is done as soon as it is begun.
+    /// Starts an action. An action without a performer ends immediately with success.
     pub(super) fn perform(&mut self, number: u64, call: Call) {
-        // PDDL knows no cases.
+        // PDDL names are case-insensitive.
         let performer = self.performers.iter().find(|(action, _)| action.eq_ignore_ascii_case(&call.action));
         let Some((_, performer)) = performer else {
             let _ = self.inputs.send(Input::Performed(number, Ended::Succeeded));
@@ -267,12 +273,12 @@ impl Robot {
                 let _ = inputs.send(input);
             }
         });
-        // What ended long ago is not kept.
+        // Finished actions are removed.
         self.performing.retain(|_, (_, task)| !task.is_finished());
         self.performing.insert(number, (running, task));
     }
 
-    /// Ends an action early.
+    /// Cancels an action.
     pub(super) fn stop(&self, number: u64) {
         match self.performing.get(&number) {
             Some((running, _)) => running.cancel(),
@@ -288,7 +294,7 @@ impl Robot {
         self.events.publish(std_msgs::msg::String { data: event.to_string() });
     }
 
-    /// Says on `/diagnostics` how the manager itself is.
+    /// Publishes the status of the manager on `/diagnostics`.
     pub(super) fn diagnose(&self, level: u8, message: &str, values: Vec<(&str, String)>) {
         let values = values.into_iter().map(|(key, value)| KeyValue { key: key.to_owned(), value }).collect();
         let status = DiagnosticStatus {
@@ -304,7 +310,7 @@ impl Robot {
     }
 }
 
-/// What `system_modes` tells of a function, and its node of its states.
+/// Subscribes to the mode manager's messages about a function, and to the lifecycle of its node.
 fn hear_function(
     node: &Arc<Node>,
     settings: &Settings,
@@ -326,7 +332,7 @@ fn hear_function(
     }
 }
 
-/// Parameters of a function's node that somebody has set.
+/// Subscribes to parameter changes of a function's node.
 fn hear_parameters(
     node: &Arc<Node>,
     settings: &Settings,
@@ -344,7 +350,7 @@ fn hear_parameters(
 
 type Replies = Arc<Mutex<HashMap<u64, Responder<TaskService>>>>;
 
-/// Serves the requests of tasks and their ends.
+/// Serves the requests to start and end tasks.
 fn serve_tasks(node: &Arc<Node>, inputs: &Sender<Input>, replies: &Replies) -> Result<(), Message> {
     let count = Arc::new(AtomicU64::new(0));
     for (service, is_request) in [("/task/request", true), ("/task/cancel", false)] {

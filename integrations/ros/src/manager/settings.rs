@@ -1,4 +1,4 @@
-//! How a mission meets a robot: the file of `--settings`.
+//! Settings of a mission on a robot: the file of `--settings`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -9,17 +9,17 @@ use serde::Deserialize;
 use crate::diagnostic_rules::DiagnosticRule;
 use crate::performer::{By, Offered, Poses};
 
-/// The mode of a function that nobody needs.
+/// Default mode of a function that is not needed.
 const UNGROUND: &str = "fd_unground";
 
-/// The file of settings.
+/// Contents of the settings file.
 #[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
     /// Tasks by the names with which they are requested.
     #[serde(default)]
     pub tasks: BTreeMap<String, TaskSettings>,
-    /// What `system_modes` calls functions and designs, where that differs.
+    /// Names of functions and designs in `system_modes`, if they differ.
     #[serde(default)]
     pub functions: Functions,
     /// Diagnostics of drivers that report a component or measure an attribute.
@@ -27,13 +27,13 @@ pub struct Settings {
     pub diagnostics: Vec<DiagnosticRule>,
     /// The autopilot, if there is one.
     pub autopilot: Option<Autopilot>,
-    /// Who carries out an action, by its name; the rest are done as soon as they are begun.
+    /// Performers by action names. Other actions end immediately.
     #[serde(default)]
     pub actions: BTreeMap<String, By>,
-    /// Where things are, for actions that move.
+    /// Poses of objects, for actions that move.
     #[serde(default)]
     pub poses: Poses,
-    /// Who carries out an action for PlanSys2's executor, by its name.
+    /// Performers of actions for PlanSys2's executor, by action names.
     #[serde(default)]
     pub offers: BTreeMap<String, Offered>,
 }
@@ -42,24 +42,25 @@ pub struct Settings {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TaskSettings {
-    /// What is reached when it is done: a PDDL condition.
+    /// PDDL condition that ends the task.
     pub goal: String,
-    /// Facts that are so when it begins, as for `--set`.
+    /// Facts that hold when the task begins, as for `--set`.
     #[serde(default)]
     pub facts: BTreeMap<String, toml::Value>,
 }
 
-/// What says whether the robot obeys.
+/// Autopilot, whose mode tells whether the robot executes commands.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Autopilot {
-    /// A topic of `mavros_msgs/State`.
+    /// Topic of type `mavros_msgs/State`.
     pub topic: String,
-    /// The mode in which it obeys.
+    /// Mode in which the robot executes commands.
     pub mode: String,
 }
 
-/// What functions and designs are called by `system_modes`: as in the knowledge base, unless it is said here.
+/// Names of functions and designs in `system_modes`. The defaults are the names in the knowledge
+/// base.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
 #[serde(transparent)]
 pub struct Functions(BTreeMap<String, FunctionSettings>);
@@ -67,22 +68,22 @@ pub struct Functions(BTreeMap<String, FunctionSettings>);
 #[derive(Debug, Clone, Default, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct FunctionSettings {
-    /// The system's name, without slash.
+    /// Name of the system, without slash.
     system: Option<String>,
-    /// The node that does its work; `<system>_node` unless said otherwise.
+    /// Node of the function; `<system>_node` by default.
     node: Option<String>,
-    /// The mode that it has when nobody needs it.
+    /// Mode while the function is not needed.
     unground: Option<String>,
-    /// The mode of a design.
+    /// Modes of designs.
     #[serde(default)]
     modes: BTreeMap<String, String>,
 }
 
 impl Settings {
-    /// Reads the file; without one, a file `ros.toml` beside the mission, if there is one.
+    /// Reads the settings file, by default a file `ros.toml` beside the mission, if it exists.
     ///
     /// # Errors
-    /// It cannot be read, or something in it is wrong.
+    /// The file cannot be read or is invalid.
     pub fn read(file: Option<&Path>, mission: &Path) -> Result<Self, Message> {
         let beside = mission.with_file_name("ros.toml");
         let file = match file {
@@ -100,7 +101,7 @@ impl Settings {
     }
 }
 
-/// Line and column, from 1, in characters.
+/// Line and column of a byte offset, from 1, in characters.
 fn position(text: &str, at: usize) -> (usize, usize) {
     let before = text.get(..at).unwrap_or(text);
     let line = before.rsplit('\n').next().unwrap_or_default();
@@ -108,28 +109,28 @@ fn position(text: &str, at: usize) -> (usize, usize) {
 }
 
 impl Functions {
-    /// The system of a function.
+    /// Returns the system of a function.
     pub fn system<'s>(&'s self, function: &'s str) -> &'s str {
-        self.0.get(function).and_then(|own| own.system.as_deref()).unwrap_or(function)
+        self.0.get(function).and_then(|settings| settings.system.as_deref()).unwrap_or(function)
     }
 
-    /// The node of a function.
+    /// Returns the node of a function.
     pub fn node(&self, function: &str) -> String {
-        let own = self.0.get(function).and_then(|own| own.node.clone());
-        own.unwrap_or_else(|| format!("{}_node", self.system(function)))
+        let node = self.0.get(function).and_then(|node| node.node.clone());
+        node.unwrap_or_else(|| format!("{}_node", self.system(function)))
     }
 
-    /// The mode of a design.
+    /// Returns the mode of a design.
     pub fn mode<'s>(&'s self, function: &str, design: &'s str) -> &'s str {
-        self.0.get(function).and_then(|own| own.modes.get(design)).map_or(design, String::as_str)
+        self.0.get(function).and_then(|settings| settings.modes.get(design)).map_or(design, String::as_str)
     }
 
-    /// The mode of a function that nobody needs.
+    /// Returns the mode of a function that is not needed.
     pub fn unground(&self, function: &str) -> &str {
-        self.0.get(function).and_then(|own| own.unground.as_deref()).unwrap_or(UNGROUND)
+        self.0.get(function).and_then(|settings| settings.unground.as_deref()).unwrap_or(UNGROUND)
     }
 
-    /// The design of a mode, among those that the function has.
+    /// Returns the design of a mode, among the designs of a function.
     pub fn design(&self, function: &str, mode: &str, designs: &[String]) -> Option<String> {
         designs.iter().find(|design| self.mode(function, design) == mode).cloned()
     }
@@ -159,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_with_its_place() {
+    fn errors_have_source_locations() {
         let directory = tempfile::tempdir().expect("a directory");
         let file = directory.path().join("ros.toml");
         std::fs::write(&file, "[tasks.a]\ngoal = 1\n").expect("written");

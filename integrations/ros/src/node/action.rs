@@ -1,4 +1,4 @@
-//! Actions: serving them, and having them done by others.
+//! Action servers and action clients.
 
 mod caller;
 
@@ -25,22 +25,22 @@ use crate::node::{Node, Severity, client_name, dds_type, latched, not_made, qos}
 
 pub use caller::{Accepted, ActionCaller, GoalError, Pursued};
 
-/// The client library has no stream of all that an action server hears: it is asked so often.
+/// Polling interval, because the client library has no stream of all events of an action server.
 const POLL: Duration = Duration::from_millis(2);
 
-/// So long a result is kept for those who ask for it, as in `rcl_action`.
+/// Lifetime of a result for later requests, as in `rcl_action`.
 const KEPT: Duration = Duration::from_secs(15 * 60);
 
 type Server<A> = ActionServer<<A as Action>::Goal, <A as Action>::Result, <A as Action>::Feedback>;
 
-/// How a goal has ended.
+/// Outcome of a goal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GoalEnd {
-    /// As it should.
+    /// The goal was reached.
     Succeeded,
-    /// It was cancelled.
+    /// The goal was cancelled.
     Canceled,
-    /// It could not be reached.
+    /// The goal could not be reached.
     Aborted,
 }
 
@@ -54,23 +54,23 @@ impl GoalEnd {
     }
 }
 
-/// What a client of an action of ours wants.
+/// Request of a client of an action server.
 #[derive(Debug)]
 pub enum GoalEvent<A: Action> {
-    /// A new goal, to be answered with [`Goals::accept`] or [`Goals::reject`].
+    /// A new goal, to be answered by [`Goals::accept`] or [`Goals::reject`].
     Wanted(Wanted, A::Goal),
-    /// A goal is to be cancelled: [`Goals::canceling`] says whether it will be.
+    /// A request to cancel, to be answered by [`Goals::canceling`].
     Cancel(GoalId, CancelRequest),
 }
 
-/// A goal that waits for an answer.
+/// A goal without an answer so far.
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted {
     request: RmwRequestId,
     goal: GoalId,
 }
 
-/// A request to cancel that waits for an answer.
+/// A request to cancel without an answer so far.
 #[derive(Debug, Clone, Copy)]
 pub struct CancelRequest {
     request: RmwRequestId,
@@ -78,18 +78,18 @@ pub struct CancelRequest {
     goal: GoalId,
 }
 
-/// A goal that was accepted.
+/// An accepted goal.
 #[derive(Debug)]
 struct Known<R> {
     accepted: Time,
     status: GoalStatusEnum,
-    /// With the time when it has ended.
+    /// Result with the time of its end.
     result: Option<(R, Instant)>,
-    /// Who waits for the result.
+    /// Requests that wait for the result.
     asked: Vec<RmwRequestId>,
 }
 
-/// The goals of an action that is served here.
+/// Goals of an action server.
 pub struct Goals<A: Action> {
     server: OnceLock<Server<A>>,
     goals: Mutex<BTreeMap<GoalId, Known<A::Result>>>,
@@ -101,7 +101,7 @@ impl<A: Action> std::fmt::Debug for Goals<A> {
     }
 }
 
-/// Requests to the three services of an action.
+/// Pending requests to the three services of an action.
 struct Gates<A: Action> {
     goals: ReplyGate<(GoalId, A::Goal)>,
     cancels: ReplyGate<ros2_client::action::CancelGoalRequest>,
@@ -123,43 +123,44 @@ impl<A: Action> Goals<A> {
         self.goals.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Accepts a goal, which is under way from then on.
+    /// Accepts a goal and starts it.
     pub fn accept(&self, wanted: Wanted) -> GoalId {
         let accepted = Time::now();
-        let known = Known { accepted, status: GoalStatusEnum::Executing, result: None, asked: Vec::new() };
-        self.goals().insert(wanted.goal, known);
+        let goal_state =
+            Known { accepted, status: GoalStatusEnum::Executing, result: None, asked: Vec::new() };
+        self.goals().insert(wanted.goal, goal_state);
         self.answer(wanted, true, accepted);
         self.tell();
         wanted.goal
     }
 
-    /// A goal that was accepted before this program was started is under way still.
+    /// Registers a goal as running that was accepted before this program started.
     pub fn go_on(&self, goal: [u8; 16]) -> GoalId {
-        // The library takes numbers of goals as data only.
+        // The library has no constructor for goal ids other than deserialisation.
         let id = serde_json::from_value(serde_json::json!({ "uuid": goal })).unwrap_or(GoalId::ZERO);
-        let known = Known {
+        let goal_state = Known {
             accepted: Time::now(),
             status: GoalStatusEnum::Executing,
             result: None,
             asked: Vec::new(),
         };
-        self.goals().insert(id, known);
+        self.goals().insert(id, goal_state);
         id
     }
 
-    /// Does not accept a goal.
+    /// Rejects a goal.
     pub fn reject(&self, wanted: Wanted) {
         self.answer(wanted, false, Time::now());
     }
 
     fn answer(&self, wanted: Wanted, accepted: bool, stamp: Time) {
         if let Some(server) = self.server.get() {
-            // What cannot be written is lost, and the client's time runs out.
+            // A lost response leads to a timeout of the client.
             let _ = server.send_goal_response(wanted.request, SendGoalResponse { accepted, stamp });
         }
     }
 
-    /// Says whether a goal will be cancelled.
+    /// Answers whether a goal will be cancelled.
     pub fn canceling(&self, request: CancelRequest, will_be: bool) {
         let goals_canceling =
             if will_be { vec![GoalInfo { goal_id: request.goal, stamp: request.info }] } else { Vec::new() };
@@ -180,14 +181,14 @@ impl<A: Action> Goals<A> {
         }
     }
 
-    /// Says how it goes.
+    /// Publishes feedback.
     pub fn feedback(&self, goal: GoalId, feedback: A::Feedback) {
         if let Some(server) = self.server.get() {
             let _ = server.send_feedback(goal, feedback);
         }
     }
 
-    /// Ends a goal.
+    /// Ends a goal and sends its result.
     pub fn finish(&self, goal: GoalId, end: GoalEnd, result: A::Result) {
         let mut goals = self.goals();
         let Some(known) = goals.get_mut(&goal) else { return };
@@ -270,14 +271,15 @@ impl<A: Action> Goals<A> {
         }
     }
 
-    /// Which goals are meant: one, all, or those accepted up to a time (`action_msgs/srv/CancelGoal`).
+    /// Selects the goals of a cancel request: a single one, all, or those accepted up to a time
+    /// (`action_msgs/srv/CancelGoal`).
     fn cancel(
         &self,
         request: RmwRequestId,
         cancel: &ros2_client::action::CancelGoalRequest,
         take: &mut impl FnMut(GoalEvent<A>),
     ) {
-        // The library keeps the fields to itself, and shows them only as data.
+        // The library's fields are private and only accessible by serialisation.
         let Some(cancel) = serde_json::to_value(cancel)
             .ok()
             .and_then(|data| serde_json::from_value::<CancelGoalRequest>(data).ok())
@@ -343,10 +345,10 @@ fn expect_action<A: Action>(graph: &Graph, full: &str) {
 }
 
 impl Node {
-    /// Serves an action as soon as it is known how services are mapped.
+    /// Serves an action once the mapping of services is known.
     ///
     /// # Errors
-    /// The name is wrong.
+    /// The name is not a valid action name.
     pub fn serve_action<A: Action + 'static>(
         self: &Arc<Self>,
         name: &str,
@@ -368,9 +370,9 @@ impl Node {
                 status_publisher: latched(1),
             };
             let kind = ActionTypeName::new(A::PACKAGE, A::NAME);
-            let made =
+            let created =
                 node.inner().create_action_server(mapping.service_mapping(), &action_name, &kind, policies);
-            match made {
+            match created {
                 Ok(server) => drop(served.server.set(server)),
                 Err(error) => {
                     node.log(Severity::Fatal, &not_made(&full, &error).message);

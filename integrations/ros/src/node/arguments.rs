@@ -1,8 +1,9 @@
-//! What stands behind `--ros-args` on a command line: names to other names, parameters, and files of parameters.
+//! Parses the arguments after `--ros-args`: remapping rules, parameters, and parameter files.
 //!
-//! The syntax is that of `rcl` (ROS 2 design, articles "ROS 2 command line arguments" and "Remapping names"): `-r from:=to`,
-//! `-r node:from:=to`, `-r __node:=name`, `-r __ns:=/namespace`, `-p name:=value` (the value is YAML), `--params-file FILE`,
-//! `--log-level LEVEL`, each as often as wanted; `--` ends the group.
+//! The syntax is that of `rcl` (ROS 2 design, articles "ROS 2 command line arguments" and
+//! "Remapping names"): `-r from:=to`, `-r node:from:=to`, `-r __node:=name`, `-r __ns:=/namespace`,
+//! `-p name:=value` (the value is YAML), `--params-file FILE`, `--log-level LEVEL`, each any number
+//! of times. `--` ends the group.
 use std::path::{Path, PathBuf};
 
 use metaplan::message::{Errors, Message};
@@ -11,16 +12,16 @@ use serde_yaml_ng::Value;
 
 use crate::node::names::{FullName, is_match};
 
-/// The words of a command line that are for ROS.
+/// Command-line arguments for ROS.
 #[derive(Debug, Clone, Default)]
 pub struct RosArguments {
     rules: Vec<Rule>,
     parameters: Vec<Assigned>,
-    /// The least level of what is logged, as `--log-level` has it.
+    /// Minimum severity of log messages, from `--log-level`.
     pub log_level: Option<String>,
 }
 
-/// One name in place of another, for all nodes or for one.
+/// Remapping rule of a name, for all nodes or a single one.
 #[derive(Debug, Clone)]
 struct Rule {
     node: Option<String>,
@@ -28,7 +29,7 @@ struct Rule {
     to: String,
 }
 
-/// A value of a parameter, for the nodes whose full names match a pattern.
+/// Parameter value for the nodes whose full names match a pattern.
 #[derive(Debug, Clone)]
 struct Assigned {
     nodes: String,
@@ -37,19 +38,19 @@ struct Assigned {
 }
 
 impl RosArguments {
-    /// Parts the words of a command line: those of the program, and what stands behind `--ros-args`.
+    /// Splits a command line into the arguments of the program and those after `--ros-args`.
     ///
     /// # Errors
-    /// All that is wrong with the latter, and with the files that it names.
+    /// All errors of the latter and of the files that they name.
     pub fn split(words: impl IntoIterator<Item = String>) -> Result<(Vec<String>, Self), Errors> {
-        let (mut own, mut ros) = (Vec::new(), Vec::new());
+        let (mut program_arguments, mut ros) = (Vec::new(), Vec::new());
         let mut is_ros = false;
         for word in words {
             match word.as_str() {
                 "--ros-args" => is_ros = true,
                 "--" if is_ros => is_ros = false,
                 _ if is_ros => ros.push(word),
-                _ => own.push(word),
+                _ => program_arguments.push(word),
             }
         }
         let mut arguments = Self::default();
@@ -60,7 +61,7 @@ impl RosArguments {
                 messages.extend(more);
             }
         }
-        if messages.is_empty() { Ok((own, arguments)) } else { Err(messages.into()) }
+        if messages.is_empty() { Ok((program_arguments, arguments)) } else { Err(messages.into()) }
     }
 
     fn take(&mut self, word: &str, words: &mut impl Iterator<Item = String>) -> Result<(), Errors> {
@@ -70,7 +71,8 @@ impl RosArguments {
             "-p" | "--param" => self.parameters.push(parameter(&next()?)?),
             "--params-file" => self.parameters.extend(parameters_file(&PathBuf::from(next()?))?),
             "--log-level" => self.log_level = Some(next()?.to_lowercase()),
-            // What these set has no counterpart here: the enclave of security, files of log4 libraries, where logs go.
+            // These options have no counterpart here: security enclave, log4 configuration, log
+            // file.
             "-e" | "--enclave" | "--log-config-file" | "--log-file-name" => drop(next()?),
             _ if word.starts_with("--enable-") || word.starts_with("--disable-") => {}
             _ => {
@@ -83,7 +85,7 @@ impl RosArguments {
         Ok(())
     }
 
-    /// What a node is called that calls itself so in this namespace, after `__node` and `__ns`.
+    /// Full name of a node after the rules `__node` and `__ns`.
     pub(crate) fn node(&self, name: &str) -> FullName {
         let rule = |key: &str| {
             let is_it = |own: &&Rule| own.from == key && own.node.as_deref().is_none_or(|node| node == name);
@@ -96,7 +98,7 @@ impl RosArguments {
         )
     }
 
-    /// The full name of a topic, a service or an action of a node, after the first rule that fits.
+    /// Full name of a topic, service or action of a node after the first matching rule.
     pub(crate) fn remap(&self, name: &str, node: &FullName) -> String {
         let full = node.expand(name);
         let fits = |own: &&Rule| {
@@ -106,11 +108,11 @@ impl RosArguments {
         self.rules.iter().find(fits).map_or(full, |rule| node.expand(&rule.to))
     }
 
-    /// The values given to parameters of a node, later ones last.
+    /// Returns the parameter values of a node; later ones take precedence.
     pub(crate) fn parameters(&self, node: &FullName) -> Vec<(String, ParameterValue)> {
         let full = node.to_string();
-        let mine = self.parameters.iter().filter(|own| is_match(&own.nodes, &full, node.name()));
-        mine.map(|own| (own.name.clone(), own.value.clone())).collect()
+        let matching = self.parameters.iter().filter(|own| is_match(&own.nodes, &full, node.name()));
+        matching.map(|assigned| (assigned.name.clone(), assigned.value.clone())).collect()
     }
 }
 
@@ -118,27 +120,27 @@ fn wrong(text: String) -> Message {
     Message::error("N101", text)
 }
 
-/// `from:=to` or `node:from:=to`.
+/// Parses `from:=to` or `node:from:=to`.
 fn rule(text: &str) -> Result<Rule, Message> {
-    let wanted = || wrong(format!("`{text}` is not a rule; it should be `from:=to`, or `node:from:=to`"));
-    let (left, to) = text.split_once(":=").ok_or_else(wanted)?;
-    let (node, from) = match left.split_once(':') {
-        // `rostopic://` and `rosservice://` say which kind of name is meant.
+    let malformed = || wrong(format!("`{text}` is not a rule; it should be `from:=to`, or `node:from:=to`"));
+    let (selector, to) = text.split_once(":=").ok_or_else(malformed)?;
+    let (node, from) = match selector.split_once(':') {
+        // `rostopic://` and `rosservice://` select the kind of name.
         Some((_, from)) if from.starts_with("//") => (None, from.trim_start_matches('/')),
         Some((node, from)) => (Some(node.to_owned()), from),
-        None => (None, left),
+        None => (None, selector),
     };
     if from.is_empty() || to.is_empty() {
-        return Err(wanted());
+        return Err(malformed());
     }
     Ok(Rule { node, from: from.to_owned(), to: to.to_owned() })
 }
 
-/// `name:=value`, for every node, or `node:name:=value`.
+/// Parses `name:=value`, for every node, or `node:name:=value`.
 fn parameter(text: &str) -> Result<Assigned, Message> {
-    let wanted = || wrong(format!("`{text}` is not a parameter; it should be `name:=value`"));
-    let (left, value) = text.split_once(":=").ok_or_else(wanted)?;
-    let (nodes, name) = left.split_once(':').unwrap_or(("/**", left));
+    let malformed = || wrong(format!("`{text}` is not a parameter; it should be `name:=value`"));
+    let (selector, value) = text.split_once(":=").ok_or_else(malformed)?;
+    let (nodes, name) = selector.split_once(':').unwrap_or(("/**", selector));
     let value: Value = serde_yaml_ng::from_str(value)
         .map_err(|error| wrong(format!("the value of the parameter `{name}` is not YAML: {error}")))?;
     let value = parameter_value(&value)
@@ -146,7 +148,7 @@ fn parameter(text: &str) -> Result<Assigned, Message> {
     Ok(Assigned { nodes: nodes.to_owned(), name: name.to_owned(), value })
 }
 
-/// A file of parameters: names or patterns of nodes, and below `ros__parameters` their parameters.
+/// Parses a parameter file: node names or patterns with their parameters below `ros__parameters`.
 fn parameters_file(path: &Path) -> Result<Vec<Assigned>, Errors> {
     let file = path.display().to_string();
     let fault = |text: String| vec![Message::at("N102", &file, None, text)];
@@ -161,7 +163,7 @@ fn parameters_file(path: &Path) -> Result<Vec<Assigned>, Errors> {
     if messages.is_empty() { Ok(found) } else { Err(messages.into()) }
 }
 
-/// Goes down to each `ros__parameters`; the keys on the way are parts of the nodes' names.
+/// Collects parameters recursively. The keys above `ros__parameters` are parts of node names.
 fn nodes(path: &str, value: &Value, found: &mut Vec<Assigned>, messages: &mut Vec<String>) {
     let Some(fields) = value.as_mapping() else {
         messages.push(format!("`{path}` should hold names of nodes, or `ros__parameters`"));
@@ -186,7 +188,7 @@ fn nodes(path: &str, value: &Value, found: &mut Vec<Assigned>, messages: &mut Ve
     }
 }
 
-/// Parameters below parameters are joined with a point.
+/// Flattens nested parameters, whose names are joined with points.
 fn flatten(name: &str, value: &Value, nodes: &str, found: &mut Vec<Assigned>, messages: &mut Vec<String>) {
     if let Some(fields) = value.as_mapping() {
         for (key, below) in fields {
@@ -201,7 +203,8 @@ fn flatten(name: &str, value: &Value, nodes: &str, found: &mut Vec<Assigned>, me
     }
 }
 
-/// A YAML value as a parameter; none for mappings, null, and lists of unlike members.
+/// Converts a YAML value to a parameter. Returns `None` for mappings, null, and lists of mixed
+/// types.
 fn parameter_value(value: &Value) -> Option<ParameterValue> {
     Some(match value {
         Value::Bool(truth) => ParameterValue::Boolean(*truth),
@@ -241,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn words_behind_ros_args_are_for_ros() {
+    fn arguments_after_ros_args_are_for_ros() {
         let (own, ros) = read(
             "metaplan-ros --ros-args -r __node:=boss -r __ns:=/uuv -r /diagnostics:=/d2 -r ~/plan:=plan -p speed:=2 -- --as manager",
         );
@@ -257,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn rules_for_another_node_do_not_count() {
+    fn rules_for_another_node_are_ignored() {
         let (_, ros) = read("p --ros-args -r other:a:=b -r metaplan:a:=c -r other:__node:=x");
         let node = ros.node("metaplan");
         assert_eq!(node.to_string(), "/metaplan");
@@ -280,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn all_that_is_wrong_is_said() {
+    fn all_errors_are_reported() {
         let line = "p --ros-args -r nothing -p x --fly -p";
         let messages = RosArguments::split(line.split(' ').map(str::to_owned)).expect_err("wrong");
         assert_eq!(messages.len(), 4, "{messages:?}");

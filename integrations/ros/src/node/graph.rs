@@ -1,4 +1,4 @@
-//! Who else is there: participants with their vendors, and endpoints with their types, as discovery tells.
+//! ROS graph from DDS discovery: participants with their vendors, and endpoints with their types.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -14,13 +14,13 @@ use smol::{Task, Timer};
 
 use crate::node::rmw::{Mapping, Rmw, Vendor};
 
-/// How often is looked at what has been discovered while something is waited for.
+/// Polling interval while waiting for discovery.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// So long other participants are waited for where all that were seen speak either mapping.
+/// Time to wait for further participants if all discovered ones support both mappings.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// What is known of the other participants.
+/// State of the graph.
 #[derive(Debug)]
 pub(crate) struct Graph {
     rmw: Rmw,
@@ -30,32 +30,32 @@ pub(crate) struct Graph {
 
 #[derive(Debug, Default)]
 struct Seen {
-    /// Participants by the first bytes of their GUIDs, and the time of the first.
+    /// Participants by GUID prefix, and the time of the first discovery.
     participants: BTreeMap<[u8; 12], Vendor>,
     first: Option<Instant>,
     endpoints: BTreeMap<[u8; 16], Endpoint>,
-    /// Remote readers that receive what our writers write.
+    /// Remote readers that match our writers.
     matched_readers: BTreeSet<[u8; 16]>,
-    /// The mapping that our own services have, once it is decided on.
+    /// Mapping of our own services, once it is decided.
     mapping: Option<Mapping>,
-    /// The types that we have for topics, as DDS names both, with the type hash.
+    /// Expected types of topics, by DDS names, with the type hash.
     expected: BTreeMap<String, Expected>,
-    /// What was found wrong and is to be reported.
+    /// Problems that are not reported yet.
     complaints: Vec<String>,
-    /// What was reported.
+    /// Problems that were reported.
     reported: BTreeSet<String>,
 }
 
-/// The type of a topic.
+/// Type of a topic.
 #[derive(Debug, Clone)]
 pub(crate) struct Expected {
-    /// As DDS names it.
+    /// DDS name of the type.
     pub(crate) type_name: String,
-    /// `RIHS01_…`; what is compared where the other side says its own.
+    /// `RIHS01_…`; compared only if the other side publishes its hash.
     pub(crate) hash: &'static str,
 }
 
-/// The two topics of a service, named as DDS names them.
+/// DDS names of the two topics of a service.
 #[derive(Debug, Clone)]
 pub(crate) struct Topics {
     pub(crate) requests: String,
@@ -69,16 +69,16 @@ impl Topics {
     }
 }
 
-/// Whoever serves a service.
+/// A server of a service.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Server {
-    /// How it maps services.
+    /// Mapping of its services.
     pub(crate) mapping: Mapping,
-    /// What reads its requests.
+    /// Reader of its requests.
     pub(crate) reader: [u8; 16],
 }
 
-/// A reader or a writer of another participant.
+/// A reader or writer of another participant.
 #[derive(Debug, Clone)]
 struct Endpoint {
     is_reader: bool,
@@ -88,9 +88,10 @@ struct Endpoint {
 }
 
 impl Graph {
-    /// Begins to watch, until the task is dropped. Nobody else may listen to the status of the participant.
+    /// Starts to watch discovery until the task is dropped. The status of the participant must have
+    /// no other listener.
     pub(crate) fn watch(participant: &DomainParticipant, own: [u8; 12], rmw: Rmw) -> (Arc<Self>, Task<()>) {
-        // A mapping that is given counts before the first participant is met.
+        // A given mapping is valid before the first participant is discovered.
         let seen = Seen { mapping: rmw.fixed(), ..Seen::default() };
         let graph = Arc::new(Self { rmw, own, seen: Mutex::new(seen) });
         let (listener, watching) = (participant.status_listener(), Arc::clone(&graph));
@@ -118,17 +119,17 @@ impl Graph {
             }
             Event::ParticipantLost { id, .. } => {
                 let lost: &[u8] = id.as_ref();
-                let mut seen = self.seen();
-                seen.participants.retain(|prefix, _| prefix != lost);
-                seen.endpoints.retain(|guid, _| &guid[..12] != lost);
-                seen.matched_readers.retain(|guid| &guid[..12] != lost);
+                let mut state = self.seen();
+                state.participants.retain(|prefix, _| prefix != lost);
+                state.endpoints.retain(|guid, _| &guid[..12] != lost);
+                state.matched_readers.retain(|guid| &guid[..12] != lost);
             }
             Event::ReaderDetected { reader } => self.found(true, reader),
             Event::WriterDetected { writer } => self.found(false, writer),
             Event::ReaderLost { guid, .. } | Event::WriterLost { guid, .. } => {
-                let mut seen = self.seen();
-                seen.endpoints.remove(&bytes(guid));
-                seen.matched_readers.remove(&bytes(guid));
+                let mut state = self.seen();
+                state.endpoints.remove(&bytes(guid));
+                state.matched_readers.remove(&bytes(guid));
             }
             Event::RemoteReaderMatched { remote_reader, .. } => {
                 self.seen().matched_readers.insert(bytes(remote_reader));
@@ -146,50 +147,51 @@ impl Graph {
         }
         let EndpointDescription { topic_name: topic, type_name, user_data, .. } = description;
         let endpoint = Endpoint { is_reader, topic, type_name, hash: type_hash(&user_data) };
-        let mut seen = self.seen();
-        let complaint = seen.expected.get(&endpoint.topic).and_then(|expected| endpoint.complaint(expected));
-        seen.complaints.extend(complaint);
-        seen.endpoints.insert(guid, endpoint);
+        let mut state = self.seen();
+        let complaint = state.expected.get(&endpoint.topic).and_then(|expected| endpoint.complaint(expected));
+        state.complaints.extend(complaint);
+        state.endpoints.insert(guid, endpoint);
     }
 
     fn incompatible(&self, guid: GUID) {
-        let mut seen = self.seen();
-        let topic = seen.endpoints.get(&bytes(guid)).map(|endpoint| endpoint.topic.clone());
+        let mut state = self.seen();
+        let topic = state.endpoints.get(&bytes(guid)).map(|endpoint| endpoint.topic.clone());
         if let Some(topic) = topic {
-            seen.complaints
+            state
+                .complaints
                 .push(format!("an endpoint of {topic} has a quality of service that does not fit ours"));
         }
     }
 
-    /// The type of a topic that we use; endpoints with another one are complained of, and not heard.
+    /// Sets the expected type of a topic. Endpoints with another type are reported and ignored.
     pub(crate) fn expect(&self, topic: String, expected: Expected) {
-        let mut seen = self.seen();
-        let found: Vec<String> = seen
+        let mut state = self.seen();
+        let complaints: Vec<String> = state
             .endpoints
             .values()
             .filter(|endpoint| endpoint.topic == topic)
             .filter_map(|endpoint| endpoint.complaint(&expected))
             .collect();
-        seen.complaints.extend(found);
-        seen.expected.insert(topic, expected);
+        state.complaints.extend(complaints);
+        state.expected.insert(topic, expected);
     }
 
-    /// What was found wrong since it was asked last, each thing once.
+    /// Returns the problems since the last call, each once.
     pub(crate) fn complaints(&self) -> Vec<String> {
-        let mut seen = self.seen();
-        let new = std::mem::take(&mut seen.complaints);
-        new.into_iter().filter(|complaint| seen.reported.insert(complaint.clone())).collect()
+        let mut state = self.seen();
+        let new = std::mem::take(&mut state.complaints);
+        new.into_iter().filter(|complaint| state.reported.insert(complaint.clone())).collect()
     }
 
-    /// Whether what this writer writes has another type than ours.
+    /// Returns `true` if this writer has another type than expected.
     pub(crate) fn is_unfit(&self, writer: Gid) -> bool {
-        let seen = self.seen();
-        seen.endpoints.get(&writer.to_bytes16()).is_some_and(|endpoint| {
-            seen.expected.get(&endpoint.topic).is_some_and(|expected| endpoint.complaint(expected).is_some())
+        let state = self.seen();
+        state.endpoints.get(&writer.to_bytes16()).is_some_and(|endpoint| {
+            state.expected.get(&endpoint.topic).is_some_and(|expected| endpoint.complaint(expected).is_some())
         })
     }
 
-    /// Whether somebody writes on a topic, named as DDS does.
+    /// Returns `true` if a topic, given by its DDS name, has a writer.
     pub(crate) fn has_writer(&self, topic: &str) -> bool {
         self.seen().endpoints.values().any(|endpoint| !endpoint.is_reader && endpoint.topic == topic)
     }
@@ -197,21 +199,21 @@ impl Graph {
     /// Returns the server of a service if there is one. An endpoint with another type name is an error. A differing type hash is
     /// not: DDS has matched the type names, and the warning has been logged.
     pub(crate) fn server(&self, topics: &Topics) -> Option<Result<Server, String>> {
-        let seen = self.seen();
+        let state = self.seen();
         let endpoint = |topic: &str, is_reader: bool| {
             let is_it = |own: &(&[u8; 16], &Endpoint)| own.1.is_reader == is_reader && own.1.topic == topic;
-            seen.endpoints.iter().find(is_it)
+            state.endpoints.iter().find(is_it)
         };
         let ((guid, reader), (_, writer)) =
             (endpoint(&topics.requests, true)?, endpoint(&topics.replies, false)?);
         for endpoint in [reader, writer] {
-            let expected = seen.expected.get(&endpoint.topic);
+            let expected = state.expected.get(&endpoint.topic);
             if let Some(complaint) = expected.and_then(|expected| endpoint.wrong_type(expected)) {
                 return Some(Err(complaint));
             }
         }
         let vendor = Vendor::new([guid[0], guid[1]]);
-        let mapping = self.rmw.fixed().or_else(|| vendor.mapping()).or(seen.mapping);
+        let mapping = self.rmw.fixed().or_else(|| vendor.mapping()).or(state.mapping);
         Some(Ok(Server { mapping: mapping.unwrap_or(Mapping::Enhanced), reader: *guid }))
     }
 
@@ -222,16 +224,16 @@ impl Graph {
     /// bytes that are no GUID, so that every participant that writes requests must have as many reply readers matched.
     pub(crate) fn can_reply(&self, topics: &Topics, client: Gid) -> bool {
         let client = client.to_bytes16();
-        let seen = self.seen();
-        let is_known = seen.participants.keys().any(|prefix| *prefix == client[..12]);
+        let state = self.seen();
+        let is_known = state.participants.keys().any(|prefix| *prefix == client[..12]);
         if is_known && is_reader(client) {
-            return seen.matched_readers.contains(&client);
+            return state.matched_readers.contains(&client);
         }
         let mut unmatched: BTreeMap<&[u8], i64> = BTreeMap::new();
-        for (guid, endpoint) in &seen.endpoints {
+        for (guid, endpoint) in &state.endpoints {
             if !endpoint.is_reader && endpoint.topic == topics.requests {
                 *unmatched.entry(&guid[..12]).or_default() += 1;
-            } else if endpoint.topic == topics.replies && seen.matched_readers.contains(guid) {
+            } else if endpoint.topic == topics.replies && state.matched_readers.contains(guid) {
                 *unmatched.entry(&guid[..12]).or_default() -= 1;
             }
         }
@@ -241,14 +243,15 @@ impl Graph {
         !unmatched.is_empty() && unmatched.values().all(|count| *count <= 0)
     }
 
-    /// Who reads on a topic, named as DDS does.
+    /// Returns the readers of a topic, given by its DDS name.
     pub(crate) fn readers(&self, topic: &str) -> BTreeSet<[u8; 16]> {
-        let seen = self.seen();
+        let state = self.seen();
         let is_it = |endpoint: &Endpoint| endpoint.is_reader && endpoint.topic == topic;
-        seen.endpoints.iter().filter(|(_, endpoint)| is_it(endpoint)).map(|(guid, _)| *guid).collect()
+        state.endpoints.iter().filter(|(_, endpoint)| is_it(endpoint)).map(|(guid, _)| *guid).collect()
     }
 
-    /// The mapping of our own services: that of the first participant that has only one.
+    /// Waits for the mapping of our own services: that of the first participant that supports only
+    /// a single one.
     pub(crate) async fn mapping(&self) -> Mapping {
         loop {
             if let Some(mapping) = self.decide() {
@@ -259,16 +262,16 @@ impl Graph {
     }
 
     fn decide(&self) -> Option<Mapping> {
-        let mut seen = self.seen();
-        if seen.mapping.is_none() {
-            let met = seen.participants.values().find_map(|vendor| vendor.mapping());
-            let waited = seen.first.is_some_and(|first| first.elapsed() >= PATIENCE);
-            seen.mapping = met.or_else(|| waited.then_some(Mapping::Enhanced));
+        let mut state = self.seen();
+        if state.mapping.is_none() {
+            let met = state.participants.values().find_map(|vendor| vendor.mapping());
+            let waited = state.first.is_some_and(|first| first.elapsed() >= PATIENCE);
+            state.mapping = met.or_else(|| waited.then_some(Mapping::Enhanced));
         }
-        seen.mapping
+        state.mapping
     }
 
-    /// Waits until something can be said, or time is up.
+    /// Polls `look` until it returns a value or the time is up.
     pub(crate) async fn wait<T>(&self, within: Duration, look: impl Fn(&Self) -> Option<T>) -> Option<T> {
         let until = Instant::now() + within;
         loop {
@@ -338,11 +341,12 @@ fn is_reader(guid: [u8; 16]) -> bool {
     matches!(guid[15], 0x04 | 0x07)
 }
 
-/// What an endpoint of ROS 2 Jazzy and later says of its type: `typehash=RIHS01_…;` in its user data (REP 2011).
+/// Parses the type hash that endpoints of ROS 2 Jazzy and later publish: `typehash=RIHS01_…;` in
+/// their user data (REP 2011).
 fn type_hash(user_data: &[u8]) -> Option<String> {
     let text = String::from_utf8_lossy(user_data);
     let hash = text.split(';').find_map(|part| part.trim_matches('\0').strip_prefix("typehash="))?;
-    // What an RMW does not know is all zero, or another version.
+    // An unknown hash is all zero, and other versions are not comparable.
     let digits = hash.strip_prefix("RIHS01_")?;
     digits.bytes().any(|digit| digit != b'0').then(|| hash.to_owned())
 }

@@ -1,4 +1,5 @@
-//! A managed node (ROS 2 design article "Managed nodes"): its primary states, and the services by which others move it between them.
+//! Managed node (ROS 2 design article "Managed nodes"): primary states, and the services for
+//! transitions between them.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
@@ -13,26 +14,26 @@ use crate::interfaces::lifecycle_msgs::srv::{
 use crate::interfaces::lyrical::lifecycle_msgs::msg as lyrical;
 use crate::node::{Node, Publisher, Severity, depth, is_lyrical, now};
 
-/// A primary state of a managed node.
+/// Primary state of a managed node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
-    /// It has read nothing.
+    /// The node has read nothing.
     Unconfigured,
-    /// It knows its mission and does nothing.
+    /// The node has read its mission and is idle.
     Inactive,
-    /// It does its work.
+    /// The node works.
     Active,
-    /// It ends.
+    /// The node is shutting down.
     Finalized,
 }
 
-/// A way from one primary state to another.
+/// Transition between primary states.
 struct Way {
     id: u8,
     label: &'static str,
     from: Phase,
     to: Phase,
-    /// The state on the way.
+    /// Transition state.
     via: (u8, &'static str),
 }
 
@@ -100,11 +101,11 @@ impl Way {
     }
 }
 
-/// Where changes are told, in the type of the distribution.
+/// Publisher of transitions, in the message type of the distribution.
 enum Events {
-    /// Up to Kilted.
+    /// Message type up to Kilted.
     Nanoseconds(Publisher<TransitionEvent>),
-    /// From Lyrical on.
+    /// Message type from Lyrical on.
     Stamp(Publisher<lyrical::TransitionEvent>),
 }
 
@@ -119,13 +120,13 @@ impl Events {
     }
 }
 
-/// The states of a managed node.
+/// Lifecycle of a managed node.
 pub struct Lifecycle {
-    /// The node holds what is served, and that this.
+    /// A weak reference, because the node holds its services, which hold this.
     node: Weak<Node>,
     phase: Mutex<Phase>,
     events: Events,
-    /// Does what a change needs; without success the node stays where it is.
+    /// Performs a transition. On failure the node keeps its state.
     change: Box<dyn Fn(Phase) -> bool + Send + Sync>,
 }
 
@@ -136,11 +137,11 @@ impl std::fmt::Debug for Lifecycle {
 }
 
 impl Lifecycle {
-    /// Serves the states of a node that has read its mission, and works as soon as it is there; others may bid it rest. Returns whether it
-    /// is active.
+    /// Serves the lifecycle of a node that starts in the active state. Returns a flag that is set
+    /// while the node is active.
     ///
     /// # Errors
-    /// A topic cannot be made.
+    /// A topic cannot be created.
     pub(crate) fn activated(node: &Arc<Node>) -> Result<Arc<AtomicBool>, Message> {
         let active = Arc::new(AtomicBool::new(true));
         let hear = Arc::clone(&active);
@@ -153,26 +154,27 @@ impl Lifecycle {
         Ok(active)
     }
 
-    /// Serves the states of a node that is not configured. `change` is asked before each change, with the state that will be.
+    /// Serves the lifecycle of a node that starts unconfigured. `change` is called before each
+    /// transition with the target state.
     ///
     /// # Errors
-    /// A topic cannot be made.
+    /// A topic cannot be created.
     pub fn serve(
         node: &Arc<Node>,
         change: impl Fn(Phase) -> bool + Send + Sync + 'static,
     ) -> Result<Arc<Self>, Message> {
         let events = Events::new(node, is_lyrical())?;
-        let own = Arc::new(Self {
+        let served = Arc::new(Self {
             node: Arc::downgrade(node),
             phase: Mutex::new(Phase::Unconfigured),
             events,
             change: Box::new(change),
         });
-        let lifecycle = Arc::clone(&own);
+        let lifecycle = Arc::clone(&served);
         node.serve::<ChangeState>("~/change_state", move |request, answer| {
             answer.send(ChangeStateResponse { success: lifecycle.take(&request.transition) });
         })?;
-        let lifecycle = Arc::clone(&own);
+        let lifecycle = Arc::clone(&served);
         node.serve::<GetState>("~/get_state", move |_, answer| {
             answer.send(GetStateResponse { current_state: lifecycle.phase().state() });
         })?;
@@ -188,7 +190,7 @@ impl Lifecycle {
             }
             answer.send(GetAvailableStatesResponse { available_states });
         })?;
-        let lifecycle = Arc::clone(&own);
+        let lifecycle = Arc::clone(&served);
         node.serve::<GetAvailableTransitions>("~/get_available_transitions", move |_, answer| {
             let phase = lifecycle.phase();
             answer.send(described(|way| way.from == phase));
@@ -196,15 +198,16 @@ impl Lifecycle {
         node.serve::<GetAvailableTransitions>("~/get_transition_graph", |_, answer| {
             answer.send(described(|_| true));
         })?;
-        Ok(own)
+        Ok(served)
     }
 
-    /// The state now.
+    /// Returns the current state.
     pub fn phase(&self) -> Phase {
         *self.phase.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Goes to a state to which there is a way, as if asked.
+    /// Performs a transition to a state. Returns `false` if there is no such transition or if it
+    /// fails.
     pub fn go(&self, to: Phase) -> bool {
         let from = self.phase();
         WAYS.iter().find(|way| way.from == from && way.to == to).is_some_and(|way| self.walk(way))
@@ -212,7 +215,8 @@ impl Lifecycle {
 
     fn take(&self, wanted: &Transition) -> bool {
         let from = self.phase();
-        // A label counts where there is no number, as in rcl_lifecycle; any number of a shutdown means that of the state.
+        // As in rcl_lifecycle, a label is used if there is no id, and every id of a shutdown has
+        // the label of the current state.
         let is_it = |way: &&Way| {
             way.from == from && if wanted.id == 0 { way.label == wanted.label } else { way.id == wanted.id }
         };

@@ -1,4 +1,4 @@
-//! The log: what a node says on `/rosout`, and on standard error as `rcutils` writes it.
+//! Log of a node on `/rosout`, and on standard error in the format of `rcutils`.
 
 use std::io::Write as _;
 use std::sync::PoisonError;
@@ -11,28 +11,28 @@ use ros2_client::rosout::RosoutRaw as _;
 
 use crate::node::Node;
 
-/// So many warnings are remembered, so as to say each once.
+/// Maximum number of remembered warnings, which are printed once each.
 const WARNED: usize = 1000;
 
-/// How grave it is.
+/// Severity of a log message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
-    /// For developers.
+    /// Information for developers.
     Debug,
-    /// As it should be.
+    /// Normal operation.
     Info,
-    /// It goes on, but somebody should look at it.
+    /// A problem that does not prevent operation.
     Warn,
-    /// Something could not be done.
+    /// A failed operation.
     Error,
-    /// It does not go on.
+    /// A failure that ends the node.
     Fatal,
 }
 
 impl Severity {
-    /// From the word that `--log-level` takes.
+    /// Parses the argument of `--log-level`.
     pub(crate) fn parse(word: &str) -> Option<Self> {
-        // `node:=level` is for one node of a process; there is one here.
+        // `node:=level` selects a node of a process, and this process has a single node.
         Some(match word.rsplit(":=").next().unwrap_or(word) {
             "debug" => Self::Debug,
             "info" => Self::Info,
@@ -65,12 +65,12 @@ impl Severity {
 }
 
 impl Node {
-    /// Whether anybody hears what is so grave.
+    /// Returns `true` if messages of this severity are logged.
     pub(crate) fn is_logged(&self, severity: Severity) -> bool {
         severity >= self.least
     }
 
-    /// Warns of something, once of the same.
+    /// Logs a warning unless it was logged before.
     pub(crate) fn warn_once(&self, text: &str) {
         let mut warned = self.warned.lock().unwrap_or_else(PoisonError::into_inner);
         if warned.len() >= WARNED {
@@ -82,7 +82,7 @@ impl Node {
         }
     }
 
-    /// Says something to whoever reads logs.
+    /// Logs a message.
     pub fn log(&self, severity: Severity, text: &str) {
         if !self.is_logged(severity) {
             return;
@@ -95,7 +95,7 @@ impl Node {
             since.as_secs(),
             since.subsec_nanos()
         );
-        // Who has closed standard error does not want to know.
+        // A closed standard error is ignored.
         let _ = std::io::stderr().write_all(visible(&line).as_bytes());
         self.inner().rosout_raw(Time::now(), severity.level(), &name, text, file!(), "", line!());
     }

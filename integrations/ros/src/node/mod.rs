@@ -1,8 +1,10 @@
-//! A node of a ROS 2 graph over DDS: topics, services, actions, parameters, log and lifecycle, without a ROS installation.
+//! A node of a ROS 2 graph over DDS: topics, services, actions, parameters, log and lifecycle,
+//! without a ROS installation.
 //!
-//! Names are expanded and remapped as ROS 2 does. What is heard is handed to closures on a thread of the executor, which must be quick;
-//! samples that are not of their type, and endpoints whose type is not ours, are reported and left out. Our own services wait for
-//! the first participant that tells how services are mapped, see `rmw`.
+//! Names are expanded and remapped as in ROS 2. Received messages are passed to closures on a
+//! thread of the executor, which must return quickly. Samples of the wrong type and endpoints with
+//! another type are reported and ignored. Our own services wait for the first participant that
+//! reveals its mapping of services, see `rmw`.
 
 mod action;
 mod arguments;
@@ -45,29 +47,29 @@ use names::FullName;
 
 pub use qos::{depth, keep_all, latched};
 
-/// What a node is made with.
+/// Options for creating a node.
 #[derive(Debug, Clone)]
 pub struct Opening {
-    /// Its name, unless `__node` is remapped.
+    /// Name of the node, unless `__node` is remapped.
     pub name: String,
-    /// What stands behind `--ros-args`.
+    /// Arguments after `--ros-args`.
     pub arguments: RosArguments,
     /// Domain and network.
     pub network: Network,
-    /// The middleware of the others.
+    /// Middleware of the other participants.
     pub rmw: Rmw,
 }
 
-/// A node.
+/// A node of the ROS graph.
 pub struct Node {
     inner: Mutex<ros2_client::Node>,
     name: FullName,
     arguments: RosArguments,
     graph: Arc<Graph>,
     least: Severity,
-    /// What was warned of, to be said once.
+    /// Warnings that were logged, to log each once.
     warned: Mutex<HashSet<String>>,
-    /// What goes on for as long as the node is there.
+    /// Background tasks, which end with the node.
     tasks: Mutex<Vec<Task<()>>>,
 }
 
@@ -78,10 +80,10 @@ impl std::fmt::Debug for Node {
 }
 
 impl Node {
-    /// Enters the graph. Parameters are declared with [`Node::declare`], which has to follow.
+    /// Joins the graph. [`Node::declare`] must be called next, to declare the parameters.
     ///
     /// # Errors
-    /// The name is wrong, or there is no network.
+    /// The name is wrong, or the network is not available.
     pub fn open(opening: Opening) -> Result<Arc<Self>, Message> {
         let Opening { name, arguments, network, rmw } = opening;
         let name = arguments.node(&name);
@@ -122,17 +124,17 @@ impl Node {
         Ok(node)
     }
 
-    /// With namespace, as in `/uuv/metaplan`.
+    /// Full name with namespace, such as `/uuv/metaplan`.
     pub fn full_name(&self) -> String {
         self.name.to_string()
     }
 
-    /// The full name of a topic, service or action that this node calls so, after remapping.
+    /// Returns the full name of a topic, service or action of this node after remapping.
     pub fn resolve(&self, name: &str) -> String {
         self.arguments.remap(name, &self.name)
     }
 
-    /// Whether anybody writes on a topic.
+    /// Returns `true` if a topic has a writer.
     pub fn is_written(&self, topic: &str) -> bool {
         self.graph.has_writer(&format!("rt{}", self.resolve(topic)))
     }
@@ -141,14 +143,14 @@ impl Node {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Lets something go on until it ends, or the node is dropped.
+    /// Runs a background task until it ends or the node is dropped.
     fn spawn(&self, work: impl Future<Output = ()> + Send + 'static) {
         let mut tasks = self.tasks.lock().unwrap_or_else(PoisonError::into_inner);
         tasks.retain(|task| !task.is_finished());
         tasks.push(smol::spawn(work));
     }
 
-    /// Logs from time to time what the graph complains of.
+    /// Logs the problems of the graph periodically.
     fn report_complaints(self: &Arc<Self>) {
         const PERIOD: Duration = Duration::from_millis(100);
         let node = Arc::downgrade(self);
@@ -164,29 +166,29 @@ impl Node {
     }
 }
 
-/// The type of a message, as DDS names it.
+/// DDS name of a message type.
 fn dds_type(package: &str, kind: &str, name: &str) -> String {
     format!("{package}::{kind}::dds_::{name}_")
 }
 
-/// A name for the client library, from a full name.
+/// Converts a full name to a name of the client library.
 fn client_name(full: &str) -> Result<ros2_client::Name, Message> {
     ros2_client::Name::parse(full).map_err(|error| {
         Message::error("N121", format!("`{full}` is not the name of a topic or service: {error}"))
     })
 }
 
-/// Why something could not be made.
+/// Error about an entity that could not be created.
 fn not_made(what: &str, error: &dyn std::fmt::Display) -> Message {
     Message::error("N122", format!("{what} could not be made: {error}"))
 }
 
-/// Whether the robot has Lyrical or what follows it, as the environment says: some types differ.
+/// Returns `true` if the environment specifies Lyrical or later, in which some types differ.
 pub(crate) fn is_lyrical() -> bool {
     std::env::var("ROS_DISTRO").is_ok_and(|name| ["lyrical", "rolling"].contains(&name.trim()))
 }
 
-/// The time now, for stamps.
+/// Returns the current time as a ROS timestamp.
 pub(crate) fn now() -> crate::interfaces::builtin_interfaces::msg::Time {
     let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
     crate::interfaces::builtin_interfaces::msg::Time {

@@ -1,4 +1,5 @@
-//! Names of nodes, topics and services, as ROS 2 expands and matches them (design article "Topic and service names").
+//! Expansion and matching of names of nodes, topics and services (ROS 2 design article "Topic and
+//! service names").
 
 use std::fmt;
 
@@ -11,7 +12,7 @@ pub(crate) struct FullName {
 }
 
 impl FullName {
-    /// A node in a namespace, with or without its first slash.
+    /// Creates a full name; the leading slash of the namespace is optional.
     pub(crate) fn new(namespace: &str, name: &str) -> Self {
         let namespace = format!("/{}", namespace.trim_matches('/'));
         Self { namespace, name: name.to_owned() }
@@ -25,7 +26,7 @@ impl FullName {
         &self.name
     }
 
-    /// A name as this node means it, with all namespaces: `~/x` is below the node, `x` is below its namespace.
+    /// Expands a name relative to this node: `~/x` is below the node, `x` is below its namespace.
     pub(crate) fn expand(&self, name: &str) -> String {
         if name.starts_with('/') {
             name.to_owned()
@@ -46,8 +47,8 @@ impl fmt::Display for FullName {
     }
 }
 
-/// Whether a pattern of a file of parameters is for a node: `*` is one part of a name, `**` any number of them. A pattern without
-/// namespace is for the node of that name in any.
+/// Returns `true` if a pattern of a parameter file matches a node: `*` matches a part of a name,
+/// `**` any number of parts. A pattern without namespace matches a node name in every namespace.
 pub(crate) fn is_match(pattern: &str, full: &str, name: &str) -> bool {
     let bare = pattern.trim_start_matches('/');
     if bare == name {

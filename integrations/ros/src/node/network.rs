@@ -1,27 +1,28 @@
-//! Which network and which domain a node is in, from the environment as ROS 2 reads it.
+//! Domain and network of a node, from the environment variables of ROS 2.
 
 use std::net::Ipv4Addr;
 
 use metaplan::message::Message;
 use ros2_client::dds::rustdds::DomainParticipantBuilder;
 
-/// The greatest domain for which there are ports (RTPS 2.5, section 9.6.1.1).
+/// Greatest domain with valid ports (RTPS 2.5, section 9.6.1.1).
 const GREATEST_DOMAIN: u16 = 232;
 
-/// Where other participants are looked for.
+/// Discovery range.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Network {
     /// `ROS_DOMAIN_ID`.
     pub domain: u16,
-    /// Only on this machine: `ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`, or `ROS_LOCALHOST_ONLY=1` of older distributions.
+    /// `true` to restrict discovery to this machine: `ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST`, or
+    /// `ROS_LOCALHOST_ONLY=1` of older distributions.
     pub loopback: bool,
 }
 
 impl Network {
-    /// From variables of the environment; warnings about what is not supported.
+    /// Reads the environment variables. Also returns warnings about unsupported values.
     ///
     /// # Errors
-    /// A value that is wrong.
+    /// A variable has an invalid value.
     pub fn from_environment(
         variable: impl Fn(&str) -> Option<String>,
     ) -> Result<(Self, Vec<Message>), Message> {
@@ -42,7 +43,7 @@ impl Network {
             .map(|range| range.to_uppercase())
             .as_deref()
         {
-            // ROS_LOCALHOST_ONLY counts where both are there (Jazzy's release notes).
+            // `ROS_LOCALHOST_ONLY` takes precedence if both are set (Jazzy's release notes).
             None | Some("SYSTEM_DEFAULT" | "SUBNET") => only,
             Some("LOCALHOST") => true,
             Some("OFF") => {
@@ -66,7 +67,7 @@ impl Network {
         Ok((Self { domain, loopback }, warnings))
     }
 
-    /// A participant to be built in this network.
+    /// Creates a builder of a participant in this network.
     pub(crate) fn participant(self) -> DomainParticipantBuilder {
         let builder = DomainParticipantBuilder::new(self.domain);
         if self.loopback { builder.with_only_networks([Ipv4Addr::LOCALHOST]) } else { builder }
@@ -81,7 +82,7 @@ fn wrong(text: String) -> Message {
 mod tests {
     use super::Network;
 
-    /// Domain and whether loopback only; or nothing for an error.
+    /// Checks the domain and the restriction to loopback; `None` stands for an error.
     fn check(variables: &[(&str, &str)], expected: Option<(u16, bool, usize)>) {
         let value = |name: &str| {
             variables.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned())
@@ -92,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn variables_of_all_distributions_count() {
+    fn variables_of_all_distributions_are_read() {
         check(&[], Some((0, false, 0)));
         check(&[("ROS_DOMAIN_ID", "42"), ("ROS_LOCALHOST_ONLY", "0")], Some((42, false, 0)));
         check(&[("ROS_LOCALHOST_ONLY", "1")], Some((0, true, 0)));

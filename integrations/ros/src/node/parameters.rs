@@ -1,4 +1,4 @@
-//! Parameters: declared, overridden from the command line, and served to `ros2 param`.
+//! Parameters: declaration, overrides from the command line, and the services for `ros2 param`.
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -15,18 +15,18 @@ use crate::interfaces::rcl_interfaces::srv::{
 };
 use crate::node::{Node, Severity};
 
-/// A parameter of a node.
+/// A declared parameter.
 #[derive(Debug, Clone)]
 pub struct Declared {
-    /// Parts are joined with points.
+    /// Name, whose parts are joined with points.
     pub name: &'static str,
-    /// What it is for, with its unit.
+    /// Purpose with the unit.
     pub description: &'static str,
-    /// Its value unless the command line says otherwise; it keeps the type.
+    /// Default value, which also determines the type.
     pub value: ParameterValue,
-    /// Whether it can be set while the node runs.
+    /// `true` if the parameter can be set while the node runs.
     pub is_dynamic: bool,
-    /// Checks a value of the right type; an error says which values are allowed.
+    /// Checks a value of the right type. The error describes the allowed values.
     pub check: fn(&ParameterValue) -> Result<(), &'static str>,
 }
 
@@ -55,21 +55,23 @@ impl Declared {
 
 type Table = BTreeMap<String, Declared>;
 
-/// Hears of parameters that are set.
+/// Callback for parameters that are set.
 type Listener = dyn Fn(&str, &ParameterValue) + Send + Sync;
 
 impl Node {
-    /// Declares the parameters of the node, gives them the values of the command line, and serves them. `changed` hears of each that is set
-    /// from then on.
+    /// Declares the parameters of the node, applies the values of the command line, and serves
+    /// them. `changed` is called for each parameter that is set later. Returns warnings about
+    /// undeclared parameters.
     ///
     /// # Errors
-    /// The command line gives a value of another type. A parameter that is not declared is a warning, returned.
+    /// The command line gives a value of another type.
     pub fn declare(
         self: &Arc<Self>,
         declared: Vec<Declared>,
         changed: impl Fn(&str, &ParameterValue) + Send + Sync + 'static,
     ) -> Result<Vec<Message>, Errors> {
-        let mut table: Table = declared.into_iter().map(|own| (own.name.to_owned(), own)).collect();
+        let mut table: Table =
+            declared.into_iter().map(|parameter| (parameter.name.to_owned(), parameter)).collect();
         table.insert(
             "use_sim_time".to_owned(),
             Declared {
@@ -84,11 +86,14 @@ impl Node {
         for (name, value) in self.arguments.parameters(&self.name) {
             match table.get_mut(&name) {
                 None => {
-                    let meant = did_you_mean(&name, table.keys().map(String::as_str));
-                    warnings.push(Message::warning("N103", format!("there is no parameter `{name}`{meant}")));
+                    let suggestion = did_you_mean(&name, table.keys().map(String::as_str));
+                    warnings.push(Message::warning(
+                        "N103",
+                        format!("there is no parameter `{name}`{suggestion}"),
+                    ));
                 }
-                Some(own) => match own.accept(value) {
-                    Ok(value) => own.value = value,
+                Some(parameter) => match parameter.accept(value) {
+                    Ok(value) => parameter.value = value,
                     Err(text) => {
                         errors.push(Message::error("N103", format!("the parameter `{name}` {text}")));
                     }
@@ -98,19 +103,20 @@ impl Node {
         if !errors.is_empty() {
             return Err(errors.into());
         }
-        for own in table.values() {
-            // Undeclared ones are allowed underneath; what is allowed is decided here.
-            let _ = self.inner().set_parameter(own.name, own.value.clone());
+        for parameter in table.values() {
+            // The client library accepts undeclared parameters. Access is checked by the services
+            // of this module.
+            let _ = self.inner().set_parameter(parameter.name, parameter.value.clone());
         }
         self.serve_parameters(Arc::new(Mutex::new(table)), Arc::new(changed))?;
         Ok(warnings)
     }
 
-    /// Declares one parameter, a time in seconds that can be set while the node runs; returns it in milliseconds. What else the command line
-    /// gives is warned of in the log.
+    /// Declares a single parameter, a time in seconds that can be set while the node runs. Returns
+    /// its value in milliseconds. Other parameters of the command line are logged as warnings.
     ///
     /// # Errors
-    /// As [`Node::declare`].
+    /// See [`Node::declare`].
     pub(crate) fn declare_seconds(
         self: &Arc<Self>,
         name: &'static str,
@@ -144,7 +150,7 @@ impl Node {
         Ok(time)
     }
 
-    /// The value of a parameter that was declared.
+    /// Returns the value of a declared parameter.
     pub fn parameter(&self, name: &str) -> Option<ParameterValue> {
         self.inner().get_parameter(name)
     }
@@ -170,15 +176,15 @@ impl Node {
             let kind = |name: &String| read(name).map_or(0, |value| raw(value).r#type);
             answer.send(GetParameterTypesResponse { types: request.names.iter().map(kind).collect() });
         })?;
-        let known = Arc::clone(&table);
+        let declared = Arc::clone(&table);
         self.serve::<ListParameters>("~/list_parameters", move |request, answer| {
             let names: Vec<String> =
-                known.lock().unwrap_or_else(PoisonError::into_inner).keys().cloned().collect();
+                declared.lock().unwrap_or_else(PoisonError::into_inner).keys().cloned().collect();
             answer.send(ListParametersResponse { result: listed(names, &request.prefixes, request.depth) });
         })?;
-        let known = Arc::clone(&table);
+        let declared = Arc::clone(&table);
         self.serve::<DescribeParameters>("~/describe_parameters", move |request, answer| {
-            let table = known.lock().unwrap_or_else(PoisonError::into_inner);
+            let table = declared.lock().unwrap_or_else(PoisonError::into_inner);
             let describe = |name: &String| described(name, table.get(name));
             answer.send(DescribeParametersResponse {
                 descriptors: request.names.iter().map(describe).collect(),
@@ -198,7 +204,7 @@ impl Node {
         })
     }
 
-    /// Sets all of these, or none.
+    /// Sets all parameters, or none of them if one is refused.
     fn set(
         &self,
         table: &Mutex<Table>,
@@ -220,7 +226,7 @@ impl Node {
             if let Some(own) = table.get_mut(&name) {
                 own.value = value.clone();
             }
-            // Tells `/parameter_events`, too.
+            // This also publishes on `/parameter_events`.
             self.inner().set_parameter(&name, value.clone())?;
             changed(&name, &value);
         }
@@ -228,7 +234,7 @@ impl Node {
     }
 }
 
-/// A value of the type of another one; a whole number serves as a double.
+/// Converts a value to the type of `own`. An integer is accepted for a double.
 fn fitting(own: &ParameterValue, value: ParameterValue) -> Result<ParameterValue, String> {
     match (own, value) {
         (ParameterValue::Double(_), ParameterValue::Integer(whole)) => {
@@ -261,7 +267,8 @@ fn result(outcome: Result<(), String>) -> msg::SetParametersResult {
     msg::SetParametersResult { successful: outcome.is_ok(), reason: outcome.err().unwrap_or_default() }
 }
 
-/// The names below some prefixes, not deeper than `depth` below them (0: however deep), and the prefixes of these names.
+/// Returns the names below the prefixes, at most `depth` levels deep (0: unlimited), and the
+/// prefixes of these names.
 fn listed(names: Vec<String>, prefixes: &[String], depth: u64) -> msg::ListParametersResult {
     let is_near = |below: &str| depth == 0 || (below.matches('.').count() as u64) < depth;
     let is_wanted = |name: &String| {
@@ -273,10 +280,10 @@ fn listed(names: Vec<String>, prefixes: &[String], depth: u64) -> msg::ListParam
         if prefixes.is_empty() { is_near(name) } else { prefixes.iter().any(below) }
     };
     let names: Vec<String> = names.into_iter().filter(is_wanted).collect();
-    let mut found: Vec<String> =
+    let mut names_below: Vec<String> =
         names.iter().filter_map(|name| name.rsplit_once('.')).map(|(prefix, _)| prefix.to_owned()).collect();
-    found.dedup();
-    msg::ListParametersResult { names, prefixes: found }
+    names_below.dedup();
+    msg::ListParametersResult { names, prefixes: names_below }
 }
 
 fn described(name: &str, own: Option<&Declared>) -> msg::ParameterDescriptor {
@@ -289,37 +296,37 @@ fn described(name: &str, own: Option<&Declared>) -> msg::ParameterDescriptor {
     }
 }
 
-/// A value as it is sent.
+/// Converts a value to its message.
 pub(crate) fn raw(value: ParameterValue) -> msg::ParameterValue {
     use msg::{ParameterType as Kind, ParameterValue as Raw};
-    let none = Raw::default();
+    let unset = Raw::default();
     match value {
-        ParameterValue::NotSet => none,
-        ParameterValue::Boolean(bool_value) => Raw { r#type: Kind::PARAMETER_BOOL, bool_value, ..none },
+        ParameterValue::NotSet => unset,
+        ParameterValue::Boolean(bool_value) => Raw { r#type: Kind::PARAMETER_BOOL, bool_value, ..unset },
         ParameterValue::Integer(integer_value) => {
-            Raw { r#type: Kind::PARAMETER_INTEGER, integer_value, ..none }
+            Raw { r#type: Kind::PARAMETER_INTEGER, integer_value, ..unset }
         }
-        ParameterValue::Double(double_value) => Raw { r#type: Kind::PARAMETER_DOUBLE, double_value, ..none },
-        ParameterValue::String(string_value) => Raw { r#type: Kind::PARAMETER_STRING, string_value, ..none },
+        ParameterValue::Double(double_value) => Raw { r#type: Kind::PARAMETER_DOUBLE, double_value, ..unset },
+        ParameterValue::String(string_value) => Raw { r#type: Kind::PARAMETER_STRING, string_value, ..unset },
         ParameterValue::ByteArray(byte_array_value) => {
-            Raw { r#type: Kind::PARAMETER_BYTE_ARRAY, byte_array_value, ..none }
+            Raw { r#type: Kind::PARAMETER_BYTE_ARRAY, byte_array_value, ..unset }
         }
         ParameterValue::BooleanArray(bool_array_value) => {
-            Raw { r#type: Kind::PARAMETER_BOOL_ARRAY, bool_array_value, ..none }
+            Raw { r#type: Kind::PARAMETER_BOOL_ARRAY, bool_array_value, ..unset }
         }
         ParameterValue::IntegerArray(integer_array_value) => {
-            Raw { r#type: Kind::PARAMETER_INTEGER_ARRAY, integer_array_value, ..none }
+            Raw { r#type: Kind::PARAMETER_INTEGER_ARRAY, integer_array_value, ..unset }
         }
         ParameterValue::DoubleArray(double_array_value) => {
-            Raw { r#type: Kind::PARAMETER_DOUBLE_ARRAY, double_array_value, ..none }
+            Raw { r#type: Kind::PARAMETER_DOUBLE_ARRAY, double_array_value, ..unset }
         }
         ParameterValue::StringArray(string_array_value) => {
-            Raw { r#type: Kind::PARAMETER_STRING_ARRAY, string_array_value, ..none }
+            Raw { r#type: Kind::PARAMETER_STRING_ARRAY, string_array_value, ..unset }
         }
     }
 }
 
-/// A value that was received; none where it is not set.
+/// Converts a received value. Returns `None` if it is not set.
 pub(crate) fn parameter(value: msg::ParameterValue) -> Option<ParameterValue> {
     use msg::ParameterType as Kind;
     Some(match value.r#type {
@@ -343,7 +350,7 @@ mod tests {
     use super::{Declared, duration, listed};
 
     #[test]
-    fn durations_that_cannot_be_used_are_refused() {
+    fn unusable_durations_are_rejected() {
         let value = ParameterValue::Double(5.0);
         let declared = Declared { name: "t", description: "", value, is_dynamic: true, check: duration };
         for seconds in [-1.0, f64::NAN, f64::INFINITY, 1e30] {

@@ -1,23 +1,23 @@
-//! Qualities of service, as the interfaces of ROS 2 have them.
+//! Quality-of-service profiles of the ROS 2 interfaces.
 
 use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
 
-/// Reliable and volatile, the last ones kept: what `rclcpp` has for a depth.
+/// Reliable and volatile with a history of `depth` samples, as in `rclcpp`.
 pub fn depth(depth: usize) -> QosProfile {
     QosProfile::default().reliability_reliable(WhenFull::DEFAULT).history(History::KeepLast { depth })
 }
 
-/// Reliable and volatile, nothing dropped.
+/// Reliable and volatile with unlimited history.
 pub fn keep_all() -> QosProfile {
     QosProfile::default().reliability_reliable(WhenFull::DEFAULT).history(History::KeepAll)
 }
 
-/// Reliable, and kept for those who come later.
+/// Reliable and transient local: late subscribers receive the last samples.
 pub fn latched(depth: usize) -> QosProfile {
     self::depth(depth).durability(Durability::TransientLocal)
 }
 
-/// What services have.
+/// Profile of services.
 pub(crate) fn service() -> QosProfile {
     depth(10)
 }

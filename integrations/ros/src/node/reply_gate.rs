@@ -1,8 +1,9 @@
-//! Holds requests back until the reply can arrive.
+//! Delays requests until the reply can arrive.
 //!
-//! A server discovers a client's request writer and reply reader separately. A reply that is written before the reply reader is matched is
-//! lost, and the client waits for ever. `rmw_send_response` of `rmw_fastrtps` and `rmw_cyclonedds` therefore waits up to 100 ms
-//! for the reader. Requests wait here instead, so that a server never blocks.
+//! A server discovers a client's request writer and reply reader separately. A reply that is
+//! written before the reply reader is matched is lost, and the client waits forever.
+//! `rmw_send_response` of `rmw_fastrtps` and `rmw_cyclonedds` therefore waits up to 100 ms for the
+//! reader. Requests wait here instead, so that a server never blocks.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::time::{Duration, Instant};

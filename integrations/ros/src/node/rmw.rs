@@ -1,7 +1,8 @@
-//! How services are mapped onto DDS, which depends on the middleware of the other side.
+//! Mapping of services to DDS, which depends on the middleware of the other side.
 //!
-//! `rmw_fastrtps` (and Connext) relate a reply to its request beside the data (OMG DDS-RPC 1.0, section 7.8.2, "enhanced");
-//! `rmw_cyclonedds` writes a header in front of the data. With the wrong mapping a service is found, and never answers.
+//! `rmw_fastrtps` and Connext relate a reply to its request outside of the data (OMG DDS-RPC 1.0,
+//! section 7.8.2, "enhanced"). `rmw_cyclonedds` writes a header before the data. With the wrong
+//! mapping a service is discovered but never answers.
 
 use std::fmt;
 
@@ -20,7 +21,7 @@ pub enum Rmw {
     Cyclonedds,
 }
 
-/// A mapping that is decided on.
+/// Mapping of services.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Mapping {
     Enhanced,
@@ -35,7 +36,7 @@ impl Mapping {
         }
     }
 
-    /// The value of `--rmw` that chooses the other one.
+    /// Value of `--rmw` that selects the other mapping.
     pub(crate) fn other(self) -> &'static str {
         match self {
             Self::Enhanced => "cyclonedds",
@@ -54,7 +55,7 @@ impl fmt::Display for Mapping {
 }
 
 impl Rmw {
-    /// The mapping that is chosen whatever is discovered.
+    /// Returns the mapping that is selected independently of discovery.
     pub(crate) fn fixed(self) -> Option<Mapping> {
         match self {
             Self::Auto => None,
@@ -64,16 +65,16 @@ impl Rmw {
     }
 }
 
-/// Who has made a participant (RTPS 2.5, section 8.3.3.1.3; the numbers are assigned by the OMG).
+/// Vendor of a participant (RTPS 2.5, section 8.3.3.1.3; ids are assigned by the OMG).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Vendor {
     /// RTI Connext, 01.01, or eProsima Fast DDS, 01.0F.
     Enhanced,
     /// Eclipse Cyclone DDS, 01.10.
     Cyclone,
-    /// `RustDDS`, 01.12: what this program uses, which speaks either.
+    /// `RustDDS`, 01.12, the library of this program, which supports both mappings.
     Own,
-    /// Another one.
+    /// Another vendor.
     Other,
 }
 
@@ -87,7 +88,7 @@ impl Vendor {
         }
     }
 
-    /// The mapping that it has, if it has only one.
+    /// Returns the mapping of the vendor, if it supports only a single one.
     pub(crate) fn mapping(self) -> Option<Mapping> {
         match self {
             Self::Enhanced => Some(Mapping::Enhanced),

@@ -1,4 +1,4 @@
-//! Services: serving them, and calling those of others.
+//! Service servers and service clients.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -20,10 +20,11 @@ use crate::node::reply_gate::ReplyGate;
 use crate::node::rmw::Mapping;
 use crate::node::{Node, Severity, client_name, dds_type, not_made};
 
-/// After a server was discovered, so long is waited for it to discover us: what it answers before is lost.
+/// Time after the discovery of a server during which it discovers this client. Its earlier replies
+/// would be lost.
 const MATCHING: Duration = Duration::from_millis(100);
 
-/// Where the answer to one request goes. Dropped without an answer, the client hears none.
+/// Sender of the reply to a request. If it is dropped, the client receives no reply.
 pub struct Responder<S: Service> {
     id: RmwRequestId,
     answers: channel::Sender<(RmwRequestId, S::Response)>,
@@ -36,59 +37,59 @@ impl<S: Service> fmt::Debug for Responder<S> {
 }
 
 impl<S: Service> Responder<S> {
-    /// Answers.
+    /// Sends the reply.
     pub fn send(self, response: S::Response) {
-        // The node may be gone.
+        // The node may no longer exist.
         let _ = self.answers.try_send((self.id, response));
     }
 }
 
-/// Why a call has no answer.
+/// Reason for a missing reply.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CallError {
-    /// Nobody serves it.
+    /// The service has no server.
     #[error("nobody serves {service} after {waited} s")]
     Absent {
-        /// Its full name.
+        /// Full name of the service.
         service: String,
-        /// In seconds.
+        /// Time waited, in seconds.
         waited: String,
     },
-    /// Whoever serves it has another type.
+    /// The server has another type.
     #[error("{service} is not what it should be: {complaint}")]
     Unfit {
-        /// Its full name.
+        /// Full name of the service.
         service: String,
-        /// What is wrong.
+        /// Difference of the types.
         complaint: String,
     },
-    /// There was no answer in time.
+    /// The reply did not arrive in time.
     #[error(
         "no answer from {service} after {waited} s; it was called with the mapping of {mapping}, `--rmw {other}` has the other one"
     )]
     Silent {
-        /// Its full name.
+        /// Full name of the service.
         service: String,
-        /// In seconds.
+        /// Time waited, in seconds.
         waited: String,
-        /// Which middleware's mapping.
+        /// Middleware whose mapping was used.
         mapping: String,
-        /// The value of `--rmw` for the other mapping.
+        /// Value of `--rmw` for the other mapping.
         other: &'static str,
     },
-    /// The answer is not a message of its type, or the request could not be written.
+    /// The reply is not a message of its type, or the request could not be written.
     #[error("{service}: {because}")]
     Broken {
-        /// Its full name.
+        /// Full name of the service.
         service: String,
-        /// What has happened.
+        /// Description of the error.
         because: String,
     },
 }
 
 type Connection<S> = (Server, Client<<S as Service>::Request, <S as Service>::Response>);
 
-/// Calls a service, one request at a time.
+/// Service client that sends a single request at a time.
 pub struct Caller<S: Service> {
     node: Arc<Node>,
     full: String,
@@ -104,43 +105,44 @@ impl<S: Service> fmt::Debug for Caller<S> {
 }
 
 impl<S: Service> Caller<S> {
-    /// The full name of the service.
+    /// Full name of the service.
     pub fn service(&self) -> &str {
         &self.full
     }
 
-    /// Whether somebody serves it now.
+    /// Returns `true` if the service has a server now.
     pub fn is_served(&self) -> bool {
         self.node.graph.server(&self.topics).is_some()
     }
 
-    /// Who serves it now, by numbers: one that is started again has another one.
+    /// Returns the GUIDs of the current servers. A restarted server has a new one.
     pub fn servers(&self) -> BTreeSet<[u8; 16]> {
         self.node.graph.readers(&self.topics.requests)
     }
 
-    /// Makes ready to call, as soon as somebody serves it, so that the first call need not wait for discovery.
+    /// Connects as soon as the service has a server, so that the first call need not wait for
+    /// discovery.
     ///
     /// # Errors
-    /// Nobody serves it in time, or with another type.
+    /// The service has no server in time, or the server has another type.
     pub async fn ready(&self, within: Duration) -> Result<(), CallError> {
         self.connect(&mut *self.connection.lock().await, within).await.map(|_| ())
     }
 
-    /// Calls it.
+    /// Calls the service.
     ///
     /// # Errors
-    /// There is no answer in time, or none that is understood.
+    /// No valid reply arrives in time.
     pub async fn call(&self, request: S::Request, within: Duration) -> Result<S::Response, CallError> {
         let begun = Instant::now();
         let mut connection = self.connection.lock().await;
         let (Server { mapping, .. }, client) = self.connect(&mut connection, within).await?;
-        let left = within.saturating_sub(begun.elapsed());
+        let remaining = within.saturating_sub(begun.elapsed());
         let broken = |because: String| CallError::Broken { service: self.full.clone(), because };
         let id = client.async_send_request(request).await.map_err(|error| broken(error.to_string()))?;
         let (mut answer, mut timer) = (
             Box::pin(client.async_receive_response(id)).fuse(),
-            futures::FutureExt::fuse(Timer::after(left)),
+            futures::FutureExt::fuse(Timer::after(remaining)),
         );
         futures::select! {
             answer = answer => answer.map_err(|error| broken(format!("the answer is none: {error}"))),
@@ -153,20 +155,20 @@ impl<S: Service> Caller<S> {
         }
     }
 
-    /// A client with the mapping of whoever serves it now.
+    /// Returns a client with the mapping of the current server.
     async fn connect<'c>(
         &self,
         connection: &'c mut Option<Connection<S>>,
         within: Duration,
     ) -> Result<&'c Connection<S>, CallError> {
         let absent = || CallError::Absent { service: self.full.clone(), waited: seconds(within) };
-        let found = self.node.graph.wait(within, |graph| graph.server(&self.topics)).await;
-        let server = found
+        let discovered = self.node.graph.wait(within, |graph| graph.server(&self.topics)).await;
+        let server = discovered
             .ok_or_else(absent)?
             .map_err(|complaint| CallError::Unfit { service: self.full.clone(), complaint })?;
         let before = connection.take();
-        let is_new = before.as_ref().is_none_or(|(own, _)| *own != server);
-        let client = match before.filter(|(own, _)| own.mapping == server.mapping) {
+        let is_new = before.as_ref().is_none_or(|(connected, _)| *connected != server);
+        let client = match before.filter(|(connected, _)| connected.mapping == server.mapping) {
             Some((_, client)) => client,
             None => self.client(server.mapping).map_err(|message| CallError::Broken {
                 service: self.full.clone(),
@@ -195,7 +197,7 @@ fn seconds(duration: Duration) -> String {
 }
 
 impl Node {
-    /// To call a service of somebody else.
+    /// Creates a client of a service.
     pub fn caller<S: Service>(self: &Arc<Self>, name: &str) -> Caller<S> {
         let full = self.resolve(name);
         self.expect_service::<S>(&full);
@@ -208,10 +210,11 @@ impl Node {
         }
     }
 
-    /// Serves a service as soon as it is known how services are mapped. The closure gets a request, and where the answer goes.
+    /// Serves a service once the mapping is known. The closure receives requests and the senders of
+    /// their replies.
     ///
     /// # Errors
-    /// The name is wrong.
+    /// The name is not a valid service name.
     pub fn serve<S: Service + 'static>(
         self: &Arc<Self>,
         name: &str,
@@ -225,14 +228,14 @@ impl Node {
             let mapping = graph.mapping().await;
             let Some(node) = weak.upgrade() else { return };
             let kind = ServiceTypeName::new(S::PACKAGE, S::NAME);
-            let made = node.inner().create_server::<S::Request, S::Response>(
+            let created = node.inner().create_server::<S::Request, S::Response>(
                 mapping.service_mapping(),
                 &service_name,
                 &kind,
                 qos::service(),
                 qos::service(),
             );
-            let server = match made {
+            let server = match created {
                 Ok(server) => server,
                 Err(error) => {
                     node.log(Severity::Fatal, &not_made(&full, &error).message);

@@ -1,4 +1,4 @@
-//! Topics.
+//! Publishers and subscriptions.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -14,14 +14,15 @@ use crate::interfaces::Msg;
 use crate::node::graph::Expected;
 use crate::node::{Node, Severity, client_name, dds_type, not_made};
 
-/// So often is said that samples of a topic are not messages of its type.
+/// Number of invalid samples of a topic per log message.
 const RUBBISH: u64 = 1000;
 
-/// So long after its beginning a subscription looks at the age of what it hears.
+/// Time after its creation during which a subscription checks the age of samples.
 const OLD: Duration = Duration::from_secs(5);
 
-/// What was said before somebody listened. Writers keep what a reader that was killed has not acknowledged, and hand it to the next one,
-/// though nobody has asked for it.
+/// Filter of samples that were published before the subscription existed. Writers keep the samples
+/// that a killed reader has not acknowledged, and send them to the next reader although it has not
+/// requested them.
 struct Old {
     since: SystemTime,
     is_wanted: bool,
@@ -30,12 +31,12 @@ struct Old {
 impl Old {
     fn is_old(&self, info: &MessageInfo) -> bool {
         let stamp = info.source_timestamp().and_then(|stamp| u64::try_from(stamp.to_nanos()).ok());
-        let said = stamp.map(|nanoseconds| UNIX_EPOCH + Duration::from_nanos(nanoseconds));
-        !self.is_wanted && said.is_some_and(|said| said < self.since)
+        let published = stamp.map(|nanoseconds| UNIX_EPOCH + Duration::from_nanos(nanoseconds));
+        !self.is_wanted && published.is_some_and(|published| published < self.since)
     }
 }
 
-/// Writes messages on a topic.
+/// Publisher of messages on a topic.
 pub struct Publisher<M: Msg> {
     inner: ros2_client::dds::Publisher<M>,
 }
@@ -47,35 +48,35 @@ impl<M: Msg> std::fmt::Debug for Publisher<M> {
 }
 
 impl<M: Msg> Publisher<M> {
-    /// Writes a message. One that cannot be written is lost, as on any topic.
+    /// Publishes a message. A message that cannot be written is lost, as on any topic.
     pub fn publish(&self, message: M) {
-        // Readers that are too slow lose samples; nobody waits for them.
+        // Slow readers lose samples, because the publisher does not wait for them.
         let _ = self.inner.publish(message);
     }
 }
 
 impl Node {
-    /// Writes on a topic.
+    /// Creates a publisher.
     ///
     /// # Errors
-    /// The name is wrong, or the topic is there with another type.
+    /// The name is wrong, or the topic exists with another type.
     pub fn publisher<M: Msg>(&self, name: &str, qos: QosProfile) -> Result<Publisher<M>, Message> {
         let full = self.resolve(name);
         let topic_name = client_name(&full)?;
         let mut node = self.inner();
-        let made = node
+        let created = node
             .create_topic(&topic_name, MessageTypeName::new(M::PACKAGE, M::NAME), &qos)
             .and_then(|topic| node.create_publisher(&topic, Some(qos)));
         drop(node);
-        let inner = made.map_err(|error| not_made(&full, &error))?;
+        let inner = created.map_err(|error| not_made(&full, &error))?;
         self.expect_message::<M>(&full);
         Ok(Publisher { inner })
     }
 
-    /// Hears a topic for as long as the node is there.
+    /// Subscribes to a topic for the lifetime of the node.
     ///
     /// # Errors
-    /// The name is wrong, or the topic is there with another type.
+    /// The name is wrong, or the topic exists with another type.
     pub fn subscribe<M: Msg>(
         self: &Arc<Self>,
         name: &str,
@@ -86,11 +87,11 @@ impl Node {
         let topic_name = client_name(&full)?;
         let qos_wants_old = qos.durability == Durability::TransientLocal;
         let mut node = self.inner();
-        let made = node
+        let created = node
             .create_topic(&topic_name, MessageTypeName::new(M::PACKAGE, M::NAME), &qos)
             .and_then(|topic| node.create_subscription::<M>(&topic, Some(qos)));
         drop(node);
-        let subscription = made.map_err(|error| not_made(&full, &error))?;
+        let subscription = created.map_err(|error| not_made(&full, &error))?;
         self.expect_message::<M>(&full);
         let (weak, begun) = (Arc::downgrade(self), Instant::now());
         let old = Old { since: SystemTime::now(), is_wanted: qos_wants_old };
@@ -110,7 +111,7 @@ impl Node {
                         }
                         wrong += 1;
                         drop(node);
-                        // An error that repeats itself must not take all of the time.
+                        // A repeated error must not consume all of the processor time.
                         Timer::after(Duration::from_millis(1)).await;
                     }
                 }

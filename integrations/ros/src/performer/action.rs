@@ -1,4 +1,4 @@
-//! An action of ROS in the place of an action of the plan.
+//! ROS actions that perform actions of a plan.
 
 use std::marker::PhantomData;
 use std::sync::Arc;
@@ -17,25 +17,26 @@ use crate::node::{Accepted, ActionCaller, GoalEnd, Node, Pursued};
 use crate::perform::{Call, End, Perform, Performance, Progress, Running};
 use crate::performer::{feedback, part};
 
-/// So long a server is waited for, and its answer to a goal.
+/// Timeout for a server, and for its answer to a goal.
 pub(super) const PATIENCE: Duration = Duration::from_secs(10);
 
-/// What an action of ROS means to an action of a plan.
+/// Mapping of an action of a plan to a ROS action.
 pub(super) trait Meaning: Action + Sized + 'static {
-    /// What the call needs beside its arguments.
+    /// Settings that a goal needs in addition to the arguments.
     type Settings: Clone + Send + Sync + 'static;
 
-    /// The goal for a call, or why there is none.
+    /// Creates the goal of a call. The error is the reason why there is none.
     fn goal(settings: &Self::Settings, call: &Call) -> Result<Self::Goal, String>;
 
-    /// How it goes.
+    /// Converts feedback.
     fn progress(call: &Call, heard: &Self::Feedback) -> Progress;
 
-    /// Why a goal that was reached, as its server says, has not done what it should.
+    /// Returns the reason why a goal that succeeded according to its server has not achieved its
+    /// purpose.
     fn shortfall(result: &Self::Result) -> Option<String>;
 }
 
-/// A client of such an action.
+/// Client of such an action.
 pub(super) struct Client<A: Meaning> {
     caller: Arc<ActionCaller<A>>,
     settings: A::Settings,
@@ -72,7 +73,7 @@ impl<A: Meaning> Perform for Client<A> {
     }
 }
 
-/// Pursues a goal to its end.
+/// Sends a goal and follows it until it ends.
 async fn follow<A: Meaning>(
     caller: &ActionCaller<A>,
     goal: A::Goal,
@@ -86,7 +87,7 @@ async fn follow<A: Meaning>(
     pursue_on(&pursued, performance, |heard| A::progress(call, heard), A::shortfall).await
 }
 
-/// Hears of a goal until it ends, and has it cancelled when that is asked for.
+/// Follows a goal until it ends, and cancels it on request.
 pub(super) async fn pursue_on<A: Action>(
     pursued: &Pursued<A>,
     performance: &Performance,
@@ -136,7 +137,7 @@ impl Meaning for SpiralSearch {
 impl Meaning for FollowPipeline {
     type Settings = ();
 
-    /// Whoever plans decides when it has been enough; so there is no time-out.
+    /// The planner decides when the inspection ends, so there is no timeout.
     fn goal((): &(), _: &Call) -> Result<FollowPipelineGoal, String> {
         Ok(FollowPipelineGoal { timeout: 0.0 })
     }

@@ -1,4 +1,5 @@
-//! An action of the plan that gives a function a design: `/<function>/change_mode` of `system_modes`.
+//! Action of a plan that sets the design of a function: `/<function>/change_mode` of
+//! `system_modes`.
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -9,7 +10,7 @@ use crate::perform::{Call, End, Perform, Running};
 use crate::performer::action::PATIENCE;
 use crate::performer::settings::argument;
 
-/// Which arguments are the function and the design.
+/// Positions of the function and the design among the arguments.
 #[derive(Debug)]
 pub(super) struct ChangeMode {
     node: Arc<Node>,

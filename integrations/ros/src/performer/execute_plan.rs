@@ -1,4 +1,5 @@
-//! PlanSys2's executor carries out a whole plan: its action `execute_plan`, in the types of its versions.
+//! Execution of a whole plan by PlanSys2's executor: its action `execute_plan`, in the types of its
+//! versions.
 
 use std::sync::Arc;
 
@@ -12,17 +13,17 @@ use crate::perform::{End, Progress, Running};
 use crate::performer::action::{PATIENCE, pursue_on};
 use crate::performer::{feedback, part};
 
-/// Versions of PlanSys2 whose executors differ.
+/// Versions of PlanSys2 with different executors.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 pub enum PlanVersion {
-    /// The executor asks PlanSys2's planner for the plan, and the goal is empty.
+    /// The executor requests the plan from PlanSys2's planner, and the goal is empty.
     Older,
-    /// The plan is the goal.
+    /// The goal contains the plan.
     #[default]
     Newer,
 }
 
-/// Has plans executed.
+/// Client of PlanSys2's executor.
 #[derive(Debug)]
 pub struct ExecutePlans {
     caller: Caller,
@@ -35,7 +36,7 @@ enum Caller {
 }
 
 impl ExecutePlans {
-    /// To call PlanSys2's executor; `server` is `/execute_plan` unless that is remapped.
+    /// Creates a client. `server` is `/execute_plan` unless that is remapped.
     pub fn new(node: &Arc<Node>, server: &str, version: PlanVersion) -> Self {
         let caller = match version {
             PlanVersion::Older => Caller::Older(Arc::new(node.action_caller(server))),
@@ -44,7 +45,7 @@ impl ExecutePlans {
         Self { caller }
     }
 
-    /// Has a plan executed. How far it is is told as a part of its actions.
+    /// Starts a plan. The progress is the completed share of its actions.
     pub fn start(&self, plan: Plan) -> Running {
         let (running, performance) = Running::pair();
         match &self.caller {
@@ -97,7 +98,7 @@ fn told_older(heard: &older::ExecutePlanFeedback) -> Progress {
     feedback(part(done, heard.total_actions as f32), heard.current_action.clone())
 }
 
-/// What is done counts whole, what is being done in part.
+/// Progress of a plan: a completed action counts as 1, a running one by its completed share.
 fn told(actions: &[ActionExecutionInfo]) -> Progress {
     let done = |action: &ActionExecutionInfo| match action.status {
         ActionExecutionInfo::SUCCEEDED => 1.0,

@@ -1,14 +1,14 @@
-//! The topic `actions_hub` of PlanSys2, on which its executor and its performers find each other: an action of the plan is done by a
-//! performer of PlanSys2, as if its executor had asked.
+//! Topic `actions_hub` of PlanSys2, by which its executor and its performers communicate. This client
+//! takes the role of the executor, so that a performer of PlanSys2 executes an action of the plan.
 //!
-//! | type | from | says |
+//! | type | from | meaning |
 //! |---|---|---|
-//! | REQUEST | executor | who does this action? again each second |
-//! | RESPONSE | performer | I |
-//! | CONFIRM, REJECT | executor | to the first: do it; to all others: no |
-//! | FEEDBACK | performer | how far it is |
-//! | FINISH | performer | it is done, with success or without |
-//! | CANCEL | executor | no more of it; nothing is answered |
+//! | REQUEST | executor | request for a performer, repeated every second |
+//! | RESPONSE | performer | offer to perform the action |
+//! | CONFIRM, REJECT | executor | confirmation to the first performer, rejection to all others |
+//! | FEEDBACK | performer | completed share |
+//! | FINISH | performer | end of the action, with or without success |
+//! | CANCEL | executor | cancellation, without a reply |
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -21,16 +21,16 @@ use crate::node::{Node, Publisher, depth};
 use crate::perform::{Call, End, Perform, Performance, Progress, Running};
 use crate::performer::feedback;
 
-/// As PlanSys2 has it.
+/// Queue depth in PlanSys2.
 pub(super) const DEPTH: usize = 100;
 
-/// So often is asked for a performer.
+/// Period of the requests for a performer.
 const AGAIN: Duration = Duration::from_secs(1);
 
-/// So long is asked for a performer.
+/// Timeout of the search for a performer.
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// The topic, and who listens to it.
+/// The topic and its listeners.
 pub(super) struct Hub {
     name: String,
     publisher: Publisher<ActionExecution>,
@@ -43,7 +43,7 @@ impl Hub {
         let heard = Arc::clone(&listeners);
         node.subscribe::<ActionExecution>("actions_hub", depth(DEPTH), move |message| {
             let mut listeners = heard.lock().unwrap_or_else(PoisonError::into_inner);
-            // Who listens no more is forgotten.
+            // Listeners that were dropped are removed.
             listeners.retain(|listener| listener.try_send(message.clone()).is_ok());
         })?;
         let publisher = node.publisher("actions_hub", depth(DEPTH))?;
@@ -52,7 +52,7 @@ impl Hub {
         Ok(Arc::new(Self { name, publisher, listeners }))
     }
 
-    /// The name by which others know this end.
+    /// Name of this participant in messages.
     pub(super) fn name(&self) -> &str {
         &self.name
     }
@@ -61,7 +61,7 @@ impl Hub {
         self.publisher.publish(message);
     }
 
-    /// All that is said from now on.
+    /// Returns a receiver of all future messages.
     pub(super) fn listen(&self) -> Receiver<ActionExecution> {
         let (sender, receiver) = channel::unbounded();
         self.listeners.lock().unwrap_or_else(PoisonError::into_inner).push(sender);
@@ -69,7 +69,7 @@ impl Hub {
     }
 }
 
-/// An action that somebody is to do, as its executor sees it.
+/// Request of an action, from the view of the executor.
 #[derive(Debug)]
 struct Asking {
     executor: String,
@@ -78,7 +78,7 @@ struct Asking {
     performer: Option<String>,
 }
 
-/// What follows from what was heard.
+/// Reaction to a message.
 #[derive(Debug, PartialEq)]
 enum Heard {
     Nothing,
@@ -151,7 +151,7 @@ async fn ask(
     heard: &Receiver<ActionExecution>,
     performance: &Performance,
 ) -> End {
-    /// What happens next.
+    /// The next event.
     enum Next {
         Heard(Option<ActionExecution>),
         Canceled,
@@ -159,7 +159,7 @@ async fn ask(
     }
     let begun = Instant::now();
     hub.say(asking.request());
-    let mut asked = Instant::now();
+    let mut last_request = Instant::now();
     loop {
         let hears = async { Next::Heard(heard.recv().await.ok()) };
         let canceled = async {
@@ -167,7 +167,7 @@ async fn ask(
             Next::Canceled
         };
         let time = async {
-            smol::Timer::after(AGAIN.saturating_sub(asked.elapsed())).await;
+            smol::Timer::after(AGAIN.saturating_sub(last_request.elapsed())).await;
             Next::Time
         };
         match smol::future::or(hears, smol::future::or(canceled, time)).await {
@@ -184,7 +184,7 @@ async fn ask(
                 return End::Canceled;
             }
             Next::Time => {
-                asked = Instant::now();
+                last_request = Instant::now();
                 if asking.performer.is_none() {
                     if begun.elapsed() > PATIENCE {
                         let seconds = PATIENCE.as_secs();
@@ -216,14 +216,14 @@ mod tests {
     }
 
     #[test]
-    fn the_first_that_answers_does_it_and_others_do_not() {
+    fn the_first_responder_is_confirmed_and_others_are_rejected() {
         let mut asking = asking();
         assert_eq!(asking.hear(&said(ActionExecution::FINISH, "one")), Heard::Nothing);
         let confirmed = Heard::Reply(said(ActionExecution::CONFIRM, "one"));
         assert_eq!(asking.hear(&said(ActionExecution::RESPONSE, "one")), confirmed);
         let rejected = Heard::Reply(said(ActionExecution::REJECT, "two"));
         assert_eq!(asking.hear(&said(ActionExecution::RESPONSE, "two")), rejected);
-        // A confirmation that was lost is said again.
+        // A lost confirmation is repeated.
         assert_eq!(asking.hear(&said(ActionExecution::RESPONSE, "one")), confirmed);
         let told = ActionExecution {
             completion: 0.5,
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_about_another_action_is_not_heard() {
+    fn messages_about_other_actions_are_ignored() {
         let mut asking = asking();
         let response = said(ActionExecution::RESPONSE, "one");
         let arguments = ActionExecution { arguments: vec!["r".to_owned()], ..response.clone() };

@@ -1,4 +1,4 @@
-//! Those who carry out actions of a plan on a robot, by the settings: see [`perform`](crate::perform).
+//! Performers of the actions of a plan, by the settings; see [`perform`](crate::perform).
 
 mod action;
 mod change_mode;
@@ -28,10 +28,10 @@ pub use execute_plan::{ExecutePlans, PlanVersion};
 pub use offer::{offer, offers};
 pub use settings::{By, Distribution, Offered, Pose, Poses};
 
-/// Whoever is to carry out actions, by the names of these.
+/// Creates the configured performers by action names.
 ///
 /// # Errors
-/// What is wrong with the names of topics, all of it.
+/// All invalid names of topics and actions.
 pub fn performers(
     node: &Arc<Node>,
     actions: &BTreeMap<String, By>,
@@ -62,8 +62,8 @@ fn performer(
             let hub = if let Some(hub) = hub.get() {
                 Arc::clone(hub)
             } else {
-                let made = Hub::new(node)?;
-                Arc::clone(hub.get_or_init(|| made))
+                let created = Hub::new(node)?;
+                Arc::clone(hub.get_or_init(|| created))
             };
             Box::new(hub)
         }
@@ -76,12 +76,12 @@ fn performer(
     })
 }
 
-/// How far along something is, of which the whole is known.
+/// Completed share of a known total.
 fn part(done: f32, whole: f32) -> Option<f32> {
     (whole > 0.0).then(|| (done / whole).clamp(0.0, 1.0))
 }
 
-/// How it goes.
+/// Creates feedback.
 fn feedback(completion: Option<f32>, text: impl Into<String>) -> Progress {
     Progress::Feedback { completion, text: text.into() }
 }

@@ -1,4 +1,4 @@
-//! Nav2: an action of the plan is a goal for `navigate_to_pose`, with the pose of one of its arguments.
+//! Nav2: an action of the plan becomes a goal for `navigate_to_pose`, with the pose of an argument.
 
 use std::num::NonZeroUsize;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use crate::performer::action::{Client, Meaning};
 use crate::performer::settings::argument;
 use crate::performer::{Distribution, Poses, feedback, part};
 
-/// What goals are made of.
+/// Settings from which goals are created.
 #[derive(Debug, Clone)]
 pub(super) struct Navigation {
     poses: Poses,
@@ -18,7 +18,7 @@ pub(super) struct Navigation {
     behavior_tree: String,
 }
 
-/// A client with the types of a distribution.
+/// Creates a client with the types of a distribution.
 pub(super) fn performer(
     node: &Arc<Node>,
     server: &str,
@@ -50,13 +50,13 @@ impl Navigation {
     }
 }
 
-/// What was travelled of the way, as far as that can be told from the time.
-fn told(gone: i32, left: i32, distance: f32, recoveries: i16) -> Progress {
-    let (gone, left) = (gone as f32, left as f32);
+/// Travelled share of the route, estimated from the times.
+fn told(elapsed: i32, remaining: i32, distance: f32, recoveries: i16) -> Progress {
+    let (elapsed, remaining) = (elapsed as f32, remaining as f32);
     let recovered = if recoveries > 0 { format!(", {recoveries} recoveries") } else { String::new() };
     let text = format!("{distance:.2} m left{recovered}");
-    // Nav2 says that no time is left before it knows.
-    feedback(if left > 0.0 { part(gone, gone + left) } else { None }, text)
+    // Nav2 reports no remaining time while it is unknown.
+    feedback(if remaining > 0.0 { part(elapsed, elapsed + remaining) } else { None }, text)
 }
 
 fn error(code: u16, text: &str) -> Option<String> {
@@ -64,7 +64,7 @@ fn error(code: u16, text: &str) -> Option<String> {
     (code != 0).then(|| format!("Nav2 says error {code}{because}"))
 }
 
-/// The types of the distributions have the same fields, and some have more.
+/// The types of the distributions have the same fields, except for additional ones.
 macro_rules! meaning {
     ($($path:ident)::+, |$result:ident| $shortfall:expr) => {
         impl Meaning for $($path)::+::action::NavigateToPose {

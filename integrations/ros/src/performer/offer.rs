@@ -1,4 +1,5 @@
-//! A performer for PlanSys2: what its executor asks for on `actions_hub` is done by whoever is configured for it here.
+//! Performer for PlanSys2: actions that its executor requests on `actions_hub` are executed by the
+//! configured performers.
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -13,36 +14,36 @@ use crate::perform::{Call, End, Perform, Progress, Running};
 use crate::performer::hub::{DEPTH, Hub};
 use crate::performer::{Offered, Poses, performers};
 
-/// So often the others hear that we are there.
+/// Period of the heartbeat.
 const HEARTBEAT: Duration = Duration::from_secs(1);
 
-/// An executor that is silent after our answer has somebody else.
+/// Time after which a silent executor is assumed to have chosen another performer.
 const SILENCE: Duration = Duration::from_secs(5);
 
-/// Where a performer is.
+/// State of a performer.
 enum Stage {
     Idle,
-    /// It has answered a request with these arguments.
+    /// The performer has responded to a request with these arguments.
     Committed(Vec<String>, Instant),
     Running(Vec<String>, Running),
 }
 
-/// A performer of one action.
+/// A performer of an action.
 struct Offer {
     hub: Arc<Hub>,
     action: String,
-    /// What arguments have to be; an empty one may be anything.
+    /// Required arguments. An empty one admits every argument.
     specialized: Vec<String>,
     performer: Arc<dyn Perform>,
     stage: Mutex<Stage>,
     status: Publisher<ActionPerformerStatus>,
 }
 
-/// Does an action for PlanSys2's executor, as long as the node is there. `specialized` are the arguments that it is for: an empty one, or
-/// one that is not there, may be anything.
+/// Performs an action for PlanSys2's executor, during the lifetime of the node. `specialized` has
+/// the required arguments. An empty or missing one admits every argument.
 ///
 /// # Errors
-/// A topic cannot be made.
+/// A topic cannot be created.
 pub fn offer(
     node: &Arc<Node>,
     action: &str,
@@ -74,10 +75,10 @@ pub fn offer(
     Ok(())
 }
 
-/// Does actions for PlanSys2's executor, by the settings.
+/// Performs actions for PlanSys2's executor, by the settings.
 ///
 /// # Errors
-/// What is wrong with the names of topics, all of it.
+/// All invalid names of topics and actions.
 pub fn offers(node: &Arc<Node>, offered: &BTreeMap<String, Offered>, poses: &Poses) -> Result<(), Errors> {
     let by = offered.iter().map(|(action, offered)| (action.clone(), offered.by.clone())).collect();
     for (action, performer) in performers(node, &by, poses)? {
@@ -163,7 +164,7 @@ impl Offer {
         }
     }
 
-    /// Tells the executor how it goes, up to the end.
+    /// Reports the progress to the executor until the action ends.
     async fn tell(&self, running: &Running) {
         loop {
             let progress = running.next().await;
@@ -179,7 +180,7 @@ impl Offer {
                 Progress::Ended(End::Succeeded) => (1.0, "done".to_owned(), true),
                 Progress::Ended(End::Failed(because)) => (0.0, because, false),
                 Progress::Ended(End::Canceled) => {
-                    // Who has cancelled it waits for nothing.
+                    // A client that cancels does not wait for a reply.
                     *stage = Stage::Idle;
                     return;
                 }

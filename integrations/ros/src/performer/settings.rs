@@ -1,4 +1,4 @@
-//! The settings of performers, and what can be wrong with them.
+//! Settings of performers.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -11,71 +11,71 @@ use crate::interfaces::geometry_msgs::msg::Pose as PoseMessage;
 use crate::interfaces::geometry_msgs::msg::{Point, PoseStamped, Quaternion};
 use crate::interfaces::std_msgs::msg::Header;
 
-/// Who carries out an action.
+/// Performer of an action.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "by", rename_all = "snake_case", deny_unknown_fields)]
 pub enum By {
-    /// Nav2, with the pose of one of the action's arguments.
+    /// Nav2, with the pose of an argument.
     NavigateToPose {
-        /// The name of Nav2's action.
+        /// Name of Nav2's action.
         #[serde(default = "navigate_to_pose")]
         server: String,
-        /// Which argument, from 1; if not given, the last.
+        /// Position of the argument from 1; by default the last.
         pose: Option<NonZeroUsize>,
-        /// Whose types.
+        /// Distribution whose types are used.
         #[serde(default)]
         types: Distribution,
-        /// A behaviour tree, as Nav2 takes it.
+        /// Behaviour tree for Nav2.
         #[serde(default)]
         behavior_tree: String,
     },
-    /// A performer of PlanSys2, over `actions_hub`.
+    /// A performer of PlanSys2 on `actions_hub`.
     ActionsHub,
-    /// The world: it is done when a `std_msgs/Bool` on a topic is true.
+    /// The environment: the action ends when a `std_msgs/Bool` on a topic is true.
     Topic {
-        /// The name of the topic.
+        /// Name of the topic.
         topic: String,
     },
-    /// `system_modes`: one argument is a function, another one the design that it is to have.
+    /// `system_modes`: an argument is a function, another one its new design.
     ChangeMode {
-        /// Which argument is the function, from 1; if not given, the last but one.
+        /// Position of the function from 1; by default the last but one.
         function: Option<NonZeroUsize>,
-        /// Which argument is the design, from 1; if not given, the last.
+        /// Position of the design from 1; by default the last.
         design: Option<NonZeroUsize>,
     },
     /// SUAVE's search.
     SpiralSearch {
-        /// The name of the action.
+        /// Name of the action.
         #[serde(default = "spiral_search")]
         server: String,
     },
     /// SUAVE's inspection.
     FollowPipeline {
-        /// The name of the action.
+        /// Name of the action.
         #[serde(default = "follow_pipeline")]
         server: String,
     },
     /// SUAVE's repair.
     RecoverThrusters {
-        /// The name of the action.
+        /// Name of the action.
         #[serde(default = "recover_thrusters")]
         server: String,
     },
     /// SUAVE's charging.
     RechargeBattery {
-        /// The name of the action.
+        /// Name of the action.
         #[serde(default = "recharge_battery")]
         server: String,
     },
 }
 
-/// An action that is done for PlanSys2's executor.
+/// An action that is performed for PlanSys2's executor.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Offered {
-    /// What its arguments have to be; an empty one, or one that is not there, may be anything.
+    /// Required arguments. An empty or missing one admits every argument.
     #[serde(default)]
     pub specialized_arguments: Vec<String>,
-    /// Who does it.
+    /// Performer of the action.
     #[serde(flatten)]
     pub by: By,
 }
@@ -100,7 +100,7 @@ fn recharge_battery() -> String {
     "/recharge_battery".to_owned()
 }
 
-/// A distribution of ROS 2, where types of Nav2 differ.
+/// Distribution of ROS 2 with its own Nav2 types.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Distribution {
@@ -115,13 +115,13 @@ pub enum Distribution {
     Rolling,
 }
 
-/// Where things are, in one frame.
+/// Poses of objects in a common frame.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Poses {
-    /// The coordinate frame.
+    /// Coordinate frame.
     #[serde(default = "map")]
     pub frame: String,
-    /// By the names of objects.
+    /// Poses by object names.
     #[serde(flatten)]
     pub places: BTreeMap<String, Pose>,
 }
@@ -136,30 +136,30 @@ fn map() -> String {
     "map".to_owned()
 }
 
-/// A place and a direction.
+/// Position and orientation.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pose {
-    /// In metres.
+    /// Coordinate in metres.
     pub x: f64,
-    /// In metres.
+    /// Coordinate in metres.
     pub y: f64,
-    /// In metres.
+    /// Coordinate in metres.
     #[serde(default)]
     pub z: f64,
-    /// The direction, counter-clockwise from the x-axis, in radians.
+    /// Orientation in radians, counter-clockwise from the x-axis.
     #[serde(default)]
     pub yaw: f64,
 }
 
 impl Poses {
-    /// The pose of an object, as of now.
+    /// Returns the pose of an object, for the current time.
     pub(super) fn find(&self, object: &str) -> Option<PoseStamped> {
         let is_it = |(name, _): &(&String, &Pose)| name.eq_ignore_ascii_case(object);
         let (_, pose) = self.places.iter().find(is_it)?;
         let half = pose.yaw / 2.0;
         Some(PoseStamped {
-            // A time of 0 is the latest that is known, for those who transform it.
+            // Time 0 selects the latest transform.
             header: Header { stamp: Time::default(), frame_id: self.frame.clone() },
             pose: PoseMessage {
                 position: Point { x: pose.x, y: pose.y, z: pose.z },
@@ -168,14 +168,14 @@ impl Poses {
         })
     }
 
-    /// That an object has no pose, and what may be meant.
+    /// Error about a missing pose, with a suggestion.
     pub(super) fn lacking(&self, object: &str) -> String {
-        let meant = did_you_mean(object, self.places.keys().map(String::as_str));
-        format!("`[poses]` has no `{object}`{meant}")
+        let suggestion = did_you_mean(object, self.places.keys().map(String::as_str));
+        format!("`[poses]` has no `{object}`{suggestion}")
     }
 }
 
-/// An argument by its number from 1, or from the end: 0 is the last.
+/// Returns an argument by its position from 1, or counted from the end, where 0 is the last.
 pub(super) fn argument(
     arguments: &[String],
     number: Option<NonZeroUsize>,
@@ -185,8 +185,8 @@ pub(super) fn argument(
         Some(number) => Some(number.get() - 1),
         None => arguments.len().checked_sub(from_end + 1),
     };
-    let found = index.and_then(|index| arguments.get(index)).map(String::as_str);
-    found.ok_or_else(|| match number {
+    let argument_text = index.and_then(|index| arguments.get(index)).map(String::as_str);
+    argument_text.ok_or_else(|| match number {
         Some(number) => format!("there is no argument {number}, but {}", arguments.len()),
         None => format!("{} arguments are too few", arguments.len()),
     })

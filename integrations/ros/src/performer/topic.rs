@@ -1,4 +1,4 @@
-//! An action that the world does: it is done when a `std_msgs/Bool` on a topic is true.
+//! Action of the environment, which ends when a `std_msgs/Bool` on a topic is true.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -8,7 +8,7 @@ use crate::interfaces::std_msgs::msg::Bool;
 use crate::node::{Node, depth};
 use crate::perform::{Call, End, Perform, Running};
 
-/// Who waits for a topic.
+/// Listeners of a topic.
 #[derive(Debug)]
 pub(super) struct Awaited {
     waiting: Arc<Mutex<Vec<smol::channel::Sender<()>>>>,
@@ -18,7 +18,7 @@ impl Awaited {
     pub(super) fn new(node: &Arc<Node>, topic: &str) -> Result<Self, Message> {
         let waiting = Arc::new(Mutex::new(Vec::<smol::channel::Sender<()>>::new()));
         let listeners = Arc::clone(&waiting);
-        // Who publishes for those who come later, and who does not, are both heard.
+        // A volatile subscription matches both latched and volatile publishers.
         node.subscribe::<Bool>(topic, depth(10), move |heard| {
             if heard.data {
                 for listener in listeners.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {

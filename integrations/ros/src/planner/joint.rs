@@ -1,4 +1,4 @@
-//! A mission whose knowledge base joins in, as `/diagnostics` have it.
+//! Mission whose knowledge base is updated from `/diagnostics`.
 
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -11,7 +11,7 @@ use metaplan::planner::Exact;
 use crate::diagnosed::Diagnosed;
 use crate::node::Node;
 
-/// The mission, and what was diagnosed since it was looked at.
+/// The mission, and the diagnostics since its last use.
 #[derive(Debug)]
 pub(crate) struct Joint {
     mission: Mutex<Mission>,
@@ -19,21 +19,21 @@ pub(crate) struct Joint {
 }
 
 impl Joint {
-    /// Listens to the diagnostics from now on.
+    /// Subscribes to the diagnostics.
     ///
     /// # Errors
-    /// The topic cannot be made.
+    /// The topic cannot be created.
     pub(crate) fn listen(node: &Arc<Node>, mission: Mission) -> Result<Arc<Self>, Errors> {
         let diagnosed = Diagnosed::hear(node, &[], || {})?;
         Ok(Arc::new(Self { mission: Mutex::new(mission), diagnosed }))
     }
 
-    /// The mission as it is now.
+    /// Returns the mission in its current state.
     pub(crate) fn mission(&self) -> Mission {
         self.lock().clone()
     }
 
-    /// The designs that are available now, as problems call them.
+    /// Returns the currently available designs, by object names.
     pub(crate) fn available(&self) -> BTreeSet<String> {
         let mission = self.lock();
         let designs = mission.knowledge().map(|knowledge| knowledge.view().function_designs());
@@ -41,10 +41,10 @@ impl Joint {
         available.map(|design| design.individual.name.to_lowercase()).collect()
     }
 
-    /// The mission, once it has taken over what the diagnostics say of what the knowledge base knows.
+    /// Locks the mission after applying the pending diagnostics.
     fn lock(&self) -> MutexGuard<'_, Mission> {
         let mut mission = self.mission.lock().unwrap_or_else(PoisonError::into_inner);
-        // What is not understood, or not known, is about something else.
+        // Invalid or unknown diagnostics concern other devices.
         for event in Observation::parse(&self.diagnosed.line()).events.into_iter().flatten() {
             let _ = match event {
                 Event::Measured { attribute, value } => {

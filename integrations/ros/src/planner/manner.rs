@@ -1,4 +1,4 @@
-//! How plans are made, as the node's parameters say.
+//! Planning parameters of the node.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -9,13 +9,13 @@ use ros2_client::ParameterValue;
 use crate::node::{Declared, Node, Severity, any_value};
 use crate::planner::Manner;
 
-/// In seconds; what PlanSys2 has.
+/// Default timeout in seconds, that of PlanSys2.
 const TIMEOUT: f64 = 15.0;
 
-/// Who has asked gives up at the time-out, so that the answer has to come before.
+/// Share of the timeout for planning. The reply must arrive before the client's timeout.
 const SHARE: f64 = 0.9;
 
-/// Further plans in the answer of `get_plan_array`.
+/// Number of alternative plans in the reply of `get_plan_array`.
 const ALTERNATIVES: usize = 3;
 
 fn declared() -> Vec<Declared> {
@@ -82,14 +82,14 @@ fn alternatives(value: &ParameterValue) -> Result<(), &'static str> {
     }
 }
 
-/// The manner that the parameters choose.
+/// Planning parameters, updated by the node's parameters.
 #[derive(Debug)]
 pub(crate) struct Chosen {
     manner: Mutex<Manner>,
 }
 
 impl Chosen {
-    /// Declares the parameters of a node that has none yet, and follows them.
+    /// Declares the planning parameters of a node without parameters, and follows their changes.
     ///
     /// # Errors
     /// The command line gives a value of another type.
@@ -110,7 +110,7 @@ impl Chosen {
         Ok(chosen)
     }
 
-    /// The manner as it is now.
+    /// Returns the current parameters.
     pub(crate) fn get(&self) -> Manner {
         self.lock().clone()
     }

@@ -1,4 +1,4 @@
-//! In the place of PlanSys2's planner.
+//! Replacement of PlanSys2's planner.
 
 mod joint;
 mod manner;

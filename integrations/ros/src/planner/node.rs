@@ -1,8 +1,10 @@
-//! PlanSys2's planner node: `planner/get_plan`, `planner/get_plan_array`, `planner/validate_domain`, the parameters that PlanSys2 sets, and
-//! the states by which its lifecycle manager starts it.
+//! PlanSys2's planner node: the services `planner/get_plan`, `planner/get_plan_array` and
+//! `planner/validate_domain`, the parameters that PlanSys2 sets, and the lifecycle by which its
+//! manager starts the node.
 //!
-//! Each request is planned on a thread of its own, so that the node answers all others meanwhile. With a mission, its knowledge base joins
-//! in, and hears `/diagnostics`.
+//! Each request is planned on a separate thread, so that the node answers other requests in the
+//! meantime. With a mission, its knowledge base restricts the designs and is updated from
+//! `/diagnostics`.
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -25,27 +27,28 @@ use crate::planner::manner::Chosen;
 use crate::planner::solve::{DOMAIN, Found, Manner, NoPlan, PROBLEM, Request, check_domain, solve};
 use crate::planner::told::Told;
 
-/// Plans may nest deeply.
+/// Stack size of planning threads: syntax trees may be deeply nested.
 const STACK: usize = 64 << 20;
 
-/// So many requests are planned at a time; who asks for more is told so.
+/// Limit on concurrent requests. Further requests are refused.
 const MOST: usize = 8;
 
 /// The planner behind the services.
 struct Planner {
     node: Arc<Node>,
-    /// Requests that are being planned.
+    /// Number of requests being planned.
     busy: AtomicUsize,
-    /// The mission whose knowledge base joins in, as the diagnostics have it.
+    /// Mission whose knowledge base restricts the designs.
     joint: Option<Arc<Joint>>,
     manner: Arc<Chosen>,
     told: Told,
 }
 
-/// Serves as PlanSys2's planner. The node has no parameters yet; it is not configured, and its lifecycle is returned.
+/// Serves as PlanSys2's planner. The node must have no parameters yet. Returns its lifecycle, which
+/// is unconfigured.
 ///
 /// # Errors
-/// A parameter of the command line is wrong, or a topic cannot be made.
+/// A parameter of the command line is wrong, or a topic cannot be created.
 pub fn serve(node: &Arc<Node>, setup: Option<Setup>) -> Result<Arc<Lifecycle>, Errors> {
     let manner = Chosen::declare(node)?;
     let joint = setup.map(|setup| Joint::listen(node, setup.mission)).transpose()?;
@@ -56,25 +59,26 @@ pub fn serve(node: &Arc<Node>, setup: Option<Setup>) -> Result<Arc<Lifecycle>, E
         manner,
         told: Told::new(node)?,
     });
-    let one = |message: Message| vec![message];
-    let lifecycle = Lifecycle::serve(node, |_| true).map_err(one)?;
-    planner.answer(&lifecycle).map_err(one)?;
+    let to_errors = |message: Message| vec![message];
+    let lifecycle = Lifecycle::serve(node, |_| true).map_err(to_errors)?;
+    planner.answer(&lifecycle).map_err(to_errors)?;
     Ok(lifecycle)
 }
 
-/// What the planner is told.
+/// Options of the planner.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
-    /// The manifest of a mission whose knowledge base joins in.
+    /// Manifest of a mission whose knowledge base restricts the designs.
     pub mission: Option<PathBuf>,
-    /// How the mission meets the robot: who carries out actions for PlanSys2's executor.
+    /// Settings of the robot, with the performers of actions for PlanSys2's executor.
     pub settings: Option<PathBuf>,
 }
 
-/// So often is looked whether to stop.
+/// Polling interval of the stop flag.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Serves as PlanSys2's planner until told to stop, and does the actions that the settings offer.
+/// Serves as PlanSys2's planner until `stop` is set, and performs the actions that the settings
+/// offer.
 ///
 /// # Errors
 /// The mission, the settings or a parameter of the command line is wrong.
@@ -112,9 +116,9 @@ impl Planner {
         self.node.serve::<GetPlanArray>("planner/get_plan_array", move |request, answer| {
             let is_ready = is_ready(&phase);
             planner.aside("get_plan_array", move |planner| {
-                let most = planner.manner.get().alternatives;
-                let found = planner.plan(is_ready, request.domain, request.problem, most);
-                answer.send(get_plan_array_response(found));
+                let alternatives = planner.manner.get().alternatives;
+                let planned = planner.plan(is_ready, request.domain, request.problem, alternatives);
+                answer.send(get_plan_array_response(planned));
             });
         })?;
         let (planner, phase) = (Arc::clone(self), Arc::clone(lifecycle));
@@ -126,11 +130,11 @@ impl Planner {
         })
     }
 
-    /// Does something on a thread of its own.
+    /// Runs work on a separate thread.
     fn aside(self: &Arc<Self>, name: &str, work: impl FnOnce(&Self) + Send + 'static) {
         let planner = Arc::clone(self);
         if let Err(error) = on_a_thread(name, move || work(&planner)) {
-            // Who has asked hears nothing, and gives up in time.
+            // The client receives no reply and times out.
             self.node.log(Severity::Error, &format!("{name}: there is no further thread: {error}"));
         }
     }
@@ -149,9 +153,9 @@ impl Planner {
             self.busy.fetch_sub(1, Ordering::Relaxed);
             return Err(NoPlan::None(format!("{MOST} other plans are being looked for")));
         }
-        let found = self.plan_now(domain, problem, alternatives);
+        let planned = self.plan_now(domain, problem, alternatives);
         self.busy.fetch_sub(1, Ordering::Relaxed);
-        found
+        planned
     }
 
     fn plan_now(&self, domain: String, problem: String, alternatives: usize) -> Result<Found, NoPlan> {
@@ -162,16 +166,16 @@ impl Planner {
             problem: Source::new(PROBLEM, problem),
             joint: joint.as_ref(),
         };
-        let found = solve(request, &manner);
-        self.told.tell(&found);
-        found
+        let planned = solve(request, &manner);
+        self.told.tell(&planned);
+        planned
     }
 }
 
-/// Plans, or whatever takes long, on a thread of its own.
+/// Runs long work on a separate thread with a large stack.
 ///
 /// # Errors
-/// There is no further thread.
+/// The thread cannot be created.
 pub(crate) fn on_a_thread(name: &str, work: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
     std::thread::Builder::new().name(name.to_owned()).stack_size(STACK).spawn(work).map(|_| ())
 }
@@ -182,7 +186,7 @@ fn is_ready(lifecycle: &Lifecycle) -> bool {
     matches!(lifecycle.phase(), Phase::Inactive | Phase::Active)
 }
 
-/// The plan as PlanSys2 has it; times are in seconds.
+/// Converts a plan to PlanSys2's message, with times in seconds.
 pub(crate) fn plan_message(lines: &[PlanLine]) -> Plan {
     let item = |line: &PlanLine| PlanItem {
         time: line.start.to_f64() as f32,

@@ -1,8 +1,9 @@
-//! A domain and a problem, as PlanSys2 sends them → the best plan, or the reason why there is none.
+//! Planning for PlanSys2: domain and problem to the best plan, or to the reason why there is none.
 //!
-//! PlanSys2 leaves the metric out of its problems; so a default metric can be given. Durative actions overlap, as POPF has them, and the
-//! makespan counts where there is no metric; if no such plan is found in time, actions follow one another. With a knowledge base
-//! they always do: which design a function has is one choice at a time.
+//! PlanSys2's problems have no metric, so a default metric can be given. Durative actions may
+//! overlap, as in POPF, and the makespan is minimised if there is no metric. If no such plan is
+//! found in time, or with a knowledge base, plans are sequential: a function has a single design at
+//! a time.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -21,49 +22,49 @@ use metaplan::planner::{
 };
 use serde_json::{Value, json};
 
-/// What is to be planned.
+/// Planning request.
 #[derive(Debug, Clone)]
 pub struct Request<'r> {
     /// The domain.
     pub domain: Source,
     /// The problem.
     pub problem: Source,
-    /// A mission whose knowledge base and bindings join in.
+    /// Mission whose knowledge base and bindings are applied.
     pub joint: Option<&'r Mission>,
 }
 
-/// How it is to be planned.
+/// Planning parameters.
 #[derive(Debug, Clone)]
 pub struct Manner {
-    /// What is minimised where the problem has no metric: an expression as in a metric, or a function's name.
+    /// Default metric if the problem has none: an expression, or the name of a function.
     pub metric: Option<String>,
-    /// How long a plan is looked for.
+    /// Time limit of planning.
     pub time_limit: Duration,
-    /// Whether actions may overlap: if not said, durative ones without a knowledge base do.
+    /// `true` if actions may overlap; by default durative actions without a knowledge base.
     pub overlap: Option<bool>,
-    /// Up to so many further plans that are as good.
+    /// Maximum number of alternative optimal plans.
     pub alternatives: usize,
 }
 
-/// What was found.
+/// Result of planning.
 #[derive(Debug, Clone)]
 pub struct Found {
-    /// The best plan, and further ones that are as good.
+    /// The best plan, followed by alternatives of the same cost.
     pub plans: Vec<Vec<PlanLine>>,
-    /// For each action of the best plan its functions and their designs.
+    /// Functions and designs of each action of the best plan.
     pub configuration: Vec<Vec<(String, String)>>,
-    /// Its cost by the metric.
+    /// Cost by the metric.
     pub cost: Exact,
-    /// Whether it is proved that nothing is better.
+    /// `true` if the plan is proved to be optimal.
     pub proved: bool,
-    /// What is claimed of it, in a sentence.
+    /// Claim about the plan, in a sentence.
     pub verdict: String,
-    /// What is questionable about the domain and the problem.
+    /// Warnings about the domain and the problem.
     pub warnings: Vec<Message>,
 }
 
 impl Found {
-    /// The best plan for programs, as the adaptation loop says it, with its times.
+    /// Serialises the best plan with its times, in the format of the adaptation loop.
     pub fn to_json(&self) -> Value {
         let number = |number: &Exact| {
             let text = number.to_string();
@@ -89,21 +90,22 @@ impl Found {
     }
 }
 
-/// Why there is no plan.
+/// Reason why there is no plan.
 #[derive(Debug, Clone)]
 pub enum NoPlan {
-    /// The domain, the problem or what the knowledge base contributes is wrong.
+    /// The domain, the problem or the contribution of the knowledge base is wrong.
     Input(Errors),
-    /// They have something that cannot be planned with.
+    /// The input uses features that the planner does not support.
     Unsupported(Errors),
-    /// There is none, or none was found: why, in a sentence.
+    /// No plan exists or none was found; contains the reason.
     None(String),
     /// A fault of this program.
     Fault(String),
 }
 
 impl NoPlan {
-    /// The reason on one line, for PlanSys2's `error_info`, with the openings that PlanSys2 itself has.
+    /// Formats the reason on a single line for PlanSys2's `error_info`, beginning like PlanSys2's
+    /// own messages.
     pub fn text(&self) -> String {
         match self {
             Self::Input(messages) => {
@@ -128,12 +130,12 @@ impl NoPlan {
     }
 }
 
-/// What domains are called in messages.
+/// File name of domains in messages.
 pub(crate) const DOMAIN: &str = "domain";
-/// What problems are called in messages.
+/// File name of problems in messages.
 pub(crate) const PROBLEM: &str = "problem";
 
-/// Errors with their places, on one line.
+/// Formats errors with their locations on a single line.
 fn one_line(messages: &[Message]) -> String {
     let texts = messages.iter().filter(|message| message.is_error()).map(|message| {
         let place = match (&message.file, message.line, message.column) {
@@ -146,13 +148,14 @@ fn one_line(messages: &[Message]) -> String {
     texts.collect::<Vec<_>>().join("; ")
 }
 
-/// Of the time, so much is for plans whose actions overlap; the rest is for sequences if there is none.
+/// Share of the time for plans with overlapping actions. The remaining time is for sequential
+/// plans.
 const SHARE: f64 = 0.7;
 
-/// Plans.
+/// Computes a plan.
 ///
 /// # Errors
-/// Why there is no plan.
+/// The reason why there is no plan.
 pub fn solve(request: Request<'_>, manner: &Manner) -> Result<Found, NoPlan> {
     let solved = catch_unwind(AssertUnwindSafe(|| solve_or_panic(request, manner)));
     solved.unwrap_or_else(|panic| Err(NoPlan::Fault(Message::of_panic(&*panic).message.clone())))
@@ -193,7 +196,7 @@ fn solve_or_panic(Request { domain, problem, joint }: Request<'_>, manner: &Mann
     })
 }
 
-/// A mission to plan, with its problem complete.
+/// A mission with its completed problem.
 struct Asked<'a> {
     mission: &'a Mission,
     problem: &'a Problem,
@@ -201,7 +204,8 @@ struct Asked<'a> {
 }
 
 impl Asked<'_> {
-    /// A plan whose actions overlap, or that there is none; nothing if that is not known in time, or cannot be planned so.
+    /// Computes a plan with overlapping actions, or a proof that there is none. Returns `None` on
+    /// timeout or for unsupported features.
     fn overlapping(&self, limits: &Limits) -> Result<Option<Solution>, NoPlan> {
         let separation = instant();
         let Ok(task) = self.mission.ground_concurrent(self.problem, &[], &separation, limits) else {
@@ -215,7 +219,7 @@ impl Asked<'_> {
         Ok(Some(solution).filter(|solution| solution.status != Status::Unknown))
     }
 
-    /// A plan whose actions follow one another, and others that are as good.
+    /// Computes a sequential plan and alternatives of the same cost.
     fn sequence(&self, limits: Limits) -> Result<(Solution, Vec<Plan>), NoPlan> {
         let config = Config::default().with_limits(limits);
         let task = match self.mission.ground(self.problem, &[], &config.limits) {
@@ -234,8 +238,12 @@ impl Asked<'_> {
             return Err(NoPlan::Fault(contradiction.clone()));
         }
         let reading = Reading::sequential(task.is_timed());
-        let most = self.manner.alternatives;
-        let found = if most > 0 { alternatives(&task, &solution, most, &config) } else { None };
+        let max_alternatives = self.manner.alternatives;
+        let found = if max_alternatives > 0 {
+            alternatives(&task, &solution, max_alternatives, &config)
+        } else {
+            None
+        };
         solution.plan =
             solution.plan.map(|plan| self.confirmed(plan, &reading, &config.limits)).transpose()?;
         let others = found.into_iter().flat_map(|found| found.plans);
@@ -244,7 +252,7 @@ impl Asked<'_> {
         Ok((solution, others))
     }
 
-    /// A plan of a task whose numbers are too large for formulas.
+    /// Computes a plan of a task whose numbers exceed the range of the SAT encoding.
     fn exact(&self, config: &Config) -> Result<Solution, NoPlan> {
         let task =
             self.mission.ground_exact(self.problem, &[], &config.limits).map_err(NoPlan::Unsupported)?;
@@ -272,17 +280,17 @@ impl Asked<'_> {
             let limits = Limits::none().with_time(self.manner.time_limit);
             let config = Config::default().with_limits(limits);
             let blocking = blocking(self.mission, self.problem, &config);
-            let more = blocking.as_ref().map(ToString::to_string);
-            text.extend(more.map(|more| format!("; {more}")));
+            let explanation = blocking.as_ref().map(ToString::to_string);
+            text.extend(explanation.map(|explanation| format!("; {explanation}")));
         }
         NoPlan::None(text)
     }
 }
 
-/// That a text is a valid domain.
+/// Checks that a text is a valid domain.
 ///
 /// # Errors
-/// All that is wrong with it.
+/// All errors of the domain.
 pub(crate) fn check_domain(domain: &Source) -> Result<(), Errors> {
     let (tree, mut found) = pddl::parse_domain(domain);
     if let Some(tree) = &tree {

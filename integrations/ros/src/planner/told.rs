@@ -1,5 +1,5 @@
-//! What is found, told to people and programs: in the log, and as JSON on the topic `~/plan`, with the designs for which PlanSys2's plans
-//! have no place.
+//! Publication of planning results: in the log, and as JSON on the topic `~/plan`, with the
+//! designs, which PlanSys2's plans cannot contain.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::interfaces::std_msgs::msg::String as Text;
 use crate::node::{Node, Publisher, Severity, latched};
 use crate::planner::{Found, NoPlan};
 
-/// Tells it.
+/// Publisher of planning results.
 #[derive(Debug)]
 pub(crate) struct Told {
     node: Arc<Node>,
@@ -17,16 +17,16 @@ pub(crate) struct Told {
 }
 
 impl Told {
-    /// Makes the topic.
+    /// Creates the topic.
     ///
     /// # Errors
-    /// It cannot be made.
+    /// The topic cannot be created.
     pub(crate) fn new(node: &Arc<Node>) -> Result<Self, Errors> {
         let plans = node.publisher("~/plan", latched(1))?;
         Ok(Self { node: Arc::clone(node), plans })
     }
 
-    /// Tells what was found, or why nothing was.
+    /// Publishes a plan, or the reason why there is none.
     pub(crate) fn tell(&self, found: &Result<Found, NoPlan>) {
         match found {
             Ok(found) => {

@@ -1,4 +1,5 @@
-//! Goals, diagnostics and answers of functions to designs that are asked for: what the reasoner decides, without a clock and a network.
+//! Decisions of the reasoner about goals, diagnostics and replies of functions, without clock and
+//! network.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -13,37 +14,37 @@ use crate::interfaces::mros2_msgs::msg::QoS;
 use crate::manager::Functions;
 use crate::reasoner::memory::{Memory, Remembered};
 
-/// A design that was refused is tried again so much later.
+/// Delay until a refused design is retried.
 const REFUSED: Duration = Duration::from_secs(60);
 
-/// A design for which nobody answered is tried again so much later at first; twice as late with each time.
+/// Initial delay until a design without a reply is retried; doubled with each attempt.
 const SILENT: Duration = Duration::from_secs(2);
 
-/// What is to be done.
+/// Output of the reasoner.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Output {
-    /// To ask for the mode of a function.
+    /// Request the mode of a function.
     Configure(Wanted),
-    /// To tell how an objective is.
+    /// Publish the status of an objective.
     Feedback(GoalId, QoS),
-    /// A goal may be cancelled, and has ended then; or not.
+    /// Answer a cancel request. `true` if the goal has ended.
     Cancelled(GoalId, bool),
-    /// To publish an event.
+    /// Publish an event.
     Event(Value),
-    /// To log something that is wrong.
+    /// Log a warning.
     Warn(String),
 }
 
-/// A mode that is asked for.
+/// A requested mode.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Wanted {
     pub(super) function: String,
     pub(super) mode: String,
-    /// The keeper's effect; none where the function is given up.
+    /// Effect of the keeper that requires the mode. `None` if the function is released.
     effect: Option<u64>,
 }
 
-/// What has come of it.
+/// Outcome of a request.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Outcome {
     Done,
@@ -51,35 +52,35 @@ pub(super) enum Outcome {
     Failed(String),
 }
 
-/// An objective that somebody pursues.
+/// An objective of a client.
 #[derive(Debug)]
 struct Pursued {
     objective: String,
     function: String,
     always_improve: bool,
-    /// The design that its function has, as far as it has said yes.
+    /// Confirmed design of the function.
     design: Option<String>,
-    /// A cancellation waits for its function.
+    /// `true` while cancellation waits for the function.
     cancelling: bool,
-    /// What was wanted, for who comes after a restart.
+    /// The goal as requested, to restore it after a restart.
     wanted: QoS,
 }
 
-/// What the reasoner knows beside the knowledge base.
+/// State of the reasoner in addition to the knowledge base.
 #[derive(Debug)]
 pub(super) struct Keeping {
     keeper: Keeper,
     functions: Functions,
     goals: BTreeMap<GoalId, Pursued>,
-    /// Modes that were asked for without an answer, by function, with the design.
+    /// Requested modes without a reply, by function, with the design.
     pending: BTreeMap<String, (Wanted, Option<String>)>,
-    /// Designs that could not be had, with the time from which they are tried again, and how often nobody answered.
+    /// Failed designs with the time of the next attempt and the number of missing replies.
     failed: BTreeMap<String, (Duration, u32)>,
-    /// What was measured last.
+    /// Last measured values.
     measured: BTreeMap<String, String>,
-    /// The last event about each thing.
+    /// Last event by subject.
     reports: BTreeMap<String, String>,
-    /// Designs that functions have from before a restart.
+    /// Designs of functions from before a restart.
     had: BTreeMap<String, String>,
     outputs: Vec<Output>,
     count: u64,
@@ -101,22 +102,22 @@ impl Keeping {
         }
     }
 
-    /// The functions that have designs.
+    /// Returns the functions that have designs.
     pub(super) fn functions(&self) -> Vec<String> {
         self.keeper.configurator().functions()
     }
 
-    /// What a function is called on the robot.
+    /// Returns the name of a function on the robot.
     pub(super) fn system<'s>(&'s self, function: &'s str) -> &'s str {
         self.functions.system(function)
     }
 
-    /// What is to be done since it was asked last.
+    /// Returns the outputs since the last call.
     pub(super) fn outputs(&mut self) -> Vec<Output> {
         std::mem::take(&mut self.outputs)
     }
 
-    /// What is to be known after a restart.
+    /// Returns the state that must survive a restart.
     pub(super) fn memory(&self) -> Memory {
         let goal = |(goal, own): (&GoalId, &Pursued)| Remembered {
             goal: goal.uuid.into_bytes(),
@@ -127,8 +128,8 @@ impl Keeping {
         Memory::new(self.reports.clone(), goals)
     }
 
-    /// Goes on after a restart: functions that have the design that is right are not asked for it again. `modes` are those that they were
-    /// found with, as far as they say.
+    /// Restores the state after a restart. Functions that already have the right design are not
+    /// requested again. `modes` are the modes found on the robot, if known.
     pub(super) fn remember(&mut self, memory: Memory, goals: &[GoalId], modes: &BTreeMap<String, String>) {
         for line in memory.reports.values() {
             self.hear(line);
@@ -146,32 +147,32 @@ impl Keeping {
         self.had.clear();
     }
 
-    /// A goal is wanted: why it cannot be pursued, if it cannot.
+    /// Returns the reason why a goal must be rejected, if there is one.
     pub(super) fn refused(&self, wanted: &QoS) -> Option<String> {
         let QoS { objective_type: function, .. } = wanted;
-        let known = self.functions();
-        if known.iter().all(|own| own != function) {
+        let functions = self.functions();
+        if functions.iter().all(|known| known != function) {
             return Some(format!(
                 "no design is for the function `{function}`; designs are for {}",
-                known.join(", ")
+                functions.join(", ")
             ));
         }
-        let bad = wanted
+        let invalid = wanted
             .qos
             .iter()
             .find(|pair| pair.value.trim().parse::<f64>().is_ok_and(f64::is_finite).eq(&false))?;
-        Some(format!("the requirement {} is `{}`, which is not a number", bad.key, bad.value))
+        Some(format!("the requirement {} is `{}`, which is not a number", invalid.key, invalid.value))
     }
 
-    /// Begins to pursue a goal that is not refused.
+    /// Starts to pursue a goal that is not rejected.
     pub(super) fn pursue(&mut self, goal: GoalId, wanted: &QoS) {
         self.count += 1;
-        let asked = wanted.objective_id.trim();
-        let is_taken = self.goals.values().any(|own| own.objective == asked);
-        let objective = if asked.is_empty() || is_taken {
+        let requested = wanted.objective_id.trim();
+        let is_taken = self.goals.values().any(|own| own.objective == requested);
+        let objective = if requested.is_empty() || is_taken {
             format!("obj_{}_{}", wanted.objective_type, self.count)
         } else {
-            asked.to_owned()
+            requested.to_owned()
         };
         let requirements: Vec<String> = wanted
             .qos
@@ -198,7 +199,7 @@ impl Keeping {
         self.tell(goal);
     }
 
-    /// A goal is to be cancelled: first its function gives up its design.
+    /// Cancels a goal. Its function is released first.
     pub(super) fn cancel(&mut self, goal: GoalId) {
         let Some(pursued) = self.goals.get_mut(&goal) else {
             self.outputs.push(Output::Cancelled(goal, false));
@@ -215,7 +216,7 @@ impl Keeping {
         self.outputs.push(Output::Configure(wanted));
     }
 
-    /// A line of events, as a loop reads them.
+    /// Handles a line of events in the format of the loop.
     pub(super) fn hear(&mut self, line: &str) {
         let observation = Observation::parse(line);
         for event in observation.events.iter().flatten() {
@@ -237,7 +238,7 @@ impl Keeping {
 
     fn take(&mut self, answers: Vec<KeeperAnswer>) {
         for answer in answers {
-            // Answers are always data.
+            // Serialisation cannot fail: answers consist of texts and numbers.
             self.outputs.push(Output::Event(serde_json::to_value(&answer).unwrap_or_default()));
             match answer {
                 KeeperAnswer::Service(Service::Reconfigure {
@@ -265,7 +266,7 @@ impl Keeping {
         }
     }
 
-    /// A function has answered, or has not.
+    /// Handles the outcome of a request.
     pub(super) fn answered(&mut self, wanted: &Wanted, outcome: Outcome, now: Duration) {
         let is_awaited = self.pending.get(&wanted.function).is_some_and(|(own, _)| own == wanted);
         let Some((_, design)) = is_awaited.then(|| self.pending.remove(&wanted.function)).flatten() else {
@@ -297,7 +298,7 @@ impl Keeping {
         }
     }
 
-    /// A function has a design.
+    /// Handles a confirmed design.
     fn has(&mut self, function: &str, design: &str, effect: Option<u64>) {
         self.failed.remove(design);
         if let Some(effect) = effect {
@@ -333,7 +334,7 @@ impl Keeping {
         })));
     }
 
-    /// A design could not be had: it is not realisable for a while.
+    /// Handles a design that could not be set: it counts as not realisable for a while.
     fn could_not(&mut self, wanted: &Wanted, design: &str, outcome: &Outcome, now: Duration) {
         self.complain(wanted, outcome);
         let times = self.failed.get(design).map_or(0, |(_, times)| *times);
@@ -346,12 +347,12 @@ impl Keeping {
         if !self.pending.contains_key(&wanted.function)
             && let Some(effect) = wanted.effect
         {
-            // Nothing else serves: it has the design of before.
+            // No alternative exists: the function keeps its former design.
             self.hear(&Event::ReconfigurationFailed { effect }.to_json().to_string());
         }
     }
 
-    /// Time passes: designs that could not be had are tried again, and objectives are told of.
+    /// Retries failed designs whose delay has passed, and publishes the status of objectives.
     pub(super) fn tick(&mut self, now: Duration) {
         let due: Vec<String> = self
             .failed
@@ -371,7 +372,7 @@ impl Keeping {
         }
     }
 
-    /// How an objective is, as MROS tells it.
+    /// Publishes the status of an objective in MROS's format.
     fn tell(&mut self, goal: GoalId) {
         let Some(own) = self.goals.get(&goal) else { return };
         let objectives = self.keeper.configurator().objectives();
@@ -382,7 +383,7 @@ impl Keeping {
             .unwrap_or_else(|| "IN_PROGRESS".to_owned());
         let mode = own.design.as_ref().map(|design| self.functions.mode(&own.function, design).to_owned());
         let pair = |(key, value): (&String, &String)| KeyValue { key: key.clone(), value: value.clone() };
-        let told = QoS {
+        let status = QoS {
             objective_id: own.objective.clone(),
             objective_type: own.function.clone(),
             objective_status: status,
@@ -390,7 +391,7 @@ impl Keeping {
             always_improve: own.always_improve,
             qos: self.measured.iter().map(pair).collect(),
         };
-        self.outputs.push(Output::Feedback(goal, told));
+        self.outputs.push(Output::Feedback(goal, status));
     }
 }
 

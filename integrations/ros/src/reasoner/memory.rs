@@ -1,6 +1,7 @@
-//! What a reasoner has to know after a restart: the goals that it pursues, the designs that they have, and what was reported last.
+//! State of a reasoner that must survive a restart: its goals, their designs, and the latest
+//! reports.
 //!
-//! It is one file, which is replaced as a whole, whenever the program ends.
+//! The state is a single file, which is replaced atomically on changes.
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
@@ -12,14 +13,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::interfaces::mros2_msgs::msg::QoS;
 
-/// The version of the file.
+/// Version of the file format.
 const FORMAT: &str = "metaplan-reasoner/1";
 
-/// Everything that is kept.
+/// Contents of the file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Memory {
     format: String,
-    /// The last event about each thing, by what it is about.
+    /// Last event by subject.
     pub(super) reports: BTreeMap<String, String>,
     pub(super) goals: Vec<Remembered>,
 }
@@ -27,15 +28,15 @@ pub(super) struct Memory {
 /// A goal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Remembered {
-    /// The number that its client has given it.
+    /// Goal id of the client.
     pub(super) goal: [u8; 16],
-    /// What was wanted, with the name that the objective has.
+    /// Requested objective, with its final name.
     pub(super) wanted: QoS,
-    /// The design that its function has.
+    /// Design of the function.
     pub(super) design: Option<String>,
 }
 
-/// Where it is kept.
+/// File of the state.
 #[derive(Debug)]
 pub(super) struct MemoryFile {
     path: PathBuf,
@@ -49,7 +50,7 @@ impl Memory {
 }
 
 impl MemoryFile {
-    /// Opens the file in a directory, which is made if there is none.
+    /// Opens the file in a directory, which is created if needed.
     ///
     /// # Errors
     /// The directory cannot be used, or the file is damaged.
@@ -71,15 +72,15 @@ impl MemoryFile {
         Ok(Self { path, last })
     }
 
-    /// What was kept.
+    /// Returns the stored state.
     pub(super) fn read(&self) -> Memory {
         self.last.clone()
     }
 
-    /// Keeps this, if it is something else than before.
+    /// Stores the state if it has changed.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The file cannot be written.
     pub(super) fn write(&mut self, memory: Memory) -> Result<(), Message> {
         if memory == self.last {
             return Ok(());

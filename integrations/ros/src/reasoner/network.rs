@@ -1,4 +1,4 @@
-//! The reasoner on the network: the action that it serves, the diagnostics that it hears, and the services that it calls.
+//! Network side of the reasoner: its action server, subscriptions and service clients.
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -23,13 +23,13 @@ use crate::node::{
 use crate::reasoner::keeping::{Keeping, Outcome, Output, Wanted};
 use crate::reasoner::memory::{MemoryFile, Remembered};
 
-/// How long a function may take to change its mode.
+/// Timeout of a mode change.
 const TIMEOUT: Duration = Duration::from_secs(5);
 
-/// So long a function may take to say which mode it has.
+/// Timeout of a function's reply with its mode.
 const LOOK: Duration = Duration::from_secs(2);
 
-/// What is heard.
+/// Input of the reasoner.
 enum Input {
     Wanted(Offer, QoS),
     Cancel(GoalId, CancelRequest),
@@ -37,21 +37,21 @@ enum Input {
     Answered(Wanted, Outcome),
 }
 
-/// Everything that the reasoner hears from and asks of others.
+/// All topics, services and actions of the reasoner.
 pub(super) struct Network {
     node: Arc<Node>,
     keeping: Keeping,
     goals: Arc<Goals<ControlQos>>,
-    /// Cancellations that wait for an answer.
+    /// Cancel requests without an answer.
     cancels: BTreeMap<GoalId, CancelRequest>,
     bridge: Arc<Caller<MetacontrolFD>>,
     systems: BTreeMap<String, Arc<Caller<ChangeMode>>>,
     calling: BTreeMap<String, Task<()>>,
     diagnosed: Diagnosed,
     events: Publisher<std_msgs::msg::String>,
-    /// Milliseconds.
+    /// Period of status messages in milliseconds.
     period: Arc<AtomicU64>,
-    /// Whether it does its work, as its lifecycle says.
+    /// `true` while the lifecycle state is active.
     active: Arc<AtomicBool>,
     memory: Option<MemoryFile>,
     sender: Sender<Input>,
@@ -65,7 +65,7 @@ impl Network {
         rules: &[DiagnosticRule],
         memory: Option<MemoryFile>,
     ) -> Result<Self, Errors> {
-        let one = |message: Message| vec![message];
+        let to_errors = |message: Message| vec![message];
         let period = node.declare_seconds(
             "reasoning_period",
             "How often is told how objectives are, in seconds; what changes is told at once.",
@@ -74,7 +74,7 @@ impl Network {
         let (sender, inputs) = mpsc::channel();
         let heard = sender.clone();
         let diagnosed =
-            Diagnosed::hear(node, rules, move || drop(heard.send(Input::Diagnosed))).map_err(one)?;
+            Diagnosed::hear(node, rules, move || drop(heard.send(Input::Diagnosed))).map_err(to_errors)?;
         let heard = sender.clone();
         let goals = node.serve_action::<ControlQos>("/mros/objective", move |event| {
             let input = match event {
@@ -91,19 +91,19 @@ impl Network {
         let systems = systems.collect();
         let bridge = Arc::new(node.caller::<MetacontrolFD>("/mros/request_configuration"));
         let client = Arc::clone(&bridge);
-        // So that the first call need not wait for discovery.
+        // Connects in advance, so that the first call need not wait for discovery.
         smol::spawn(async move { while client.ready(TIMEOUT).await.is_err() {} }).detach();
-        let active = Lifecycle::activated(node).map_err(one)?;
+        let active = Lifecycle::activated(node).map_err(to_errors)?;
         Ok(Self {
             node: Arc::clone(node),
             keeping,
-            goals: goals.map_err(one)?,
+            goals: goals.map_err(to_errors)?,
             cancels: BTreeMap::new(),
             bridge,
             systems,
             calling: BTreeMap::new(),
             diagnosed,
-            events: node.publisher("~/events", depth(100)).map_err(one)?,
+            events: node.publisher("~/events", depth(100)).map_err(to_errors)?,
             period,
             active,
             memory,
@@ -112,10 +112,10 @@ impl Network {
         })
     }
 
-    /// Serves until told to stop.
+    /// Runs until `stop` is set.
     ///
     /// # Errors
-    /// What has to be known after a restart cannot be written.
+    /// The state cannot be written.
     pub(super) fn run(mut self, stop: &AtomicBool) -> Result<(), Message> {
         self.go_on();
         self.node.log(Severity::Info, "serves /mros/objective");
@@ -126,7 +126,8 @@ impl Network {
             match self.inputs.recv_timeout(wait) {
                 Ok(input) => {
                     self.handle(input, clock.elapsed());
-                    // What is asked for is known before, if it ends in between.
+                    // The state is written before the requests are sent, so that a crash in between
+                    // loses none of them.
                     if let Some(memory) = &mut self.memory {
                         memory.write(self.keeping.memory())?;
                     }
@@ -143,7 +144,7 @@ impl Network {
         Ok(())
     }
 
-    /// Goes on with what was pursued before a restart.
+    /// Resumes the goals from before a restart.
     fn go_on(&mut self) {
         let Some(memory) = self.memory.as_ref().map(MemoryFile::read) else { return };
         if !memory.goals.is_empty() {
@@ -213,12 +214,12 @@ impl Network {
         }
     }
 
-    /// Asks for a mode: MROS's bridge, or the function itself where there is no bridge.
+    /// Requests a mode from MROS's bridge, or from the function itself if there is no bridge.
     fn configure(&mut self, wanted: Wanted) {
         let bridge = Arc::clone(&self.bridge);
         let Some(system) = self.systems.get(&wanted.function).map(Arc::clone) else { return };
         let (sender, name) = (self.sender.clone(), wanted.function.clone());
-        // A call that is under way for the same function is given up first.
+        // A running call for the same function is cancelled first.
         self.calling.remove(&name);
         let call = smol::spawn(async move {
             let (function, mode) = (wanted.function.clone(), wanted.mode.clone());

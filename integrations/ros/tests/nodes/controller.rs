@@ -1,4 +1,5 @@
-//! The controller, between experts and an executor in PlanSys2's place, with the example `examples/nav2`.
+//! The controller with simulated experts and a simulated executor of PlanSys2, for the example
+//! `examples/nav2`.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -45,7 +46,7 @@ fn failed(component: &str) -> DiagnosticArray {
     DiagnosticArray { status, ..Default::default() }
 }
 
-/// What the controller has come to, once it is there.
+/// Waits for the result of the controller.
 fn control(domain: u16, stop: &Arc<AtomicBool>) -> std::thread::JoinHandle<Result<(), String>> {
     let controller = node(domain, "metaplan", "");
     let (options, stop) =
@@ -66,7 +67,7 @@ fn a_plan_whose_design_is_lost_is_cancelled_and_made_anew() {
         let mut seen = seen.lock().expect("no panic");
         seen.push(goal.plan.items.iter().map(|item| item.duration).sum::<f32>());
         let done = ExecutePlanResult { success: true, ..Default::default() };
-        // The first plan is never done, the second fails, and the third succeeds.
+        // The first plan does not end, the second one fails, and the third one succeeds.
         match seen.len() {
             1 => None,
             2 => Some((GoalEnd::Aborted, ExecutePlanResult::default())),
@@ -83,7 +84,8 @@ fn a_plan_whose_design_is_lost_is_cancelled_and_made_anew() {
         controls.is_finished()
     });
     assert_eq!(controls.join().expect("no panic"), Ok(()));
-    // By hand: 18 m at 1 s for each, and at 2 s where cameras localize; two pictures of 2 s.
+    // Calculated by hand: 18 m at 1 s each, and at 2 s with cameras for localisation; two pictures
+    // of 2 s.
     assert_eq!(*durations.lock().expect("no panic"), [22.0, 40.0, 40.0]);
 }
 
@@ -120,7 +122,7 @@ fn it_gives_up_and_it_can_be_stopped() {
     let end = controls.join().expect("no panic");
     assert!(end.as_ref().is_err_and(|text| text.starts_with("5 plans on end have failed")), "{end:?}");
     assert_eq!(goals.lock().expect("no panic").len(), 5);
-    // Without an executor there is nothing to cancel.
+    // Without an executor, cancellation has no effect.
     let other = crate::common::domain();
     experts(&node(other, "robot", ""));
     let controls = control(other, &stop);

@@ -36,13 +36,13 @@ fn messages_are_heard_and_rubbish_is_not() {
             list.lock().expect("no panic").push(message.data);
         })
         .expect("a subscription");
-    // Later comers hear what was said before, and names are remapped.
+    // Late subscribers receive earlier messages, and names are remapped.
     let told = second.publisher("/told", latched(10)).expect("a publisher");
     for word in ["one", "two"] {
         told.publish(std_msgs::msg::String { data: word.to_owned() });
     }
     until("two words", || heard.lock().expect("no panic").len() == 2);
-    // Of another type than the topic has, and of another shape: nobody takes it for a word.
+    // Messages with another type or shape are ignored.
     let third = node(domain, "third", "");
     let wrong = third.publisher::<std_msgs::msg::Float32>("/heard", depth(10)).expect("a publisher");
     std::thread::sleep(Duration::from_millis(500));
@@ -76,7 +76,7 @@ fn services_answer_or_it_is_said_why_not() {
         error.contains("no answer from /uuv/task/request after 0.3 s") && error.contains("--rmw"),
         "{error}"
     );
-    // What comes late is not taken for the answer to the next call.
+    // A late reply is not taken for the reply to the next call.
     assert_eq!(call("search_pipeline", LONG), Ok(true));
     let nobody = client.caller::<Task>("/task/cancel");
     let error =
@@ -102,7 +102,7 @@ fn goals_are_pursued_cancelled_and_rejected() {
         name.clone_into(&mut goal.qos_expected.objective_type);
         goal
     };
-    // One goal to its end.
+    // A goal runs to its end.
     let pursuing = std::thread::spawn(move || {
         let first = block_on(caller.pursue(goal("f_move"), LONG)).expect("accepted");
         let second = block_on(caller.pursue(goal("nonsense"), LONG));

@@ -1,4 +1,4 @@
-//! Two of our own nodes over loopback.
+//! Two nodes of this package over loopback.
 
 mod common;
 mod controller;

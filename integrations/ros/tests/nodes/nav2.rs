@@ -1,4 +1,4 @@
-//! The example `examples/nav2`: its plan is driven by a server in Nav2's place.
+//! The example `examples/nav2`: its plan is executed by a simulated Nav2 server.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -22,7 +22,7 @@ pub fn file(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/nav2").join(name)
 }
 
-/// The best plan with some components failed.
+/// Returns the best plan with some failed components.
 fn plan(failed: &[&str]) -> Result<Found, NoPlan> {
     let mut mission = Setup::read(&file("mission.toml")).expect("a mission").mission;
     for component in failed {
@@ -74,7 +74,8 @@ fn the_round_is_driven() {
     assert_eq!(places, [(4.0, 0.0), (4.0, 3.0), (6.0, 3.0), (4.0, 0.0), (0.0, 0.0)]);
 }
 
-/// By hand: 16 m at 1 s for each, and two pictures of 2 s; 1 s more for each metre where cameras have to localize.
+/// Calculated by hand: 16 m at 1 s each, and two pictures of 2 s; an additional 1 s per metre with
+/// cameras for localisation.
 #[test]
 fn the_designs_follow_the_components() {
     let designs = |found: &Found| {

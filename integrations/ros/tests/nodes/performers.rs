@@ -1,4 +1,4 @@
-//! Those who carry out actions, against servers of our own.
+//! Performers of actions, tested with simulated servers.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -52,7 +52,7 @@ fn call(text: &str) -> Call {
     Call { action, arguments: words.collect(), configuration: BTreeMap::new(), duration: 0.0 }
 }
 
-/// All that is heard of an action.
+/// Collects all messages about an action.
 pub fn hear(running: &Running) -> (Vec<Progress>, End) {
     let mut heard = Vec::new();
     loop {
@@ -63,7 +63,7 @@ pub fn hear(running: &Running) -> (Vec<Progress>, End) {
     }
 }
 
-/// The performers of settings.
+/// Creates the performers of settings.
 pub struct Cast(BTreeMap<String, Box<dyn Perform>>);
 
 impl Cast {
@@ -86,7 +86,8 @@ fn cast(domain: u16, settings: &str) -> (Arc<Node>, Cast) {
     (manager, cast)
 }
 
-/// A server that accepts goals, says something once, and ends them as wanted; goals that are to be cancelled are.
+/// A server that accepts goals, sends a feedback, and ends them with a given outcome. Goals are
+/// cancelled on request.
 pub fn serve<A: Action + 'static>(
     node: &Arc<Node>,
     name: &str,
@@ -153,11 +154,11 @@ fn nav2_moves_the_robot() {
     running.cancel();
     let (_, end) = hear(&running);
     assert_eq!(end, End::Canceled);
-    // Another distribution, another argument, and no success.
+    // Another distribution, another argument, and a failure.
     let (_, end) = hear(&cast.start(call("(drive r1 hall)")));
     assert!(matches!(&end, End::Failed(because) if because.contains("gave up")), "{end:?}");
     assert_eq!(others.lock().expect("no panic").len(), 1);
-    // What has no pose goes nowhere.
+    // Objects without a pose have no goal.
     let (_, end) = hear(&cast.start(call("(move r1 hall hal)")));
     assert!(matches!(&end, End::Failed(because) if because.contains("did you mean `hall`")), "{end:?}");
 }
@@ -194,7 +195,7 @@ fn the_world_and_the_modes_of_functions_do_their_part() {
     assert_eq!(end.join().expect("no panic"), End::Succeeded);
 }
 
-/// Both ends of the topic: one asks as PlanSys2's executor does, the other is a performer as PlanSys2's are.
+/// Both ends of the topic: a simulated executor and a simulated performer of PlanSys2.
 #[test]
 fn actions_go_over_the_hub() {
     let domain = domain();
@@ -205,7 +206,7 @@ fn actions_go_over_the_hub() {
     offer(&performer, "search", vec![String::new(), "here".to_owned()], Arc::new(own)).expect("an offer");
     let (said, states) = (Arc::new(Mutex::new(Vec::new())), Arc::new(Mutex::new(Vec::new())));
     let list = Arc::clone(&said);
-    // A node does not hear itself.
+    // A node does not receive its own messages.
     let observer = node(domain, "observer", "");
     observer
         .subscribe::<ActionExecution>("/actions_hub", depth(100), move |message| {
@@ -225,21 +226,22 @@ fn actions_go_over_the_hub() {
     assert_eq!(end, End::Succeeded);
     let (_, end) = hear(&cast.start(call("(search r2 here)")));
     assert_eq!(end, End::Failed("performer has failed: lost".to_owned()));
-    // It goes on until it is cancelled.
+    // The action runs until it is cancelled.
     let running = cast.start(call("(search r3 here)"));
     until("the third", || begun.lock().expect("no panic").len() == 3);
     running.cancel();
     assert_eq!(hear(&running).1, End::Canceled);
     let (_, end) = hear(&cast.start(call("(search r1 here)")));
     assert_eq!(end, End::Succeeded);
-    // It is for one place only.
+    // The performer is restricted to a single place.
     let running = cast.start(call("(search r1 there)"));
     std::thread::sleep(Duration::from_millis(1500));
     running.cancel();
     assert_eq!(hear(&running).1, End::Canceled);
     assert_eq!(begun.lock().expect("no panic").len(), 4);
     until("the last word", || said.lock().expect("no panic").last() == Some(&ActionExecution::CANCEL));
-    // Who comes late does not hear all of the first action, and two writers are not heard in their order.
+    // A late subscriber misses messages of the first action, and messages of two writers are not
+    // ordered.
     let said: BTreeSet<i16> = said.lock().expect("no panic").iter().copied().collect();
     let all = [
         ActionExecution::REQUEST,
@@ -252,7 +254,7 @@ fn actions_go_over_the_hub() {
     assert_eq!(said, BTreeSet::from(all));
 }
 
-/// PlanSys2's executor asks for an action of the settings, which changes a mode.
+/// PlanSys2's executor requests an action of the settings, which changes a mode.
 #[test]
 fn what_the_settings_offer_is_done_for_plansys2() {
     let domain = domain();
@@ -276,7 +278,7 @@ fn what_the_settings_offer_is_done_for_plansys2() {
     assert!(matches!(&end, End::Failed(because) if because.contains("refused")), "{end:?}");
 }
 
-/// Does what the name of the robot says.
+/// Behaves according to the name of the robot.
 struct Own {
     begun: Arc<Mutex<Vec<Call>>>,
 }

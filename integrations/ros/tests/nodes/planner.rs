@@ -1,4 +1,5 @@
-//! In the place of PlanSys2's planner: as PlanSys2's own planner client and lifecycle manager call it.
+//! Replacement of PlanSys2's planner, called like by PlanSys2's planner client and lifecycle
+//! manager.
 
 use std::path::Path;
 use std::sync::{Arc, Mutex};
@@ -29,13 +30,13 @@ const DOMAIN: &str = "(define (domain d) (:requirements :typing) (:types place)
   (:action go :parameters (?a ?b - place) :precondition (and (at ?a) (way ?a ?b))
     :effect (and (not (at ?a)) (at ?b) (increase (spent) (price ?a ?b)))))";
 
-/// The direct way is dear; of the others two are as good.
+/// The direct way is expensive; two other ways are equally good.
 const PROBLEM: &str = "(define (problem p) (:domain d) (:objects a b c d - place)
   (:init (at a) (way a b) (way b d) (way a c) (way c d) (way a d) (= (spent) 0)
     (= (price a b) 1) (= (price b d) 1) (= (price a c) 1) (= (price c d) 1) (= (price a d) 5))
   (:goal (at d)))";
 
-/// Pigeons without enough holes: nothing is found out in any reasonable time.
+/// A pigeonhole problem, which cannot be solved in reasonable time.
 fn hopeless() -> (String, String) {
     let domain = "(define (domain holes) (:requirements :typing) (:types pigeon hole)
       (:predicates (free ?h - hole) (out ?p - pigeon) (in ?p - pigeon ?h - hole) (home ?p - pigeon)
@@ -49,7 +50,7 @@ fn hopeless() -> (String, String) {
     let facts = |before: &str, count: usize| {
         (0..count).map(|i| format!("({before}{i}) ")).collect::<Vec<_>>().concat()
     };
-    // No two pigeons and no two holes are alike, so that no symmetry helps.
+    // Pigeons and holes are pairwise different, so there is no symmetry.
     let fits = (0..20)
         .flat_map(|pigeon| (0..19).map(move |hole| (pigeon, hole)))
         .filter(|(pigeon, hole)| (pigeon * pigeon * hole + 5 * hole * hole + pigeon) % 23 >= 4)
@@ -67,7 +68,7 @@ fn hopeless() -> (String, String) {
     (domain.to_owned(), problem)
 }
 
-/// A planner that is configured, and a node that calls it.
+/// Creates a configured planner and a client node.
 fn planner(setup: Option<Setup>, words: &str) -> (Arc<Node>, Arc<Node>) {
     let domain = domain();
     let (planner, client) = (node(domain, "planner", words), node(domain, "client", ""));
@@ -160,7 +161,7 @@ fn others_are_answered_while_a_plan_is_looked_for_and_its_time_is_kept() {
     assert!(!found.success && found.error_info.contains("a limit was reached"), "{}", found.error_info);
 }
 
-/// The diagnostics say that a component has failed: the design that needs it is out.
+/// Diagnostics report a failed component: its design is no longer used.
 #[test]
 fn the_knowledge_base_of_a_mission_joins_in() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -175,7 +176,7 @@ fn the_knowledge_base_of_a_mission_joins_in() {
     let get_plan = client.caller::<GetPlan>("/planner/get_plan");
     let before = ask(&get_plan, &domain, &problem);
     assert!(before.success, "{}", before.error_info);
-    // What PlanSys2's plans have no place for.
+    // Information that PlanSys2's plans cannot contain.
     until("the plan as JSON", || !told.lock().expect("no panic").is_empty());
     let plan: serde_json::Value = serde_json::from_str(&told.lock().expect("no panic")).expect("JSON");
     assert_eq!((&plan["optimal"], &plan["steps"][0]["action"]), (&true.into(), &"search_pipeline".into()));
@@ -185,7 +186,7 @@ fn the_knowledge_base_of_a_mission_joins_in() {
     let values = vec![KeyValue { key: "water_visibility".into(), value: "1.5".into() }];
     let status = vec![DiagnosticStatus { message: "QA status".into(), values, ..Default::default() }];
     let array = DiagnosticArray { status, ..Default::default() };
-    // In murky water it has to search lower, which takes longer.
+    // In murky water the search altitude is lower, which takes longer.
     until("another plan", || {
         said.publish(array.clone());
         let after = ask(&get_plan, &domain, &problem);

@@ -1,4 +1,4 @@
-//! The manager and the reasoner on a robot of our own nodes.
+//! The manager and the reasoner on a simulated robot.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -30,7 +30,7 @@ const MODES: [(&str, &[&str]); 4] = [
     ("generate_recharge_path", &["normal", "inactive", "fd_unground"]),
 ];
 
-/// A robot with functions that do as they are told.
+/// A robot with functions that execute all requests.
 struct Robot {
     node: Arc<Node>,
     modes: Arc<Mutex<BTreeMap<String, String>>>,
@@ -92,7 +92,7 @@ impl Robot {
     }
 }
 
-/// A role that runs in a thread of its own.
+/// Runs a role in a separate thread.
 struct Running {
     stop: Arc<AtomicBool>,
     thread: JoinHandle<Result<(), Errors>>,
@@ -155,7 +155,7 @@ fn a_manager_searches_adapts_restarts_and_inspects() {
     robot.until("f_maintain_motion", "fd_all_thrusters");
     first.end().expect("it ends as it should");
     let before = robot.asked.lock().expect("no panic").len();
-    // What it has asked for is not asked for again, and the task goes on.
+    // A requested mode is not requested again, and the task continues.
     let second = manager(domain, Some(journal));
     until("it adapts again", || {
         robot.measure("water_visibility", "1.5");
@@ -164,7 +164,7 @@ fn a_manager_searches_adapts_restarts_and_inspects() {
     });
     let low = ("f_generate_search_path".to_owned(), "fd_spiral_low".to_owned());
     assert_eq!(robot.asked.lock().expect("no panic")[before..], [low]);
-    // The topic tells that the pipeline is found: nobody needs a function any more.
+    // The topic reports that the pipeline is found: no function is needed any more.
     let found = robot.node.publisher("/pipeline/detected", depth(10)).expect("a topic");
     until("the search ends", || {
         found.publish(Bool { data: true });
@@ -212,7 +212,7 @@ fn a_reasoner_serves_objectives() {
     let wrong = block_on(caller.pursue(goal("f_fly"), LONG)).expect_err("there is no such function");
     assert!(wrong.to_string().contains("rejected"), "{wrong}");
     let pursued = block_on(caller.pursue(goal("f_generate_search_path"), LONG)).expect("accepted");
-    // Nobody serves MROS's bridge: the function is asked itself.
+    // MROS's bridge has no server, so the function itself is called.
     robot.until("f_generate_search_path", "fd_spiral_high");
     until("diagnostics are heard", || {
         robot.measure("water_visibility", "2.5");

@@ -9,10 +9,10 @@ use crate::ground::vocabulary::partial_eval::{Residual, compare, truth};
 use crate::ground::vocabulary::world::World;
 use crate::lifted::{Bound, Formula};
 
-/// Evaluates a condition that mentions no open slot. A comparison with a value that is not defined does not hold.
+/// Evaluates a condition without open slots. A comparison with an undefined value is false.
 ///
 /// # Errors
-/// Fails when a value is missing, or a limit is reached.
+/// A limit is reached, or the input is not supported.
 pub fn residual(
     world: &mut World<'_>,
     formula: &Formula,
@@ -21,10 +21,10 @@ pub fn residual(
     Evaluation { refuses_undefined: false }.residual(world, formula, binding)
 }
 
-/// Evaluates the condition of an effect that mentions no open slot.
+/// Evaluates the condition of an effect without open slots.
 ///
 /// # Errors
-/// A comparison with a value that is not defined.
+/// A comparison has an undefined value.
 pub fn residual_of_effect(
     world: &mut World<'_>,
     formula: &Formula,
@@ -33,10 +33,10 @@ pub fn residual_of_effect(
     Evaluation { refuses_undefined: true }.residual(world, formula, binding)
 }
 
-/// How conditions are evaluated.
+/// Treatment of undefined values.
 #[derive(Clone, Copy)]
 struct Evaluation {
-    /// Whether values that are compared must be defined.
+    /// `true` if compared values must be defined.
     refuses_undefined: bool,
 }
 
@@ -53,8 +53,8 @@ impl Evaluation {
             Formula::Exists(bound, body) => self.quantified(world, bound, body, binding, false),
             Formula::ForAll(bound, body) => self.quantified(world, bound, body, binding, true),
             Formula::Equal { positive, left, right } => {
-                let same = arguments(&[*left], binding) == arguments(&[*right], binding);
-                Ok(truth(same == *positive))
+                let is_equal = arguments(&[*left], binding) == arguments(&[*right], binding);
+                Ok(truth(is_equal == *positive))
             }
             Formula::Literal { positive, predicate, terms } => {
                 let arguments = arguments(terms, binding);
@@ -69,7 +69,7 @@ impl Evaluation {
             Formula::Compare(comparison, left, right, place) => {
                 let difference = match (ground(world, left, binding), ground(world, right, binding)) {
                     (Ok(left), Ok(right)) => (left, right),
-                    // PDDL 2.1: an action with an undefined value in an effect cannot be executed…
+                    // PDDL 2.1: an action with an undefined value in an effect is not executable.
                     (Err(Failure::Undefined), _) | (_, Err(Failure::Undefined)) if self.refuses_undefined => {
                         return Err(Failure::Error(Error::Unsupported {
                             construct: "a comparison in `when` with a value that is not defined".into(),
@@ -77,7 +77,7 @@ impl Evaluation {
                             place: *place,
                         }));
                     }
-                    // … and elsewhere a comparison with one does not hold.
+                    // Elsewhere, a comparison with an undefined value is false.
                     (Err(Failure::Undefined), _) | (_, Err(Failure::Undefined)) => {
                         return Ok(Residual::False);
                     }
@@ -95,15 +95,15 @@ impl Evaluation {
         binding: &mut Binding,
         conjunction: bool,
     ) -> Result<Residual, Failure> {
-        let mut kept = Vec::new();
+        let mut residuals = Vec::new();
         for part in parts {
             let part = self.residual(world, part, binding)?;
             if part == truth(!conjunction) {
                 return Ok(part);
             }
-            kept.push(part);
+            residuals.push(part);
         }
-        Ok(Residual::junction(kept, conjunction))
+        Ok(Residual::junction(residuals, conjunction))
     }
 
     fn quantified(
@@ -115,14 +115,14 @@ impl Evaluation {
         universal: bool,
     ) -> Result<Residual, Failure> {
         let guards = if universal { guards_of_forall(body) } else { guards_of_exists(body) };
-        let mut kept = Vec::new();
+        let mut residuals = Vec::new();
         let mut failure = None;
         let complete = each_binding(world, bound, &guards, binding, &mut |world, binding| match self
             .residual(world, body, binding)
         {
             Ok(part) if part == truth(!universal) => false,
             Ok(part) => {
-                kept.push(part);
+                residuals.push(part);
                 true
             }
             Err(error) => {
@@ -132,7 +132,7 @@ impl Evaluation {
         })?;
         match failure {
             Some(failure) => Err(failure),
-            None if complete => Ok(Residual::junction(kept, universal)),
+            None if complete => Ok(Residual::junction(residuals, universal)),
             None => Ok(truth(!universal)),
         }
     }

@@ -1,4 +1,4 @@
-//! Expressions without open slots.
+//! Evaluation of expressions without open slots.
 
 use crate::error::{Error, Place};
 use crate::ground::vocabulary::atom::{Binding, arguments};
@@ -7,10 +7,10 @@ use crate::ground::vocabulary::world::World;
 use crate::lifted::{Expression, Rational};
 use crate::task::quantity::Linear;
 
-/// Evaluates an expression that mentions no open slot.
+/// Evaluates an expression without open slots.
 ///
 /// # Errors
-/// Fails when a value is undefined, the expression is not linear, or a limit is reached.
+/// A value is undefined, the expression is not linear, or a limit is reached.
 pub fn ground(
     world: &mut World<'_>,
     expression: &Expression,
@@ -18,7 +18,7 @@ pub fn ground(
 ) -> Result<Linear<Rational>, Failure> {
     match expression {
         Expression::Number(number) => Ok(Linear::constant(number.clone())),
-        // Only the metric mentions it, and takes it apart before it comes here.
+        // Only the metric contains it, and splits it off before this function.
         Expression::TotalTime => Err(Failure::Undefined),
         Expression::Function(function, terms, place) => {
             let arguments = arguments(terms, binding);

@@ -1,17 +1,18 @@
-//! Enumeration of the objects that bound variables can stand for, driven by the facts that must hold.
+//! Enumerates the bindings of quantified variables by a join over the atoms that must hold.
 //!
-//! `exists` and `forall` range over products of types; most of their elements fail a static atom. So the atoms of the
-//! body are joined, each looked up by the arguments that are bound already, and only what they leave open is tried.
+//! Quantifiers range over products of types, but most elements fail a static atom. The atoms of the
+//! body are therefore joined, each looked up by its bound arguments, and only the remaining
+//! variables are enumerated by type.
 
 use crate::ground::vocabulary::atom::Binding;
 use crate::ground::vocabulary::world::World;
 use crate::lifted::{Arguments, Bound, Formula, ObjectId, PredicateId, Term};
 use crate::limits::Interrupted;
 
-/// An atom that must be able to hold.
+/// An atom that must be possibly true.
 type Guard<'f> = (PredicateId, &'f [Term]);
 
-/// The atoms without which the body of an existential quantifier fails.
+/// Returns the necessary atoms of an existential quantifier: the body is false without them.
 pub fn guards_of_exists(body: &Formula) -> Vec<Guard<'_>> {
     let mut guards = Vec::new();
     match body {
@@ -23,7 +24,7 @@ pub fn guards_of_exists(body: &Formula) -> Vec<Guard<'_>> {
     guards
 }
 
-/// The atoms without which the body of a universal quantifier holds.
+/// Returns the guard atoms of a universal quantifier: the body is true without them.
 pub fn guards_of_forall(body: &Formula) -> Vec<Guard<'_>> {
     let mut guards = Vec::new();
     match body {
@@ -35,11 +36,12 @@ pub fn guards_of_forall(body: &Formula) -> Vec<Guard<'_>> {
     guards
 }
 
-/// Calls `visit` with every binding of the variables under which all guards can hold, until it returns
-/// false; the variables are unbound again afterwards, unless a limit ends it all. Returns whether `visit` never returned false.
+/// Calls `visit` with every binding of the variables under which all guards can hold, until it
+/// returns `false`. Returns `true` if `visit` always returned `true`. Afterwards the variables are
+/// unbound, unless a limit was reached.
 ///
 /// # Errors
-/// Fails when a limit is reached.
+/// A limit is reached.
 pub fn each_binding<'a>(
     world: &mut World<'a>,
     bound: &[Bound],
@@ -47,9 +49,10 @@ pub fn each_binding<'a>(
     binding: &mut Binding,
     visit: &mut dyn FnMut(&mut World<'a>, &mut Binding) -> bool,
 ) -> Result<bool, Interrupted> {
-    debug_assert!(bound.is_sorted_by_key(|own| own.variable));
+    debug_assert!(bound.is_sorted_by_key(|bound| bound.variable));
     let mut join = Join { bound, guards, is_used: vec![false; guards.len()] };
-    // Quantifiers may bind more variables than the call stack has frames.
+    // An explicit stack, because quantifiers may bind more variables than the call stack has
+    // frames.
     let mut levels: Vec<Level> = Vec::new();
     loop {
         world.visit()?;
@@ -77,25 +80,25 @@ pub fn each_binding<'a>(
     }
 }
 
-/// The variables and the guards of an enumeration.
+/// Variables and guards of an enumeration.
 struct Join<'j> {
-    /// Ascending by variable.
+    /// In ascending order of the variables.
     bound: &'j [Bound],
     guards: &'j [Guard<'j>],
     /// `true` for each guard whose rows are being enumerated.
     is_used: Vec<bool>,
 }
 
-/// Options for some variables, and the variables that the present option has bound.
+/// Remaining options of some variables, and the variables bound by the current option.
 struct Level {
     options: Options,
     fresh: Vec<u32>,
 }
 
 enum Options {
-    /// The rows that fit a guard, by its position.
+    /// The rows that match a guard, with the position of the guard.
     Rows(usize, std::vec::IntoIter<Arguments>),
-    /// The candidates of a variable, by its place, and the position of the next one.
+    /// The candidates of a variable, with its position and that of the next candidate.
     Candidates(usize, usize),
 }
 
@@ -108,7 +111,8 @@ impl Level {
 }
 
 impl Join<'_> {
-    /// The next options: the rows of the guard with the fewest unbound variables, or else the candidates of a variable.
+    /// Returns the next options: the rows of the guard with the fewest unbound variables, or the
+    /// candidates of a variable.
     fn next_level(
         &mut self,
         world: &mut World<'_>,
@@ -116,7 +120,7 @@ impl Join<'_> {
         binding: &Binding,
     ) -> Option<Level> {
         let guard = match last {
-            // No guard was left before.
+            // Candidates are enumerated only after all guards.
             Some(Level { options: Options::Candidates(..), .. }) => None,
             _ => self.next_guard(binding),
         };
@@ -135,7 +139,7 @@ impl Join<'_> {
         Some(Level { options, fresh: Vec::new() })
     }
 
-    /// The guard with the fewest open variables, all of which are those of the quantifier.
+    /// Returns the guard with the fewest unbound variables, all of which belong to the quantifier.
     fn next_guard(&self, binding: &Binding) -> Option<usize> {
         let open_variables = |(position, (_, terms)): (usize, &Guard<'_>)| {
             let open = terms.iter().filter_map(|term| match term {
@@ -152,7 +156,7 @@ impl Join<'_> {
         self.guards.iter().enumerate().filter_map(open_variables).min().map(|(_, position)| position)
     }
 
-    /// Binds what the next option binds. Returns `false` after the last option.
+    /// Applies the next option. Returns `false` after the last one.
     fn advance(
         &self,
         world: &mut World<'_>,
@@ -184,23 +188,24 @@ impl Join<'_> {
         }
     }
 
-    /// Binds the open variables of terms to the objects of a row. Returns `false` if the row does not fit.
+    /// Binds the unbound variables of terms to the objects of a row. Returns `false` if the row
+    /// does not match.
     fn fits(&self, terms: &[Term], row: &[ObjectId], binding: &mut Binding, fresh: &mut Vec<u32>) -> bool {
         terms.iter().zip(row).all(|(term, object)| match term {
             Term::Object(constant) => constant == object,
             Term::Parameter(variable) => {
-                if let Some(known) = binding[*variable as usize] {
-                    return known == *object;
+                if let Some(object_of_variable) = binding[*variable as usize] {
+                    return object_of_variable == *object;
                 }
                 binding[*variable as usize] = Some(*object);
                 fresh.push(*variable);
-                self.find(*variable).is_some_and(|own| own.candidates.binary_search(object).is_ok())
+                self.find(*variable).is_some_and(|bound| bound.candidates.binary_search(object).is_ok())
             }
         })
     }
 
     fn find(&self, variable: u32) -> Option<&Bound> {
-        let place = self.bound.binary_search_by_key(&variable, |own| own.variable).ok()?;
+        let place = self.bound.binary_search_by_key(&variable, |bound| bound.variable).ok()?;
         self.bound.get(place)
     }
 

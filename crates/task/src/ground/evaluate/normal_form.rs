@@ -1,8 +1,8 @@
-//! Residual conditions to conjunctive normal form.
+//! Converts residual conditions to conjunctive normal form (CNF).
 //!
-//! A disjunction of literals is a clause. Small ones of conjunctions are multiplied out; all others, and comparisons of
-//! numbers inside disjunctions, get a name: a derived atom that holds where the part does. So no condition grows by more than a
-//! constant factor.
+//! A disjunction of literals is a clause. Small disjunctions of conjunctions are distributed.
+//! Larger ones, and comparisons within disjunctions, are replaced by auxiliary derived atoms
+//! (Tseitin transformation), so that conditions grow by at most a constant factor.
 
 use rustc_hash::FxHashMap;
 
@@ -15,10 +15,10 @@ use crate::ground::vocabulary::world::World;
 use crate::lifted::{ObjectId, PredicateId};
 use crate::number::dense;
 
-/// Disjunctions with more clauses than this are named rather than multiplied out.
+/// Limit on the clauses of a distributed disjunction; larger ones get an auxiliary atom.
 const CLAUSE_LIMIT: usize = 16;
 
-/// Parts of conditions that have a name, and the rules of all derived atoms.
+/// Auxiliary atoms of subconditions, and the rules of all derived atoms.
 #[derive(Debug, Default)]
 pub struct Definitions {
     named: FxHashMap<Residual, AtomId>,
@@ -26,7 +26,7 @@ pub struct Definitions {
 }
 
 impl Definitions {
-    /// Conjunctive normal form; `Failure::Undefined` if the condition is false.
+    /// Returns the CNF of a condition, or `Failure::Undefined` if it is false.
     pub(crate) fn condition(
         &mut self,
         world: &mut World<'_>,
@@ -69,7 +69,7 @@ impl Definitions {
         Ok(())
     }
 
-    /// A clause with a literal for each part.
+    /// Returns a clause with a literal for each part.
     fn clause(&mut self, world: &mut World<'_>, parts: &[Residual]) -> Vec<GroundLiteral> {
         let mut clause: Vec<_> = parts.iter().map(|part| self.literal(world, part)).collect();
         clause.sort_unstable();
@@ -77,7 +77,8 @@ impl Definitions {
         clause
     }
 
-    /// A literal that holds where the condition does: the condition itself, or a derived atom.
+    /// Returns a literal that is equivalent to the condition: the condition itself, or an auxiliary
+    /// atom.
     pub(crate) fn literal(&mut self, world: &mut World<'_>, residual: &Residual) -> GroundLiteral {
         if let Residual::Literal { atom, positive } = residual {
             return (*atom, *positive);
@@ -90,7 +91,7 @@ impl Definitions {
         (atom, true)
     }
 
-    /// A fresh atom for a part of a condition.
+    /// Creates an auxiliary atom for a subcondition.
     fn name(&mut self, world: &mut World<'_>, residual: Residual) -> AtomId {
         let predicate = PredicateId(dense(world.lifted.predicates.len()));
         let number = ObjectId(dense(self.named.len()));
@@ -99,7 +100,7 @@ impl Definitions {
         atom
     }
 
-    /// Adds rules by which an atom holds where the condition does.
+    /// Adds rules that make an atom equivalent to the condition.
     pub(crate) fn define(&mut self, world: &mut World<'_>, head: AtomId, residual: &Residual) {
         if let Residual::Or(parts) = residual {
             for part in parts {
@@ -124,27 +125,29 @@ impl Definitions {
     }
 }
 
-/// The clauses of a condition without numbers, by distribution; tautologies are left out. None if there are many.
+/// Returns the clauses of a condition without numbers by distribution, without tautologies. `None`
+/// if they exceed the limit.
 fn clauses(residual: &Residual) -> Option<Vec<Vec<GroundLiteral>>> {
     match residual {
         Residual::True => Some(Vec::new()),
         Residual::False => Some(vec![Vec::new()]),
         Residual::Literal { atom, positive } => Some(vec![vec![(*atom, *positive)]]),
         Residual::And(parts) => {
-            let mut all = Vec::new();
+            let mut clauses_of_parts = Vec::new();
             for part in parts {
-                all.extend(clauses(part)?);
+                clauses_of_parts.extend(clauses(part)?);
             }
-            Some(all)
+            Some(clauses_of_parts)
         }
         Residual::Or(parts) => {
             let mut product: Vec<Vec<GroundLiteral>> = vec![Vec::new()];
             for part in parts {
-                let more = clauses(part)?;
-                if product.len().saturating_mul(more.len()) > CLAUSE_LIMIT {
+                let clauses_of_part = clauses(part)?;
+                if product.len().saturating_mul(clauses_of_part.len()) > CLAUSE_LIMIT {
                     return None;
                 }
-                let pairs = product.iter().flat_map(|left| more.iter().map(move |right| (left, right)));
+                let pairs =
+                    product.iter().flat_map(|left| clauses_of_part.iter().map(move |right| (left, right)));
                 let mut next = Vec::new();
                 for (left, right) in pairs {
                     let mut clause: Vec<_> = left.iter().chain(right).copied().collect();

@@ -1,7 +1,9 @@
-//! What happenings read, by the rule of PDDL 2.1 that there are no moving targets \[1\].
+//! Computes the fluents and atoms that happenings read, for the rule of no moving targets in PDDL
+//! 2.1 \[1\].
 //!
-//! Everything that a condition or an effect mentions counts as read, whether or not it matters in a state: below a quantifier all
-//! instances of an atom, below a derived predicate all that its axioms depend on.
+//! Everything in a condition or an effect counts as read, whether or not it matters in a state: all
+//! instances of an atom below a quantifier, and all dependencies of the axioms of a derived
+//! predicate.
 //!
 //! \[1\] M. Fox, D. Long: PDDL2.1, JAIR 20, 2003, section 8.4.
 
@@ -14,49 +16,50 @@ use crate::lifted::{
     Bound, Change, Effect, Expression, Formula, FunctionId, Lifted, ObjectId, PredicateId, Term,
 };
 
-/// Atoms or functions with gaps where a quantifier runs through its objects; none for any arguments at all.
+/// A symbol with its arguments, where quantified variables are placeholders. `None` matches all
+/// arguments.
 pub type Pattern<S> = (S, Option<Vec<Slot>>);
 
 /// An argument of a pattern.
 #[derive(Debug, Clone)]
 pub enum Slot {
     Object(ObjectId),
-    /// Each object that a quantifier runs through: the same wherever its variable stands.
+    /// Each object of a quantified variable, with the same object at all its occurrences.
     Each(u32, Arc<[ObjectId]>),
-    /// Any object: a parameter that has none yet.
+    /// Any object: an unbound parameter.
     Any,
 }
 
-/// Whether objects fit into the slots of a pattern.
+/// Returns `true` if objects match the slots of a pattern.
 pub fn fits(pattern: &[Slot], arguments: &[ObjectId]) -> bool {
-    let same = |variable: u32, object: ObjectId| {
-        let mut all = pattern.iter().zip(arguments);
-        all.all(|(slot, other)| !matches!(slot, Slot::Each(own, _) if *own == variable) || *other == object)
+    let is_consistent = |variable: u32, object: ObjectId| {
+        let mut pairs = pattern.iter().zip(arguments);
+        pairs.all(|(slot, other)| !matches!(slot, Slot::Each(own, _) if *own == variable) || *other == object)
     };
     let slot_fits = |(slot, object): (&Slot, &ObjectId)| match slot {
         Slot::Object(own) => own == object,
-        Slot::Each(variable, objects) => objects.contains(object) && same(*variable, *object),
+        Slot::Each(variable, objects) => objects.contains(object) && is_consistent(*variable, *object),
         Slot::Any => true,
     };
     pattern.len() == arguments.len() && pattern.iter().zip(arguments).all(slot_fits)
 }
 
-/// What is read, before it is looked up.
+/// Read atoms and fluents, before their look-up.
 #[derive(Debug, Default)]
 pub struct Reads {
     pub atoms: Vec<Pattern<PredicateId>>,
     pub numbers: Vec<Pattern<FunctionId>>,
-    /// The variables of the quantifiers around, innermost last.
+    /// Variables of the enclosing quantifiers, innermost last.
     scope: Vec<Bound>,
 }
 
-/// Whether a pattern stands for a symbol with arguments.
+/// Returns `true` if a pattern matches a symbol with arguments.
 pub fn matches<S: PartialEq>(pattern: &Pattern<S>, symbol: &S, arguments: &[ObjectId]) -> bool {
     pattern.0 == *symbol && pattern.1.as_ref().is_none_or(|wanted| fits(wanted, arguments))
 }
 
 impl Reads {
-    /// Adds what a condition mentions under a binding of the parameters.
+    /// Adds the reads of a condition under a binding of the parameters.
     pub fn condition(&mut self, lifted: &Lifted, formula: &Formula, binding: &Binding) {
         match formula {
             Formula::And(parts) | Formula::Or(parts) => {
@@ -85,7 +88,7 @@ impl Reads {
         }
     }
 
-    /// Adds what effects mention besides their targets.
+    /// Adds the reads of effects, without the targets of the effects.
     pub fn effects(&mut self, lifted: &Lifted, effects: &[Effect], binding: &Binding) {
         for effect in effects {
             let outer = self.scope.len();
@@ -98,7 +101,7 @@ impl Reads {
         }
     }
 
-    /// Adds what an expression mentions.
+    /// Adds the reads of an expression.
     pub fn expression(&mut self, expression: &Expression, binding: &Binding) {
         match expression {
             Expression::Number(_) | Expression::TotalTime => {}
@@ -136,7 +139,7 @@ impl Reads {
         }
     }
 
-    /// What a condition mentions, whatever the arguments are.
+    /// Adds the reads of a condition with arbitrary arguments.
     fn literals(&mut self, formula: &Formula) {
         match formula {
             Formula::And(parts) | Formula::Or(parts) => parts.iter().for_each(|part| self.literals(part)),

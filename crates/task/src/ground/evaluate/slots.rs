@@ -1,4 +1,4 @@
-//! Expressions with open slots as tables over the remaining designs.
+//! Evaluates expressions with open slots to tables over the remaining designs.
 
 use crate::error::Error;
 use crate::ground::evaluate::expression::ground;
@@ -10,24 +10,24 @@ use crate::lifted::{Expression, ObjectId, Rational};
 use crate::limits::{LimitPoll, Limits};
 use crate::task::quantity::{Linear, Quantity, SlotSet, Table};
 
-/// The open slots of the schema at hand with the designs that are left for each.
+/// Open slots of the current schema, with the remaining designs of each.
 pub struct Slots<'a> {
     pub(crate) parameters: &'a [SlotParameter],
     pub(crate) designs: Vec<Vec<ObjectId>>,
 }
 
 impl Slots<'_> {
-    /// How many designs are left for each.
+    /// Number of remaining designs of each slot.
     pub(crate) fn sizes(&self) -> Vec<usize> {
         self.designs.iter().map(Vec::len).collect()
     }
 }
 
-/// Evaluates an expression with open slots: sums fall apart into tables over few slots each. Combinations
-/// for which it is undefined are handed to `undefined`, and count as 0.
+/// Evaluates an expression with open slots. Sums are split into tables over few slots each.
+/// Combinations with undefined values are passed to `undefined` and count as 0.
 ///
 /// # Errors
-/// Fails when the expression is not linear, or a limit is reached.
+/// The expression is not linear, or a limit is reached.
 pub fn open(
     world: &mut World<'_>,
     expression: &Expression,
@@ -82,7 +82,8 @@ fn table(
     for_each_combination(&mentioned, slots, binding, limits, &mut |binding, combination| {
         match ground(world, expression, binding) {
             Ok(linear) => {
-                // What a slot stands beside in a product or quotient is static: else it would be no slot.
+                // Factors of a slot in a product or quotient are static, otherwise the
+                // parameter would not be a slot.
                 assert!(linear.coefficients.is_empty(), "invariant: a table has no fluents");
                 values.push(linear.quantity.constant);
             }
@@ -99,13 +100,14 @@ fn table(
     Ok(Linear { coefficients: Vec::new(), quantity })
 }
 
-/// What is done with the combinations of designs.
+/// Callback for combinations of designs.
 type Visit<'v> = dyn FnMut(&Binding, &[u32]) -> Result<(), Failure> + 'v;
 
-/// Binds the mentioned slots to every combination of their designs, the last one fastest.
+/// Binds the slots in `mentioned` to every combination of their designs, the last slot varying
+/// fastest.
 ///
 /// # Errors
-/// When a limit is reached, or `visit` fails.
+/// A limit is reached, or `visit` fails.
 pub fn for_each_combination(
     mentioned: &[u32],
     slots: &Slots<'_>,
@@ -121,7 +123,7 @@ pub fn for_each_combination(
         pulse: &mut LimitPoll<'_>,
         visit: &mut Visit<'_>,
     ) -> Result<(), Failure> {
-        let Some((slot, rest)) = mentioned.split_first() else {
+        let Some((slot, remaining)) = mentioned.split_first() else {
             pulse.beat()?;
             return visit(binding, chosen);
         };
@@ -129,7 +131,7 @@ pub fn for_each_combination(
         for (design, index) in slots.designs[*slot as usize].iter().zip(0..) {
             binding[parameter] = Some(*design);
             chosen.push(index);
-            let visited = go(rest, slots, binding, chosen, pulse, visit);
+            let visited = go(remaining, slots, binding, chosen, pulse, visit);
             chosen.pop();
             binding[parameter] = None;
             visited?;

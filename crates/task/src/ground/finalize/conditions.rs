@@ -1,4 +1,4 @@
-//! Conditions and rules over atoms to those over variables.
+//! Converts conditions and axioms over atoms to conditions and axioms over variables.
 
 use crate::error::Error;
 use crate::ground::finalize::numbers::Numbers;
@@ -10,7 +10,7 @@ use crate::number::checked_lcm;
 use crate::task::number::TaskNumber;
 use crate::task::{Axiom, Condition, Fact, Layer};
 
-/// A condition of the final task.
+/// Converts a condition.
 #[expect(clippy::arithmetic_side_effects, reason = "above the least number of its type")]
 pub(super) fn condition<N: TaskNumber>(
     ground: &GroundCondition,
@@ -20,11 +20,11 @@ pub(super) fn condition<N: TaskNumber>(
     let mut condition = Condition::default();
     for literal in &ground.literals {
         let literal = atoms.literal(*literal);
-        let none = atoms.none[literal.fact.variable.index()];
+        let no_value = atoms.none[literal.fact.variable.index()];
         if literal.positive {
             condition.facts.push(literal.fact);
-        } else if none == 1 {
-            condition.facts.push(Fact { variable: literal.fact.variable, value: none });
+        } else if no_value == 1 {
+            condition.facts.push(Fact { variable: literal.fact.variable, value: no_value });
         } else {
             condition.clauses.push(vec![literal]);
         }
@@ -39,7 +39,7 @@ pub(super) fn condition<N: TaskNumber>(
             continue;
         }
         let mut linear = numbers.stored(linear, 1).into_owned();
-        // A comparison may be scaled at will, so fractional factors do no harm here.
+        // Comparisons may be scaled freely, so fractional factors are removed.
         let mut denominators = linear.coefficients.iter().map(|(_, factor)| factor.denominator());
         let common = denominators.try_fold(1, |common, next| checked_lcm(common, next?));
         let common = common.ok_or_else(|| Error::overflow("a factor of a numeric fluent"))?;
@@ -55,12 +55,12 @@ pub(super) fn condition<N: TaskNumber>(
     Ok(condition)
 }
 
-/// Whether two values of one variable are required.
+/// Returns `true` if the condition requires two values of a variable.
 pub(super) fn contradictory<N>(condition: &Condition<N>) -> bool {
     condition.facts.windows(2).any(|pair| pair[0].variable == pair[1].variable)
 }
 
-/// The rules of derived variables in layers: what a layer depends on comes before it.
+/// Sorts the rules of derived variables into layers, each after its dependencies.
 pub(super) fn axioms<N: TaskNumber>(
     axioms: &[GroundAxiom],
     atoms: &Atoms,

@@ -1,4 +1,5 @@
-//! Exact rationals to integers: one factor for all numbers of a kind, and each table converted once.
+//! Scales exact rationals to integers, with a common factor per kind of number. Each table is
+//! converted once.
 
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
@@ -12,20 +13,20 @@ use crate::task::number::TaskNumber;
 use crate::task::quantity::Quantity;
 use crate::task::table_map::TableMap;
 
-/// The least factor that makes all numbers of one kind integers.
+/// Least common denominator of all numbers of a kind.
 #[derive(Debug)]
 pub(super) struct Denominator {
     what: &'static str,
-    /// None if it is too large.
+    /// `None` on overflow.
     common: Option<Int>,
-    /// Where the number was that made it so.
+    /// Source location of the number that caused the overflow.
     culprit: Option<(String, Option<Place>)>,
-    /// Tables that have been looked at.
+    /// Tables that were already visited.
     seen: FxHashMap<*const Rational, Arc<[Rational]>>,
 }
 
 impl Denominator {
-    /// `what` names the numbers in errors.
+    /// Creates a denominator; `what` describes the numbers in errors.
     pub(super) fn new(what: &'static str) -> Self {
         Self { what, common: Some(1), culprit: None, seen: FxHashMap::default() }
     }
@@ -49,14 +50,14 @@ impl Denominator {
         }
     }
 
-    /// Notes where the last number was, if it made the factor too large.
+    /// Records the source location of the last number if it caused the overflow.
     pub(super) fn note(&mut self, place: impl FnOnce() -> (String, Option<Place>)) {
         if self.common.is_none() && self.culprit.is_none() {
             self.culprit = Some(place());
         }
     }
 
-    /// The conversion.
+    /// Returns the conversion to integers.
     ///
     /// # Errors
     /// `Error::Overflow` if the factor is too large.
@@ -71,7 +72,7 @@ impl Denominator {
     }
 }
 
-/// Turns numbers of one kind into integers, or leaves them as they are.
+/// Converts numbers of a kind to integers, or leaves them unchanged.
 #[derive(Debug)]
 pub(super) struct Integers<N> {
     what: &'static str,
@@ -102,7 +103,8 @@ mod tests {
     use super::*;
     use crate::task::quantity::Table;
 
-    /// A quantity of so many tables over slots of their own, each of 0 and a number.
+    /// Creates a quantity with `tables` tables over distinct slots, each with the values 0 and
+    /// `number`.
     fn quantity(tables: u32, number: Int) -> Quantity<Rational> {
         let values: Arc<[Rational]> = [Rational::zero(), Rational::from_integer(number)].into();
         let table = |slot| Table { slots: [slot].into_iter().collect(), values: values.clone() };
@@ -110,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_do_not_fit_together_are_refused() {
+    fn numbers_without_a_common_scale_are_rejected() {
         let number = LIMIT - 1;
         for (tables, number, fits) in [
             (1, number, true),
@@ -122,11 +124,11 @@ mod tests {
             (600, 1 << 113, true),
         ] {
             let mut integers: Integers<Int> = Denominator::new("costs").integers().expect("a factor");
-            let found = integers.quantity(&quantity(tables, number));
-            assert_eq!(found.is_ok(), fits, "{tables} tables of {number}");
-            if let Ok(found) = found {
+            let converted = integers.quantity(&quantity(tables, number));
+            assert_eq!(converted.is_ok(), fits, "{tables} tables of {number}");
+            if let Ok(converted) = converted {
                 let (choice, sizes) = (vec![1; tables as usize], vec![2; tables as usize]);
-                assert_eq!(found.at(&choice, &sizes), Int::from(tables) * number);
+                assert_eq!(converted.at(&choice, &sizes), Int::from(tables) * number);
             }
         }
     }

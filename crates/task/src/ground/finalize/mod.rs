@@ -1,4 +1,4 @@
-//! The last pass of grounding: atoms to finite-domain variables, rationals to integers.
+//! Last grounding pass: atoms to finite-domain variables, rationals to integers.
 
 mod conditions;
 mod integers;
@@ -31,7 +31,7 @@ use crate::task::{Condition, Objective, Operator, State, Task};
 /// Builds the final task.
 ///
 /// # Errors
-/// `Error::Overflow` if exact integers would not fit.
+/// `Error::Overflow` if numbers exceed exact integers.
 pub fn finish<N: TaskNumber>(
     mut task: GroundTask<'_>,
     unreachable: Option<String>,
@@ -96,7 +96,7 @@ pub fn finish<N: TaskNumber>(
     Ok(task)
 }
 
-/// An operator of the final task; none if its condition contradicts itself.
+/// Converts an operator. Returns `None` if its condition contradicts itself.
 fn operator<N: TaskNumber>(
     ground: GroundOperator,
     atoms: &Atoms,
@@ -130,14 +130,14 @@ fn operator<N: TaskNumber>(
     }))
 }
 
-/// The action of an operator with its place, for errors.
+/// Name and source location of the operator's action, for errors.
 fn schema_name(lifted: &Lifted, operator: &GroundOperator) -> (String, Option<Place>) {
     let schema = lifted.schemas.get(operator.schema as usize);
     let named = schema.map(|schema| (format!("`{}`", schema.name), Some(schema.place)));
     named.unwrap_or_else(|| ("a wait".to_owned(), None))
 }
 
-/// Operators without repetitions, in order.
+/// Ordered set of operators.
 struct Distinct<N> {
     operators: Vec<Operator<N>>,
     /// Positions by hash.
@@ -160,7 +160,7 @@ impl<N: TaskNumber> Distinct<N> {
     }
 }
 
-/// The objectives, and what makes integers of the costs by each.
+/// Converts the objectives. Also returns the scales of their costs.
 #[expect(clippy::type_complexity, reason = "a list for each of two things")]
 fn objectives<N: TaskNumber>(
     task: &GroundTask<'_>,
@@ -177,8 +177,13 @@ fn objectives<N: TaskNumber>(
         }
         let integers = denominator.integers()?;
         let offset = integers.number(&objective.offset)?;
-        let rest = numbers.rest(&objective.rest);
-        objectives.push(Objective { scale: integers.scale, offset, maximize: objective.maximize, rest });
+        let remaining = numbers.rest(&objective.rest);
+        objectives.push(Objective {
+            scale: integers.scale,
+            offset,
+            maximize: objective.maximize,
+            rest: remaining,
+        });
         conversions.push(integers);
     }
     Ok((objectives, conversions))

@@ -1,11 +1,13 @@
-//! Groups of atoms of which at most one holds: what becomes a finite-domain variable.
+//! Mutex groups: sets of atoms of which at most one holds, which become finite-domain variables.
 //!
-//! Invariant synthesis after Helmert [1]: a candidate is a set of predicates that share some arguments and count
-//! another; it is an invariant if no operator increases the number of true atoms of any instance. Candidates that
-//! an operator breaks are refined by a predicate that the same operator deletes. Checked on ground operators, so that
-//! statically impossible instances do no harm.
+//! Invariant synthesis after Helmert [1]: a candidate is a set of predicates that share some
+//! arguments and count another one. It is an invariant if no operator increases the number of true
+//! atoms of any instance. A candidate that an operator violates is refined by a predicate that this
+//! operator deletes. The check uses ground operators, so that statically impossible instances do
+//! not violate candidates.
 //!
-//! \[1\] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009, section 5.
+//! \[1\] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial
+//! Intelligence 173, 2009, section 5.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -20,7 +22,8 @@ use crate::ground::vocabulary::task::GroundTask;
 use crate::lifted::{ObjectId, PredicateId};
 use crate::limits::{Interrupted, Limits};
 
-/// One predicate of a candidate: argument positions that make up the key, in order; one more may be counted.
+/// A predicate of a candidate: the argument positions of the key, in order. Another argument may be
+/// counted.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
 struct Part {
     predicate: PredicateId,
@@ -30,18 +33,19 @@ struct Part {
 type Candidate = Vec<Part>;
 type Key = SmallVec<[ObjectId; 4]>;
 
-/// How many candidates are tried before the search gives up refining.
+/// Limit on the number of candidates.
 const CANDIDATE_LIMIT: usize = 500;
 
 /// Atoms that become the values of a variable.
 pub struct Group {
-    /// At least two, in no other group.
+    /// At least two atoms, which are in no other group.
     pub(crate) atoms: Vec<AtomId>,
-    /// These and others: at most one of all of them is true at any time. Operators on the variable are right only if that is so.
+    /// The whole mutex group: at most one of these atoms is true in every state. The operators on
+    /// the variable rely on this.
     pub(crate) exclusive: Vec<AtomId>,
 }
 
-/// Disjoint groups, largest first.
+/// Returns disjoint groups, the largest first.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 pub fn groups(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec<Group>, Interrupted> {
     let limits = task.world.limits;
@@ -61,18 +65,19 @@ pub fn groups(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec
     cover(&instances, limits)
 }
 
-/// Greedy: the group that covers most uncovered atoms first; of equal ones the one that comes first.
+/// Greedy set cover: the group with most uncovered atoms first, ties broken by order.
 fn cover(instances: &[Vec<AtomId>], limits: &Limits) -> Result<Vec<Group>, Interrupted> {
     let mut covered: FxHashSet<AtomId> = FxHashSet::default();
-    let mut chosen = Vec::new();
-    // What a group covers only shrinks, so one whose turn comes with as much as it was filed under is the best.
+    let mut selected = Vec::new();
+    // The number of uncovered atoms of a group only decreases. A group whose stored number is still
+    // correct is therefore the best.
     let filed = |(index, atoms): (usize, &Vec<AtomId>)| (atoms.len(), Reverse(index));
     let mut open: BinaryHeap<(usize, Reverse<usize>)> = instances.iter().enumerate().map(filed).collect();
     let mut pulse = limits.pulse();
     while let Some((size, Reverse(index))) = open.pop() {
         pulse.beat()?;
-        let own = &instances[index];
-        let atoms: Vec<AtomId> = own.iter().filter(|atom| !covered.contains(*atom)).copied().collect();
+        let group = &instances[index];
+        let atoms: Vec<AtomId> = group.iter().filter(|atom| !covered.contains(*atom)).copied().collect();
         if atoms.len() < 2 {
             continue;
         }
@@ -81,25 +86,25 @@ fn cover(instances: &[Vec<AtomId>], limits: &Limits) -> Result<Vec<Group>, Inter
             continue;
         }
         covered.extend(&atoms);
-        chosen.push(Group { atoms, exclusive: own.clone() });
+        selected.push(Group { atoms, exclusive: group.clone() });
     }
-    Ok(chosen)
+    Ok(selected)
 }
 
 fn sorted(atoms: &FxHashSet<AtomId>) -> Vec<AtomId> {
-    let mut all: Vec<_> = atoms.iter().copied().collect();
-    all.sort_unstable();
-    all
+    let mut atoms_in_order: Vec<_> = atoms.iter().copied().collect();
+    atoms_in_order.sort_unstable();
+    atoms_in_order
 }
 
-/// The key of an atom under a candidate, if the candidate covers its predicate.
+/// Returns the key of an atom under a candidate, if the candidate covers its predicate.
 fn key_of(task: &GroundTask<'_>, candidate: &Candidate, atom: AtomId) -> Option<Key> {
     let ((predicate, arguments), ()) = task.world.atoms.get_index(atom.index())?;
     let part = candidate.iter().find(|part| part.predicate == *predicate)?;
     Some(part.key.iter().map(|position| arguments[*position]).collect())
 }
 
-/// The candidates that hold up.
+/// Returns the candidates that are invariants.
 #[expect(clippy::arithmetic_side_effects, reason = "no more than the limit on candidates")]
 fn invariants(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec<Candidate>, Interrupted> {
     let mut arities: BTreeMap<PredicateId, usize> = BTreeMap::new();
@@ -110,15 +115,15 @@ fn invariants(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec
     }
     let mut open: Vec<Candidate> = Vec::new();
     for (predicate, arity) in &arities {
-        let all: Vec<usize> = (0..*arity).collect();
-        open.push(vec![Part { predicate: *predicate, key: all.clone() }]);
-        for counted in &all {
-            let key = all.iter().copied().filter(|position| position != counted).collect();
+        let positions: Vec<usize> = (0..*arity).collect();
+        open.push(vec![Part { predicate: *predicate, key: positions.clone() }]);
+        for counted in &positions {
+            let key = positions.iter().copied().filter(|position| position != counted).collect();
             open.push(vec![Part { predicate: *predicate, key }]);
         }
     }
-    let mut seen: FxHashSet<Candidate> = open.iter().cloned().collect();
-    let mut found = Vec::new();
+    let mut visited: FxHashSet<Candidate> = open.iter().cloned().collect();
+    let mut accepted = Vec::new();
     let mut next = 0;
     while next < open.len() && next < CANDIDATE_LIMIT {
         let candidate = open[next].clone();
@@ -131,20 +136,20 @@ fn invariants(task: &GroundTask<'_>, relevant: &FxHashSet<AtomId>) -> Result<Vec
             }
         }
         match broken {
-            None => found.push(candidate),
+            None => accepted.push(candidate),
             Some((operator, key)) => {
                 for refined in refinements(task, &candidate, operator, &key, &arities) {
-                    if seen.insert(refined.clone()) {
+                    if visited.insert(refined.clone()) {
                         open.push(refined);
                     }
                 }
             }
         }
     }
-    Ok(found)
+    Ok(accepted)
 }
 
-/// Conjuncts under which atoms are added and deleted together.
+/// Conditions under which atoms are added and deleted together.
 struct Change<'o> {
     conditions: [&'o [GroundLiteral]; 2],
     adds: &'o [AtomId],
@@ -157,7 +162,7 @@ impl Change<'_> {
     }
 }
 
-/// The operator itself and a key whose weight it may increase (or decrease without anybody knowing).
+/// Returns the operator and a key whose weight it may increase.
 #[expect(clippy::arithmetic_side_effects, reason = "atoms of one operator are counted")]
 fn broken_by<'o>(
     task: &GroundTask<'_>,
@@ -165,7 +170,8 @@ fn broken_by<'o>(
     operator: &'o GroundOperator,
 ) -> Option<(&'o GroundOperator, Key)> {
     let literals = &operator.condition.literals[..];
-    let own = Change { conditions: [literals, &[]], adds: &operator.adds, deletes: &operator.deletes };
+    let unconditional =
+        Change { conditions: [literals, &[]], adds: &operator.adds, deletes: &operator.deletes };
     let conditional = operator.conditional.iter().map(|effect| Change {
         conditions: [literals, &effect.condition],
         adds: &effect.adds,
@@ -175,11 +181,12 @@ fn broken_by<'o>(
         let mut effects = operator.conditional.iter().map(|effect| &effect.deletes);
         operator.deletes.contains(atom) || effects.any(|deletes| deletes.contains(atom))
     };
-    // Each entry has to keep the weight by itself, and no two of them may add to one key.
+    // Each change must preserve the weight individually, and no two of them may add to the same
+    // key.
     let mut adding: Vec<Key> = Vec::new();
-    for change in std::iter::once(own).chain(conditional) {
+    for change in std::iter::once(unconditional).chain(conditional) {
         let mut balance: SmallVec<[(Key, i32); 4]> = SmallVec::new();
-        let mut weigh = |key: Key, weight| match balance.iter_mut().find(|(known, _)| *known == key) {
+        let mut weigh = |key: Key, weight| match balance.iter_mut().find(|(entry, _)| *entry == key) {
             Some((_, sum)) => *sum += weight,
             None => balance.push((key, weight)),
         };
@@ -207,7 +214,8 @@ fn broken_by<'o>(
     None
 }
 
-/// The candidate plus one predicate that the operator requires and deletes, its arguments matched to the key.
+/// Returns the candidate extended by a predicate that the operator requires and deletes, with its
+/// arguments matched to the key.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 fn refinements(
     task: &GroundTask<'_>,
@@ -228,7 +236,8 @@ fn refinements(
             let free = (0..arguments.len()).find(|p| arguments[*p] == *object && !positions.contains(p));
             positions.extend(free);
         }
-        // What is under way is counted whatever its other arguments are: it stands for where they have left.
+        // Atoms of running actions are counted for all other arguments: they replace the value at
+        // the action's start.
         let is_running = task.world.lifted.predicates.get(predicate.index()).is_some_and(|p| p.running);
         if positions.len() == key.len() && (arguments.len() <= key.len() + 1 || is_running) {
             let mut parts = candidate.clone();

@@ -1,4 +1,4 @@
-//! The numeric variables of a task, in integers.
+//! Converts the numeric variables of a task to integers.
 
 use std::borrow::Cow;
 
@@ -15,12 +15,12 @@ use crate::task::NumericEffect;
 use crate::task::number::TaskNumber;
 use crate::task::quantity::{Linear, NumericId};
 
-/// The numeric variables that conditions depend on, with the factor that makes all their values integers.
+/// Numeric variables that conditions depend on, with the common scale of their values.
 pub(super) struct Numbers<N> {
     pub(super) initial: Vec<N>,
     pub(super) names: Vec<String>,
     ids: FxHashMap<NumericId, NumericId>,
-    /// The multiples that some fluents are stored as.
+    /// Multiples in which some fluents are stored.
     multiples: FxHashMap<NumericId, Int>,
     pub(super) integers: Integers<N>,
 }
@@ -42,7 +42,9 @@ impl<N: TaskNumber> Numbers<N> {
         for operator in &task.operators {
             operator.numeric_effects.iter().for_each(|(_, value)| note(value));
         }
-        used.extend(task.objectives.iter().flat_map(|own| own.rest.iter().map(|(variable, _)| *variable)));
+        used.extend(
+            task.objectives.iter().flat_map(|objective| objective.rest.iter().map(|(variable, _)| *variable)),
+        );
         let mut used: Vec<_> = used.into_iter().collect();
         used.sort_unstable();
         let initial: Vec<_> = used.iter().map(|variable| task.world.initial_value(*variable)).collect();
@@ -76,33 +78,33 @@ impl<N: TaskNumber> Numbers<N> {
         Ok(Linear { coefficients, quantity: self.integers.quantity(&linear.quantity)? })
     }
 
-    /// Fluents with their factors.
+    /// Converts weighted fluents of an objective.
     pub(super) fn rest(&self, rest: &[(NumericId, Rational)]) -> Vec<(NumericId, Rational)> {
-        let own = |(variable, factor): &(NumericId, Rational)| {
+        let converted = |(variable, factor): &(NumericId, Rational)| {
             (self.ids[variable], factor.clone() / Rational::from_integer(self.multiple(*variable)))
         };
-        rest.iter().map(own).collect()
+        rest.iter().map(converted).collect()
     }
 
     fn multiple(&self, variable: NumericId) -> Int {
         self.multiples.get(&variable).copied().unwrap_or(1)
     }
 
-    /// The multiples that fluents are stored as, in their order; nothing if all are stored as they are.
+    /// Returns the multiples of all fluents in order; empty if none is scaled.
     pub(super) fn multiples(&self) -> Vec<Int> {
         if self.multiples.is_empty() {
             return Vec::new();
         }
         let mut multiples = vec![1; self.initial.len()];
         for (variable, multiple) in &self.multiples {
-            if let Some(own) = self.ids.get(variable) {
-                multiples[own.index()] = *multiple;
+            if let Some(id) = self.ids.get(variable) {
+                multiples[id.index()] = *multiple;
             }
         }
         multiples
     }
 
-    /// So many times an expression, over fluents as they are stored.
+    /// Scales an expression over stored fluents by `times`.
     pub(super) fn stored<'l>(&self, linear: &'l Linear<Rational>, times: Int) -> Cow<'l, Linear<Rational>> {
         if self.multiples.is_empty() {
             return Cow::Borrowed(linear);
@@ -118,9 +120,9 @@ impl<N: TaskNumber> Numbers<N> {
     pub(super) fn effects(&mut self, operator: &GroundOperator) -> Result<Vec<NumericEffect<N>>, Error> {
         let mut effects = Vec::new();
         for (variable, value) in operator.numeric_effects.iter() {
-            let own = *variable;
+            let target = *variable;
             if let Some(variable) = self.ids.get(variable).copied() {
-                let value = self.stored(value, self.multiple(own));
+                let value = self.stored(value, self.multiple(target));
                 effects.push(NumericEffect { variable, value: self.linear(&value)? });
             }
         }
@@ -128,8 +130,9 @@ impl<N: TaskNumber> Numbers<N> {
     }
 }
 
-/// The multiple that each of some fluents is stored as, where that is not the fluent itself, so that what they add to each other by
-/// fractions are integers: if `(increase (x) (* 0.5 (y)))`, twice x is stored. Nothing where no multiples do.
+/// Computes the multiples in which fluents are stored, so that fractional factors between fluents
+/// become integers: for `(increase (x) (* 0.5 (y)))`, twice x is stored. Empty if no multiples
+/// exist.
 fn multiples(task: &GroundTask<'_>) -> FxHashMap<NumericId, Int> {
     let mut factors: Vec<(NumericId, NumericId, &Rational)> = Vec::new();
     for (variable, value) in task.operators.iter().flat_map(|operator| operator.numeric_effects.iter()) {
@@ -141,7 +144,7 @@ fn multiples(task: &GroundTask<'_>) -> FxHashMap<NumericId, Int> {
     factors.sort_unstable();
     factors.dedup();
     let mut multiples: FxHashMap<NumericId, Int> = FxHashMap::default();
-    // What is passed on takes no more rounds than there are fluents, if not in a circle.
+    // Propagation along acyclic dependencies ends within as many rounds as there are fluents.
     for _ in 0..=factors.len() {
         let mut is_changed = false;
         for (variable, read, factor) in &factors {
@@ -150,8 +153,10 @@ fn multiples(task: &GroundTask<'_>) -> FxHashMap<NumericId, Int> {
             if stored.is_integer() {
                 continue;
             }
-            let more = if variable == read { None } else { stored.denominator() };
-            let multiple = more.and_then(|more| of(variable).checked_mul(more)).filter(|own| *own < LIMIT);
+            let denominator = if variable == read { None } else { stored.denominator() };
+            let multiple = denominator
+                .and_then(|factor| of(variable).checked_mul(factor))
+                .filter(|product| *product < LIMIT);
             let Some(multiple) = multiple else { return FxHashMap::default() };
             multiples.insert(*variable, multiple);
             is_changed = true;

@@ -1,4 +1,4 @@
-//! The slots of a task: all functions whose design some operator leaves open.
+//! Slots of a task: the functions with open designs in operators.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -10,7 +10,8 @@ use crate::lifted::ObjectId;
 use crate::number::dense;
 use crate::task::{Slot, SlotId, SlotUse};
 
-/// A function, and which of the operator's slots for this function it is: an action may require one twice.
+/// A function, and the index among the operator's slots for it, because an action may require a
+/// function twice.
 type SlotKey = (ObjectId, usize);
 
 fn slot_keys(slots: &GroundSlots) -> impl Iterator<Item = (SlotKey, &Vec<ObjectId>)> {
@@ -20,18 +21,18 @@ fn slot_keys(slots: &GroundSlots) -> impl Iterator<Item = (SlotKey, &Vec<ObjectI
     })
 }
 
-/// All functions whose design some operator leaves open, in the order of the objects, with all their designs.
+/// All slots in the order of the objects, with all their designs.
 pub(super) struct Slots {
     pub(super) all: Vec<Slot>,
     ids: FxHashMap<SlotKey, SlotId>,
-    /// How slots are used, by where they lie: operators share them.
+    /// Slot uses by address, because operators share them.
     uses: FxHashMap<*const (ObjectId, Vec<ObjectId>), Arc<[SlotUse]>>,
 }
 
 impl Slots {
     pub(super) fn new(operators: &[GroundOperator]) -> Self {
-        let mut seen = FxHashSet::default();
-        let distinct = operators.iter().filter(|operator| seen.insert(operator.slots.as_ptr()));
+        let mut visited = FxHashSet::default();
+        let distinct = operators.iter().filter(|operator| visited.insert(operator.slots.as_ptr()));
         let mut designs: BTreeMap<SlotKey, Vec<ObjectId>> = BTreeMap::new();
         for (key, suitable) in distinct.flat_map(|operator| slot_keys(&operator.slots)) {
             designs.entry(key).or_default().extend(suitable);
@@ -47,14 +48,14 @@ impl Slots {
     }
 
     pub(super) fn uses(&mut self, ground: &Arc<GroundSlots>) -> Arc<[SlotUse]> {
-        if let Some(known) = self.uses.get(&ground.as_ptr()) {
-            return known.clone();
+        if let Some(uses) = self.uses.get(&ground.as_ptr()) {
+            return uses.clone();
         }
         let uses: Arc<[SlotUse]> = slot_keys(ground)
             .map(|(key, suitable)| {
                 let slot = self.ids[&key];
-                let all = &self.all[slot.index()].designs;
-                let designs = suitable.iter().filter_map(|design| all.binary_search(design).ok());
+                let slot_designs = &self.all[slot.index()].designs;
+                let designs = suitable.iter().filter_map(|design| slot_designs.binary_search(design).ok());
                 SlotUse { slot, designs: designs.map(dense).collect() }
             })
             .collect();

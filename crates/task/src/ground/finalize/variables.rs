@@ -1,4 +1,4 @@
-//! Atoms to finite-domain variables.
+//! Assigns atoms to finite-domain variables.
 
 use rustc_hash::FxHashSet;
 
@@ -11,17 +11,17 @@ use crate::limits::Interrupted;
 use crate::number::dense;
 use crate::task::{ConditionalEffect, Fact, Literal, Variable, VariableId};
 
-/// The finite-domain variables and where each atom went.
+/// The finite-domain variables and the fact of each atom.
 pub(super) struct Atoms {
     pub(super) variables: Vec<Variable>,
-    /// How many of them are not derived.
+    /// Number of variables that are not derived.
     pub(super) basic: usize,
     pub(super) initial: Vec<u32>,
-    /// By atom.
+    /// Fact by atom.
     facts: Vec<Option<Fact>>,
-    /// The value of each variable that stands for none of its atoms.
+    /// Value of each variable for "none of these atoms".
     pub(super) none: Vec<u32>,
-    /// See [`exclusive`](crate::task::Task::exclusive).
+    /// Mutex groups, see [`exclusive`](crate::task::Task::exclusive).
     pub(super) exclusive: Vec<Vec<Fact>>,
 }
 
@@ -57,9 +57,9 @@ impl Atoms {
             let group = group?;
             let variable = VariableId::of(atoms.variables.len());
             let mut values: Vec<String> = group.iter().map(|atom| task.world.atom_name(*atom)).collect();
-            let none = dense(values.len());
+            let none_value = dense(values.len());
             values.push("none of these".into());
-            let mut initial = none;
+            let mut initial = none_value;
             for (atom, value) in group.iter().zip(0..) {
                 atoms.facts[atom.index()] = Some(Fact { variable, value });
                 if task.world.is_initial(*atom) {
@@ -68,7 +68,7 @@ impl Atoms {
             }
             atoms.variables.push(Variable { values });
             atoms.initial.push(initial);
-            atoms.none.push(none);
+            atoms.none.push(none_value);
         }
         let facts = |group: Vec<AtomId>| group.into_iter().filter_map(|atom| atoms.fact(atom)).collect();
         atoms.exclusive = exclusive.into_iter().map(facts).collect();
@@ -80,20 +80,20 @@ impl Atoms {
         Literal { fact, positive }
     }
 
-    /// What an atom is in the task; nothing if no condition reads it.
+    /// Returns the fact of an atom, or `None` if no condition reads it.
     pub(super) fn fact(&self, atom: AtomId) -> Option<Fact> {
         self.facts[atom.index()]
     }
 
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(super) fn effects(&self, operator: &GroundOperator) -> Vec<Fact> {
-        let none = |fact: Fact| Fact { value: self.none[fact.variable.index()], ..fact };
-        let deletes = operator.deletes.iter().filter_map(|atom| self.fact(*atom)).map(none);
+        let to_none = |fact: Fact| Fact { value: self.none[fact.variable.index()], ..fact };
+        let deletes = operator.deletes.iter().filter_map(|atom| self.fact(*atom)).map(to_none);
         let adds = operator.adds.iter().filter_map(|atom| self.fact(*atom));
         let mut effects: Vec<Fact> = Vec::with_capacity(operator.deletes.len() + operator.adds.len());
         for fact in deletes.chain(adds) {
-            match effects.iter_mut().find(|known| known.variable == fact.variable) {
-                Some(known) => *known = fact,
+            match effects.iter_mut().find(|existing| existing.variable == fact.variable) {
+                Some(existing) => *existing = fact,
                 None => effects.push(fact),
             }
         }
@@ -101,7 +101,7 @@ impl Atoms {
             let atoms =
                 operator.conditional.iter().flat_map(|effect| effect.adds.iter().chain(&effect.deletes));
             let mut facts = atoms.filter_map(|atom| self.fact(*atom));
-            facts.any(|other| other.variable == fact.variable)
+            facts.any(|candidate| candidate.variable == fact.variable)
         };
         let required = |fact: &Fact| {
             let literals = &operator.condition.literals;
@@ -112,8 +112,8 @@ impl Atoms {
         effects
     }
 
-    /// Conditional effects in the order in which they take place: what becomes false, then what becomes true. A
-    /// deletion where the operator sets the same variable anyway says nothing: of two atoms of one variable only one holds.
+    /// Converts conditional effects, deletions first. A deletion is dropped if the operator sets
+    /// the variable unconditionally, because only one atom of a variable holds.
     pub(super) fn conditional(&self, operator: &GroundOperator) -> Vec<ConditionalEffect> {
         if operator.conditional.is_empty() {
             return Vec::new();
@@ -128,10 +128,11 @@ impl Atoms {
             (!effects.is_empty()).then_some(ConditionalEffect { condition, effects })
         };
         let deletes = operator.conditional.iter().filter_map(|effect| {
-            let gone = effect.deletes.iter().filter_map(|atom| Some((atom, self.fact(*atom)?)));
-            let gone = gone.filter(|(atom, fact)| added.contains(atom) || !set.contains(&fact.variable));
-            let none = |(_, fact): (_, Fact)| Fact { value: self.none[fact.variable.index()], ..fact };
-            entry(&effect.condition, gone.map(none).collect())
+            let deleted = effect.deletes.iter().filter_map(|atom| Some((atom, self.fact(*atom)?)));
+            let deleted =
+                deleted.filter(|(atom, fact)| added.contains(atom) || !set.contains(&fact.variable));
+            let to_none = |(_, fact): (_, Fact)| Fact { value: self.none[fact.variable.index()], ..fact };
+            entry(&effect.condition, deleted.map(to_none).collect())
         });
         let adds = operator.conditional.iter().filter_map(|effect| {
             entry(&effect.condition, effect.adds.iter().filter_map(|atom| self.fact(*atom)).collect())

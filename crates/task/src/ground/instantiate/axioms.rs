@@ -1,4 +1,4 @@
-//! The rules of derived atoms, as far as something mentions them.
+//! Instantiates the rules of derived atoms that are used.
 
 use crate::ground::evaluate::condition::residual;
 use crate::ground::evaluate::normal_form::Definitions;
@@ -7,7 +7,7 @@ use crate::ground::vocabulary::eval_error::Failure;
 use crate::ground::vocabulary::world::World;
 use crate::number::dense;
 
-/// The rules of all derived atoms that have been met, and of those that their bodies lead to.
+/// Returns the rules of all used derived atoms and of their dependencies.
 #[expect(clippy::arithmetic_side_effects, reason = "positions in lists that are held in memory")]
 pub(super) fn instantiate_axioms(
     world: &mut World<'_>,

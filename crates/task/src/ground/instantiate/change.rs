@@ -1,4 +1,4 @@
-//! Changes of one happening together, in terms of the state before an action.
+//! Composes simultaneous changes into updates in terms of the state before an action (regression).
 
 use std::sync::Arc;
 
@@ -20,9 +20,10 @@ pub(super) enum GroundChange {
     Number {
         variable: NumericId,
         assignment: Assignment,
-        /// None if it is undefined: the operator does not exist where the change would be made.
+        /// `None` if the value is undefined: the operator does not exist where the change would be
+        /// made.
         operand: Option<Linear<Rational>>,
-        /// Combinations of designs for which it is undefined.
+        /// Combinations of designs for which the value is undefined.
         undefined: Arc<[ForbiddenCombinations]>,
         place: Place,
     },
@@ -36,7 +37,7 @@ impl GroundChange {
         }
     }
 
-    /// Whether it changes what is read.
+    /// Returns `true` if the change interferes with the reads.
     pub(super) fn disturbs(&self, world: &World<'_>, reads: &Reads) -> bool {
         match self {
             Self::Atom(atom, _) => {
@@ -51,7 +52,8 @@ impl GroundChange {
     }
 }
 
-/// The atoms that changes make true, and those that they make false; what is both becomes true.
+/// Returns the atoms that changes make true and those that they make false. Adding takes
+/// precedence.
 pub(super) fn atoms<'c>(changes: impl Iterator<Item = &'c GroundChange>) -> (Vec<AtomId>, Vec<AtomId>) {
     let (mut adds, mut deletes) = (Vec::new(), Vec::new());
     for change in changes {
@@ -63,7 +65,7 @@ pub(super) fn atoms<'c>(changes: impl Iterator<Item = &'c GroundChange>) -> (Vec
     (adds, deletes)
 }
 
-/// How a number changes; two changes of one way commute, unless both assign (0).
+/// Kind of a numeric change; changes of the same kind commute, except assignments (0).
 pub(super) fn way_of(assignment: Assignment) -> u8 {
     match assignment {
         Assignment::Assign => 0,
@@ -72,22 +74,23 @@ pub(super) fn way_of(assignment: Assignment) -> u8 {
     }
 }
 
-/// Whether changes of one number at one time go together: additions, scalings, and assignments of the same value do.
-/// `Failure::Undefined` if they do not, which leaves the action inapplicable (PDDL 2.1, section 8).
+/// Checks that changes of a number at the same time are compatible: additions, scalings, or
+/// assignments of the same value. Otherwise returns `Failure::Undefined`, which makes the action
+/// inapplicable (PDDL 2.1, section 8).
 fn reconcile(earlier: &GroundChange, later: &GroundChange) -> Result<(), Failure> {
     let (
-        GroundChange::Number { assignment: kind, operand: known, .. },
+        GroundChange::Number { assignment: kind, operand: first_value, .. },
         GroundChange::Number { assignment, operand, place, .. },
     ) = (earlier, later)
     else {
         return Ok(());
     };
-    match (known, operand) {
+    match (first_value, operand) {
         _ if way_of(*kind) != way_of(*assignment) => Err(Failure::Undefined),
-        (Some(known), Some(value)) if way_of(*kind) == 0 && known != value => {
+        (Some(first_value), Some(value)) if way_of(*kind) == 0 && first_value != value => {
             let is_constant =
                 |value: &Linear<Rational>| value.coefficients.is_empty() && value.quantity.tables.is_empty();
-            if is_constant(known) && is_constant(value) {
+            if is_constant(first_value) && is_constant(value) {
                 return Err(Failure::Undefined);
             }
             Err(Failure::Error(Error::Unsupported {
@@ -100,8 +103,8 @@ fn reconcile(earlier: &GroundChange, later: &GroundChange) -> Result<(), Failure
     }
 }
 
-/// What numeric variables become, in terms of the state before the action; `before` are the changes that
-/// the action has made already.
+/// Returns the new values of numeric variables in terms of the state before the action. `before`
+/// has the earlier changes of the action.
 pub(super) fn numbers<'c>(
     changes: impl Iterator<Item = &'c GroundChange>,
     before: &Numbers,
@@ -158,7 +161,7 @@ fn scaled(
     Ok(value)
 }
 
-/// Puts what numeric variables have become in their place.
+/// Substitutes the new values of numeric variables.
 pub(super) fn substitute(linear: &mut Linear<Rational>, before: &Numbers) {
     if !linear.coefficients.iter().any(|(variable, _)| before.get(*variable).is_some()) {
         return;

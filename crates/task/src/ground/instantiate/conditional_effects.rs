@@ -1,4 +1,5 @@
-//! Splits an instance into operators, one for each combination of outcomes of its conditions.
+//! Case splitting: splits an instance into operators, one for each combination of outcomes of its
+//! conditions.
 
 use std::sync::Arc;
 
@@ -20,17 +21,17 @@ use crate::lifted::Schema;
 use crate::limits::Limits;
 use crate::task::ForbiddenCombinations;
 
-/// An instance becomes at most this many operators.
+/// Maximum number of operators of an instance.
 const CASE_LIMIT: usize = 64;
 
-/// One way in which the conditions of an instance can turn out, all its conditions in terms of the state before it.
+/// A combination of outcomes of an instance's conditions, in terms of the state before it.
 pub(super) struct Case {
     parts: Vec<Residual>,
     start: Start,
     end: Vec<(Residual, GroundChange)>,
 }
 
-/// What the start of an instance changes for certain.
+/// Unconditional changes at the start of an instance.
 #[derive(Clone)]
 struct Start {
     adds: Vec<AtomId>,
@@ -56,18 +57,20 @@ impl Start {
     }
 }
 
-/// What must hold between the start effects and the end effects, and what happens by itself in between.
+/// Conditions between the start and the end, and timed events in between.
 pub(super) struct Middle<'m> {
-    /// Hold all the time between start and end.
+    /// Conditions during the whole interval.
     pub(super) over_all: &'m [Residual],
-    /// Hold before the end.
+    /// Conditions before the end.
     pub(super) at_end: &'m [Residual],
-    /// If something happens by itself: when the action starts and ends, and what must not hold then.
+    /// With timed events: the window of the action, and the conditions under which events
+    /// interfere.
     pub(super) passage: Option<&'m (TimelineWindow<'m>, Interference)>,
 }
 
 impl Middle<'_> {
-    /// Adds the conditions in terms of the state before the start, and to the start what happens until the end.
+    /// Adds the conditions in terms of the state before the start, and adds the timed events until
+    /// the end to `start`.
     fn pass(&self, start: &mut Start, parts: &mut Vec<Residual>) {
         let Some((passage, interference)) = self.passage else {
             let conditions = self.over_all.iter().chain(self.at_end);
@@ -91,8 +94,9 @@ impl Middle<'_> {
     }
 }
 
-/// The cases of an instance: one, unless its start is conditional or its numbers are. A case that contradicts itself, or in which
-/// a value is missing, is none; the others stay (PDDL 2.1, section 8: an effect whose condition does not hold is not an effect).
+/// Returns the cases of an instance: a single one, unless its start or its numbers are conditional.
+/// Contradictory cases and cases with undefined values are dropped (PDDL 2.1, section 8: an effect
+/// whose condition does not hold is not an effect).
 pub(super) fn cases(
     schema: &Schema,
     before: &[Residual],
@@ -100,7 +104,7 @@ pub(super) fn cases(
     middle: &Middle<'_>,
     end: &SimultaneousEffects,
 ) -> Result<Vec<Case>, Failure> {
-    let mut all = Vec::new();
+    let mut cases = Vec::new();
     for (decided, chosen) in split(schema, start.changes.iter().map(|(condition, _)| condition))? {
         let holds = |(condition, _): &&(Residual, GroundChange)| {
             *condition == Residual::True || chosen.contains(&condition)
@@ -135,14 +139,14 @@ pub(super) fn cases(
             let parts: Vec<_> = parts.iter().cloned().chain(decided).collect();
             if !contradictory(&parts) {
                 let end = end.iter().map(settle).filter(|(condition, _)| *condition != Residual::False);
-                all.push(Case { parts, start: start.clone(), end: end.collect() });
+                cases.push(Case { parts, start: start.clone(), end: end.collect() });
             }
         }
     }
-    Ok(all)
+    Ok(cases)
 }
 
-/// Whether parts cannot hold together, as far as their literals tell.
+/// Returns `true` if the literals of the parts contradict each other.
 fn contradictory(parts: &[Residual]) -> bool {
     fn note(parts: &[Residual], known: &mut FxHashMap<AtomId, bool>) -> bool {
         parts.iter().any(|part| match part {
@@ -155,7 +159,7 @@ fn contradictory(parts: &[Residual]) -> bool {
     note(parts, &mut FxHashMap::default())
 }
 
-/// Every way in which conditions can turn out: what must hold then, and which of them hold.
+/// Returns every combination of outcomes: the required literals, and the conditions that hold.
 #[allow(clippy::type_complexity)]
 #[expect(clippy::arithmetic_side_effects, reason = "cases are at most twice their limit")]
 fn split<'r>(
@@ -168,28 +172,28 @@ fn split<'r>(
             distinct.push(condition);
         }
     }
-    let mut all: Vec<(Vec<Residual>, Vec<&Residual>)> = vec![(Vec::new(), Vec::new())];
+    let mut combinations: Vec<(Vec<Residual>, Vec<&Residual>)> = vec![(Vec::new(), Vec::new())];
     for condition in distinct {
-        if all.len() * 2 > CASE_LIMIT {
+        if combinations.len() * 2 > CASE_LIMIT {
             return Err(Failure::Error(Error::Unsupported {
                 construct: format!("an instance of `{}` with more than {CASE_LIMIT} cases", schema.name),
                 instead: "fewer conditions on which its numbers or its start effects depend".into(),
                 place: schema.place,
             }));
         }
-        let mut longer = Vec::with_capacity(2 * all.len());
-        for (decided, chosen) in all {
+        let mut longer = Vec::with_capacity(2 * combinations.len());
+        for (decided, chosen) in combinations {
             let with = |part: Residual| decided.iter().cloned().chain([part]).collect::<Vec<_>>();
             longer.push((with(condition.clone()), chosen.iter().copied().chain([condition]).collect()));
             longer.push((with(condition.negated()), chosen));
         }
-        all = longer;
+        combinations = longer;
     }
-    Ok(all)
+    Ok(combinations)
 }
 
 impl Case {
-    /// The combinations of designs that the case cannot run with; `Failure::Undefined` if there is no other.
+    /// Returns the forbidden combinations of designs, or `Failure::Undefined` if no other remains.
     fn forbidden(
         &self,
         template: &GroundOperator,
@@ -201,17 +205,18 @@ impl Case {
         if rules.peek().is_none() {
             return Ok(template.forbidden.clone());
         }
-        let mut all = template.forbidden.to_vec();
+        let mut forbidden = template.forbidden.to_vec();
         for rule in rules {
             for combination in &rule.combinations {
-                forbid(&mut all, &rule.slots, combination.clone());
+                forbid(&mut forbidden, &rule.slots, combination.clone());
             }
         }
         let sizes: Vec<_> = template.slots.iter().map(|(_, designs)| designs.len()).collect();
-        if admit_some(&all, &sizes, limits)? { Ok(all.into()) } else { Err(Failure::Undefined) }
+        if admit_some(&forbidden, &sizes, limits)? { Ok(forbidden.into()) } else { Err(Failure::Undefined) }
     }
 
-    /// The operator of this case; everything but conditions and effects is that of the template.
+    /// Returns the operator of this case. Everything except conditions and effects is taken from
+    /// the template.
     #[expect(clippy::arithmetic_side_effects, reason = "something was pushed before")]
     pub(super) fn operator(
         self,
@@ -228,15 +233,15 @@ impl Case {
         let mut conditional: Vec<GroundConditional> = Vec::new();
         for (condition, change) in self.end.iter().filter(|(condition, _)| *condition != Residual::True) {
             let GroundChange::Atom(atom, positive) = change else { continue };
-            let gone = start.deletes.contains(atom) && !start.adds.contains(atom);
-            if !positive && (gone || end_adds.contains(atom)) {
+            let is_deleted = start.deletes.contains(atom) && !start.adds.contains(atom);
+            if !positive && (is_deleted || end_adds.contains(atom)) {
                 continue;
             }
             let condition = literals(world, definitions, condition);
             if condition.windows(2).any(|pair| pair[0].0 == pair[1].0) {
                 continue;
             }
-            let position = conditional.iter().position(|known| known.condition == condition);
+            let position = conditional.iter().position(|entry| entry.condition == condition);
             let position = position.unwrap_or_else(|| {
                 conditional.push(GroundConditional { condition, adds: Vec::new(), deletes: Vec::new() });
                 conditional.len() - 1
@@ -260,7 +265,7 @@ impl Case {
     }
 }
 
-/// The literals of a conjunction; parts that are none get a name.
+/// Returns the literals of a conjunction. Other parts are replaced by auxiliary atoms.
 fn literals(
     world: &mut World<'_>,
     definitions: &mut Definitions,
@@ -274,7 +279,8 @@ fn literals(
     literals
 }
 
-/// A condition of the middle or end of a durative action in terms of the state before its start.
+/// Rewrites a condition of the middle or end of a durative action in terms of the state before its
+/// start.
 fn after_start(residual: &Residual, Start { adds, deletes, numbers, .. }: &Start) -> Residual {
     if adds.is_empty() && deletes.is_empty() && numbers.is_empty() {
         return residual.clone();

@@ -1,4 +1,4 @@
-//! Forbidden combinations of designs, and whether an allowed one remains.
+//! Forbidden combinations of designs, and the test whether an admissible one remains.
 
 use rustc_hash::FxHashSet;
 
@@ -6,7 +6,7 @@ use crate::limits::{Interrupted, LimitPoll, Limits};
 use crate::task::ForbiddenCombinations;
 use crate::task::quantity::SlotSet;
 
-/// Adds a combination of designs to those that are forbidden.
+/// Adds a forbidden combination of designs.
 pub(super) fn forbid(forbidden: &mut Vec<ForbiddenCombinations>, slots: &SlotSet, combination: SlotSet) {
     match forbidden.iter_mut().find(|rule| rule.slots == *slots) {
         Some(rule) if rule.combinations.contains(&combination) => {}
@@ -17,10 +17,11 @@ pub(super) fn forbid(forbidden: &mut Vec<ForbiddenCombinations>, slots: &SlotSet
     }
 }
 
-/// Whether some combination of designs is not forbidden; `sizes` counts the designs of each slot.
+/// Returns `true` if a combination of designs is admissible. `sizes` has the number of designs of
+/// each slot.
 ///
-/// Only slots that exclusions mention are looked at, those that no exclusion joins apart from each other, and a choice for some of them
-/// that is forbidden already is not extended.
+/// Only constrained slots are searched, separately for each connected component of the constraints.
+/// Backtracking search: a partial choice that violates a constraint is not extended.
 pub(super) fn admit_some(
     forbidden: &[ForbiddenCombinations],
     sizes: &[usize],
@@ -48,10 +49,11 @@ pub(super) fn admit_some(
     Ok(true)
 }
 
-/// Positions of the slots in their group, and what must not be chosen for them together.
+/// Positions of the slots in their component, and the forbidden choices for them.
 type Rule<'f> = (Vec<usize>, FxHashSet<&'f SlotSet>);
 
-/// Whether designs for the first slots can be extended to all; rules are filed under the last slot that they mention.
+/// Returns `true` if designs for the first slots can be extended to all slots. Rules are indexed by
+/// the last slot that they mention.
 fn extends(
     chosen: &mut Vec<u32>,
     sizes: &[usize],
@@ -74,7 +76,7 @@ fn extends(
     Ok(false)
 }
 
-/// The slots of the exclusions in groups that no exclusion joins, each ascending.
+/// Returns the connected components of slots that share constraints, each in ascending order.
 fn joined(forbidden: &[ForbiddenCombinations]) -> Vec<Vec<u32>> {
     let mut groups: Vec<Vec<u32>> = Vec::new();
     for rule in forbidden {
@@ -130,9 +132,9 @@ mod tests {
         }
     }
 
-    /// Five slots of 100 designs, and none of the first goes with any of the second.
+    /// Five slots of 100 designs, where no pair of the first two slots is admissible.
     #[test]
-    fn a_product_is_not_gone_through() {
+    fn a_large_product_is_not_enumerated() {
         let pairs = (0..100).flat_map(|a| (0..100).map(move |b| [a, b].into())).collect();
         let forbidden = [ForbiddenCombinations { slots: [0, 1].into(), combinations: pairs }];
         assert_eq!(admit_some(&forbidden, &[100; 5], &Limits::none()), Ok(false));

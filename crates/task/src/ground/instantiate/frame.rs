@@ -1,8 +1,8 @@
-//! What the instances of a schema share: all that depends on the designs of its slots.
+//! Cache of instance data that depends only on the designs of the slots.
 //!
-//! Which designs suit, which combinations are forbidden, and what costs and consumptions are with each combination depends
-//! on few parameters: how much a way drains a battery, but not how full the battery is. So it is worked out once
-//! for each combination of those parameters, and the instances that agree in them share it.
+//! Suitable designs, forbidden combinations, costs and consumption depend on few parameters: the
+//! battery use of a route depends on the route, but not on the battery level. They are computed
+//! once for each combination of these parameters and shared by the instances.
 
 use std::sync::Arc;
 
@@ -23,12 +23,12 @@ use crate::number::dense;
 use crate::task::ForbiddenCombinations;
 use crate::task::quantity::{Linear, Quantity};
 
-/// What instances share that agree in the parameters of the key.
+/// Data shared by instances with the same key parameters.
 pub(super) struct SharedInstanceData<'a> {
     pub(super) designs: Slots<'a>,
     pub(super) slots: Arc<GroundSlots>,
     pub(super) forbidden: Arc<[ForbiddenCombinations]>,
-    /// What is left of the open conjuncts.
+    /// Residuals of the open conjuncts.
     pub(super) start: Vec<Residual>,
     pub(super) over_all: Vec<Residual>,
     pub(super) at_end: Vec<Residual>,
@@ -38,17 +38,19 @@ pub(super) struct SharedInstanceData<'a> {
     pub(super) duration: Quantity<Rational>,
 }
 
-/// The operand of an effect, as far as a frame knows it.
+/// Operand of an effect, as far as it is determined by the shared parameters.
 pub(super) enum Operand {
-    /// It mentions no slot, or the effect has bound variables, or none.
+    /// The operand mentions no slot, or the effect has bound variables.
     Closed,
     Undefined,
-    /// With the combinations of designs for which it is undefined, if the effect has a condition.
+    /// The operand, with the combinations of designs for which it is undefined, if the effect is
+    /// conditional.
     Open(Linear<Rational>, Arc<[ForbiddenCombinations]>),
 }
 
 impl<'a> SharedInstanceData<'a> {
-    /// The frame of an instance; none if no combination of designs suits.
+    /// Computes the shared data of an instance. Returns `None` if no combination of designs is
+    /// suitable.
     pub(super) fn new(
         world: &mut World<'_>,
         outline: &SplitSchema<'a>,
@@ -115,7 +117,8 @@ fn operands(build: &mut Build<'_, '_>, effects: &[Effect]) -> Result<Vec<Operand
     Ok(operands)
 }
 
-/// The candidates of one slot for which everything that depends on this slot alone is true and defined.
+/// Returns the designs of a slot for which all conditions and expressions over this slot alone are
+/// true and defined.
 fn suitable_designs(
     world: &mut World<'_>,
     outline: &SplitSchema<'_>,

@@ -1,4 +1,4 @@
-//! One instance of a schema to its operators.
+//! Instantiation of a single instance of a schema.
 
 use std::sync::Arc;
 
@@ -24,11 +24,11 @@ use crate::lifted::{Effect, Formula, Joint, Lifted, ObjectId, Schema, Term};
 use crate::task::timing::Timing;
 use crate::task::{Argument, ForbiddenCombinations};
 
-/// What all instances are made with.
+/// State shared by all instantiations.
 pub(super) struct Instantiation<'a> {
     pub(super) world: World<'a>,
     pub(super) definitions: Definitions,
-    /// None if nothing happens by itself.
+    /// `None` if there are no timed events.
     pub(super) timeline: Option<Timeline>,
 }
 
@@ -38,7 +38,8 @@ impl<'a> Instantiation<'a> {
         Self { world, definitions: Definitions::default(), timeline }
     }
 
-    /// The operators of one instance, one for each passage and case. `Failure::Undefined` says that it can never be applied.
+    /// Returns the operators of an instance, one for each window and case, or `Failure::Undefined`
+    /// if it is never applicable.
     pub(super) fn operators(
         &mut self,
         outline: &SplitSchema<'_>,
@@ -62,7 +63,7 @@ impl<'a> Instantiation<'a> {
         let mut operators = Vec::new();
         let Some(timeline) = timeline else {
             let cases = cases(schema, &before, &start, &untimed, &end)?;
-            // Most instances are one operator, to which the template goes.
+            // Most instances have a single operator, which takes the template without a copy.
             let templates = std::iter::repeat_n(template, cases.len());
             for (case, template) in std::iter::zip(cases, templates) {
                 operators.extend(possible(case.operator(world, definitions, template))?);
@@ -81,7 +82,8 @@ impl<'a> Instantiation<'a> {
     }
 }
 
-/// The combinations of designs that an instance forbids beside those of its frame; none if no other is left.
+/// Returns the forbidden combinations of an instance, including the shared ones, or fails if none
+/// remains.
 fn forbidden(
     build: &Build<'_, '_>,
     frame: &SharedInstanceData,
@@ -89,17 +91,17 @@ fn forbidden(
     if build.forbidden.is_empty() {
         return Ok(Some(frame.forbidden.clone()));
     }
-    let mut all = frame.forbidden.to_vec();
+    let mut forbidden = frame.forbidden.to_vec();
     for rule in &build.forbidden {
         for combination in &rule.combinations {
-            forbid(&mut all, &rule.slots, combination.clone());
+            forbid(&mut forbidden, &rule.slots, combination.clone());
         }
     }
-    let is_left = admit_some(&all, &frame.designs.sizes(), build.world.limits)?;
-    Ok(is_left.then(|| all.into()))
+    let is_admissible = admit_some(&forbidden, &frame.designs.sizes(), build.world.limits)?;
+    Ok(is_admissible.then(|| forbidden.into()))
 }
 
-/// What the operators of an instance have in common.
+/// Returns the parts that all operators of an instance have in common.
 fn template(
     build: &Build<'_, '_>,
     outline: &SplitSchema<'_>,
@@ -137,7 +139,7 @@ fn configuration(
         .collect()
 }
 
-/// Conditions under which the start and the end of an instance interfere that are one happening.
+/// Returns the conditions under which the simultaneous start and end of an instance interfere.
 fn joint_clashes(
     build: &mut Build<'_, '_>,
     schema: &Schema,
@@ -148,13 +150,13 @@ fn joint_clashes(
     let (first, second) = schema.end_effects.split_at(joint.start_effects);
     let first_reads = reads(lifted, &joint.start, first, &build.binding);
     let second_reads = reads(lifted, &joint.end, second, &build.binding);
-    let (own, others) = frame.end_operands.split_at(joint.start_effects);
-    let first = SimultaneousEffects::new(build, first, own)?;
-    let second = SimultaneousEffects::new(build, second, others)?;
+    let (first_operands, second_operands) = frame.end_operands.split_at(joint.start_effects);
+    let first = SimultaneousEffects::new(build, first, first_operands)?;
+    let second = SimultaneousEffects::new(build, second, second_operands)?;
     Ok(clashes(build.world, (&first_reads, &first), (&second_reads, &second)))
 }
 
-/// Where the start and the end of an instance interfere with events.
+/// Returns the conditions under which the start and the end of an instance interfere with events.
 fn conflicts(
     world: &World<'_>,
     timeline: &Timeline,
@@ -174,7 +176,7 @@ fn conflicts(
     }
 }
 
-/// What a happening reads.
+/// Returns the reads of a happening.
 fn reads(lifted: &Lifted, condition: &Formula, effects: &[Effect], binding: &Binding) -> Reads {
     let mut reads = Reads::default();
     reads.condition(lifted, condition, binding);

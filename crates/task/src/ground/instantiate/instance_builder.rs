@@ -1,4 +1,5 @@
-//! An instance under construction: its conditions and expressions, and which combinations of designs they forbid.
+//! Partially evaluates the conditions and expressions of an instance, and collects forbidden
+//! combinations of designs.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -19,9 +20,9 @@ use pddl::ast::Span;
 
 /// An expression of a conditional effect.
 pub(super) struct Apart {
-    /// None where it is undefined.
+    /// `None` if the value is undefined.
     pub(super) operand: Option<Linear<Rational>>,
-    /// The combinations of designs for which it is undefined.
+    /// Combinations of designs for which the value is undefined.
     pub(super) undefined: Arc<[ForbiddenCombinations]>,
 }
 
@@ -34,7 +35,7 @@ pub(super) struct Build<'w, 'a> {
 }
 
 impl Build<'_, '_> {
-    /// What is left of conjuncts that mention no slot, after what is left of those that do.
+    /// Returns the residuals of closed conjuncts, after those of open ones.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(super) fn conditions(
         &mut self,
@@ -49,7 +50,8 @@ impl Build<'_, '_> {
         Ok(parts)
     }
 
-    /// What is left of conjuncts that mention slots; combinations of designs that break a static one are forbidden.
+    /// Returns the residuals of open conjuncts. Combinations of designs that violate a static
+    /// conjunct are forbidden.
     pub(super) fn open_conditions(&mut self, open: &[(&Formula, SlotSet)]) -> Result<Vec<Residual>, Failure> {
         let mut parts = Vec::new();
         for (conjunct, mentioned) in open {
@@ -67,11 +69,12 @@ impl Build<'_, '_> {
         Ok(parts)
     }
 
-    /// The expression, or nothing where it is undefined, and apart the combinations of designs for which it is.
+    /// Evaluates an expression of a conditional effect. Undefined combinations are returned instead
+    /// of forbidden.
     pub(super) fn open_apart(&mut self, expression: &Expression) -> Result<Apart, Failure> {
-        let own = std::mem::take(&mut self.forbidden);
+        let outer = std::mem::take(&mut self.forbidden);
         let operand = possible(self.open(expression));
-        let undefined = std::mem::replace(&mut self.forbidden, own);
+        let undefined = std::mem::replace(&mut self.forbidden, outer);
         Ok(Apart { operand: operand?, undefined: undefined.into() })
     }
 
@@ -112,7 +115,7 @@ impl Build<'_, '_> {
         })
     }
 
-    /// Forbids the combinations of designs with which the action would end before it begins.
+    /// Forbids the combinations of designs with a negative duration.
     pub(super) fn forbid_negative(&mut self, duration: &Quantity<Rational>) -> Result<(), Failure> {
         let zero = Rational::from_integer(0);
         let least = duration.tables.iter().filter_map(|table| table.values.iter().min());

@@ -1,15 +1,17 @@
-//! Instances of schemas to ground operators, the designs of their slots still open.
+//! Instantiation: instances of schemas to ground operators with open design slots.
 //!
-//! A durative action is composed into one step: conditions of its middle and end that its start effects
-//! provide are dropped, those that they destroy make the instance impossible, and numeric conditions and effects of the
-//! end are rewritten in terms of the state before the start (sequential execution of PDDL 2.1, section 8).
+//! A durative action is composed into a single step: conditions of its middle and end that its
+//! start effects provide are dropped, conditions that they destroy make the instance impossible,
+//! and numeric conditions and effects of the end are rewritten in terms of the state before the
+//! start (sequential execution of PDDL 2.1, section 8).
 //!
-//! Conditional effects on atoms stay as they are. An instance whose numbers (cost among them) change under a
-//! condition becomes one operator for each case, and so does one whose start effects are conditional.
+//! Conditional effects on atoms are kept. An instance with conditional numeric effects (including
+//! cost) or conditional start effects becomes an operator for each case.
 //!
-//! `slot_split` separates the parts of a schema that mention its slots, and `frame` caches what instances with the same design dependencies share.
-//! `simultaneous_effects` are the effects of a start or an end. `timeline_windows` lists the ways in which an action lies between timed initial
-//! literals, and `conditional_effects` splits each into operators.
+//! `slot_split` separates the parts of a schema that mention its slots, and `frame` caches data of
+//! instances with the same design dependencies. `simultaneous_effects` has the effects of a start
+//! or an end. `timeline_windows` enumerates the positions of an action between timed initial
+//! literals, and `conditional_effects` splits each of them into operators.
 
 mod axioms;
 mod change;
@@ -45,10 +47,11 @@ use crate::lifted::Schema;
 use crate::lifted::configuration::{SlotParameter, depends_on_own_start};
 use crate::number::dense;
 
-/// Turns every reached instance into operators, the goal into a condition, and derived atoms that they mention into rules. For each
-/// schema: its design parameters, and those of them that are slots.
+/// Converts every reached instance into operators, the goal into a condition, and the used derived
+/// atoms into rules. `designs` has the design parameters of each schema.
 ///
 /// # Errors
+/// All unsupported expressions and conditions.
 /// All expressions and conditions that the planner does not handle.
 pub fn instantiate<'a>(
     world: World<'a>,
@@ -77,7 +80,7 @@ pub fn instantiate<'a>(
     Ok(GroundTask { world, operators, axioms: definitions.axioms, goal, objectives: Vec::new() })
 }
 
-/// The operators of all instances; of each schema the first error is noted.
+/// Returns the operators of all instances. Records the first error of each schema.
 ///
 /// # Errors
 /// `Error::Interrupted` at a limit.
@@ -88,7 +91,7 @@ fn operators(
     errors: &mut Vec<Error>,
 ) -> Result<Vec<GroundOperator>, Errors> {
     let (lifted, reached) = (instantiation.world.lifted, instantiation.world.reached);
-    // Growing would move operators that are large and many; most instances become one.
+    // The exact capacity avoids moving many large operators; most instances have a single operator.
     let mut operators = Vec::with_capacity(reached.instances.iter().map(Vec::len).sum());
     let parameters = designs.iter().zip(slots);
     for ((schema, (designs, slots)), instances) in
@@ -139,7 +142,8 @@ fn own_start(schema: &Schema) -> Error {
     }
 }
 
-/// The goal, and the rules of all derived atoms that have been met; `Failure::Undefined` if it is false whatever happens.
+/// Returns the goal and the rules of the used derived atoms, or `Failure::Undefined` if the goal is
+/// false in all states.
 fn goal(instantiation: &mut Instantiation<'_>) -> Result<GroundCondition, Failure> {
     let Instantiation { world, definitions, timeline } = instantiation;
     let lifted = world.lifted;

@@ -1,4 +1,4 @@
-//! The effects of the start or of the end of an instance.
+//! Simultaneous effects of the start or the end of an instance.
 
 use std::sync::Arc;
 
@@ -15,19 +15,19 @@ use crate::ground::vocabulary::world::World;
 use crate::lifted::{Change, Effect};
 use crate::task::ForbiddenCombinations;
 
-/// What the start or the end of an instance changes, each change under a condition.
+/// Conditional changes at the start or the end of an instance.
 #[derive(Clone)]
 pub(super) struct SimultaneousEffects {
     pub(super) changes: Vec<(Residual, GroundChange)>,
 }
 
 impl SimultaneousEffects {
-    /// Nothing changes.
+    /// Returns an empty set of changes.
     pub(super) fn nothing() -> Self {
         Self { changes: Vec::new() }
     }
 
-    /// The changes of effects that happen at once.
+    /// Evaluates simultaneous effects.
     pub(super) fn new(
         build: &mut Build<'_, '_>,
         effects: &[Effect],
@@ -45,18 +45,18 @@ impl SimultaneousEffects {
                 bindings.push(binding.clone());
                 true
             })?;
-            let own = std::mem::take(&mut build.binding);
+            let outer_binding = std::mem::take(&mut build.binding);
             for binding in bindings {
                 build.binding = binding;
                 ground_effect(build, effect, operand, &mut changes)?;
             }
-            build.binding = own;
+            build.binding = outer_binding;
         }
         Ok(Self { changes })
     }
 }
 
-/// Adds the change of an effect whose bound variables have objects, unless it never takes place.
+/// Adds the change of an effect whose bound variables have objects, unless its condition is false.
 fn ground_effect(
     build: &mut Build<'_, '_>,
     effect: &Effect,
@@ -101,8 +101,9 @@ fn ground_change(
     })
 }
 
-/// Conditions under which two parts of one happening interfere: one changes what the other reads, they set an atom to
-/// different values, or they change a number in ways that do not commute.
+/// Returns the conditions under which two parts of a happening interfere: one changes a read of the
+/// other, they set an atom to different values, or they change a number in ways that do not
+/// commute.
 pub(super) fn clashes(
     world: &World<'_>,
     (first_reads, first): (&Reads, &SimultaneousEffects),

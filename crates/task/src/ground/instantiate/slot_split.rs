@@ -1,4 +1,4 @@
-//! Lifted schemas, split into the parts that mention slots and the rest.
+//! Splits lifted schemas into the parts that mention slots and the others.
 
 use crate::ground::vocabulary::atom::{Binding, Row};
 use crate::lifted::configuration::{
@@ -7,44 +7,45 @@ use crate::lifted::configuration::{
 use crate::lifted::{Change, Effect, Expression, Formula, Lifted, Schema, Term};
 use crate::task::quantity::SlotSet;
 
-/// A schema with what mentions its slots apart from the rest.
+/// A schema with the parts that mention its slots separated.
 pub(super) struct SplitSchema<'a> {
     pub(super) schema: &'a Schema,
-    /// The parameters that are designs, with the function that each solves.
+    /// The design parameters, with their functions.
     pub(super) designs: &'a [SlotParameter],
-    /// Those of them that are slots.
+    /// The design parameters that are slots.
     pub(super) parameters: &'a [SlotParameter],
-    /// The parameters on which the frame of an instance depends, ascending.
+    /// The parameters that determine the shared data of an instance, ascending.
     key: Vec<u32>,
     pub(super) start: Conjuncts<'a>,
     pub(super) over_all: Conjuncts<'a>,
     pub(super) at_end: Conjuncts<'a>,
 }
 
-/// The conjuncts of a condition.
+/// Conjuncts of a condition.
 pub(super) struct Conjuncts<'a> {
-    /// Those that mention no slot, apart from static atoms that relaxed reachability has settled.
+    /// Conjuncts without slots, except the static atoms that relaxed reachability has already
+    /// decided.
     pub(super) closed: Vec<&'a Formula>,
-    /// Those that do, with the positions of the slots.
+    /// Conjuncts with slots, with the positions of the slots.
     pub(super) open: Vec<(&'a Formula, SlotSet)>,
 }
 
 impl<'a> Conjuncts<'a> {
     fn new(lifted: &Lifted, condition: &'a Formula, slots: &[SlotParameter]) -> Self {
-        let mut own = Self { closed: Vec::new(), open: Vec::new() };
+        let mut conjuncts_by_kind = Self { closed: Vec::new(), open: Vec::new() };
         for conjunct in conjuncts(condition) {
             let mentioned = slots_of_formula(conjunct, slots);
             if !mentioned.is_empty() {
-                own.open.push((conjunct, mentioned));
+                conjuncts_by_kind.open.push((conjunct, mentioned));
             } else if !settled(lifted, conjunct) {
-                own.closed.push(conjunct);
+                conjuncts_by_kind.closed.push(conjunct);
             }
         }
-        own
+        conjuncts_by_kind
     }
 }
 
-/// Whether relaxed reachability decides a conjunct exactly.
+/// Returns `true` if relaxed reachability decides a conjunct exactly.
 fn settled(lifted: &Lifted, conjunct: &Formula) -> bool {
     match conjunct {
         Formula::Literal { predicate, .. } => {
@@ -91,12 +92,12 @@ impl<'a> SplitSchema<'a> {
         Self { schema, designs, parameters, key, start, over_all, at_end }
     }
 
-    /// The objects on which the frame of an instance depends.
+    /// Returns the objects that determine the shared data of an instance.
     pub(super) fn key(&self, binding: &Binding) -> Row {
         self.key.iter().filter_map(|parameter| binding[*parameter as usize]).collect()
     }
 
-    /// The conditions and expressions that mention one slot and no other.
+    /// Returns the conditions and expressions that mention a single slot.
     pub(super) fn about(&self, position: u32) -> (Vec<&'a Formula>, Vec<&'a Expression>) {
         let only = SlotSet::from_slice(&[position]);
         let open = self.start.open.iter().chain(&self.over_all.open).chain(&self.at_end.open);
@@ -110,7 +111,7 @@ impl<'a> SplitSchema<'a> {
     }
 }
 
-/// The operand of a numeric effect without bound variables, if it mentions slots.
+/// Returns the operand of a numeric effect without bound variables, if it mentions slots.
 pub(super) fn open_operand<'a>(effect: &'a Effect, parameters: &[SlotParameter]) -> Option<&'a Expression> {
     match &effect.change {
         Change::Assign { expression, .. }

@@ -1,20 +1,26 @@
-//! Timed initial literals: what happens by itself while actions execute one after another.
+//! Timed initial literals: events that occur during sequential execution.
 //!
-//! The definition is that of `validate`: an action may start at any time, and waiting is free. The times of the events divide the plan
-//! into *phases*: phase i is the time from event i (included) to event i + 1 (excluded). What an action does depends on the phases of its start and its
-//! end alone, and on whether it ends at the very time of an event; an earlier start within them never hurts, because one can wait. So
-//! each instance becomes one operator for each such *passage* (see `timeline_windows`), which starts it as early as can be. A finite-domain variable is
-//! the phase, a numeric variable the clock. A wait leads to the next event.
+//! The semantics is that of `validate`: an action may start at any time, and waiting is free. The
+//! times of the events divide the plan into *phases*: phase i is the time from event i (inclusive)
+//! to event i + 1 (exclusive). The effect of an action depends only on the phases of its start and
+//! end, and on whether it ends exactly at an event. An earlier start within the phases is never
+//! worse, because waiting is possible. Each instance therefore becomes an operator for each
+//! *window* (see `timeline_windows`), which starts as early as possible. A finite-domain variable
+//! is the phase, a numeric variable the clock. A wait leads to the next event.
 //!
-//! Where "later than" has no earliest time, the action starts a *moment* later: so short a time that no two times that
-//! differ, made of events and durations, are less than two moments apart. So whatever can be done at any time after can be done then.
+//! If "later than" has no earliest time, the action starts a *moment* later. The moment is so short
+//! that two distinct times, composed of events and durations, always differ by at least two
+//! moments. Anything possible at some later time within the phase is thus possible then.
 //!
-//! Events change the state at their time. A start or an end that *interferes* with an event (one changes what the other
-//! reads, or they set an atom to different values) is not at its time [1, section 8.4; 2, section 2]; one that does not may be, and
-//! then their order does not matter. An event at the time of an end is not part of the interval over which a condition holds.
+//! Events change the state at their time. A start or an end that *interferes* with an event (one
+//! changes a read of the other, or they set an atom to different values) cannot be at its time [1,
+//! section 8.4; 2, section 2]. Otherwise it can be, and their order is irrelevant. An event at the
+//! time of an end is not part of the interval of an over-all condition.
 //!
-//! \[1\] M. Fox, D. Long: PDDL2.1: an extension to PDDL for expressing temporal planning domains, JAIR 20, 2003.
-//! \[2\] S. Edelkamp, J. Hoffmann: PDDL2.2: the language for the classical part of IPC-4, technical report 195, 2004.
+//! \[1\] M. Fox, D. Long: PDDL2.1: an extension to PDDL for expressing temporal planning domains,
+//! JAIR 20, 2003.
+//! \[2\] S. Edelkamp, J. Hoffmann: PDDL2.2: the language for the classical part of IPC-4, technical
+//! report 195, 2004.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -31,32 +37,32 @@ use crate::number::dense;
 use crate::task::quantity::{Linear, NumericId, Quantity};
 use crate::task::timing::Timing;
 
-/// The atoms and the numeric variables that stand for time; none of them has a name in the files.
+/// Auxiliary atoms and numeric variables for time, without names in the files.
 #[derive(Debug, Clone)]
 pub(super) struct Timeline {
     pub(super) clock: NumericId,
-    /// Stands for a moment until all durations are known.
+    /// Placeholder for the moment until all durations are known.
     pub(super) moment: NumericId,
     pub(super) phases: Vec<AtomId>,
-    /// The last thing that happened was a wait.
+    /// Atom: the last step was a wait.
     pub(super) waited: AtomId,
-    /// For each event its time and what becomes true or false.
+    /// Times of the events with the changed atoms.
     pub(super) events: Vec<(Rational, Vec<(AtomId, bool)>)>,
-    /// How many events have taken place at the start.
+    /// Number of events before the start of the plan.
     pub(super) first: usize,
 }
 
 impl Timeline {
-    /// None if nothing happens by itself.
+    /// Returns `None` if there are no timed events.
     #[expect(clippy::arithmetic_side_effects, reason = "phases are objects, which are held in memory")]
     pub(super) fn new(world: &mut World<'_>) -> Option<Self> {
         let events = &world.lifted.events[..];
         if events.is_empty() {
             return None;
         }
-        let own = &world.lifted.time;
-        let (clock, moment, phase, waited) = (own.clock, own.moment, own.phase, own.waited);
-        let first = own.first_phase;
+        let time = &world.lifted.time;
+        let (clock, moment, phase, waited) = (time.clock, time.moment, time.phase, time.waited);
+        let first = time.first_phase;
         let phases = (0..=dense(events.len()))
             .map(|number| world.atom(phase, &[ObjectId(first.0 + number)]))
             .collect();
@@ -75,12 +81,12 @@ impl Timeline {
         Some(Self { clock, moment, phases, waited, events, first })
     }
 
-    /// What a goal needs besides: a plan does not end with a wait.
+    /// Additional goal: a plan must not end with a wait.
     pub(super) fn at_rest(&self) -> Residual {
         Residual::Literal { atom: self.waited, positive: false }
     }
 
-    /// Waiting until the next event, from each phase.
+    /// Returns the operators that wait until the next event, one for each phase.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
@@ -112,18 +118,20 @@ impl Timeline {
         })
     }
 
-    /// Puts a number for the moment, now that all durations are known; operators that cannot be there any more go.
+    /// Replaces the placeholder by the moment, once all durations are known. Operators that become
+    /// impossible are removed.
     pub(super) fn settle(&self, operators: &mut Vec<GroundOperator>) {
         let durations = operators.iter().flat_map(|operator| {
             let tables = operator.duration.tables.iter().flat_map(|table| table.values.iter());
             tables.chain([&operator.duration.constant])
         });
         let times = self.events.iter().map(|(time, _)| time).chain(durations);
-        // At most the separation that validators take for granted, so that nobody waits longer than need be.
+        // The moment is at most the usual separation of validators, so that no start is later than
+        // necessary.
         let unit =
             times.fold(BigInt::from(1000), |unit, time| num_integer::lcm(unit, time.to_big().denom() * 2_u8));
         let moment = Rational::from_big(BigRational::new(BigInt::from(1), unit));
-        let put = |linear: &mut Linear<Rational>| {
+        let substitute_moment = |linear: &mut Linear<Rational>| {
             let position = linear.coefficients.iter().position(|(variable, _)| *variable == self.moment);
             if let Some(position) = position {
                 let (_, factor) = linear.coefficients.remove(position);
@@ -131,13 +139,13 @@ impl Timeline {
             }
         };
         operators.retain_mut(|operator| {
-            operator.numeric_effects.each(&mut |value| put(value));
+            operator.numeric_effects.each(&mut |value| substitute_moment(value));
             let mut holds = true;
             operator.condition.comparisons.retain_mut(|(linear, strict)| {
-                put(linear);
-                let known = constant_comparison(linear, *strict);
-                holds &= known != Some(Residual::False);
-                known.is_none()
+                substitute_moment(linear);
+                let truth_value = constant_comparison(linear, *strict);
+                holds &= truth_value != Some(Residual::False);
+                truth_value.is_none()
             });
             for (time, later) in [&mut operator.timing.start, &mut operator.timing.end].into_iter().flatten()
             {
@@ -150,7 +158,7 @@ impl Timeline {
     }
 }
 
-/// The atoms that become true and false by changes in order: the last one of an atom prevails.
+/// Returns the atoms that ordered changes make true and false; the last change of an atom prevails.
 fn prevailing(changes: &[(AtomId, bool)]) -> (Vec<AtomId>, Vec<AtomId>) {
     let (mut adds, mut deletes) = (Vec::new(), Vec::new());
     for (atom, holds) in changes {

@@ -1,5 +1,5 @@
-//! How an action can lie in time, where something happens by itself: in which phases it starts and ends, and under which
-//! conditions events interfere with that (the definition is that of `timeline`).
+//! Windows of an action between timed events: the phases of its start and end, and the conditions
+//! under which events interfere (see `timeline` for the semantics).
 
 use num_traits::One;
 
@@ -14,44 +14,44 @@ use crate::lifted::Rational;
 use crate::task::quantity::{Linear, NumericId, Quantity};
 use crate::task::timing::Timing;
 
-/// When an action starts and ends.
+/// Phases of the start and the end of an action.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TimelineWindow<'t> {
     timeline: &'t Timeline,
     duration: &'t Quantity<Rational>,
-    /// The phases of its start and its end.
+    /// Phases of the start and the end.
     from: usize,
     to: usize,
     start: Start,
     end: End,
 }
 
-/// What sets the time of the start.
+/// Determination of the start time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Start {
-    /// It is whenever the action before has ended, even at the time of an event.
+    /// At the end of the previous action, possibly at the time of an event.
     Free,
-    /// The same, but later than the event that begins its phase.
+    /// At the end of the previous action, but later than the event that begins the phase.
     Later,
-    /// A moment after that event.
+    /// A moment after the event that begins the phase.
     AfterEvent,
-    /// So that the action ends when it has to.
+    /// Determined by the required end of the action.
     ByEnd,
-    /// The same, but later than the event that begins the phase of the start.
+    /// Determined by the required end, but later than the event that begins the phase of the start.
     LaterByEnd,
 }
 
-/// Where the end lies.
+/// Position of the end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum End {
-    /// In its phase, later than the event that begins it; or in the phase of the start.
+    /// Within its phase, later than the event that begins it, or in the phase of the start.
     Inside,
-    /// At the very time of that event.
+    /// Exactly at the event that begins its phase.
     AtEvent,
 }
 
 impl<'t> TimelineWindow<'t> {
-    /// The ways in which an action of this duration can lie in time.
+    /// Returns all windows of an action of this duration.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
@@ -62,19 +62,20 @@ impl<'t> TimelineWindow<'t> {
         conflicts: &Conflicts,
     ) -> Vec<(Self, Interference)> {
         let extreme = |pick: fn(std::slice::Iter<'t, Rational>) -> Option<&'t Rational>| {
-            let own = duration.tables.iter().filter_map(|table| pick(table.values.iter()));
-            own.fold(duration.constant.clone(), |sum, value| sum + value)
+            let extremes = duration.tables.iter().filter_map(|table| pick(table.values.iter()));
+            extremes.fold(duration.constant.clone(), |sum, value| sum + value)
         };
         let (least, most) = (extreme(Iterator::min), extreme(Iterator::max));
-        let mut all = Vec::new();
+        let mut windows = Vec::new();
         for from in timeline.first..timeline.phases.len() {
             let before = from.checked_sub(1);
-            let own: &[Residual] = before.map_or(&[], |event| &conflicts.start[event]);
+            let conflicts_at_start: &[Residual] = before.map_or(&[], |event| &conflicts.start[event]);
             for to in from..timeline.phases.len() {
                 let apart = |later: usize, earlier: usize| {
                     timeline.events[later].0.clone() - &timeline.events[earlier].0
                 };
-                // It starts before its phase ends, and ends in its phase or when that begins.
+                // The action starts before its phase ends, and ends in its phase or at the
+                // beginning of the end's phase.
                 if to > from && most <= apart(to - 1, from) {
                     break;
                 }
@@ -89,35 +90,38 @@ impl<'t> TimelineWindow<'t> {
                 let mut add = |start, end| {
                     let passage = Self { timeline, duration, from, to, start, end };
                     let at_event = matches!(start, Start::Free | Start::ByEnd);
-                    let start = if at_event { own.to_vec() } else { Vec::new() };
+                    let start = if at_event { conflicts_at_start.to_vec() } else { Vec::new() };
                     let end = if end == End::AtEvent { conflicts.end[to - 1].clone() } else { Vec::new() };
                     if !start.contains(&Residual::True) && !end.contains(&Residual::True) {
-                        all.push((passage, Interference { start, end }));
+                        windows.push((passage, Interference { start, end }));
                     }
                 };
-                if own.is_empty() || from < timeline.events.len() {
+                if conflicts_at_start.is_empty() || from < timeline.events.len() {
                     add(Start::Free, End::Inside);
                 }
-                if !own.is_empty() {
+                if !conflicts_at_start.is_empty() {
                     add(Start::AfterEvent, End::Inside);
                     if from < timeline.events.len() {
                         add(Start::Later, End::Inside);
                     }
                 }
                 if to > from {
-                    // A moment after an event is not the time of an event.
-                    add(if own.is_empty() { Start::ByEnd } else { Start::LaterByEnd }, End::Inside);
+                    // A moment after an event is not the time of any event.
+                    add(
+                        if conflicts_at_start.is_empty() { Start::ByEnd } else { Start::LaterByEnd },
+                        End::Inside,
+                    );
                     add(Start::ByEnd, End::AtEvent);
-                    if !own.is_empty() {
+                    if !conflicts_at_start.is_empty() {
                         add(Start::LaterByEnd, End::AtEvent);
                     }
                 }
             }
         }
-        all
+        windows
     }
 
-    /// The time of the start, in terms of the clock before.
+    /// Start time, in terms of the previous clock.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
@@ -140,14 +144,14 @@ impl<'t> TimelineWindow<'t> {
         }
     }
 
-    /// A moment after a time.
+    /// Returns a moment after a time.
     fn later(&self, time: &Rational) -> Linear<Rational> {
         let mut later = Linear::variable(self.timeline.moment);
         later.quantity.constant = time.clone();
         later
     }
 
-    /// When an action can start and end so.
+    /// Conditions of this window.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
@@ -166,7 +170,7 @@ impl<'t> TimelineWindow<'t> {
         };
         let time = |event: usize| Linear::constant(events[event].0.clone());
         if self.from < events.len() {
-            // After the last event any start can be put off.
+            // After the last event every start can be delayed.
             if !matches!(self.start, Start::Free | Start::Later) {
                 less(&Linear::variable(*clock), start.clone(), false);
             }
@@ -184,7 +188,7 @@ impl<'t> TimelineWindow<'t> {
         conditions
     }
 
-    /// The events strictly between the start and the end, in order.
+    /// Events strictly between the start and the end, in order.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
@@ -194,7 +198,7 @@ impl<'t> TimelineWindow<'t> {
         self.timeline.events[self.from..last].iter().map(|(_, changes)| &changes[..])
     }
 
-    /// The event at the time of the end.
+    /// Event at the time of the end.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
@@ -203,7 +207,7 @@ impl<'t> TimelineWindow<'t> {
         (self.end == End::AtEvent).then(|| &self.timeline.events[self.to - 1].1[..])
     }
 
-    /// What the action changes besides its own effects.
+    /// Changes in addition to the action's own effects.
     pub(super) fn changes(&self) -> Vec<(AtomId, bool)> {
         let phases = &self.timeline.phases;
         let mut changes = vec![(self.timeline.waited, false)];
@@ -213,7 +217,8 @@ impl<'t> TimelineWindow<'t> {
         changes
     }
 
-    /// The clock after the action. It stands still once nothing more happens by itself, so that states do not differ for ever.
+    /// Returns the clock after the action. It stops after the last event, which keeps the state
+    /// space finite.
     pub(super) fn clock(&self) -> Option<(NumericId, Linear<Rational>)> {
         let Timeline { clock, events, .. } = self.timeline;
         if self.from == events.len() {
@@ -227,7 +232,7 @@ impl<'t> TimelineWindow<'t> {
         Some((*clock, end))
     }
 
-    /// When it starts at the earliest, each time with whether a moment later is meant.
+    /// Earliest start times, each with a flag whether a moment later is meant.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "positions of phases, of which there is one more than events; there is one before an end at or after an event"
@@ -242,14 +247,15 @@ impl<'t> TimelineWindow<'t> {
     }
 }
 
-/// Under which conditions the start and the end of an instance interfere with each event; `True` among them if always.
+/// Conditions under which the start and the end of an instance interfere with each event.
+/// [`Residual::True`] for unconditional interference.
 pub(super) struct Conflicts {
     start: Vec<Vec<Residual>>,
     end: Vec<Vec<Residual>>,
 }
 
 impl Conflicts {
-    /// For what the start and the end read and change.
+    /// Computes the conflicts from the reads and changes of the start and the end.
     pub(super) fn new(
         world: &World<'_>,
         timeline: &Timeline,
@@ -264,7 +270,7 @@ impl Conflicts {
     }
 }
 
-/// The conditions before a happening under which it interferes with an event.
+/// Returns the conditions before a happening under which it interferes with an event.
 fn interference(
     world: &World<'_>,
     event: &[(AtomId, bool)],
@@ -286,7 +292,7 @@ fn interference(
     changes.map(|(condition, _)| condition.clone()).collect()
 }
 
-/// Conditions that must not hold: before the start, and before the end.
+/// Conditions that must not hold before the start and before the end.
 pub(super) struct Interference {
     pub(super) start: Vec<Residual>,
     pub(super) end: Vec<Residual>,

@@ -1,4 +1,4 @@
-//! Forward pruning: relaxed reachability over the ground operators.
+//! Forward pruning by relaxed reachability over the ground operators.
 
 use rustc_hash::FxHashMap;
 
@@ -7,7 +7,8 @@ use crate::ground::vocabulary::condition::GroundLiteral;
 use crate::ground::vocabulary::task::GroundTask;
 use crate::limits::Interrupted;
 
-/// Removes operators and rules that are not reachable in the delete relaxation; returns the atoms that are.
+/// Removes operators and rules that are unreachable in the delete relaxation. Returns the reachable
+/// atoms.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "what is missing is counted before it is reached, each time once; indices of axioms come after those of operators"

@@ -1,8 +1,9 @@
-//! Which values numeric variables can have at all: interval reachability.
+//! Interval analysis of numeric variables.
 //!
-//! The relaxation of Hoffmann's Metric-FF \[1\] with an upper and a lower end for each variable: an operator whose comparisons
-//! can hold somewhere in the intervals widens those of the variables that it changes. An end that still moves
-//! after a few rounds is taken to be unbounded, so that the iteration ends.
+//! Relaxation of Hoffmann's Metric-FF \[1\] with an upper and a lower bound for each variable: an
+//! operator whose comparisons are satisfiable within the intervals widens the intervals of its
+//! numeric effects. For termination, a bound that still changes after a few rounds is widened to
+//! infinity.
 //!
 //! \[1\] J. Hoffmann: The Metric-FF planning system, JAIR 20, 2003.
 
@@ -14,17 +15,17 @@ use crate::lifted::Rational;
 use crate::limits::Interrupted;
 use crate::task::quantity::{Linear, NumericId, Quantity};
 
-/// Ends of intervals move freely for this many rounds.
+/// Number of rounds before widening.
 const ROUNDS: usize = 3;
 
-/// A range of numbers; an end that is missing is unbounded.
+/// Range of numbers. `None` is an unbounded end.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Interval {
     low: Option<Rational>,
     high: Option<Rational>,
 }
 
-/// Removes operators and rules whose comparisons can never hold. Returns whether there were any.
+/// Removes operators and rules with unsatisfiable comparisons. Returns `true` if there were any.
 pub fn prune_by_numbers(task: &mut GroundTask<'_>) -> Result<bool, Interrupted> {
     let conditions = task.operators.iter().map(|operator| &operator.condition);
     let bodies = task.axioms.iter().map(|axiom| &axiom.body);
@@ -38,7 +39,7 @@ pub fn prune_by_numbers(task: &mut GroundTask<'_>) -> Result<bool, Interrupted> 
     Ok(operators != task.operators.len() || axioms != task.axioms.len())
 }
 
-/// Whether the numeric part of the goal can hold.
+/// Returns `true` if the numeric part of the goal is satisfiable.
 pub fn goal_can_hold(task: &GroundTask<'_>) -> Result<bool, Interrupted> {
     let Some(goal) = task.goal.as_ref().filter(|goal| !goal.comparisons.is_empty()) else {
         return Ok(true);
@@ -71,9 +72,9 @@ fn reachable(task: &GroundTask<'_>) -> Result<Vec<Interval>, Interrupted> {
             }
             for (variable, value) in operator.numeric_effects.iter() {
                 let range = range(value, &before);
-                let own = &mut intervals[variable.index()];
-                own.low = own.low.take().zip(range.low).map(|(a, b)| a.min(b));
-                own.high = own.high.take().zip(range.high).map(|(a, b)| a.max(b));
+                let interval = &mut intervals[variable.index()];
+                interval.low = interval.low.take().zip(range.low).map(|(a, b)| a.min(b));
+                interval.high = interval.high.take().zip(range.high).map(|(a, b)| a.max(b));
             }
         }
         if intervals == before {
@@ -97,20 +98,24 @@ fn can_hold(condition: &GroundCondition, intervals: &[Interval]) -> bool {
     })
 }
 
-/// The values that an expression can have.
+/// Returns the range of an expression.
 fn range(linear: &Linear<Rational>, intervals: &[Interval]) -> Interval {
     let mut low = Some(extreme(&linear.quantity, Iterator::min));
     let mut high = Some(extreme(&linear.quantity, Iterator::max));
     for (variable, factor) in &linear.coefficients {
-        let own = &intervals[variable.index()];
-        let (least, most) = if factor.is_positive() { (&own.low, &own.high) } else { (&own.high, &own.low) };
+        let interval = &intervals[variable.index()];
+        let (least, most) = if factor.is_positive() {
+            (&interval.low, &interval.high)
+        } else {
+            (&interval.high, &interval.low)
+        };
         low = low.zip(least.as_ref()).map(|(sum, value)| sum + factor.clone() * value);
         high = high.zip(most.as_ref()).map(|(sum, value)| sum + factor.clone() * value);
     }
     Interval { low, high }
 }
 
-/// The sum of the extreme entries of all tables: a bound for every combination of designs.
+/// Sum of the extreme entries of all tables: a bound for every combination of designs.
 fn extreme<'q>(
     quantity: &'q Quantity<Rational>,
     pick: impl Fn(std::slice::Iter<'q, Rational>) -> Option<&'q Rational>,

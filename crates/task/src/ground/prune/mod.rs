@@ -1,7 +1,8 @@
-//! Operators and atoms that cannot matter are removed.
+//! Removal of irrelevant and unreachable operators and atoms.
 //!
-//! Forwards: relaxed reachability once more, now over the operators that are left when everything static is
-//! decided, and the intervals of numbers. Backwards: effects on atoms that no condition reads, then operators that do nothing at all.
+//! Forwards: relaxed reachability over the ground operators, whose static conditions are decided,
+//! and interval analysis of numbers. Backwards: effects on atoms that no condition reads, then
+//! operators without effects.
 
 mod forward;
 mod intervals;
@@ -18,7 +19,7 @@ use crate::lifted::Formula;
 use crate::lifted::configuration::conjuncts;
 use crate::limits::Interrupted;
 
-/// Prunes the task in place; returns a reason if the goal cannot be reached even if nothing is ever deleted.
+/// Prunes the task in place. Returns a reason if the goal is unreachable in the delete relaxation.
 pub fn prune(task: &mut GroundTask<'_>, generality: &Generality) -> Result<Option<String>, Interrupted> {
     let world = &task.world;
     let initially: Vec<bool> = world
@@ -51,7 +52,7 @@ fn never_true(atom: &str) -> String {
     format!("no action can make {atom} true, even if nothing is ever deleted")
 }
 
-/// A sentence about a goal that is false whatever happens: the first atom in it that can never hold.
+/// Describes a goal that is false in all states by its first unreachable atom.
 fn why_goal_is_false(task: &GroundTask<'_>) -> String {
     for conjunct in conjuncts(&task.world.lifted.goal) {
         if let Formula::Literal { positive: true, predicate, terms } = conjunct {

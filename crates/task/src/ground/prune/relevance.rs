@@ -9,7 +9,8 @@ use crate::lifted::Rational;
 use crate::limits::Interrupted;
 use crate::task::quantity::{NumericId, Quantity};
 
-/// Removes effects on numeric variables that no condition depends on, and no metric in the end; costs have been made of the others already.
+/// Removes effects on numeric variables that no condition or final metric reads. Costs are already
+/// compiled.
 pub(super) fn drop_unread_numerics(task: &mut GroundTask<'_>) {
     let conditions = task.operators.iter().map(|operator| &operator.condition).chain(&task.goal);
     let bodies = task.axioms.iter().map(|axiom| &axiom.body);
@@ -17,7 +18,9 @@ pub(super) fn drop_unread_numerics(task: &mut GroundTask<'_>) {
     let mut read: FxHashSet<NumericId> = comparisons
         .flat_map(|(linear, _)| linear.coefficients.iter().map(|(variable, _)| *variable))
         .collect();
-    read.extend(task.objectives.iter().flat_map(|own| own.rest.iter().map(|(variable, _)| *variable)));
+    read.extend(
+        task.objectives.iter().flat_map(|objective| objective.rest.iter().map(|(variable, _)| *variable)),
+    );
     let mut open: Vec<NumericId> = read.iter().copied().collect();
     while let Some(variable) = open.pop() {
         let values = task.operators.iter().filter_map(|operator| operator.numeric_effects.get(variable));
@@ -32,7 +35,8 @@ pub(super) fn drop_unread_numerics(task: &mut GroundTask<'_>) {
     }
 }
 
-/// Removes rules of atoms that nothing reads, effects on such atoms, and operators that do nothing and earn nothing.
+/// Removes rules of unread atoms, effects on such atoms, and operators that neither change the
+/// state nor reduce the cost.
 pub(super) fn backward(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
     loop {
         task.world.limits.check()?;
@@ -55,15 +59,16 @@ pub(super) fn backward(task: &mut GroundTask<'_>) -> Result<(), Interrupted> {
     }
 }
 
-/// Whether the operator changes nothing and cannot lower the cost of a plan.
+/// Returns `true` if the operator changes nothing and cannot reduce the cost of a plan.
 fn is_idle(operator: &GroundOperator) -> bool {
-    let known = |atom: AtomId, value: bool| operator.condition.literals.binary_search(&(atom, value)).is_ok();
+    let is_required =
+        |atom: AtomId, value: bool| operator.condition.literals.binary_search(&(atom, value)).is_ok();
     let lowest = |cost: &Quantity<Rational>| {
         let tables = cost.tables.iter().filter_map(|table| table.values.iter().min());
         tables.fold(cost.constant.clone(), |sum, value| sum + value)
     };
-    operator.adds.iter().all(|atom| known(*atom, true))
-        && operator.deletes.iter().all(|atom| known(*atom, false))
+    operator.adds.iter().all(|atom| is_required(*atom, true))
+        && operator.deletes.iter().all(|atom| is_required(*atom, false))
         && operator.conditional.is_empty()
         && operator.numeric_effects.iter().all(|(variable, value)| {
             value.quantity.is_zero() && value.coefficients[..] == [(*variable, Rational::from_integer(1))]

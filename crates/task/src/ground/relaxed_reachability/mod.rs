@@ -1,13 +1,16 @@
-//! Relaxed reachability: which instances of each schema can ever become applicable if nothing is ever deleted.
+//! Relaxed reachability: the instances of each schema that are applicable in the delete relaxation.
 //!
-//! The lifted task becomes a Datalog program for the rule engine \[1\]. A schema with slots has one auxiliary
-//! relation for each slot, which says for which other arguments *some* design fits; the designs themselves never
-//! enter the relation of the schema, so its size does not depend on how many designs there are.
+//! The lifted task becomes a Datalog program for the rule engine \[1\]. A schema with slots has an
+//! auxiliary relation for each slot, which contains the other arguments for which *some* design is
+//! suitable. Designs are not part of the schema's relation, so its size is independent of their
+//! number.
 //!
-//! Static derived predicates are rules of the same program, with stratified negation: the engine evaluates them once,
-//! and from then on they are facts. Derived fluents are relaxed like everything else that changes.
+//! Static derived predicates are rules of the same program, with stratified negation. The engine
+//! evaluates them once, and afterwards they are facts. Derived fluents are relaxed like all other
+//! fluents.
 //!
-//! \[1\] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial Intelligence 173, 2009.
+//! \[1\] M. Helmert: Concise finite-domain representations for PDDL planning tasks, Artificial
+//! Intelligence 173, 2009.
 
 mod program;
 mod relaxed;
@@ -24,10 +27,10 @@ use crate::lifted::configuration::SlotParameter;
 use crate::lifted::{Arguments, Lifted, ObjectId, PredicateId};
 use crate::limits::{Interrupted, Limits};
 
-/// Runs the relaxed task to its fixpoint.
+/// Computes the fixpoint of the relaxed task.
 ///
 /// # Errors
-/// `Error::Rules` if the rule engine refuses the program, `Error::Interrupted` at a limit.
+/// `Error::Rules` if the rule engine rejects the program, `Error::Interrupted` at a limit.
 #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
 pub fn reach(
     lifted: &Lifted,
@@ -90,7 +93,7 @@ pub fn reach(
     Ok(RelaxedReachability { instances, atoms, derived })
 }
 
-/// Why the rule engine has no result.
+/// Converts errors of the rule engine.
 fn refusal(errors: &[rules::Error]) -> Error {
     if errors.iter().any(|error| matches!(error, rules::Error::Interrupted { .. })) {
         return Error::Interrupted;

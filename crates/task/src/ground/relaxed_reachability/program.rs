@@ -1,4 +1,4 @@
-//! Rules of schemas and derived predicates in the Datalog program of relaxed reachability.
+//! Datalog rules of schemas and derived predicates for relaxed reachability.
 
 use rules::{Atom, Symbol};
 
@@ -10,7 +10,7 @@ use crate::lifted::{Axiom, Change, Effect, Formula, Lifted, PredicateId, Schema,
 use crate::limits::Interrupted;
 use crate::number::dense;
 
-/// Adds the rules of a derived predicate: exact if it is static, else relaxed.
+/// Adds the rules of a derived predicate: exact if it is static, otherwise relaxed.
 pub(super) fn add_axiom(
     relaxed: &mut ReachabilityProgramBuilder<'_>,
     axiom: &Axiom,
@@ -27,7 +27,7 @@ pub(super) fn add_axiom(
     Ok(())
 }
 
-/// Adds the rules of a schema; returns the relation of its instances and the parameters that it ranges over.
+/// Adds the rules of a schema. Returns the relation of its instances and their parameters.
 pub(super) fn add_schema(
     relaxed: &mut ReachabilityProgramBuilder<'_>,
     schema: &Schema,
@@ -35,29 +35,29 @@ pub(super) fn add_schema(
 ) -> Result<(Symbol, Vec<u32>), Interrupted> {
     let number = relaxed.fresh("applicable");
     let is_slot = |parameter: &u32| slots.iter().any(|slot| slot.parameter == *parameter);
-    let all: Vec<u32> = (0..dense(schema.parameters.len())).collect();
-    let core: Vec<u32> = all.iter().copied().filter(|p| !is_slot(p)).collect();
+    let parameters: Vec<u32> = (0..dense(schema.parameters.len())).collect();
+    let core: Vec<u32> = parameters.iter().copied().filter(|p| !is_slot(p)).collect();
     let candidates: Candidates =
-        all.iter().copied().zip(schema.parameters.iter().map(|p| p.candidates.clone())).collect();
+        parameters.iter().copied().zip(schema.parameters.iter().map(|p| p.candidates.clone())).collect();
     let needs = needs(relaxed.lifted, schema);
 
     let mut body = relaxed.types(&core, &candidates);
     for slot in slots {
-        let own: Vec<_> =
+        let slot_conditions: Vec<_> =
             needs.iter().filter(|formula| slots_in(formula, slots) == [slot.parameter]).collect();
-        let mut others: Vec<u32> =
-            own.iter().flat_map(|formula| free(formula)).filter(|p| !is_slot(p)).collect();
-        others.sort_unstable();
-        others.dedup();
-        let mut ranging = others.clone();
+        let mut other_parameters: Vec<u32> =
+            slot_conditions.iter().flat_map(|formula| free(formula)).filter(|p| !is_slot(p)).collect();
+        other_parameters.sort_unstable();
+        other_parameters.dedup();
+        let mut ranging = other_parameters.clone();
         ranging.push(slot.parameter);
         let mut fits = relaxed.types(&ranging, &candidates);
-        for formula in own {
+        for formula in slot_conditions {
             relaxed.body(formula, &candidates, false, &mut fits)?;
         }
         let relation = relaxed.fresh("slot");
-        body.push(ReachabilityProgramBuilder::relation(relation, &others));
-        relaxed.rule(vec![ReachabilityProgramBuilder::relation(relation, &others)], fits);
+        body.push(ReachabilityProgramBuilder::relation(relation, &other_parameters));
+        relaxed.rule(vec![ReachabilityProgramBuilder::relation(relation, &other_parameters)], fits);
     }
     for formula in needs.iter().filter(|formula| slots_in(formula, slots).is_empty()) {
         relaxed.body(formula, &candidates, false, &mut body)?;
@@ -67,7 +67,7 @@ pub(super) fn add_schema(
     Ok((number, core))
 }
 
-/// What instances add; all that they add without a condition in one rule.
+/// Adds the rules of effects; unconditional effects share a rule.
 fn add_effects(
     relaxed: &mut ReachabilityProgramBuilder<'_>,
     schema: &Schema,
@@ -101,8 +101,8 @@ fn slots_in(formula: &Formula, slots: &[SlotParameter]) -> Vec<u32> {
         .collect()
 }
 
-/// What every instance needs before it starts: its conjuncts, apart from those of the middle condition that its own
-/// start effects may provide.
+/// Returns the necessary conditions of every instance: its conjuncts, except those of the middle
+/// condition that its own start effects may provide.
 fn needs<'a>(lifted: &Lifted, schema: &'a Schema) -> Vec<&'a Formula> {
     let provided: Vec<_> = schema
         .start_effects
@@ -118,11 +118,11 @@ fn needs<'a>(lifted: &Lifted, schema: &'a Schema) -> Vec<&'a Formula> {
     conjuncts(&schema.start_condition).into_iter().chain(middle).collect()
 }
 
-/// Whether a condition mentions one of the given predicates, or a derived one.
+/// Returns `true` if a condition mentions one of the given predicates, or a derived one.
 fn mentions_fluent(lifted: &Lifted, formula: &Formula, predicates: &[PredicateId]) -> bool {
-    let mut found = false;
+    let mut is_mentioned = false;
     atoms(formula, &mut |predicate| {
-        found |= predicates.contains(&predicate) || lifted.predicates[predicate.index()].derived;
+        is_mentioned |= predicates.contains(&predicate) || lifted.predicates[predicate.index()].derived;
     });
-    found
+    is_mentioned
 }

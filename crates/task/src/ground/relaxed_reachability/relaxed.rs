@@ -1,7 +1,8 @@
-//! Conditions as bodies of rules: relaxed, or exact where everything is static.
+//! Conditions as rule bodies: relaxed, or exact if everything is static.
 //!
-//! A relaxed body holds wherever the condition can: fluents are never false, numbers never stand in the way. Disjunctions
-//! and negated quantifiers become auxiliary relations over their free variables.
+//! A relaxed body holds wherever the condition can hold: negative literals and numeric conditions
+//! are ignored. Disjunctions and negated quantifiers become auxiliary relations over their free
+//! variables.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -19,10 +20,10 @@ use crate::lifted::{Arguments, Bound, Formula, Lifted, ObjectId, PredicateId, Te
 use crate::limits::{Interrupted, Limits};
 use crate::number::dense;
 
-/// What variables range over.
+/// Candidate objects of variables.
 pub(super) type Candidates = BTreeMap<u32, Arc<[ObjectId]>>;
 
-/// The symbols of a program.
+/// Symbols of a program.
 pub(super) struct Names {
     pub(super) table: Symbols,
     pub(super) objects: Vec<Symbol>,
@@ -65,14 +66,14 @@ impl<'a> ReachabilityProgramBuilder<'a> {
         (self.names, self.rules, self.facts)
     }
 
-    /// A relation that nothing else uses.
+    /// Creates an unused relation.
     #[expect(clippy::arithmetic_side_effects, reason = "a count of what is held in memory")]
     pub(super) fn fresh(&mut self, kind: &str) -> Symbol {
         self.relations += 1;
         self.names.table.name(&format!("{kind} {}", self.relations))
     }
 
-    /// Atoms that keep variables to what they range over.
+    /// Returns atoms that restrict variables to their candidates.
     pub(super) fn types(&mut self, variables: &[u32], candidates: &Candidates) -> Vec<Atom> {
         variables
             .iter()
@@ -83,7 +84,7 @@ impl<'a> ReachabilityProgramBuilder<'a> {
             .collect()
     }
 
-    /// The unary relation that holds some objects.
+    /// Returns the unary relation of some objects.
     fn candidates(&mut self, candidates: &Arc<[ObjectId]>) -> Symbol {
         if let Some(symbol) = self.types.get(candidates) {
             return *symbol;
@@ -119,8 +120,8 @@ impl<'a> ReachabilityProgramBuilder<'a> {
         self.rules.push(Rule::new(identity, head, body));
     }
 
-    /// Adds the atoms that a condition needs. `exact` asks for the condition itself, which must be static then; else
-    /// for something that it implies.
+    /// Adds the body atoms of a condition. With `exact`, the condition must be static and is
+    /// translated exactly, otherwise a relaxation is used.
     pub(super) fn body(
         &mut self,
         formula: &Formula,
@@ -174,7 +175,7 @@ impl<'a> ReachabilityProgramBuilder<'a> {
         Ok(())
     }
 
-    /// A relation over the free variables of a condition that holds where one of the parts does.
+    /// Creates a relation over the free variables of a condition that holds if a part holds.
     fn auxiliary(
         &mut self,
         formula: &Formula,
@@ -192,7 +193,7 @@ impl<'a> ReachabilityProgramBuilder<'a> {
         Ok(relation)
     }
 
-    /// Whether a relaxed condition holds without asking for anything.
+    /// Returns `true` if the relaxed condition may be a tautology.
     fn may_be_free(&self, formula: &Formula) -> bool {
         match formula {
             Formula::And(parts) => parts.iter().all(|part| self.may_be_free(part)),
@@ -207,7 +208,7 @@ impl<'a> ReachabilityProgramBuilder<'a> {
         }
     }
 
-    /// The relation of a static comparison: the objects for which it holds.
+    /// Returns the relation of a static comparison: the objects that satisfy it.
     fn comparison(&mut self, formula: &Formula, candidates: &Candidates) -> Result<Symbol, Interrupted> {
         let relation = self.fresh("comparison");
         let variables = free(formula);
@@ -220,12 +221,12 @@ impl<'a> ReachabilityProgramBuilder<'a> {
     }
 }
 
-/// The variable of a rule for a parameter or bound variable.
+/// Returns the rule variable of a parameter or bound variable.
 fn variable(number: u32) -> RuleTerm {
     RuleTerm::Variable(Variable(u16::try_from(number).expect("invariant: `reach` refuses more variables")))
 }
 
-/// The objects for which a static comparison holds, one for each variable.
+/// Returns the objects that satisfy a static comparison, one for each variable.
 #[expect(clippy::arithmetic_side_effects, reason = "variables of a condition are numbered in memory")]
 fn satisfying(
     lifted: &Lifted,
@@ -248,19 +249,19 @@ fn satisfying(
         }
         true
     })?;
-    // What was cut short above counts as not satisfied.
+    // Enumeration that stopped at a limit is incomplete, so it must not be used.
     limits.check()?;
     Ok(rows)
 }
 
-/// The variables that a quantifier binds, and all candidates in its scope.
+/// Returns the variables that a quantifier binds, and all candidates in its scope.
 pub(super) fn with_bound(candidates: &Candidates, bound: &[Bound]) -> (Vec<u32>, Candidates) {
     let mut inner = candidates.clone();
     inner.extend(bound.iter().map(|b| (b.variable, b.candidates.clone())));
     (bound.iter().map(|b| b.variable).collect(), inner)
 }
 
-/// The variables of a condition that no quantifier in it binds, ascending.
+/// Returns the free variables of a condition in ascending order.
 pub(super) fn free(formula: &Formula) -> Vec<u32> {
     fn bound_in(formula: &Formula, out: &mut Vec<u32>) {
         match formula {

@@ -18,10 +18,10 @@ impl AtomId {
     }
 }
 
-/// Ground atoms, looked up without making one.
+/// Set of ground atoms, with look-up by borrowed keys.
 pub type AtomSet = IndexSet<(PredicateId, Arguments), FxBuildHasher>;
 
-/// A symbol and arguments that lie elsewhere; hashes as `(K, Arguments)` does.
+/// Borrowed key of a symbol with arguments; hashes like `(K, Arguments)`.
 #[derive(Hash)]
 pub struct Key<'k, K>(pub K, pub &'k [ObjectId]);
 
@@ -31,13 +31,13 @@ impl<K: PartialEq> Equivalent<(K, Arguments)> for Key<'_, K> {
     }
 }
 
-/// Arguments that are looked up and forgotten.
+/// Temporary arguments for a look-up.
 pub type Row = SmallVec<[ObjectId; 8]>;
 
-/// The objects that the parameters stand for; slots are open.
+/// Objects of the parameters. Slots are `None`.
 pub type Binding = Vec<Option<ObjectId>>;
 
-/// The arguments under a binding that covers them.
+/// Returns the arguments under a binding of all their variables.
 pub fn arguments(terms: &[Term], binding: &Binding) -> Row {
     terms
         .iter()

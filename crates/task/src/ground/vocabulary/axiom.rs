@@ -1,4 +1,4 @@
-//! The rules of derived atoms.
+//! Rules of derived atoms.
 
 use petgraph::algo::tarjan_scc;
 use petgraph::graph::DiGraph;
@@ -7,14 +7,14 @@ use rustc_hash::FxHashMap;
 use crate::ground::vocabulary::atom::AtomId;
 use crate::ground::vocabulary::condition::GroundCondition;
 
-/// A rule: the head holds where the body does. The body has no clauses.
+/// A rule: the head holds if the body holds. The body has no clauses.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub struct GroundAxiom {
     pub(crate) head: AtomId,
     pub(crate) body: GroundCondition,
 }
 
-/// Derived atoms in components of mutual dependence, what a component depends on before it.
+/// Returns the strongly connected components of derived atoms, dependencies first.
 pub fn components(axioms: &[GroundAxiom]) -> Vec<Vec<AtomId>> {
     let mut graph: DiGraph<AtomId, ()> = DiGraph::new();
     let mut nodes: FxHashMap<AtomId, _> = FxHashMap::default();
@@ -28,7 +28,8 @@ pub fn components(axioms: &[GroundAxiom]) -> Vec<Vec<AtomId>> {
             }
         }
     }
-    // Tarjan's algorithm yields components in reverse topological order: what has no successors first.
+    // Tarjan's algorithm yields components in reverse topological order: those without successors
+    // first.
     let sorted = |component: Vec<_>| {
         let mut atoms: Vec<AtomId> = component.into_iter().map(|node| graph[node]).collect();
         atoms.sort_unstable();

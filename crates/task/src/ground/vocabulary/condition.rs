@@ -16,7 +16,7 @@ pub struct GroundCondition {
 }
 
 impl GroundCondition {
-    /// Sorts and removes repetitions; false if literals contradict each other.
+    /// Sorts and removes duplicates. Returns `false` if literals contradict each other.
     pub(crate) fn tidy(&mut self) -> bool {
         self.literals.sort_unstable();
         self.literals.dedup();
@@ -25,7 +25,7 @@ impl GroundCondition {
         self.literals.windows(2).all(|pair| pair[0].0 != pair[1].0)
     }
 
-    /// All atoms that occur.
+    /// Returns all atoms of the condition.
     pub(crate) fn atoms(&self) -> impl Iterator<Item = AtomId> + '_ {
         self.literals.iter().chain(self.clauses.iter().flatten()).map(|(atom, _)| *atom)
     }

@@ -3,12 +3,13 @@
 use crate::error::Error;
 use crate::limits::Interrupted;
 
-/// Why an expression has no value here.
+/// Reason for a missing value.
 #[derive(Debug)]
 pub enum Failure {
-    /// It reads a function that has no value, or divides by zero: the operator does not exist.
+    /// The value is undefined: a fluent has no value, or a divisor is zero. The operator does not
+    /// exist.
     Undefined,
-    /// The planner cannot handle it.
+    /// The expression is not supported.
     Error(Error),
 }
 
@@ -18,10 +19,10 @@ impl From<Interrupted> for Failure {
     }
 }
 
-/// Nothing where something cannot be.
+/// Converts [`Failure::Undefined`] to `None`.
 ///
 /// # Errors
-/// Each failure except [`Failure::Undefined`].
+/// All other failures.
 pub fn possible<T>(result: Result<T, Failure>) -> Result<Option<T>, Failure> {
     match result {
         Ok(value) => Ok(Some(value)),

@@ -3,16 +3,16 @@
 use crate::lifted::Rational;
 use crate::task::quantity::{Linear, NumericId};
 
-/// What numeric variables become; a list, because an operator changes few.
+/// New values of numeric variables. A sorted list, because operators change few of them.
 #[derive(Debug, Clone, Default)]
 pub struct Numbers {
-    /// Ascending by variable.
+    /// In ascending order of the variables.
     changes: Vec<(NumericId, Linear<Rational>)>,
 }
 
 impl Numbers {
     pub(crate) fn get(&self, variable: NumericId) -> Option<&Linear<Rational>> {
-        let position = self.changes.binary_search_by_key(&variable, |(own, _)| *own);
+        let position = self.changes.binary_search_by_key(&variable, |(changed, _)| *changed);
         position.ok().map(|position| &self.changes[position].1)
     }
 
@@ -28,17 +28,17 @@ impl Numbers {
         self.changes.retain(|(variable, _)| keep(*variable));
     }
 
-    /// One variable that changes.
+    /// Creates a change of a single variable.
     pub(crate) fn one(variable: NumericId, value: Linear<Rational>) -> Self {
         Self { changes: vec![(variable, value)] }
     }
 
-    /// All numbers that change.
+    /// Applies a function to all new values.
     pub(crate) fn each(&mut self, change: &mut dyn FnMut(&mut Linear<Rational>)) {
         self.changes.iter_mut().for_each(|(_, value)| change(value));
     }
 
-    /// Takes over the changes of other numbers.
+    /// Adds earlier changes of other variables.
     pub(crate) fn complete(&mut self, earlier: Self) {
         for (variable, value) in earlier.changes {
             if self.get(variable).is_none() {

@@ -10,7 +10,7 @@ use crate::task::quantity::Quantity;
 use crate::task::timing::Timing;
 use crate::task::{Argument, ForbiddenCombinations};
 
-/// The function and the designs that suit an operator, for each slot.
+/// Function and suitable designs of each slot.
 pub type GroundSlots = [(ObjectId, Vec<ObjectId>)];
 
 /// An operator over atoms, with exact rationals.
@@ -20,24 +20,25 @@ pub struct GroundOperator {
     pub(crate) arguments: Vec<Argument>,
     pub(crate) slots: Arc<GroundSlots>,
     pub(crate) forbidden: Arc<[ForbiddenCombinations]>,
-    /// Each function that the action requires, with the argument that is its design.
+    /// Required functions with the arguments that are their designs.
     pub(crate) configuration: Vec<(ObjectId, Argument)>,
     pub(crate) condition: GroundCondition,
     pub(crate) adds: Vec<AtomId>,
     pub(crate) deletes: Vec<AtomId>,
-    /// After `adds` and `deletes`, those of one entry at once, deletes first.
+    /// Conditional effects after `adds` and `deletes`. Those of an entry are simultaneous,
+    /// deletions first.
     pub(crate) conditional: Vec<GroundConditional>,
     pub(crate) numeric_effects: Numbers,
-    /// By objective.
+    /// Costs by objective.
     pub(crate) costs: Vec<Quantity<Rational>>,
     pub(crate) duration: Quantity<Rational>,
-    /// Set if this is not an action but a wait until that time.
+    /// Set for a wait instead of an action: the time of its end.
     pub(crate) wait: Option<Rational>,
-    /// Each time with whether a moment later is meant, until all durations are known.
+    /// Times, each with a flag whether a moment later is meant, until all durations are known.
     pub(crate) timing: Timing<(Rational, bool)>,
 }
 
-/// Atoms that change if a conjunction holds before the operator.
+/// Changes of atoms if a conjunction holds before the operator.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct GroundConditional {
     pub(crate) condition: Vec<GroundLiteral>,

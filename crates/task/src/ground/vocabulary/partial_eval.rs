@@ -5,7 +5,7 @@ use crate::lifted::Rational;
 use crate::task::quantity::Linear;
 use pddl::ast::Comparison;
 
-/// What is left of a condition once everything static is decided.
+/// A condition after partial evaluation.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub enum Residual {
     True,
@@ -24,27 +24,27 @@ pub enum Residual {
 }
 
 impl Residual {
-    /// A conjunction, or a disjunction, of parts, simplified.
+    /// Builds a simplified conjunction or disjunction.
     pub(crate) fn junction(parts: impl IntoIterator<Item = Self>, conjunction: bool) -> Self {
-        let mut kept = Vec::new();
+        let mut simplified = Vec::new();
         for part in parts {
             match (part, conjunction) {
                 (Self::True, true) | (Self::False, false) => {}
                 (Self::False, true) => return Self::False,
                 (Self::True, false) => return Self::True,
-                (Self::And(more), true) | (Self::Or(more), false) => kept.extend(more),
-                (other, _) => kept.push(other),
+                (Self::And(more), true) | (Self::Or(more), false) => simplified.extend(more),
+                (other, _) => simplified.push(other),
             }
         }
-        match (kept.len(), conjunction) {
+        match (simplified.len(), conjunction) {
             (0, _) => truth(conjunction),
-            (1, _) => kept.swap_remove(0),
-            (_, true) => Self::And(kept),
-            (_, false) => Self::Or(kept),
+            (1, _) => simplified.swap_remove(0),
+            (_, true) => Self::And(simplified),
+            (_, false) => Self::Or(simplified),
         }
     }
 
-    /// The negation. A comparison of what is undefined has been decided before: it does not hold.
+    /// Returns the negation. Comparisons with undefined values have already been decided as false.
     pub(crate) fn negated(&self) -> Self {
         match self {
             Self::True => Self::False,
@@ -58,7 +58,7 @@ impl Residual {
         }
     }
 
-    /// The condition with other literals and comparisons, simplified.
+    /// Replaces the leaves of the condition and simplifies it.
     pub(crate) fn mapped(self, leaf: &dyn Fn(Self) -> Self) -> Self {
         match self {
             Self::And(parts) => Self::junction(parts.into_iter().map(|part| part.mapped(leaf)), true),
@@ -68,7 +68,7 @@ impl Residual {
     }
 }
 
-/// A comparison of two expressions as `difference ≥ 0` or `difference > 0`; decided if it is constant.
+/// Converts a comparison to `difference ≥ 0` or `difference > 0`; decided if it is constant.
 pub fn compare(comparison: Comparison, left: Linear<Rational>, right: Linear<Rational>) -> Residual {
     match comparison {
         Comparison::Less => at_least_zero(right, left, true),
@@ -87,7 +87,7 @@ fn at_least_zero(mut linear: Linear<Rational>, subtrahend: Linear<Rational>, str
     constant_comparison(&linear, strict).unwrap_or(Residual::Compare { linear, strict })
 }
 
-/// The truth of a comparison in which nothing is variable.
+/// Returns the truth value of a comparison without variables and tables.
 pub fn constant_comparison(linear: &Linear<Rational>, strict: bool) -> Option<Residual> {
     if !linear.coefficients.is_empty() || !linear.quantity.tables.is_empty() {
         return None;
@@ -96,7 +96,7 @@ pub fn constant_comparison(linear: &Linear<Rational>, strict: bool) -> Option<Re
     Some(truth(if strict { value > zero } else { value >= zero }))
 }
 
-/// The residual that is always so.
+/// Returns the constant residual.
 pub fn truth(value: bool) -> Residual {
     if value { Residual::True } else { Residual::False }
 }

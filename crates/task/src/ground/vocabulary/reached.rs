@@ -3,13 +3,13 @@
 use crate::ground::vocabulary::atom::{AtomSet, Binding};
 use crate::lifted::{Arguments, PredicateId};
 
-/// What can be if nothing is ever deleted.
+/// Result of relaxed reachability.
 #[derive(Default)]
 pub struct RelaxedReachability {
-    /// For each schema the bindings of its parameters apart from slots, ascending.
+    /// Bindings of the parameters of each schema except slots, ascending.
     pub(crate) instances: Vec<Vec<Binding>>,
-    /// The fluent atoms that can become true.
+    /// Reachable fluent atoms.
     pub(crate) atoms: AtomSet,
-    /// What follows by static derived predicates.
+    /// Facts of static derived predicates.
     pub(crate) derived: Vec<(PredicateId, Arguments)>,
 }

@@ -14,26 +14,27 @@ use crate::task::quantity::NumericId;
 pub struct GroundTask<'a> {
     pub(crate) world: World<'a>,
     pub(crate) operators: Vec<GroundOperator>,
-    /// The rules of derived atoms.
+    /// Rules of derived atoms.
     pub(crate) axioms: Vec<GroundAxiom>,
-    /// None if the goal is false whatever happens.
+    /// `None` if the goal is false in all states.
     pub(crate) goal: Option<GroundCondition>,
-    /// What plans are measured by; empty until operators have their costs.
+    /// Objectives; empty until operators have their costs.
     pub(crate) objectives: Vec<GroundObjective>,
 }
 
-/// How operator costs relate to the metric.
+/// Relation between operator costs and the metric.
 #[derive(Debug, Clone, Default)]
 pub struct GroundObjective {
-    /// The metric of the initial state (negated if to be maximized).
+    /// Metric of the initial state (negated for maximisation).
     pub(crate) offset: Rational,
     pub(crate) maximize: bool,
-    /// Fluents whose changes depend on the state, with their factors (negated if to be maximized): they count in the end.
+    /// Fluents with state-dependent changes and their factors (negated for maximisation). Their
+    /// final values are added.
     pub(crate) rest: Vec<(NumericId, Rational)>,
 }
 
 impl GroundTask<'_> {
-    /// The atoms that conditions read, directly or through rules.
+    /// Returns the atoms that conditions read, directly or through rules.
     pub(crate) fn read_atoms(&self) -> FxHashSet<AtomId> {
         let conditions = self.operators.iter().map(|operator| &operator.condition).chain(&self.goal);
         let conditional = self.operators.iter().flat_map(|operator| &operator.conditional);

@@ -1,4 +1,4 @@
-//! Static facts and values, and the fluent atoms and numeric variables found so far.
+//! Static facts and values, and the fluent atoms and numeric variables found by grounding.
 
 use std::num::Wrapping;
 
@@ -16,15 +16,15 @@ use crate::number::dense;
 use crate::task::quantity::NumericId;
 use pddl::ast::Name;
 
-/// Number of steps of enumerations between two looks at the limits.
+/// Number of enumeration steps between two checks of the limits.
 const BETWEEN_LOOKS: u32 = 256;
 
 type AtomIndex<K> = IndexMap<(K, Arguments), (), FxBuildHasher>;
 
-/// Rows of a relation by the values of some of its columns.
+/// Rows of a relation, indexed by the values of some of its columns.
 type Rows = FxHashMap<Arguments, Vec<Arguments>>;
 
-/// What grounding looks at, and when it has to stop.
+/// Static data and atom tables of grounding, with its limits.
 pub struct World<'a> {
     pub(crate) lifted: &'a Lifted,
     pub(crate) limits: &'a Limits,
@@ -33,9 +33,10 @@ pub struct World<'a> {
     values: IndexMap<(FunctionId, Arguments), Rational, FxBuildHasher>,
     pub atoms: AtomIndex<PredicateId>,
     pub numerics: AtomIndex<FunctionId>,
-    /// For a predicate and a set of columns (bit i for column i): rows by the values in those columns.
+    /// Indices by predicate and column set (bit i for column i): rows by the values in these
+    /// columns.
     joins: FxHashMap<(PredicateId, u64), Rows>,
-    /// Steps of enumerations so far, modulo 2^32.
+    /// Number of enumeration steps, modulo 2^32.
     visited: Wrapping<u32>,
 }
 
@@ -58,7 +59,7 @@ impl<'a> World<'a> {
         }
     }
 
-    /// Notes a step of an enumeration. Checks the limits every few hundred steps.
+    /// Counts an enumeration step. Checks the limits every few hundred steps.
     pub(crate) fn visit(&mut self) -> Result<(), Interrupted> {
         self.visited += 1;
         if self.visited.0.is_multiple_of(BETWEEN_LOOKS) {
@@ -67,14 +68,15 @@ impl<'a> World<'a> {
         Ok(())
     }
 
-    /// The rows of a relation: of a static one those that hold, of a fluent one those that can ever hold.
+    /// Returns the rows of a relation: the true ones of a static relation, the reachable ones of a
+    /// fluent.
     fn relation(&self, predicate: PredicateId) -> Vec<Arguments> {
         let facts =
             if self.lifted.predicates[predicate.index()].fluent { &self.reached.atoms } else { &self.facts };
         facts.iter().filter(|(own, _)| *own == predicate).map(|(_, arguments)| arguments.clone()).collect()
     }
 
-    /// The rows of a relation that agree with the bound terms, in ascending order.
+    /// Returns the rows of a relation that match the bound terms, in ascending order.
     pub(crate) fn rows(
         &mut self,
         predicate: PredicateId,
@@ -102,7 +104,7 @@ impl<'a> World<'a> {
         self.joins[&(predicate, mask)].get(key.as_slice()).cloned().unwrap_or_default()
     }
 
-    /// Whether a fluent atom holds in some state of the delete relaxation.
+    /// Returns `true` if a fluent atom is reachable in the delete relaxation.
     pub(crate) fn is_reached(&self, predicate: PredicateId, arguments: &[ObjectId]) -> bool {
         self.reached.atoms.contains(&Key(predicate, arguments))
     }
@@ -111,24 +113,24 @@ impl<'a> World<'a> {
         self.facts.contains(&Key(predicate, arguments))
     }
 
-    /// Whether an atom holds in some state of the delete relaxation.
+    /// Returns `true` if an atom holds initially or is reachable in the delete relaxation.
     pub(crate) fn can_hold(&self, predicate: PredicateId, arguments: &[ObjectId]) -> bool {
         self.holds_initially(predicate, arguments) || self.is_reached(predicate, arguments)
     }
 
     pub fn atom(&mut self, predicate: PredicateId, arguments: &[ObjectId]) -> AtomId {
-        let known = self.atoms.get_index_of(&Key(predicate, arguments));
-        AtomId(dense(known.unwrap_or_else(|| self.atoms.insert_full((predicate, arguments.into()), ()).0)))
+        let index = self.atoms.get_index_of(&Key(predicate, arguments));
+        AtomId(dense(index.unwrap_or_else(|| self.atoms.insert_full((predicate, arguments.into()), ()).0)))
     }
 
-    /// The predicate and the arguments of an atom.
+    /// Returns the predicate and the arguments of an atom.
     pub(crate) fn atom_key(&self, atom: AtomId) -> (&PredicateId, &[ObjectId]) {
         let ((predicate, arguments), ()) =
             self.atoms.get_index(atom.index()).expect("invariant: an atom's number is its place");
         (predicate, arguments)
     }
 
-    /// Whether an atom follows from others.
+    /// Returns `true` if an atom is derived.
     pub(crate) fn is_derived(&self, atom: AtomId) -> bool {
         let predicate = self.atoms.get_index(atom.index()).map(|((predicate, _), ())| *predicate);
         predicate.is_none_or(|predicate| {
@@ -136,36 +138,37 @@ impl<'a> World<'a> {
         })
     }
 
-    /// The function and the arguments of a numeric variable.
+    /// Returns the function and the arguments of a numeric variable.
     pub(crate) fn numeric_key(&self, variable: NumericId) -> (&FunctionId, &[ObjectId]) {
         let ((function, arguments), ()) =
             self.numerics.get_index(variable.index()).expect("invariant: a variable's number is its place");
         (function, arguments)
     }
 
-    /// The initial value of a numeric fluent, or the value of a static function.
+    /// Returns the initial value of a numeric fluent, or the value of a static function.
     pub(crate) fn value(&self, function: FunctionId, arguments: &[ObjectId]) -> Option<Rational> {
         self.values.get(&Key(function, arguments)).cloned()
     }
 
-    /// The initial value of a numeric variable; 0 for a `total-cost` to which the file gives none.
+    /// Returns the initial value of a numeric variable; 0 for `total-cost` without a value in the
+    /// file.
     pub(crate) fn initial_value(&self, variable: NumericId) -> Rational {
         let key = self.numerics.get_index(variable.index()).map(|(key, ())| key);
         key.and_then(|(function, arguments)| self.value(*function, arguments)).unwrap_or_else(Rational::zero)
     }
 
-    /// The variable of a numeric fluent, which must have a value from the start; `total-cost` begins at 0.
+    /// Returns the variable of a numeric fluent. `total-cost` is 0 by default.
     ///
     /// # Errors
-    /// Fails when the fluent has no initial value.
+    /// The fluent has no initial value.
     pub fn numeric(
         &mut self,
         function: FunctionId,
         arguments: &[ObjectId],
         place: Place,
     ) -> Result<NumericId, Failure> {
-        if let Some(known) = self.numerics.get_index_of(&Key(function, arguments)) {
-            return Ok(NumericId::of(known));
+        if let Some(index) = self.numerics.get_index_of(&Key(function, arguments)) {
+            return Ok(NumericId::of(index));
         }
         let Function { name, partial, .. } = &self.lifted.functions[function.index()];
         let is_set = *partial || *name == Name::new("total-cost");
@@ -175,33 +178,33 @@ impl<'a> World<'a> {
         Ok(NumericId(dense(self.numerics.insert_full((function, arguments.into()), ()).0)))
     }
 
-    /// The clock, which begins at 0.
+    /// Returns the variable of the clock, which starts at 0.
     pub(crate) fn clock(&mut self, function: FunctionId) -> NumericId {
         NumericId(dense(self.numerics.insert_full((function, Box::default()), ()).0))
     }
 
-    /// Whether an atom holds at the start.
+    /// Returns `true` if an atom holds initially.
     pub(crate) fn is_initial(&self, atom: AtomId) -> bool {
         let key = self.atoms.get_index(atom.index());
         key.is_some_and(|((predicate, arguments), ())| self.holds_initially(*predicate, arguments))
     }
 
-    /// `(predicate arguments)` as PDDL writes it.
+    /// Formats an atom in PDDL: `(predicate arguments)`.
     pub(crate) fn atom_name(&self, atom: AtomId) -> String {
-        let found = self.atoms.get_index(atom.index());
-        found.map_or_else(String::new, |((predicate, arguments), ())| self.name(*predicate, arguments))
+        let key = self.atoms.get_index(atom.index());
+        key.map_or_else(String::new, |((predicate, arguments), ())| self.name(*predicate, arguments))
     }
 
-    /// `(function arguments)` as PDDL writes it.
+    /// Formats a fluent in PDDL: `(function arguments)`.
     pub(crate) fn numeric_name(&self, variable: NumericId) -> String {
-        let found = self.numerics.get_index(variable.index());
-        found.map_or_else(String::new, |((function, arguments), ())| {
+        let key = self.numerics.get_index(variable.index());
+        key.map_or_else(String::new, |((function, arguments), ())| {
             let symbol = self.lifted.functions.get(function.index());
             symbol.map_or_else(String::new, |symbol| self.applied(&symbol.name, arguments))
         })
     }
 
-    /// A predicate with arguments as PDDL writes it; that of a named part of a condition has no name in the files.
+    /// Formats a predicate with arguments in PDDL. Auxiliary atoms get a generated name.
     pub(crate) fn name(&self, predicate: PredicateId, arguments: &[ObjectId]) -> String {
         let Some(symbol) = self.lifted.predicates.get(predicate.index()) else {
             let number = arguments.first().map_or(0, |number| number.0);

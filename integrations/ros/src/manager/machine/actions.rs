@@ -1,4 +1,4 @@
-//! Actions: begun once their functions have their designs, and ended by whoever performs them.
+//! Actions: started once their functions have their designs, and ended by their performers.
 
 use metaplan::mapek::Event;
 use serde_json::json;
@@ -7,7 +7,7 @@ use crate::manager::machine::Machine;
 use crate::manager::machine::io::{Ended, Output};
 
 impl Machine {
-    /// Begins the action that was requested, once every function that it needs has its design.
+    /// Starts the requested action once every required function has its design.
     pub(super) fn begin(&mut self) {
         let beliefs = self.control.beliefs();
         let has = |(function, design): &(String, String)| {

@@ -1,4 +1,4 @@
-//! Functions: the modes that are asked for, what comes of it, and what was seen without being asked for.
+//! Functions: requested modes, replies, and modes that were changed by other clients.
 
 use std::time::Duration;
 
@@ -8,19 +8,19 @@ use serde_json::json;
 use crate::manager::machine::Machine;
 use crate::manager::machine::io::{Change, Outcome, Output, State};
 
-/// A call is made again once where there was no answer.
+/// Number of attempts of a call without a reply.
 const TRIES: u32 = 2;
 
-/// The first wait before a function that did not answer is asked again; it doubles with each failure.
+/// Initial delay before a function without a reply is probed; doubled with each failure.
 const PROBE: Duration = Duration::from_secs(1);
 
-/// The longest one.
+/// Maximum delay of a probe.
 const LONGEST_PROBE: Duration = Duration::from_secs(60);
 
-/// A function that still does not answer is asked again at least so often.
+/// Minimum delay until the designs of a function without a reply are retried.
 const AGAIN: Duration = Duration::from_secs(2);
 
-/// After a refusal, the design is tried again so much later.
+/// Delay until a refused design is retried.
 const REFUSED: Duration = Duration::from_secs(60);
 
 /// Time during which a granted mode is believed although the mode manager reports another one.
@@ -36,17 +36,17 @@ pub(super) struct Grant {
     until: Duration,
     /// Modes that were granted shortly before; reports of them may be late.
     earlier: Vec<String>,
-    /// Whether another mode was reported.
+    /// `true` if another mode was reported.
     is_contradicted: bool,
 }
 
 impl Machine {
-    /// A function that nobody needs gets the mode for that.
+    /// Requests the mode for a function that is not needed.
     pub(super) fn unground(&mut self, function: &str) {
         let mode = self.settings.functions.unground(function).to_owned();
-        let asked = self.pending.get(function).map(|change| &change.mode);
-        let has = asked.or_else(|| self.modes.get(function));
-        // A function that was never heard of has no mode that could be taken away.
+        let requested = self.pending.get(function).map(|change| &change.mode);
+        let has = requested.or_else(|| self.modes.get(function));
+        // The mode of an unknown function cannot be withdrawn.
         if has.is_some_and(|has| *has != mode) {
             self.change(Change { function: function.to_owned(), mode, effect: None, attempt: 1 });
         }
@@ -57,11 +57,11 @@ impl Machine {
         self.outputs.push(Output::Change(change));
     }
 
-    /// A function has answered, or has not.
+    /// Handles the outcome of a call.
     pub(super) fn changed(&mut self, change: Change, outcome: Outcome) -> String {
         let Change { function, mode, effect, attempt } = change.clone();
         if self.pending.get(&function) != Some(&change) {
-            // It was asked for something else since; what it did meanwhile is overwritten by that.
+            // A newer request has replaced this one, and its mode overwrites the result.
             return format!("{function} has answered late");
         }
         match outcome {
@@ -106,12 +106,13 @@ impl Machine {
         })));
     }
 
-    /// A design could not be had; it is tried again from some time on, or when the function answers.
+    /// Handles a design that could not be set. It is retried at a given time, or when the function
+    /// replies.
     pub(super) fn failed(&mut self, function: &str, effect: Option<u64>, again: Option<Duration>) {
         self.pending.remove(function);
         let Some(effect) = effect else { return };
-        let asked = self.control.beliefs().outstanding().find(|own| own.number == effect);
-        if let Some(Command::Reconfigure { to, .. }) = asked.map(|own| own.command.clone()) {
+        let outstanding = self.control.beliefs().outstanding().find(|own| own.number == effect);
+        if let Some(Command::Reconfigure { to, .. }) = outstanding.map(|own| own.command.clone()) {
             self.trouble.entry(function.to_owned()).or_default().designs.insert(to, again);
             self.say(&Event::ReconfigurationFailed { effect });
         }
@@ -147,15 +148,15 @@ impl Machine {
         self.mode(function, mode)
     }
 
-    /// A function was seen with a mode.
+    /// Handles a reported mode.
     pub(super) fn mode(&mut self, function: &str, mode: &str) -> String {
         let because = format!("{function} was seen with the mode {mode}");
         if let Some(change) = self.pending.get(function).cloned() {
             if change.mode == mode && change.attempt >= TRIES {
-                // Its answer was lost; that it has the mode is answer enough.
+                // The reply was lost, but the mode shows that the call succeeded.
                 return self.changed(change, Outcome::Done);
             }
-            // It is on its way from one mode to another, on our demand.
+            // The function is still changing its mode on our request.
             return because;
         }
         if self.modes.get(function).map(String::as_str) == Some(mode) {
@@ -172,7 +173,7 @@ impl Machine {
         because
     }
 
-    /// A mode that was asked for, and that nobody has answered for in time, is there after all.
+    /// Handles a requested mode that is reported after the timeout of its call.
     pub(super) fn came_late(&mut self, function: &str, mode: &str) {
         let designs = self.control.beliefs().mission().designs_of(function);
         let Some(design) = self.settings.functions.design(function, mode, &designs) else { return };
@@ -182,7 +183,7 @@ impl Machine {
         }
     }
 
-    /// Tells the loop of a mode that it has not asked for.
+    /// Reports a mode to the loop that it has not requested.
     pub(super) fn observe(&mut self, function: &str, mode: &str) {
         let designs = self.control.beliefs().mission().designs_of(function);
         let design = self.settings.functions.design(function, mode, &designs);
@@ -213,7 +214,7 @@ impl Machine {
         format!("{function} answers again")
     }
 
-    /// Designs that were refused long ago are tried again, and hopes that had to settle have.
+    /// Retries designs that were refused long ago, and checks contradicted grants.
     pub(super) fn tick(&mut self) -> String {
         let now = self.now;
         let mut back = Vec::new();

@@ -1,4 +1,4 @@
-//! What the machine hears, what it asks for, and where it is.
+//! Inputs, outputs and states of the state machine.
 
 use std::fmt;
 use std::time::Duration;
@@ -7,64 +7,64 @@ use serde_json::Value;
 
 use crate::perform::Call;
 
-/// What is heard.
+/// Input of the state machine.
 #[derive(Debug)]
 pub(in crate::manager) enum Input {
-    /// The functions answer; the mode that each has, as far as it says.
+    /// The functions reply. Contains their modes, if known.
     Ready(Vec<(String, Option<String>)>),
-    /// Something was diagnosed that waits to be handled: the driver makes a line of it.
+    /// A diagnostic is pending; the driver converts it to a line.
     Diagnosed,
-    /// A line of events, as the loop reads them.
+    /// A line of events in the format of the loop.
     Line(String),
-    /// A task is requested; whether it is granted is answered under this number.
+    /// A task is requested. The reply has this number.
     Request(u64, String),
-    /// A task is to end.
+    /// The end of a task is requested.
     Cancel(u64, String),
-    /// A function has answered to a call, or has not.
+    /// A function has replied to a call, or the call has failed.
     Changed(Change, Outcome),
     /// The current mode of a function, as its mode manager has answered.
     Mode(String, String),
     /// The mode that a client has requested from a function's mode manager.
     ModeRequested(String, String),
-    /// Something about a function has changed that does not say its mode.
+    /// A function has changed, but its mode is unknown.
     Touched(String),
     /// An action has ended.
     Performed(u64, Ended),
-    /// How much of it is done, from 0 to 1.
+    /// Completed share of an action from 0 to 1.
     Progress(u64, f64),
-    /// A function that did not answer does again, or not yet.
+    /// A function without a reply was probed: `true` if it replies.
     Probed(String, bool),
-    /// The mode of the autopilot.
+    /// Mode of the autopilot.
     Autopilot(String),
-    /// Time passes.
+    /// Clock tick.
     Tick,
 }
 
 /// A call of `change_mode`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::manager) struct Change {
-    /// The function.
+    /// Name of the function.
     pub(in crate::manager) function: String,
-    /// The mode that is asked for.
+    /// Requested mode.
     pub(in crate::manager) mode: String,
-    /// The loop's effect; none where the function is not needed any more.
+    /// The effect of the loop that requires the change. `None` if the function is no longer needed.
     pub(in crate::manager) effect: Option<u64>,
-    /// From 1.
+    /// Number of the attempt, from 1.
     pub(in crate::manager) attempt: u32,
 }
 
-/// What has come of a call.
+/// Outcome of a call.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::manager) enum Outcome {
     /// The function has the mode.
     Done,
-    /// It has said no.
+    /// The function has refused.
     Refused,
-    /// It has said nothing that is understood: why.
+    /// There was no valid reply, for this reason.
     Failed(String),
 }
 
-/// How an action has ended.
+/// Outcome of an action.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::manager) enum Ended {
     Succeeded,
@@ -72,35 +72,35 @@ pub(in crate::manager) enum Ended {
     Failed(String),
 }
 
-/// What is to be done.
+/// Output of the state machine.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::manager) enum Output {
-    /// To call `change_mode`.
+    /// Call `change_mode`.
     Change(Change),
-    /// To ask a function for its mode.
+    /// Request the mode of a function.
     Look(String),
-    /// To ask a function, so much later, whether it answers.
+    /// Check after a delay whether a function replies.
     Probe(String, Duration),
-    /// To answer a request.
+    /// Reply to a request.
     Reply(u64, bool),
-    /// To begin an action.
+    /// Start an action.
     Perform(u64, Call),
-    /// To end an action early.
+    /// Cancel an action.
     Stop(u64),
-    /// To publish a plan.
+    /// Publish a plan.
     Plan(Value),
-    /// To publish an event.
+    /// Publish an event.
     Event(Value),
-    /// To log something that is wrong.
+    /// Log a warning.
     Warn(String),
 }
 
-/// Where the machine is.
+/// State of the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::manager) enum State {
     WaitGraph,
     Idle,
-    /// It is passed within one input.
+    /// Transient state within the handling of an input.
     Plan,
     Reconfigure,
     Execute,

@@ -1,7 +1,8 @@
-//! What is heard to what is asked for: the state machine between the robot and the adaptation loop.
+//! State machine between the robot and the adaptation loop.
 //!
-//! It knows no clock and no network: inputs come with a time, and outputs are carried out by [`super::driver`]. A line that the loop hears is
-//! written to the journal before it is handled, and what the loop decides before any of it leaves.
+//! It has no clock and no network: inputs have a time, and [`super::driver`] executes the outputs.
+//! Each line for the loop is written to the journal before it is handled, and each decision of the
+//! loop before its outputs are executed.
 
 mod actions;
 mod functions;
@@ -24,36 +25,36 @@ use functions::Grant;
 
 pub(super) use io::{Change, Ended, Input, Outcome, Output, State};
 
-/// The goal of nobody.
+/// Goal without a task.
 const NOTHING: &str = "(and)";
 
-/// An action that was requested by the loop.
+/// An action that the loop has requested.
 #[derive(Debug, Clone)]
 struct Action {
     number: u64,
     call: Call,
     effect: u64,
-    /// Whether somebody performs it already.
+    /// `true` once a performer has started.
     begun: bool,
 }
 
-/// Why a function is not asked.
+/// Reasons not to call a function.
 #[derive(Debug, Clone, Default)]
 struct Trouble {
-    /// Designs that it did not take, with the time from which each is tried again; none while it does not answer.
+    /// Failed designs, with the time of the next attempt. `None` while the function does not reply.
     designs: BTreeMap<String, Option<Duration>>,
-    /// How often in a row it did not answer.
+    /// Number of consecutive calls without a reply.
     silences: u32,
 }
 
-/// What is done after a restart as soon as it is known how the robot is.
+/// Work after a restart that must wait until the state of the robot is known.
 #[derive(Debug)]
 struct Deferred {
-    /// What the loop asks for again.
+    /// Effects that the loop repeats.
     answers: Vec<Answer>,
-    /// The modes that the functions were found with.
+    /// Modes of the functions after the restart.
     modes: BTreeMap<String, String>,
-    /// Diagnostics are waited for until then.
+    /// End of the wait for diagnostics.
     until: Duration,
 }
 
@@ -66,22 +67,22 @@ pub(super) struct Machine {
     functions: Vec<String>,
     state: State,
     task: Option<String>,
-    /// Calls that have no answer yet, by function.
+    /// Calls without a reply, by function.
     pending: BTreeMap<String, Change>,
-    /// The mode that each function was last heard to have.
+    /// Last known mode of each function.
     modes: BTreeMap<String, String>,
     /// Modes that were granted recently, by function.
     grants: BTreeMap<String, Grant>,
     action: Option<Action>,
-    /// Who waits for the answer to the request of a task, and to the end of one.
+    /// Numbers of the unanswered requests to start and to end a task.
     waiting: Vec<u64>,
     ending: Vec<u64>,
     trouble: BTreeMap<String, Trouble>,
-    /// Whether the last plan was none.
+    /// `true` if the last planning found no plan.
     without_plan: bool,
     obeyed: bool,
     deferred: Option<Deferred>,
-    /// States that were passed since the last one that lasted.
+    /// Transient states since the last stable one.
     through: Vec<State>,
     outputs: Vec<Output>,
     lines: VecDeque<String>,
@@ -89,7 +90,8 @@ pub(super) struct Machine {
 }
 
 impl Machine {
-    /// For a loop that has not begun, with the journal that it was brought back from, if there is one.
+    /// Creates the machine for a loop that has not started, with the journal from which it was
+    /// restored, if there is one.
     pub(super) fn new(control: Loop, journal: Option<Journal>, settings: Settings) -> Self {
         let mission = control.beliefs().mission();
         let functions = mission.functions();
@@ -132,24 +134,24 @@ impl Machine {
         self.task.as_deref()
     }
 
-    /// The functions that have designs.
+    /// Returns the functions that have designs.
     pub(super) fn functions(&self) -> &[String] {
         &self.functions
     }
 
-    /// All modes that designs and their absence stand for, of a function.
+    /// Returns all modes of the designs of a function, and the mode without a design.
     pub(super) fn modes_of(&self, function: &str) -> Vec<String> {
         let designs = self.control.beliefs().mission().designs_of(function);
         designs.iter().map(|design| self.settings.functions.mode(function, design).to_owned()).collect()
     }
 
-    /// Takes something that was heard, at a time since the start, and says what is to be done.
+    /// Handles an input at a time since the start. Returns the outputs.
     ///
     /// # Errors
-    /// The journal cannot be written: nothing may be done any more.
+    /// The journal cannot be written. No outputs may then be executed.
     pub(super) fn handle(&mut self, input: Input, now: Duration) -> Result<Vec<Output>, Message> {
         self.now = now;
-        let is_over = self.deferred.as_ref().is_some_and(|own| own.until <= now);
+        let is_over = self.deferred.as_ref().is_some_and(|deferred| deferred.until <= now);
         if is_over || matches!(input, Input::Request(..) | Input::Cancel(..)) {
             self.catch_up();
             self.settle()?;
@@ -186,7 +188,7 @@ impl Machine {
         Ok(std::mem::take(&mut self.outputs))
     }
 
-    /// Hands the loop all lines that wait.
+    /// Passes all pending lines to the loop.
     fn settle(&mut self) -> Result<(), Message> {
         if self.state == State::WaitGraph {
             return Ok(());
@@ -211,7 +213,8 @@ impl Machine {
         self.lines.push_back(event.to_json().to_string());
     }
 
-    /// The state that follows from what is under way; each change is a note in the journal.
+    /// Enters the state that follows from the running work. Each transition is noted in the
+    /// journal.
     fn enter(&mut self, because: &str) -> Result<(), Message> {
         if self.state == State::WaitGraph {
             return Ok(());
@@ -240,7 +243,7 @@ impl Machine {
         Ok(())
     }
 
-    /// A change of state is a line of the journal, and told.
+    /// Notes transitions in the journal and publishes them.
     fn note(&mut self, way: &[String], because: &str) -> Result<(), Message> {
         let text = format!("{}: {because}", way.join(" -> "));
         let answers = self.hand(&Event::Note { text }.to_json().to_string())?;
@@ -256,7 +259,7 @@ impl Machine {
         because
     }
 
-    /// Takes what the loop says.
+    /// Handles the answers of the loop.
     fn take(&mut self, answers: Vec<Answer>) {
         for answer in answers {
             self.outputs.push(Output::Event(answer.to_json()));
@@ -264,7 +267,7 @@ impl Machine {
                 Answer::PlanRequested { .. } => self.through = vec![State::Plan],
                 Answer::PlanFound { .. } => {
                     self.without_plan = false;
-                    // What is left of an action is not a plan for a task that has ended.
+                    // The remainder of a cancelled action is no plan once its task has ended.
                     if self.task.is_some() || self.control.beliefs().goal().is_none() {
                         self.outputs.push(Output::Plan(answer.to_json()));
                     }
@@ -288,7 +291,7 @@ impl Machine {
         match effect.command {
             Command::Reconfigure { function, to, .. } => {
                 let mode = self.settings.functions.mode(&function, &to).to_owned();
-                // It was just seen to have it: somebody has given it while this program was not there.
+                // Another client has already set the mode while this program was not running.
                 if self.deferred.is_some() && self.modes.get(&function) == Some(&mode) {
                     self.acknowledge(effect.number);
                     return;
@@ -297,10 +300,10 @@ impl Machine {
             }
             Command::Request { step } => {
                 let call = call(&step);
-                let needed: BTreeSet<&String> =
+                let required: BTreeSet<&String> =
                     step.configuration.iter().map(|(function, _)| function).collect();
                 let idle: Vec<String> =
-                    self.functions.iter().filter(|function| !needed.contains(function)).cloned().collect();
+                    self.functions.iter().filter(|function| !required.contains(function)).cloned().collect();
                 for function in &idle {
                     self.unground(function);
                 }
@@ -310,12 +313,12 @@ impl Machine {
             Command::Cancel { .. } => {
                 self.acknowledge(effect.number);
                 match &self.action {
-                    // Who performs it says when it has ended.
+                    // The performer reports the end.
                     Some(action) if action.begun => self.outputs.push(Output::Stop(action.number)),
                     _ => self.say(&Event::Cancelled { action: effect.action }),
                 }
             }
-            // Functions keep their modes, and so do their nodes what they have done.
+            // Functions keep their modes, and nodes keep the results of their work.
             _ => self.acknowledge(effect.number),
         }
     }
@@ -325,7 +328,7 @@ impl Machine {
     }
 }
 
-/// An action as whoever performs it hears of it.
+/// Converts a planned step for its performer.
 fn call(step: &PlannedStep) -> Call {
     let written = step.arguments.get(..step.written).unwrap_or(&step.arguments);
     Call {

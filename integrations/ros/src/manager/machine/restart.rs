@@ -1,4 +1,4 @@
-//! After a restart: what was asked for before and has not been done, and what has changed meanwhile.
+//! Restart: requested work that is not done, and changes of the robot in the meantime.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -9,11 +9,11 @@ use metaplan::message::Message;
 use crate::manager::machine::io::{Output, State};
 use crate::manager::machine::{Action, Deferred, Machine, call, unwritten};
 
-/// So long diagnostics are waited for, before what was found is judged by what was known before.
+/// Time to wait for diagnostics before the modes found after a restart are evaluated with old data.
 const AGAIN: Duration = Duration::from_secs(3);
 
 impl Machine {
-    /// The robot is there: what the loop has to say, and what has changed meanwhile.
+    /// Handles the modes of the robot after the start, and the answers that the loop repeats.
     pub(super) fn ready(&mut self, modes: Vec<(String, Option<String>)>) -> Result<String, Message> {
         self.state = State::Idle;
         let is_first = self.control.beliefs().lines() == 0;
@@ -24,7 +24,7 @@ impl Machine {
         let way = |from: &str, to: State| [from.to_owned(), to.to_string()];
         self.note(&way("START", State::WaitGraph), "the mission and its settings are read")?;
         self.note(&[State::WaitGraph.to_string(), State::Idle.to_string()], "every function answers")?;
-        // What was asked for before and has been done meanwhile is not asked for again.
+        // Requests that were fulfilled in the meantime are not repeated.
         for (function, mode) in modes {
             if let Some(mode) = mode {
                 self.modes.insert(function, mode);
@@ -39,14 +39,14 @@ impl Machine {
         Ok("every function answers".to_owned())
     }
 
-    /// Asks again for what was asked for before a restart and has not been done, and adopts what has changed meanwhile.
+    /// Repeats unfulfilled requests from before the restart, and adopts changes since then.
     pub(super) fn catch_up(&mut self) {
         let Some(deferred) = &mut self.deferred else { return };
         let (mut answers, modes) =
             (std::mem::take(&mut deferred.answers), std::mem::take(&mut deferred.modes));
         let outstanding: BTreeSet<u64> =
             self.control.beliefs().outstanding().map(|effect| effect.number).collect();
-        // Of the others something else was asked for since.
+        // The other requests have been replaced.
         answers.retain(|answer| answer.effect().is_none_or(|effect| outstanding.contains(&effect.number)));
         self.take(answers);
         self.deferred = None;
@@ -57,13 +57,14 @@ impl Machine {
         }
     }
 
-    /// An action that was under way when the program ended is under way still.
+    /// Restores an action that was running when the program ended.
     pub(super) fn restore_action(&mut self) {
         let Some((number, step)) = self.control.beliefs().running() else { return };
         let call = call(step);
         let is_waiting = |effect: &&Effect| matches!(effect.command, Command::Request { .. });
         let effect = self.control.beliefs().outstanding().find(is_waiting).map(|effect| effect.number);
-        // Who performs it may not know of it any more: it is begun again, which is right for what tells by a topic that it is done.
+        // The performer may have lost the action, so it is started again. This is correct for
+        // actions that end with a message on a topic.
         self.action =
             Some(Action { number, call, effect: effect.unwrap_or_default(), begun: effect.is_none() });
         if effect.is_none()

@@ -1,4 +1,4 @@
-//! Tasks: requested, granted, ended by who asked for them, by their goals, or by the autopilot.
+//! Tasks: requested, granted, and ended by their clients, by their goals, or by the autopilot.
 
 use metaplan::mapek::Event;
 use metaplan::message::did_you_mean;
@@ -8,7 +8,7 @@ use crate::manager::machine::io::{Output, State};
 use crate::manager::machine::{Machine, NOTHING};
 
 impl Machine {
-    /// Answers those who wait, where it is known what has come of it.
+    /// Replies to requests whose result is known.
     pub(super) fn reply(&mut self) {
         if !self.pending.is_empty() {
             return;
@@ -18,16 +18,16 @@ impl Machine {
             self.outputs.push(Output::Reply(number, granted));
         }
         for number in std::mem::take(&mut self.ending) {
-            let left =
+            let unanswered =
                 self.modes.iter().any(|(function, mode)| self.settings.functions.unground(function) != mode);
-            self.outputs.push(Output::Reply(number, self.task.is_none() && !left));
+            self.outputs.push(Output::Reply(number, self.task.is_none() && !unanswered));
         }
     }
 
     pub(super) fn request(&mut self, number: u64, task: &str) -> String {
         let Some(settings) = self.settings.tasks.get(task).cloned() else {
-            let meant = did_you_mean(task, self.settings.tasks.keys().map(String::as_str));
-            let because = format!("there is no task `{task}`{meant}");
+            let suggestion = did_you_mean(task, self.settings.tasks.keys().map(String::as_str));
+            let because = format!("there is no task `{task}`{suggestion}");
             self.outputs.push(Output::Reply(number, false));
             self.refuse(&because);
             return because;
@@ -63,7 +63,7 @@ impl Machine {
             return because;
         }
         if self.task.as_deref().is_some_and(|own| own != task) {
-            // Another task is under way: what is asked for is so already.
+            // Another task is running, so the cancelled task is already ended.
             self.outputs.extend(number.map(|number| Output::Reply(number, true)));
             return format!("the task {task} is not under way");
         }
@@ -87,7 +87,7 @@ impl Machine {
         format!("the task {task} ends")
     }
 
-    /// The task is done: nobody needs a function any more.
+    /// Handles the end of a task: no function is needed any more.
     pub(super) fn reached(&mut self) {
         self.without_plan = false;
         let was_active = self.action.take().is_some();

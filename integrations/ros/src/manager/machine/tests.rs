@@ -1,4 +1,4 @@
-//! The machine without a robot: what is asked for after what was heard.
+//! Tests of the state machine without a robot: outputs after sequences of inputs.
 
 use std::path::Path;
 use std::time::Duration;
@@ -14,7 +14,7 @@ const PATH: &str = "f_generate_search_path";
 const MOTION: &str = "f_maintain_motion";
 const RECHARGE: &str = "generate_recharge_path";
 
-/// A machine with a clock that goes on a little with each input.
+/// A machine with a clock that advances with each input.
 struct Robot {
     machine: Machine,
     now: Duration,
@@ -28,12 +28,12 @@ fn control() -> (Loop, Settings) {
 }
 
 impl Robot {
-    /// All functions answer, and have no design.
+    /// Creates a machine whose functions reply and have no design.
     fn new(journal: Option<&Path>) -> Self {
         Self::found(journal, |_| "fd_unground")
     }
 
-    /// All functions answer with these modes.
+    /// Creates a machine whose functions reply with these modes.
     fn found(journal: Option<&Path>, mode: impl Fn(&str) -> &'static str) -> Self {
         let (mut control, settings) = control();
         let journal =
@@ -47,20 +47,20 @@ impl Robot {
         robot
     }
 
-    /// What is to be done; events and plans apart.
+    /// Handles an input and returns the outputs other than events and plans.
     fn hear(&mut self, input: Input) -> Vec<Output> {
         self.now += Duration::from_millis(10);
         let outputs = self.machine.handle(input, self.now).expect("a journal that can be written");
         outputs.into_iter().filter(|own| !matches!(own, Output::Event(_) | Output::Plan(_))).collect()
     }
 
-    /// A change is answered.
+    /// Answers a change.
     fn answer(&mut self, output: &Output, outcome: Outcome) -> Vec<Output> {
         let Output::Change(change) = output else { panic!("{output:?} is not a change") };
         self.hear(Input::Changed(change.clone(), outcome))
     }
 
-    /// All changes are answered with success, and those that follow from that.
+    /// Answers all changes with success, including those that follow from them.
     fn obey(&mut self, outputs: Vec<Output>) -> Vec<Output> {
         let mut open = outputs;
         while let Some(at) = open.iter().position(|own| matches!(own, Output::Change(_))) {
@@ -79,7 +79,7 @@ impl Robot {
     }
 }
 
-/// Function and mode of the changes among outputs, in alphabetical order.
+/// Functions and modes of the changes among outputs, in alphabetical order.
 fn changes(outputs: &[Output]) -> Vec<(&str, &str)> {
     let mut changes = Vec::new();
     for output in outputs {
@@ -113,7 +113,7 @@ fn a_task_is_granted_when_its_functions_have_their_designs() {
     assert_eq!(performed(&last), ["search_pipeline"]);
     assert!(last.contains(&Output::Reply(7, true)), "{last:?}");
     assert_eq!(robot.machine.state(), State::Execute);
-    // The end of the task takes all designs away; who has asked for it hears when that is done.
+    // The end of the task withdraws all designs. The client receives the reply when this is done.
     let outputs = robot.hear(Input::Cancel(8, "search_pipeline".to_owned()));
     assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
     let outputs = robot.obey(outputs);
@@ -138,14 +138,14 @@ fn a_stimulus_changes_the_mode_that_it_concerns() {
     robot.obey(outputs);
     let outputs = robot.measure("water_visibility", "2.3");
     assert_eq!(changes(&outputs), [(PATH, "fd_spiral_medium")]);
-    // Before there is an answer it becomes darker: only the last mode counts.
+    // It becomes darker before the reply arrives: only the last mode is valid.
     let darker = robot.measure("water_visibility", "1.3");
     assert_eq!(changes(&darker), [(PATH, "fd_spiral_low")]);
-    assert_eq!(robot.answer(&outputs[0], Outcome::Done), [], "it is late");
+    assert_eq!(robot.answer(&outputs[0], Outcome::Done), [], "a late reply must be ignored");
     assert_eq!(robot.machine.state(), State::Reconfigure);
     robot.obey(darker);
     assert_eq!(robot.machine.state(), State::Execute);
-    // Too dark for any: nothing is changed, and it is said.
+    // Too dark for all designs: no mode is changed, and the state is reported.
     let outputs = robot.measure("water_visibility", "1");
     assert_eq!(changes(&outputs), []);
     assert_eq!(robot.machine.state(), State::Degraded);
@@ -176,7 +176,7 @@ fn a_design_that_is_refused_is_replaced_and_tried_again_a_minute_later() {
 }
 
 #[test]
-fn a_function_that_is_silent_is_asked_twice_and_then_when_it_answers() {
+fn a_function_without_reply_is_called_twice_and_again_once_it_replies() {
     let mut robot = Robot::new(None);
     let outputs = robot.request("search_pipeline");
     robot.obey(outputs);
@@ -200,7 +200,7 @@ fn a_function_that_is_silent_is_asked_twice_and_then_when_it_answers() {
 }
 
 #[test]
-fn a_mode_that_comes_late_counts() {
+fn a_late_mode_report_is_accepted() {
     let mut robot = Robot::new(None);
     let outputs = robot.request("search_pipeline");
     robot.obey(outputs);
@@ -208,7 +208,7 @@ fn a_mode_that_comes_late_counts() {
     let silent = || Outcome::Failed("no answer".to_owned());
     let second = robot.answer(&first[0], silent());
     let again = second.iter().find(|own| matches!(own, Output::Change(_))).expect("once more").clone();
-    // The function tells its mode, though it has not answered.
+    // The function reports its mode although it has not replied.
     let outputs = robot.hear(Input::Mode(PATH.to_owned(), "fd_spiral_medium".to_owned()));
     assert_eq!(changes(&outputs), []);
     assert_eq!(robot.machine.state(), State::Execute);
@@ -216,11 +216,11 @@ fn a_mode_that_comes_late_counts() {
 }
 
 #[test]
-fn what_somebody_else_has_changed_is_adopted_or_taken_back() {
+fn modes_set_by_other_clients_are_adopted_or_reverted() {
     let mut robot = Robot::new(None);
     let outputs = robot.request("search_pipeline");
     robot.obey(outputs);
-    // What we have asked for is not news.
+    // A requested mode is no news.
     assert_eq!(robot.hear(Input::Mode(PATH.to_owned(), "fd_spiral_high".to_owned())), []);
     let outputs = robot.hear(Input::ModeRequested(PATH.to_owned(), "fd_spiral_low".to_owned()));
     assert_eq!(
@@ -234,7 +234,7 @@ fn what_somebody_else_has_changed_is_adopted_or_taken_back() {
     robot.now += Duration::from_secs(2);
     let outputs = robot.hear(Input::Mode(MOTION.to_owned(), "fd_unground".to_owned()));
     assert_eq!(changes(&outputs), [(MOTION, "fd_all_thrusters")], "it is needed");
-    // A mode that no design has is none.
+    // A mode without a design counts as no design.
     let outputs = robot.hear(Input::Mode(RECHARGE.to_owned(), "inactive".to_owned()));
     assert_eq!(changes(&outputs), []);
 }
@@ -286,7 +286,7 @@ fn the_battery_comes_first() {
     assert_eq!(changes(&outputs), [(PATH, "fd_spiral_high"), (RECHARGE, "fd_unground")]);
     let outputs = robot.obey(outputs);
     assert_eq!(performed(&outputs), ["search_pipeline"]);
-    // The goal is reached: nobody needs a function any more.
+    // The goal is reached: no function is needed any more.
     let outputs = robot.hear(Input::Performed(3, Ended::Succeeded));
     assert_eq!(changes(&outputs), [(PATH, "fd_unground"), (MOTION, "fd_unground")]);
     robot.obey(outputs);
@@ -306,13 +306,13 @@ fn a_task_ends_when_the_autopilot_does_not_obey_any_more() {
 }
 
 #[test]
-fn a_restart_goes_on_and_asks_for_nothing_twice() {
+fn a_restart_repeats_no_fulfilled_request() {
     let directory = tempfile::tempdir().expect("a directory");
     let mut robot = Robot::new(Some(directory.path()));
     let outputs = robot.request("search_pipeline");
     robot.obey(outputs);
     let outputs = robot.measure("water_visibility", "2.3");
-    // It ends before there is an answer, and the function has done it all the same.
+    // The program ends before the reply, but the function has changed its mode.
     assert_eq!(changes(&outputs), [(PATH, "fd_spiral_medium")]);
     drop(robot);
     let mode = |path: &'static str| {
@@ -328,13 +328,14 @@ fn a_restart_goes_on_and_asks_for_nothing_twice() {
     assert_eq!(robot.machine.state(), State::Execute);
     assert_eq!(robot.machine.control().beliefs().outstanding().count(), 0);
     drop(robot);
-    // Meanwhile somebody has flown lower, which the water does not ask for: after a while without diagnostics that is judged.
+    // Another client has chosen a lower altitude, which the visibility does not require. This is
+    // evaluated after a time without diagnostics.
     let mut robot = Robot::found(Some(directory.path()), mode("fd_spiral_low"));
     assert_eq!(changes(&robot.hear(Input::Tick)), []);
     robot.now += Duration::from_secs(4);
     assert_eq!(changes(&robot.hear(Input::Tick)), [(PATH, "fd_spiral_medium")]);
     drop(robot);
-    // Meanwhile the water has become darker, and somebody has seen to it.
+    // The water has become darker, and another client has already adapted the mode.
     let mut robot = Robot::found(Some(directory.path()), mode("fd_spiral_low"));
     assert_eq!(changes(&robot.measure("water_visibility", "1.3")), []);
     drop(robot);

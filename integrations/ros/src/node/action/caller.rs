@@ -1,4 +1,4 @@
-//! Actions that others do: goals are sent, followed and cancelled.
+//! Action clients: goals are sent, monitored and cancelled.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -17,81 +17,81 @@ use crate::node::graph::{Graph, Server, Topics};
 use crate::node::rmw::Mapping;
 use crate::node::{Node, client_name, latched, not_made, qos};
 
-/// After a server was discovered, so long is waited for it to discover us.
+/// Time after the discovery of a server during which it discovers this client.
 const MATCHING: Duration = Duration::from_millis(100);
 
-/// A server that is missing when it is looked for more often than this in a row is gone.
+/// Number of consecutive failed look-ups after which a server counts as lost.
 const GONE: u32 = 250;
 
 type Client<A> = ActionClient<<A as Action>::Goal, <A as Action>::Result, <A as Action>::Feedback>;
 
-/// What is heard of a goal that somebody else has accepted.
+/// Message about an accepted goal.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Accepted<A: Action> {
-    /// How it goes.
+    /// Intermediate feedback.
     Feedback(A::Feedback),
-    /// How it has ended.
+    /// Outcome and result of the goal.
     Ended(GoalEnd, A::Result),
-    /// Nobody knows how it ends.
+    /// The outcome is unknown, for this reason.
     Lost(String),
 }
 
-/// Why a goal is not pursued.
+/// Reason why a goal was not accepted.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum GoalError {
-    /// Nobody serves the action, or whoever does does not answer.
+    /// The action has no server, or the server does not answer.
     #[error("{action}: {because}")]
     Unreachable {
-        /// Its full name.
+        /// Full name of the action.
         action: String,
-        /// What has happened.
+        /// Description of the error.
         because: String,
     },
-    /// The server does not want it.
+    /// The server has rejected the goal.
     #[error("{0} has rejected the goal")]
     Rejected(String),
 }
 
-/// Has actions done by somebody else.
+/// Action client.
 pub struct ActionCaller<A: Action> {
     node: Arc<Node>,
     full: String,
     connection: smol::lock::Mutex<Option<Arc<Connection<A>>>>,
 }
 
-/// A client with the goals that are under way. The client library gives what is heard to whoever asks first, whichever goal it is
-/// about; so one task asks for all goals.
+/// A client with its running goals. The client library gives each message to the first receiver,
+/// regardless of its goal, so a single task receives for all goals.
 struct Connection<A: Action> {
     server: Server,
     client: Client<A>,
     goals: Mutex<BTreeMap<GoalId, Followed<A>>>,
 }
 
-/// Who is told of a goal.
+/// Receiver of the messages about a goal.
 struct Followed<A: Action> {
     result: RmwRequestId,
     events: channel::Sender<Accepted<A>>,
     cancelled: channel::Receiver<()>,
 }
 
-/// A goal that somebody else pursues.
+/// A goal at an action server.
 #[derive(Debug)]
 pub struct Pursued<A: Action> {
     goal: GoalId,
-    /// What is heard of it; ends with its end.
+    /// Messages about the goal. The last one is its end.
     pub events: channel::Receiver<Accepted<A>>,
     cancel: channel::Sender<()>,
 }
 
 impl<A: Action> Pursued<A> {
-    /// The goal's number, as in logs.
+    /// Id of the goal, as in logs.
     pub fn goal(&self) -> GoalId {
         self.goal
     }
 
-    /// Asks for a safe end, which is heard of as any other.
+    /// Requests cancellation, which is reported like any other end.
     pub fn cancel(&self) {
-        // Asked twice is asked once.
+        // A full channel means that cancellation was already requested.
         let _ = self.cancel.try_send(());
     }
 }
@@ -103,19 +103,20 @@ impl<A: Action> std::fmt::Debug for ActionCaller<A> {
 }
 
 impl<A: Action + 'static> ActionCaller<A> {
-    /// Sends a goal; `within` is how long a server is waited for, and its answer.
+    /// Sends a goal. `within` limits the wait for a server and its answer.
     ///
     /// # Errors
     /// There is no server, no answer, or the goal is rejected.
     pub async fn pursue(&self, goal: A::Goal, within: Duration) -> Result<Pursued<A>, GoalError> {
         let begun = Instant::now();
         let unreachable = |because: String| GoalError::Unreachable { action: self.full.clone(), because };
-        // Held until there is an answer: two who wait would take each other's.
+        // The lock is held until the answer arrives, because concurrent receivers would take each
+        // other's answers.
         let mut connection = self.connection.lock().await;
         let connection = self.connect(&mut connection, within).await.map_err(unreachable)?;
         let (client, mapping) = (&connection.client, connection.server.mapping);
-        let left = within.saturating_sub(begun.elapsed());
-        let mut timer = futures::FutureExt::fuse(Timer::after(left));
+        let remaining = within.saturating_sub(begun.elapsed());
+        let mut timer = futures::FutureExt::fuse(Timer::after(remaining));
         let mut sent = Box::pin(client.async_send_goal(goal)).fuse();
         let (id, response) = futures::select! {
             sent = sent => sent.map_err(|error| unreachable(error.to_string()))?,
@@ -149,12 +150,12 @@ impl<A: Action + 'static> ActionCaller<A> {
         within: Duration,
     ) -> Result<&'c Arc<Connection<A>>, String> {
         let topics = goal_topics(&self.full);
-        let found = self.node.graph.wait(within, |graph| graph.server(&topics)).await;
+        let discovered = self.node.graph.wait(within, |graph| graph.server(&topics)).await;
         let server =
-            found.ok_or_else(|| format!("nobody serves it after {:.1} s", within.as_secs_f64()))??;
-        if connection.as_ref().is_none_or(|own| own.server != server) {
+            discovered.ok_or_else(|| format!("nobody serves it after {:.1} s", within.as_secs_f64()))??;
+        if connection.as_ref().is_none_or(|connected| connected.server != server) {
             let client = self.client(server.mapping).map_err(|message| message.message.clone())?;
-            // What is answered before the server has discovered us is lost.
+            // Answers that precede the server's discovery of this client are lost.
             Timer::after(MATCHING.min(within)).await;
             *connection = Some(Arc::new(Connection { server, client, goals: Mutex::default() }));
         }
@@ -183,7 +184,7 @@ impl<A: Action + 'static> Connection<A> {
         self.goals.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Adds a goal; returns whether nobody asks for what is heard yet.
+    /// Registers a goal. Returns `true` if no task receives messages yet.
     fn follow(&self, goal: GoalId, followed: Followed<A>) -> bool {
         let mut goals = self.goals();
         let is_first = goals.is_empty();
@@ -191,7 +192,7 @@ impl<A: Action + 'static> Connection<A> {
         is_first
     }
 
-    /// Hands on what is heard of all goals, as long as there are any.
+    /// Forwards the messages about all goals until none is running.
     async fn run(&self, graph: &Graph, full: &str) {
         let topics = goal_topics(full);
         let mut absent = 0;
@@ -212,7 +213,8 @@ impl<A: Action + 'static> Connection<A> {
     }
 
     fn poll(&self) {
-        // What is not an answer is left out; a goal whose result is none is never heard of again, as with any client.
+        // Invalid messages are skipped. A goal with an invalid result never ends, as with every
+        // client.
         while let Ok(Some((message, _))) = self.client.feedback_subscription().take() {
             if let Some(followed) = self.goals().get(&message.goal_id) {
                 let _ = followed.events.try_send(Accepted::Feedback(message.feedback));
@@ -220,7 +222,7 @@ impl<A: Action + 'static> Connection<A> {
         }
         while let Ok(Some((request, response))) = self.client.result_client().receive_response() {
             let mut goals = self.goals();
-            let goal = goals.iter().find(|(_, own)| own.result == request).map(|(goal, _)| *goal);
+            let goal = goals.iter().find(|(_, followed)| followed.result == request).map(|(goal, _)| *goal);
             let end = match response.status {
                 GoalStatusEnum::Succeeded => GoalEnd::Succeeded,
                 GoalStatusEnum::Canceled => GoalEnd::Canceled,
@@ -248,7 +250,7 @@ fn goal_topics(action: &str) -> Topics {
 }
 
 impl Node {
-    /// To have an action done by somebody else.
+    /// Creates an action client.
     pub fn action_caller<A: Action>(self: &Arc<Self>, name: &str) -> ActionCaller<A> {
         let full = self.resolve(name);
         expect_action::<A>(&self.graph, &full);

@@ -1,4 +1,4 @@
-//! The reasoner without a robot: what is asked for after what was heard.
+//! Tests of the reasoner without a robot: outputs after sequences of inputs.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -28,7 +28,7 @@ fn wanted(function: &str) -> QoS {
     QoS { objective_type: function.to_owned(), always_improve: true, ..QoS::default() }
 }
 
-/// What is asked for; everything else apart.
+/// Requested modes; other outputs are discarded.
 fn asked(keeping: &mut Keeping) -> Vec<Wanted> {
     let mut asked = Vec::new();
     for output in keeping.outputs() {
@@ -74,7 +74,7 @@ fn an_objective_gets_the_best_design_and_loses_it_with_its_end() {
     let end = asked(&mut keeping);
     keeping.answered(&end[0], Outcome::Done, NOW);
     assert!(keeping.outputs().contains(&Output::Cancelled(goal, true)));
-    assert_eq!(see(&mut keeping, "4"), [], "nobody asks for the function any more");
+    assert_eq!(see(&mut keeping, "4"), [], "an unused function must not be reconfigured");
 }
 
 #[test]
@@ -93,7 +93,7 @@ fn a_design_that_is_refused_is_replaced_and_tried_again() {
 }
 
 #[test]
-fn a_restart_asks_for_nothing_twice() {
+fn a_restart_repeats_no_fulfilled_request() {
     let directory = tempfile::tempdir().expect("a directory");
     let mut file = MemoryFile::open(directory.path()).expect("a directory");
     let (mut before, goal) = (keeping(), GoalId::new_random());
@@ -113,16 +113,16 @@ fn a_restart_asks_for_nothing_twice() {
     let mut after = again("fd_spiral_medium");
     assert_eq!(asked(&mut after), []);
     assert_eq!(modes(&see(&mut after, "4")), ["fd_spiral_high"], "it goes on");
-    // Meanwhile somebody has changed the mode: what is right is asked for.
+    // Another client has changed the mode, so the right one is requested.
     assert_eq!(modes(&asked(&mut again("fd_spiral_low"))), ["fd_spiral_medium"]);
-    // What was reported is known without any goal, too.
+    // Reports are restored even without goals.
     let mut alone = keeping();
     see(&mut alone, "1.3");
     file.write(alone.memory()).expect("written");
     let mut after = again("fd_unground");
     after.pursue(goal, &wanted(PATH));
     assert_eq!(modes(&asked(&mut after)), ["fd_spiral_low"]);
-    // What is damaged is said.
+    // A damaged file is reported.
     std::fs::write(directory.path().join("reasoner.json"), "{").expect("written");
     let message = MemoryFile::open(directory.path()).expect_err("it is damaged");
     assert_eq!(message.code, "N141");
