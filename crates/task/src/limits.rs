@@ -66,7 +66,7 @@ impl Limits {
     }
 
     /// Returns limits for the completion of an answer. The deadline is later by a tenth of the time
-    /// limit and [`GRACE`]; flag and memory limit do not apply.
+    /// limit and a constant grace period; flag and memory limit do not apply.
     #[must_use]
     pub fn extended(&self) -> Self {
         let grace = self.time.mul_f64(0.1).saturating_add(GRACE);

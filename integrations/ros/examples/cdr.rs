@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 /// Plain CDR, little endian.
 const HEADER: [u8; 4] = [0, 1, 0, 0];
 
-/// What is done with values of a type.
+/// Conversions of values of a type.
 struct Codec {
     encode: fn(Value) -> Result<Vec<u8>, String>,
     decode: fn(&[u8]) -> Result<Value, String>,

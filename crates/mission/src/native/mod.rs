@@ -227,11 +227,11 @@ impl CoAdaptation {
                     design.solves.iter().any(|function| function.name == needed.name)
                         && needed.attributes.contains(&quality.bounds.attribute)
                 });
-                let is_met = design.estimations.get(&quality.bounds.attribute).is_some_and(|value| {
+                let kept = design.estimations.get(&quality.bounds.attribute).is_some_and(|value| {
                     quality.bounds.minimum.as_ref().is_none_or(|minimum| value >= minimum)
                         && quality.bounds.maximum.as_ref().is_none_or(|maximum| value <= maximum)
                 });
-                if (is_met || !concerned) && is_pddl_name(&design.individual.name) {
+                if (kept || !concerned) && is_pddl_name(&design.individual.name) {
                     let fact = atom(&meets(quality), &[&design.individual.name]);
                     problem.init.push(pddl::ast::InitialElement::Fact(fact));
                 }
@@ -404,18 +404,18 @@ fn conditions(
         chosen.push(Condition::Atom(of_design(SOLVES, design, Some(&needed.name))));
         lasting.push(Condition::Atom(of_design(AVAILABLE, design, None)));
         for quality in &needs.quality {
-            let bounds_met = Condition::Atom(of_design(meets(quality).as_str(), design, None));
+            let kept = Condition::Atom(of_design(meets(quality).as_str(), design, None));
             let context = quality.context.as_ref().and_then(|context| {
                 domain.predicates.iter().find(|p| p.identifier.name == Name::new(context))
             });
             lasting.push(match context {
-                None => bounds_met,
+                None => kept,
                 Some(predicate) => {
                     let mut here = atom(&predicate.identifier.name, &[]);
                     let parameters = predicate.parameters.iter();
                     here.arguments =
                         parameters.map(|p| Term::Variable(identifier(&p.identifier.name))).collect();
-                    Condition::Or(vec![Condition::Not(Box::new(Condition::Atom(here))), bounds_met])
+                    Condition::Or(vec![Condition::Not(Box::new(Condition::Atom(here))), kept])
                 }
             });
         }

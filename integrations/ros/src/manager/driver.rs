@@ -43,7 +43,7 @@ const GRAPH: Duration = Duration::from_secs(5);
 pub struct Options {
     /// Manifest of the mission.
     pub mission: PathBuf,
-    /// Settings of the robot; by default a file `ros.toml` beside the mission.
+    /// Settings of the robot; by default a file `ros.toml` in the directory of the mission.
     pub settings: Option<PathBuf>,
     /// Directory of the journal.
     pub journal: Option<PathBuf>,

@@ -63,14 +63,14 @@ pub enum GoalEvent<A: Action> {
     Cancel(GoalId, CancelRequest),
 }
 
-/// A goal without an answer so far.
+/// A goal that awaits an answer.
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted {
     request: RmwRequestId,
     goal: GoalId,
 }
 
-/// A request to cancel without an answer so far.
+/// A request to cancel that awaits an answer.
 #[derive(Debug, Clone, Copy)]
 pub struct CancelRequest {
     request: RmwRequestId,

@@ -82,7 +82,7 @@ fn wrong(text: String) -> Message {
 mod tests {
     use super::Network;
 
-    /// Checks the domain and the restriction to loopback; `None` stands for an error.
+    /// Checks the domain and the restriction to loopback; `None` expects an error.
     fn check(variables: &[(&str, &str)], expected: Option<(u16, bool, usize)>) {
         let value = |name: &str| {
             variables.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned())

@@ -69,7 +69,7 @@ impl<'t> TimelineWindow<'t> {
         let mut windows = Vec::new();
         for from in timeline.first..timeline.phases.len() {
             let before = from.checked_sub(1);
-            let conflicts_at_start: &[Residual] = before.map_or(&[], |event| &conflicts.start[event]);
+            let own: &[Residual] = before.map_or(&[], |event| &conflicts.start[event]);
             for to in from..timeline.phases.len() {
                 let apart = |later: usize, earlier: usize| {
                     timeline.events[later].0.clone() - &timeline.events[earlier].0
@@ -90,16 +90,16 @@ impl<'t> TimelineWindow<'t> {
                 let mut add = |start, end| {
                     let passage = Self { timeline, duration, from, to, start, end };
                     let at_event = matches!(start, Start::Free | Start::ByEnd);
-                    let start = if at_event { conflicts_at_start.to_vec() } else { Vec::new() };
+                    let start = if at_event { own.to_vec() } else { Vec::new() };
                     let end = if end == End::AtEvent { conflicts.end[to - 1].clone() } else { Vec::new() };
                     if !start.contains(&Residual::True) && !end.contains(&Residual::True) {
                         windows.push((passage, Interference { start, end }));
                     }
                 };
-                if conflicts_at_start.is_empty() || from < timeline.events.len() {
+                if own.is_empty() || from < timeline.events.len() {
                     add(Start::Free, End::Inside);
                 }
-                if !conflicts_at_start.is_empty() {
+                if !own.is_empty() {
                     add(Start::AfterEvent, End::Inside);
                     if from < timeline.events.len() {
                         add(Start::Later, End::Inside);
@@ -107,12 +107,9 @@ impl<'t> TimelineWindow<'t> {
                 }
                 if to > from {
                     // A moment after an event is not the time of any event.
-                    add(
-                        if conflicts_at_start.is_empty() { Start::ByEnd } else { Start::LaterByEnd },
-                        End::Inside,
-                    );
+                    add(if own.is_empty() { Start::ByEnd } else { Start::LaterByEnd }, End::Inside);
                     add(Start::ByEnd, End::AtEvent);
-                    if !conflicts_at_start.is_empty() {
+                    if !own.is_empty() {
                         add(Start::LaterByEnd, End::AtEvent);
                     }
                 }
